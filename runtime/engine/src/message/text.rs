@@ -1,0 +1,91 @@
+//! Short text of a fixed size, as it stands in shared memory.
+
+use iceoryx2::prelude::ZeroCopySend;
+use std::fmt;
+
+/// UTF-8 text of at most `N` bytes, padded with zero bytes.
+///
+/// It has the same layout in every language: `N` bytes, no length, no terminator when it is full.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ZeroCopySend)]
+#[repr(C)]
+pub struct FixedText<const N: usize> {
+    bytes: [u8; N],
+}
+
+/// A text does not fit the fixed size that shared memory gives it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` has {length} bytes, and at most {limit} fit: choose a shorter name")]
+pub struct TextTooLong {
+    /// The text.
+    pub text: String,
+    /// Its length in bytes.
+    pub length: usize,
+    /// The most that fit.
+    pub limit: usize,
+}
+
+impl<const N: usize> FixedText<N> {
+    /// No text.
+    pub const EMPTY: Self = Self { bytes: [0; N] };
+
+    /// `text` in its fixed form.
+    pub fn new(text: &str) -> Result<Self, TextTooLong> {
+        let mut bytes = [0; N];
+        match bytes.get_mut(..text.len()) {
+            Some(place) => place.copy_from_slice(text.as_bytes()),
+            None => return Err(TextTooLong { text: text.to_owned(), length: text.len(), limit: N }),
+        }
+        Ok(Self { bytes })
+    }
+
+    /// The text. Bytes from outside that are no UTF-8 are cut at the first bad one.
+    pub fn as_str(&self) -> &str {
+        let end = self.bytes.iter().position(|&byte| byte == 0).unwrap_or(N);
+        let bytes = &self.bytes[..end];
+        match std::str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+        }
+    }
+
+    /// Whether there is no text.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.first().is_none_or(|&byte| byte == 0)
+    }
+}
+
+impl<const N: usize> Default for FixedText<N> {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl<const N: usize> fmt::Debug for FixedText<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Debug::fmt(self.as_str(), f)
+    }
+}
+
+impl<const N: usize> fmt::Display for FixedText<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_comes_back_as_it_went_in() {
+        for text in ["", "robot1", "Größe", "12345678"] {
+            assert_eq!(FixedText::<8>::new(text).unwrap().as_str(), text);
+        }
+    }
+
+    #[test]
+    fn too_long_a_text_is_refused() {
+        let error = FixedText::<8>::new("123456789").unwrap_err();
+        assert_eq!((error.length, error.limit), (9, 8));
+    }
+}

@@ -1,0 +1,76 @@
+//! Pipelines: which stages there are, and which output feeds which input.
+
+use crate::stage::{Context, RobotTopics, StageKind};
+
+/// A pipeline that has passed every check: each stage's kind exists, each wire's ends exist and agree in type, and
+/// there is no cycle.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    /// Its name.
+    pub name: String,
+    /// The robot whose map frame is the world; the first by name if none is given.
+    pub reference: Option<String>,
+    /// Seeds all randomness.
+    pub seed: u64,
+    /// How topics are told apart.
+    pub robots: RobotTopics,
+    /// The stages, each behind those that feed it; among those that could be next, by name.
+    pub stages: Vec<StageSpec>,
+}
+
+/// One stage of a pipeline.
+#[derive(Clone, Debug)]
+pub struct StageSpec {
+    /// Its name.
+    pub name: String,
+    /// Its kind.
+    pub kind: StageKind,
+    /// Its parameters, those of them that are given.
+    pub parameters: toml::Table,
+    /// Its inputs, by input port and, within a port that takes many, in the order of the file. The place in this list
+    /// breaks ties between messages of one log time.
+    pub inputs: Vec<Wire>,
+    /// For every output port of the kind: the topic of its messages in a log, with `{robot}` for the robot's name.
+    pub topics: Vec<String>,
+    /// How many samples each of its inputs may hold before the sender waits.
+    pub depth: usize,
+}
+
+/// What feeds one input of a stage.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wire {
+    /// The input port, as an index among the kind's input ports.
+    pub port: usize,
+    /// The stage that it comes from, as an index among the pipeline's stages.
+    pub from_stage: usize,
+    /// The output port of that stage, as an index among its kind's output ports.
+    pub from_port: usize,
+}
+
+impl Pipeline {
+    /// What the stage with the given index is told when it is made.
+    pub fn context(&self, stage: usize) -> Context {
+        let spec = &self.stages[stage];
+        Context {
+            stage: spec.name.clone(),
+            seed: stage_seed(self.seed, &spec.name),
+            reference: self.reference.clone(),
+            robots: self.robots.clone(),
+            input_types: spec.inputs.iter().map(|wire| self.output_type(wire)).collect(),
+        }
+    }
+
+    /// The ROS 2 type that a wire carries; empty for any.
+    fn output_type(&self, wire: &Wire) -> String {
+        match self.stages[wire.from_stage].kind.outputs[wire.from_port].port_type {
+            crate::stage::PortType::Ros(name) => name.to_owned(),
+            crate::stage::PortType::Any => String::new(),
+        }
+    }
+}
+
+/// The seed of a stage: FNV-1a over the pipeline's seed and the stage's name, so that adding a stage changes no other.
+fn stage_seed(seed: u64, name: &str) -> u64 {
+    let bytes = seed.to_le_bytes().into_iter().chain(name.bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}

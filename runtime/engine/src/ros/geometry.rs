@@ -1,0 +1,143 @@
+//! `geometry_msgs` and `tf2_msgs`.
+
+use super::{Header, RosMessage};
+use nalgebra::{Isometry2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// `geometry_msgs/msg/Point`, metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Point {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+}
+
+/// `geometry_msgs/msg/Vector3`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Vector3 {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+}
+
+/// `geometry_msgs/msg/Quaternion`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Quaternion {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub w: f64,
+}
+
+impl Default for Quaternion {
+    fn default() -> Self {
+        Self::from_yaw(0.0)
+    }
+}
+
+impl Quaternion {
+    /// A turn about the vertical axis, radians.
+    pub fn from_yaw(yaw: f64) -> Self {
+        Self { x: 0.0, y: 0.0, z: (yaw / 2.0).sin(), w: (yaw / 2.0).cos() }
+    }
+
+    /// The turn about the vertical axis, radians in `(-pi, pi]`. Four zeros, which many programs write for "no turn",
+    /// give 0.
+    pub fn yaw(&self) -> f64 {
+        let sine = 2.0 * (self.w * self.z + self.x * self.y);
+        let cosine = self.w * self.w + self.x * self.x - self.y * self.y - self.z * self.z;
+        sine.atan2(cosine)
+    }
+}
+
+/// `geometry_msgs/msg/Pose`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Pose {
+    pub position: Point,
+    pub orientation: Quaternion,
+}
+
+impl Pose {
+    /// The pose in the plane: height, roll and pitch are left out.
+    pub fn planar(&self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.position.x, self.position.y), self.orientation.yaw())
+    }
+}
+
+impl From<Isometry2<f64>> for Pose {
+    fn from(pose: Isometry2<f64>) -> Self {
+        Self {
+            position: Point { x: pose.translation.x, y: pose.translation.y, z: 0.0 },
+            orientation: Quaternion::from_yaw(pose.rotation.angle()),
+        }
+    }
+}
+
+/// `geometry_msgs/msg/PoseStamped`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct PoseStamped {
+    pub header: Header,
+    pub pose: Pose,
+}
+
+impl RosMessage for PoseStamped {
+    const NAME: &'static str = "geometry_msgs/msg/PoseStamped";
+}
+
+/// `geometry_msgs/msg/PoseWithCovariance`. The covariance is 6 x 6, row by row, over (x, y, z, roll, pitch, yaw).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PoseWithCovariance {
+    /// The pose.
+    pub pose: Pose,
+    /// Six rows of six.
+    pub covariance: [[f64; 6]; 6],
+}
+
+/// `geometry_msgs/msg/Transform`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Transform {
+    pub translation: Vector3,
+    pub rotation: Quaternion,
+}
+
+impl Transform {
+    /// The transform in the plane: height, roll and pitch are left out.
+    pub fn planar(&self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.translation.x, self.translation.y), self.rotation.yaw())
+    }
+}
+
+impl From<Isometry2<f64>> for Transform {
+    fn from(transform: Isometry2<f64>) -> Self {
+        Self {
+            translation: Vector3 { x: transform.translation.x, y: transform.translation.y, z: 0.0 },
+            rotation: Quaternion::from_yaw(transform.rotation.angle()),
+        }
+    }
+}
+
+/// `geometry_msgs/msg/TransformStamped`: the pose of `child_frame_id` in `header.frame_id`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct TransformStamped {
+    pub header: Header,
+    pub child_frame_id: String,
+    pub transform: Transform,
+}
+
+/// `tf2_msgs/msg/TFMessage`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct TFMessage {
+    pub transforms: Vec<TransformStamped>,
+}
+
+impl RosMessage for TFMessage {
+    const NAME: &'static str = "tf2_msgs/msg/TFMessage";
+}

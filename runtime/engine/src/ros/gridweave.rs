@@ -1,0 +1,237 @@
+//! `gridweave_msgs`: the messages of the map merging stages. Their `.msg` texts lie in `logs/msg/gridweave_msgs/`.
+//!
+//! `T_a_b` takes a point in frame b to frame a. Covariances are row by row.
+
+use super::{Header, RosMessage};
+use nalgebra::{Isometry2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// One range reading of one radio tag.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagRange {
+    /// Time, and the frame of the antenna.
+    pub header: Header,
+    /// Which tag.
+    pub tag_id: String,
+    /// Distance from the antenna to the tag, metres.
+    pub range: f64,
+    /// Standard deviation of the distance, metres; 0 if it is not known.
+    pub range_stddev: f64,
+    /// Signal strength, dBm.
+    pub rssi: f32,
+}
+
+/// Where a robot believes one tag to be.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagEstimate {
+    /// Which tag.
+    pub tag_id: String,
+    /// Position in the robot's map frame, metres.
+    pub x: f64,
+    /// Position in the robot's map frame, metres.
+    pub y: f64,
+    /// Covariance of (x, y) of this mode, square metres, 2 x 2.
+    pub covariance: [f64; 4],
+    /// Share of the probability that lies at this place, 0 to 1.
+    pub certainty: f64,
+    /// The number of readings it rests on.
+    pub readings: u32,
+}
+
+/// All tags that a robot has located so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagEstimates {
+    /// Time, and the robot's map frame.
+    pub header: Header,
+    /// Whose map.
+    pub robot: String,
+    /// The tags, by falling certainty and then by id.
+    pub tags: Vec<TagEstimate>,
+}
+
+/// A straight wall of a map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Segment {
+    /// One end, metres, map frame.
+    pub x1: f64,
+    /// One end, metres, map frame.
+    pub y1: f64,
+    /// The other end, metres, map frame.
+    pub x2: f64,
+    /// The other end, metres, map frame.
+    pub y2: f64,
+    /// Mean occupancy along the segment, 0 to 1.
+    pub reliability: f64,
+    /// The number of occupied cells that it rests on.
+    pub inliers: u32,
+}
+
+/// The straight walls of a map.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Segments {
+    /// Time, and the robot's map frame.
+    pub header: Header,
+    /// Whose map.
+    pub robot: String,
+    /// The walls, in the order they were found: the best supported first.
+    pub segments: Vec<Segment>,
+}
+
+/// The main direction of a map's walls.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapDirection {
+    /// Time, and the robot's map frame.
+    pub header: Header,
+    /// Whose map.
+    pub robot: String,
+    /// Direction of the map's walls, radians, known up to quarter turns.
+    pub direction: f64,
+    /// Standard deviation of the direction, radians.
+    pub deviation: f64,
+    /// Directions of the two groups of walls, radians.
+    pub groups: [f64; 2],
+    /// Share of the wall length that follows the direction or stands across it, 0 to 1.
+    pub agreement: f64,
+    /// Whether there are walls enough to tell a direction.
+    pub valid: bool,
+}
+
+/// A tag that two robots have located.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CommonTag {
+    /// Which tag.
+    pub tag_id: String,
+    /// Position in map a, metres.
+    pub a: [f64; 2],
+    /// Position in map b, metres.
+    pub b: [f64; 2],
+    /// Covariance in map a, square metres, 2 x 2.
+    pub covariance_a: [f64; 4],
+    /// Covariance in map b, square metres, 2 x 2.
+    pub covariance_b: [f64; 4],
+    /// Certainty in map a, 0 to 1.
+    pub certainty_a: f64,
+    /// Certainty in map b, 0 to 1.
+    pub certainty_b: f64,
+}
+
+impl CommonTag {
+    /// The lesser of the two certainties: the common precision of Tsardoulias et al., section 4.1.3.
+    pub fn common_precision(&self) -> f64 {
+        self.certainty_a.min(self.certainty_b)
+    }
+}
+
+/// The tags that two robots have in common.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CommonTags {
+    /// Time.
+    pub header: Header,
+    /// The first robot by name.
+    pub robot_a: String,
+    /// The second robot by name.
+    pub robot_b: String,
+    /// The tags, by falling common precision and then by id.
+    pub tags: Vec<CommonTag>,
+    /// Whether they suffice for a merge.
+    pub accepted: bool,
+    /// Why they do not, or what they are.
+    pub reason: String,
+}
+
+/// How two maps lie to each other: `T_a_b`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Alignment {
+    /// Time, and the frame of map a.
+    pub header: Header,
+    /// The robot whose map stays.
+    pub a: String,
+    /// The robot whose map is moved.
+    pub b: String,
+    /// Translation of `T_a_b`, metres.
+    pub x: f64,
+    /// Translation of `T_a_b`, metres.
+    pub y: f64,
+    /// Rotation of `T_a_b`, radians.
+    pub yaw: f64,
+    /// Covariance of (x, y, yaw), 3 x 3, metres and radians.
+    pub covariance: [f64; 9],
+    /// How well the maps agree, 0 to 1.
+    pub score: f64,
+    /// How it was found.
+    pub method: String,
+    /// Whether it may be used to merge the maps.
+    pub accepted: bool,
+    /// Why it is refused, or what speaks for it.
+    pub reason: String,
+}
+
+impl Alignment {
+    /// The transform that takes a point in map b to map a.
+    pub fn transform_a_b(&self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
+    }
+
+    /// Sets the transform that takes a point in map b to map a.
+    pub fn set_transform_a_b(&mut self, transform_a_b: &Isometry2<f64>) {
+        self.x = transform_a_b.translation.x;
+        self.y = transform_a_b.translation.y;
+        self.yaw = transform_a_b.rotation.angle();
+    }
+}
+
+/// The pose of one robot's map frame in the reference robot's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotFrame {
+    /// Whose map.
+    pub robot: String,
+    /// The name of the map's frame.
+    pub frame_id: String,
+    /// Metres in the reference robot's map frame.
+    pub x: f64,
+    /// Metres in the reference robot's map frame.
+    pub y: f64,
+    /// Radians.
+    pub yaw: f64,
+    /// Covariance of (x, y, yaw), 3 x 3, metres and radians.
+    pub covariance: [f64; 9],
+}
+
+impl RobotFrame {
+    /// The transform that takes a point in this robot's map to the reference robot's.
+    pub fn transform_reference_robot(&self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
+    }
+}
+
+/// A robot that could not be tied to the reference.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UnmergedRobot {
+    /// Whose map.
+    pub robot: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Where every robot's map lies.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotFrames {
+    /// Time, and the frame `world`, which is the reference robot's map frame.
+    pub header: Header,
+    /// The robot whose map frame is the world.
+    pub reference: String,
+    /// The robots that are tied to the reference, itself among them, by name.
+    pub frames: Vec<RobotFrame>,
+    /// The robots that are not, by name.
+    pub unmerged: Vec<UnmergedRobot>,
+}
+
+macro_rules! named {
+    ($($type:ident),*) => {$(
+        impl RosMessage for $type {
+            const NAME: &'static str = concat!("gridweave_msgs/msg/", stringify!($type));
+        }
+    )*};
+}
+
+named!(TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames);

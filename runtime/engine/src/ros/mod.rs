@@ -1,0 +1,27 @@
+//! The ROS 2 messages that stages exchange, and their encoding (CDR).
+//!
+//! The types mirror the `.msg` files field by field. Units are SI, angles radians, and a frame is named in the header.
+//! [`OccupancyGrid`] borrows its cells; the others are small and own their parts.
+
+mod codec;
+mod geometry;
+mod gridweave;
+mod nav;
+mod std_msgs;
+
+pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
+pub use geometry::{
+    Point, Pose, PoseStamped, PoseWithCovariance, Quaternion, TFMessage, Transform, TransformStamped, Vector3,
+};
+pub use gridweave::{
+    Alignment, CommonTag, CommonTags, MapDirection, RobotFrame, RobotFrames, Segment, Segments, TagEstimate,
+    TagEstimates, TagRange, UnmergedRobot,
+};
+pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};
+pub use std_msgs::{Header, Time};
+
+/// A message type with a ROS 2 name.
+pub trait RosMessage {
+    /// The full name, such as `nav_msgs/msg/OccupancyGrid`.
+    const NAME: &'static str;
+}

@@ -1,0 +1,118 @@
+//! `nav_msgs`.
+
+use super::{EncodeError, Header, Pose, PoseWithCovariance, RosMessage, Time, Vector3, encode_into};
+use serde::{Deserialize, Serialize};
+
+/// `nav_msgs/msg/MapMetaData`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapMetaData {
+    /// When the map was loaded.
+    pub map_load_time: Time,
+    /// Metres a cell.
+    pub resolution: f32,
+    /// Cells along x.
+    pub width: u32,
+    /// Cells along y.
+    pub height: u32,
+    /// The pose of the outer corner of cell (0, 0) in the map's frame; its yaw is honoured.
+    pub origin: Pose,
+}
+
+/// `nav_msgs/msg/OccupancyGrid`, its cells borrowed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OccupancyGrid<'a> {
+    /// Time, and the map's frame.
+    pub header: Header,
+    /// Size, resolution and origin.
+    pub info: MapMetaData,
+    /// The cells as raw bytes; see [`cells`](Self::cells).
+    #[serde(borrow, with = "serde_bytes")]
+    pub data: &'a [u8],
+}
+
+impl OccupancyGrid<'_> {
+    /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied.
+    pub fn cells(&self) -> &[i8] {
+        bytemuck::cast_slice(self.data)
+    }
+}
+
+impl RosMessage for OccupancyGrid<'_> {
+    const NAME: &'static str = "nav_msgs/msg/OccupancyGrid";
+}
+
+/// All of an occupancy grid but its cells: what stands before them in the encoded message.
+///
+/// A stage that makes a grid encodes this, and then fills the cells in the memory that the message will be sent in.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GridPrefix {
+    /// Time, and the map's frame.
+    pub header: Header,
+    /// Size, resolution and origin.
+    pub info: MapMetaData,
+}
+
+impl GridPrefix {
+    /// The number of cells that the size calls for.
+    pub fn cell_count(&self) -> usize {
+        self.info.width as usize * self.info.height as usize
+    }
+
+    /// The encoded message up to its first cell. The message is complete with [`cell_count`](Self::cell_count) bytes
+    /// behind it.
+    pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
+        let count = u32::try_from(self.cell_count()).map_err(|_| {
+            EncodeError(format!("a grid of {} x {} cells is too large", self.info.width, self.info.height))
+        })?;
+        let mut bytes = Vec::with_capacity(160);
+        encode_into(&(self, count), &mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+/// `nav_msgs/msg/Odometry`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Odometry {
+    pub header: Header,
+    pub child_frame_id: String,
+    pub pose: PoseWithCovariance,
+    pub twist_linear: Vector3,
+    pub twist_angular: Vector3,
+    pub twist_covariance: [[f64; 6]; 6],
+}
+
+impl RosMessage for Odometry {
+    const NAME: &'static str = "nav_msgs/msg/Odometry";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::{decode, encode};
+
+    #[test]
+    fn a_grid_written_in_place_is_the_grid_encoded_at_once() {
+        let info = MapMetaData { resolution: 0.05, width: 3, height: 2, ..Default::default() };
+        for frame in ["", "a", "map", "robot1/map"] {
+            let header = Header { frame_id: frame.into(), ..Default::default() };
+            let cells = [0xff, 0, 100, 1, 2, 3];
+            let whole = encode(&OccupancyGrid { header: header.clone(), info, data: &cells }).unwrap();
+            let mut in_place = GridPrefix { header, info }.encode().unwrap();
+            in_place.extend_from_slice(&cells);
+            assert_eq!(in_place, whole);
+            let grid: OccupancyGrid<'_> = decode(&whole).unwrap();
+            assert_eq!(grid.cells(), [-1, 0, 100, 1, 2, 3]);
+            assert!(whole.as_ptr_range().contains(&grid.data.as_ptr()), "the cells are borrowed");
+        }
+    }
+
+    #[test]
+    fn truncated_bytes_are_an_error() {
+        let info = MapMetaData { width: 3, height: 2, ..Default::default() };
+        let whole = encode(&OccupancyGrid { info, data: &[0; 6], ..Default::default() }).unwrap();
+        for end in 0..whole.len() {
+            assert!(decode::<OccupancyGrid<'_>>(&whole[..end]).is_err());
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! What a stage is told when it is made.
+
+use serde::{Deserialize, Serialize};
+
+/// What a stage is told of its pipeline when it is made.
+#[derive(Clone, Debug, Default)]
+pub struct Context {
+    /// The stage's name in the pipeline.
+    pub stage: String,
+    /// Seeds the stage's randomness: made from the pipeline's seed and the stage's name.
+    pub seed: u64,
+    /// The robot whose map frame is the world; the first by name if none is given.
+    pub reference: Option<String>,
+    /// How topics are told apart.
+    pub robots: RobotTopics,
+    /// For every input of the stage, in order: the ROS 2 type, empty for any.
+    pub input_types: Vec<String>,
+}
+
+/// How the topics of a log are told apart: patterns in which `{robot}` stands for any one part of a path.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotTopics {
+    /// Occupancy grids.
+    pub map: String,
+    /// Poses of the robot's base in its map.
+    pub pose: String,
+    /// Range readings of tags.
+    pub tags: String,
+    /// Poses from tf instead of from a pose topic.
+    pub tf: Option<TfFrames>,
+}
+
+/// The two frames between which tf gives a robot's pose; `{robot}` stands for the robot's name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TfFrames {
+    /// The frame of the robot's map.
+    pub map_frame: String,
+    /// The frame of the robot's base.
+    pub base_frame: String,
+}
+
+impl Default for RobotTopics {
+    fn default() -> Self {
+        Self { map: "/{robot}/map".into(), pose: "/{robot}/pose".into(), tags: "/{robot}/tag_ranges".into(), tf: None }
+    }
+}
+
+/// Matches `text` with `pattern`, in which `{robot}` stands for one part of a path. Gives the robot's name.
+pub fn match_robot<'a>(pattern: &str, text: &'a str) -> Option<&'a str> {
+    let (before, after) = pattern.split_once("{robot}")?;
+    let robot = text.strip_prefix(before)?.strip_suffix(after)?;
+    (!robot.is_empty() && !robot.contains('/')).then_some(robot)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_is_one_part_of_a_topic() {
+        assert_eq!(match_robot("/{robot}/map", "/robot1/map"), Some("robot1"));
+        assert_eq!(match_robot("/fleet/{robot}/slam/map", "/fleet/r2/slam/map"), Some("r2"));
+        assert_eq!(match_robot("{robot}/map", "robot1/map"), Some("robot1"));
+        for other in ["/map", "//map", "/a/b/map", "/robot1/maps", "/robot1/pose", ""] {
+            assert_eq!(match_robot("/{robot}/map", other), None, "{other}");
+        }
+    }
+}

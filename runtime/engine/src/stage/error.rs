@@ -1,0 +1,37 @@
+//! How a stage fails.
+
+use std::fmt;
+
+/// Why a stage cannot go on: what it was doing, what went wrong, and what would mend it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StageError {
+    doing: String,
+    cause: String,
+    help: Option<String>,
+}
+
+impl StageError {
+    /// `doing` completes "cannot ...", such as "open /logs/a.mcap"; `cause` says what went wrong.
+    pub fn new(doing: impl Into<String>, cause: impl fmt::Display) -> Self {
+        Self { doing: doing.into(), cause: cause.to_string(), help: None }
+    }
+
+    /// Adds what would mend it.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+impl fmt::Display for StageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cannot {}: {}", self.doing, self.cause)?;
+        match &self.help {
+            Some(help) => write!(f, "; {help}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for StageError {}

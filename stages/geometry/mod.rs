@@ -1,0 +1,9 @@
+//! Poses and grids: the geometry that all algorithms share.
+//!
+//! A rigid transform is written `T_a_b` in text and `transform_a_b` in code: it takes a point in frame b to frame a.
+
+mod grid;
+mod pose;
+
+pub use grid::{Cell, FREE_BELOW, Grid, GridError, GridGeometry, OCCUPIED_ABOVE, UNKNOWN, is_free, is_occupied};
+pub use pose::{Point2, Pose2, pose, turn_difference, wrap_angle};
