@@ -1,1 +1,83 @@
-//! x
+//! Engines: what runs the stages of a pipeline.
+//!
+//! Every engine gives each stage the same inputs in the same order, so every engine gives the same result.
+
+mod error;
+mod report;
+mod runner;
+mod single;
+mod threads;
+
+pub use error::{Failure, RunError};
+pub use report::{RunReport, StageReport};
+
+use crate::message::LogTime;
+use crate::pipeline::Pipeline;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How the stages share the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EngineKind {
+    /// All stages in one thread; a message goes straight from one to the next.
+    Single,
+    /// A thread a stage, with links over iceoryx2 within the process.
+    #[default]
+    Threads,
+    /// A thread a stage, with links over the shared memory of the machine, as between processes.
+    ThreadsIpc,
+}
+
+impl FromStr for EngineKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "single" => Ok(Self::Single),
+            "threads" => Ok(Self::Threads),
+            "threads-ipc" => Ok(Self::ThreadsIpc),
+            other => Err(format!("there is no engine `{other}`; the engines are single, threads and threads-ipc")),
+        }
+    }
+}
+
+impl fmt::Display for EngineKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Single => "single",
+            Self::Threads => "threads",
+            Self::ThreadsIpc => "threads-ipc",
+        })
+    }
+}
+
+/// What looks on while a pipeline runs. Nothing that it does changes the result, unless it asks for a stop.
+pub trait Observer: Sync {
+    /// A source has done this share of its work (0 to 1) and stands at this log time. Called now and then.
+    fn progress(&self, _stage: &str, _share: f64, _log_time: LogTime) {}
+
+    /// Whether the run should stop, as after an interrupt by the user.
+    fn should_stop(&self) -> bool {
+        false
+    }
+}
+
+/// An observer that sees nothing.
+impl Observer for () {}
+
+/// Asks a run to stop when it is set, for example by a signal handler.
+impl Observer for AtomicBool {
+    fn should_stop(&self) -> bool {
+        self.load(Ordering::Relaxed)
+    }
+}
+
+/// Runs a pipeline to its end.
+pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> Result<RunReport, RunError> {
+    match engine {
+        EngineKind::Single => single::run(pipeline, observer),
+        EngineKind::Threads => threads::run::<iceoryx2::service::local::Service>(pipeline, observer),
+        EngineKind::ThreadsIpc => threads::run::<iceoryx2::service::ipc::Service>(pipeline, observer),
+    }
+}

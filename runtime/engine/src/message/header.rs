@@ -55,15 +55,73 @@ pub struct MessageHeader {
     pub topic: FixedText<128>,
 }
 
+impl MessageHeader {
+    /// The size in memory, bytes.
+    pub const SIZE: usize = 208;
+
+    /// The header as it lies in memory.
+    pub fn to_bytes(&self) -> [u8; Self::SIZE] {
+        let mut bytes = [0; Self::SIZE];
+        let words = [self.sequence, self.log_time.0, self.publish_time, self.length];
+        for (place, word) in bytes[..32].chunks_exact_mut(8).zip(words) {
+            place.copy_from_slice(&word.to_le_bytes());
+        }
+        let halves = [self.flags.0, self.channel, self.log_sequence, self.reserved];
+        for (place, half) in bytes[32..48].chunks_exact_mut(4).zip(halves) {
+            place.copy_from_slice(&half.to_le_bytes());
+        }
+        bytes[48..80].copy_from_slice(self.robot.as_bytes());
+        bytes[80..].copy_from_slice(self.topic.as_bytes());
+        bytes
+    }
+
+    /// Reads what [`to_bytes`](Self::to_bytes) wrote. `None` unless there are [`SIZE`](Self::SIZE) bytes.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let bytes: &[u8; Self::SIZE] = bytes.try_into().ok()?;
+        let word = |at: usize| Some(u64::from_le_bytes(bytes[at..at + 8].try_into().ok()?));
+        let half = |at: usize| Some(u32::from_le_bytes(bytes[at..at + 4].try_into().ok()?));
+        Some(Self {
+            sequence: word(0)?,
+            log_time: LogTime(word(8)?),
+            publish_time: word(16)?,
+            length: word(24)?,
+            flags: MessageFlags(half(32)?),
+            channel: half(36)?,
+            log_sequence: half(40)?,
+            reserved: half(44)?,
+            robot: FixedText::from_bytes(bytes[48..80].try_into().ok()?),
+            topic: FixedText::from_bytes(bytes[80..].try_into().ok()?),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_layout_is_that_of_the_protocol() {
-        assert_eq!(std::mem::size_of::<MessageHeader>(), 208);
+        assert_eq!(std::mem::size_of::<MessageHeader>(), MessageHeader::SIZE);
         assert_eq!(std::mem::offset_of!(MessageHeader, flags), 32);
         assert_eq!(std::mem::offset_of!(MessageHeader, robot), 48);
         assert_eq!(std::mem::offset_of!(MessageHeader, topic), 80);
+    }
+
+    #[test]
+    fn a_header_comes_back_as_it_went_in() {
+        let header = MessageHeader {
+            sequence: 1,
+            log_time: LogTime(2),
+            publish_time: 3,
+            length: 4,
+            flags: MessageFlags::DATA,
+            channel: 5,
+            log_sequence: 6,
+            reserved: 0,
+            robot: FixedText::new("robot1").unwrap(),
+            topic: FixedText::new("/robot1/map").unwrap(),
+        };
+        assert_eq!(MessageHeader::from_bytes(&header.to_bytes()), Some(header));
+        assert_eq!(MessageHeader::from_bytes(&[0; 207]), None);
     }
 }

@@ -48,6 +48,16 @@ impl<const N: usize> FixedText<N> {
         }
     }
 
+    /// The text in its fixed form.
+    pub fn as_bytes(&self) -> &[u8; N] {
+        &self.bytes
+    }
+
+    /// A text that is in its fixed form already.
+    pub fn from_bytes(bytes: [u8; N]) -> Self {
+        Self { bytes }
+    }
+
     /// Whether there is no text.
     pub fn is_empty(&self) -> bool {
         self.bytes.first().is_none_or(|&byte| byte == 0)

@@ -37,7 +37,7 @@ pub trait Stage {
         Ok(())
     }
 
-    /// All inputs have ended. What is sent here carries the log time of the last message received.
+    /// All inputs have ended. What is sent here carries the log time that they had come to.
     fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
         Ok(())
     }

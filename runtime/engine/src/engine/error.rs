@@ -1,0 +1,31 @@
+//! How a run fails.
+
+use crate::link::shared::LinkError;
+use crate::stage::StageError;
+
+/// A run has failed: which stage, and why.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("stage `{stage}` {failure}")]
+pub struct RunError {
+    /// The stage that failed first.
+    pub stage: String,
+    /// Why.
+    pub failure: Failure,
+}
+
+/// Why a stage has failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Failure {
+    /// It says so itself.
+    #[error("failed: {0}")]
+    Stage(#[from] StageError),
+    /// It panicked: a fault in the program.
+    #[error("panicked: {0}; this is a fault in the program, please report it")]
+    Panic(String),
+    /// Its links failed.
+    #[error("lost its links: {0}")]
+    Link(#[from] LinkError),
+    /// The user asked for a stop.
+    #[error("was interrupted")]
+    Interrupted,
+}

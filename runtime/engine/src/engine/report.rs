@@ -1,0 +1,45 @@
+//! What a run has done.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// What a run has done, stage by stage in the order of the pipeline.
+#[derive(Clone, Debug, Default)]
+pub struct RunReport {
+    /// The stages.
+    pub stages: Vec<StageReport>,
+}
+
+/// What one stage has done.
+#[derive(Clone, Debug, Default)]
+pub struct StageReport {
+    /// Its name in the pipeline.
+    pub name: String,
+    /// Its kind.
+    pub kind: String,
+    /// Messages it was given.
+    pub messages_in: u64,
+    /// Messages it has sent.
+    pub messages_out: u64,
+    /// How long it worked, without waiting for others.
+    pub busy: Duration,
+    /// What was wrong with its input and how often.
+    pub warnings: BTreeMap<String, u64>,
+    /// What it has found: [`Stage::report`](crate::stage::Stage::report).
+    pub result: Option<serde_json::Value>,
+}
+
+impl RunReport {
+    /// All warnings of all stages.
+    pub fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
+        self.stages
+            .iter()
+            .flat_map(|stage| stage.warnings.iter().map(|(what, count)| (stage.name.as_str(), what.as_str(), *count)))
+    }
+
+    /// What the stages of one kind have found, with their names.
+    pub fn results<'a>(&'a self, kind: &'a str) -> impl Iterator<Item = (&'a str, &'a serde_json::Value)> {
+        let of_kind = self.stages.iter().filter(move |stage| stage.kind == kind);
+        of_kind.filter_map(|stage| Some((stage.name.as_str(), stage.result.as_ref()?)))
+    }
+}

@@ -1,0 +1,150 @@
+//! One running stage, whatever its links are.
+
+use super::{Failure, StageReport};
+use crate::link::{InputQueue, next_input};
+use crate::message::{Channel, LogTime, Message, MessageFlags};
+use crate::pipeline::Pipeline;
+use crate::stage::{Node, Output, Sent, StageError};
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+/// A stage that runs: its node, its outputs, and what it has done.
+pub(super) struct Runner {
+    node: Node,
+    outputs: Vec<Sent>,
+    /// For each wire, the input port it leads to.
+    ports: Vec<usize>,
+    log_time: LogTime,
+    report: StageReport,
+}
+
+impl Runner {
+    /// Makes the stage with the given index of a pipeline.
+    pub(super) fn new(pipeline: &Pipeline, stage: usize, outputs: Vec<Sent>) -> Result<Self, Failure> {
+        let spec = &pipeline.stages[stage];
+        let context = pipeline.context(stage);
+        let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context))?;
+        let report = StageReport { name: spec.name.clone(), kind: spec.kind.name.to_owned(), ..Default::default() };
+        let ports = spec.inputs.iter().map(|wire| wire.port).collect();
+        Ok(Self { node, outputs, ports, log_time: LogTime::MIN, report })
+    }
+
+    /// Whether the stage is a source.
+    pub(super) fn is_source(&self) -> bool {
+        matches!(self.node, Node::Source(_))
+    }
+
+    /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
+    pub(super) fn advance(&mut self) -> Result<bool, Failure> {
+        let Node::Source(source) = &mut self.node else { return Ok(false) };
+        let start = Instant::now();
+        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
+        let more = guarded(|| source.next(&mut output));
+        self.log_time = output.log_time();
+        self.report.busy += start.elapsed();
+        more
+    }
+
+    /// How much of its work a source has done.
+    pub(super) fn progress(&self) -> Option<f64> {
+        match &self.node {
+            Node::Source(source) => source.progress(),
+            Node::Stage(_) => None,
+        }
+    }
+
+    /// Hands the next message to the stage, if it can be told which that is. Gives the wire it came on.
+    pub(super) fn handle_next(&mut self, queues: &mut [InputQueue]) -> Result<Option<usize>, Failure> {
+        let Some(wire) = next_input(queues) else { return Ok(None) };
+        let Some(message) = queues[wire].pop() else { return Ok(None) };
+        let start = Instant::now();
+        let result = self.handle(wire, &message);
+        // The message is dropped within the measured time, as giving its memory back is work of this stage.
+        drop(message);
+        self.report.busy += start.elapsed();
+        result.map(|()| Some(wire))
+    }
+
+    fn handle(&mut self, wire: usize, message: &Message) -> Result<(), Failure> {
+        let Node::Stage(stage) = &mut self.node else { return Ok(()) };
+        let header = message.header();
+        self.log_time = self.log_time.max(header.log_time);
+        if header.flags.contains(MessageFlags::CHANNEL) {
+            return guarded(|| {
+                let channel = Channel::decode(message.bytes())
+                    .map_err(|error| StageError::new("read the announcement of a channel", error))?;
+                stage.announce(wire, header.channel, &channel)
+            });
+        }
+        self.report.messages_in += 1;
+        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
+        guarded(|| stage.receive(self.ports[wire], message, &mut output))
+    }
+
+    /// Tells the stage that all its inputs have ended, having come to the log time `time`.
+    pub(super) fn finish(&mut self, time: LogTime) -> Result<(), Failure> {
+        self.log_time = self.log_time.max(time);
+        let Node::Stage(stage) = &mut self.node else { return Ok(()) };
+        let start = Instant::now();
+        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
+        let result = guarded(|| stage.finish(&mut output));
+        self.report.busy += start.elapsed();
+        result
+    }
+
+    /// Tells the stage that the run has failed.
+    pub(super) fn abort(&mut self, reason: &str) {
+        if let Node::Stage(stage) = &mut self.node {
+            // The run has failed already; a second failure while it is wound up would only hide the first.
+            let _ = catch_unwind(AssertUnwindSafe(|| stage.abort(reason)));
+        }
+    }
+
+    /// Drops the stage and gives its report. Of the time it worked, `waited` was spent waiting for others.
+    pub(super) fn into_report(mut self, waited: Duration) -> Result<StageReport, Failure> {
+        self.report.result = guarded(|| match &self.node {
+            Node::Stage(stage) => Ok(stage.report()),
+            Node::Source(source) => Ok(source.report()),
+        })?;
+        self.report.messages_out = self.outputs.iter().map(Sent::messages).sum();
+        self.report.busy = self.report.busy.saturating_sub(waited);
+        Ok(self.report)
+    }
+
+    /// The outputs of the stage with the given index, each leading to what `sink` gives for it.
+    pub(super) fn outputs(
+        pipeline: &Pipeline,
+        stage: usize,
+        mut sink: impl FnMut(usize) -> Option<Box<dyn crate::stage::OutputSink>>,
+    ) -> Vec<Sent> {
+        let spec = &pipeline.stages[stage];
+        let ports = spec.kind.outputs.iter().zip(&spec.topics).enumerate();
+        ports.map(|(port, (output, topic))| Sent::new(output.name, topic.clone(), sink(port))).collect()
+    }
+}
+
+/// Runs code of a stage. A panic becomes a failure.
+fn guarded<T>(work: impl FnOnce() -> Result<T, StageError>) -> Result<T, Failure> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(result) => result.map_err(Failure::Stage),
+        Err(panic) => Err(Failure::Panic(panic_text(&*panic))),
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a text".to_owned())
+}
+
+/// For each output port of each stage: the wires that read it, as (reading stage, wire).
+pub(super) fn readers(pipeline: &Pipeline) -> BTreeMap<(usize, usize), Vec<(usize, usize)>> {
+    let mut readers: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (stage, spec) in pipeline.stages.iter().enumerate() {
+        for (wire, input) in spec.inputs.iter().enumerate() {
+            readers.entry((input.from_stage, input.from_port)).or_default().push((stage, wire));
+        }
+    }
+    readers
+}

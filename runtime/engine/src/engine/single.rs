@@ -1,0 +1,132 @@
+//! The engine `single`: all stages in one thread.
+//!
+//! The source that is furthest behind sends a few messages; then each stage, in the order of the pipeline, handles all
+//! that it can and says how far it is. What waits stays small, and nothing is ever stuck, as every stage sees the
+//! watermarks of all before it in the same round.
+
+use super::runner::{Runner, readers};
+use super::{Failure, Observer, RunError, RunReport};
+use crate::link::direct::{DirectLink, SharedQueue};
+use crate::link::{InputQueue, latest, lower_bound};
+use crate::message::LogTime;
+use crate::pipeline::Pipeline;
+use crate::stage::OutputSink;
+use std::rc::Rc;
+
+/// How often a source may send before the others get their turn.
+const TURNS: usize = 64;
+
+struct SingleStage {
+    runner: Runner,
+    /// What other stages have sent since this one had its turn.
+    inbox: Vec<SharedQueue>,
+    queues: Vec<InputQueue>,
+    links: Vec<DirectLink>,
+    done: bool,
+}
+
+pub(super) fn run(pipeline: &Pipeline, observer: &dyn Observer) -> Result<RunReport, RunError> {
+    let mut stages = connect(pipeline)?;
+    let result = drive(pipeline, &mut stages, observer);
+    if let Err(error) = result {
+        let reason = error.to_string();
+        stages.iter_mut().for_each(|stage| stage.runner.abort(&reason));
+        return Err(error);
+    }
+    let mut report = RunReport::default();
+    for (stage, spec) in stages.into_iter().zip(&pipeline.stages) {
+        let stage = stage.runner.into_report(Default::default());
+        report.stages.push(stage.map_err(|failure| RunError { stage: spec.name.clone(), failure })?);
+    }
+    Ok(report)
+}
+
+/// Makes the stages and ties their queues to their links.
+fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
+    let inboxes: Vec<Vec<SharedQueue>> =
+        pipeline.stages.iter().map(|spec| spec.inputs.iter().map(|_| SharedQueue::default()).collect()).collect();
+    let readers = readers(pipeline);
+    let mut stages = Vec::with_capacity(inboxes.len());
+    for (index, spec) in pipeline.stages.iter().enumerate() {
+        let mut links = vec![DirectLink::default(); spec.kind.outputs.len()];
+        for (port, link) in links.iter_mut().enumerate() {
+            for &(reader, wire) in readers.get(&(index, port)).into_iter().flatten() {
+                link.add_reader(Rc::clone(&inboxes[reader][wire]), wire);
+            }
+        }
+        let outputs = Runner::outputs(pipeline, index, |port| {
+            let link = links.get(port).filter(|link| link.has_readers())?;
+            Some(Box::new(link.clone()) as Box<dyn OutputSink>)
+        });
+        let runner =
+            Runner::new(pipeline, index, outputs).map_err(|failure| RunError { stage: spec.name.clone(), failure })?;
+        let own = spec.inputs.iter().map(|_| InputQueue::default()).collect();
+        stages.push(SingleStage { runner, inbox: inboxes[index].clone(), queues: own, links, done: false });
+    }
+    Ok(stages)
+}
+
+fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observer) -> Result<(), RunError> {
+    let failed = |stage: usize| move |failure| RunError { stage: pipeline.stages[stage].name.clone(), failure };
+    while let Some(source) = furthest_behind(stages) {
+        stages[source].let_source_send().map_err(failed(source))?;
+        if let Some(share) = stages[source].runner.progress() {
+            observer.progress(&pipeline.stages[source].name, share, stages[source].reached());
+        }
+        if observer.should_stop() {
+            return Err(failed(source)(Failure::Interrupted));
+        }
+        for (index, stage) in stages.iter_mut().enumerate() {
+            stage.handle_all().map_err(failed(index))?;
+        }
+    }
+    Ok(())
+}
+
+/// Of the sources that are not done, the one whose log time is the least.
+fn furthest_behind(stages: &[SingleStage]) -> Option<usize> {
+    let sources = stages.iter().enumerate().filter(|(_, stage)| stage.runner.is_source() && !stage.done);
+    sources.min_by_key(|(index, stage)| (stage.reached(), *index)).map(|(index, _)| index)
+}
+
+impl SingleStage {
+    fn reached(&self) -> LogTime {
+        self.links.iter().map(DirectLink::reached).max().unwrap_or_default()
+    }
+
+    fn let_source_send(&mut self) -> Result<(), Failure> {
+        for _ in 0..TURNS {
+            if !self.runner.advance()? {
+                self.end(self.reached());
+                return Ok(());
+            }
+        }
+        let watermark = self.reached();
+        self.links.iter().for_each(|link| link.raise(watermark));
+        Ok(())
+    }
+
+    fn handle_all(&mut self) -> Result<(), Failure> {
+        if self.done || self.runner.is_source() {
+            return Ok(());
+        }
+        for (queue, inbox) in self.queues.iter_mut().zip(&self.inbox) {
+            queue.append(&mut inbox.borrow_mut());
+        }
+        while self.runner.handle_next(&mut self.queues)?.is_some() {}
+        match lower_bound(&self.queues) {
+            Some(watermark) => self.links.iter().for_each(|link| link.raise(watermark)),
+            None => {
+                let time = latest(&self.queues);
+                self.runner.finish(time)?;
+                self.end(time);
+            }
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, time: LogTime) {
+        self.done = true;
+        self.links.iter().for_each(|link| link.end(time));
+    }
+}

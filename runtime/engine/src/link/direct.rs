@@ -1,0 +1,73 @@
+//! Links between stages of one thread: a message goes straight into its readers' queues.
+
+use super::{InputQueue, Sequence};
+use crate::message::{LogTime, Message, MessageHeader};
+use crate::stage::{OutputSink, StageError};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// An input queue that a sender of the same thread fills.
+pub type SharedQueue = Rc<RefCell<InputQueue>>;
+
+/// One output and the queues of all its readers.
+#[derive(Clone, Debug, Default)]
+pub struct DirectLink {
+    readers: Vec<(SharedQueue, usize)>,
+    sequence: Rc<RefCell<Sequence>>,
+}
+
+impl DirectLink {
+    /// Adds a reader: its queue, and which of its wires this is.
+    pub fn add_reader(&mut self, queue: SharedQueue, wire: usize) {
+        self.readers.push((queue, wire));
+    }
+
+    /// Whether anything reads the link.
+    pub fn has_readers(&self) -> bool {
+        !self.readers.is_empty()
+    }
+
+    /// Tells the readers that nothing before `watermark` will follow.
+    pub fn raise(&self, watermark: LogTime) {
+        if self.sequence.borrow_mut().raise(watermark) {
+            self.readers.iter().for_each(|(queue, _)| queue.borrow_mut().raise(watermark));
+        }
+    }
+
+    /// Tells the readers that nothing will follow, and that the stream has come to the given log time.
+    pub fn end(&self, time: LogTime) {
+        self.readers.iter().for_each(|(queue, _)| queue.borrow_mut().end(time));
+    }
+
+    /// The log time that the link has reached.
+    pub fn reached(&self) -> LogTime {
+        self.sequence.borrow().reached()
+    }
+
+    fn deliver(&self, header: MessageHeader, bytes: Vec<u8>) {
+        let message = Message::from_vec(header, bytes);
+        for (queue, wire) in &self.readers {
+            queue.borrow_mut().push(message.clone().on_wire(*wire));
+        }
+    }
+}
+
+impl OutputSink for DirectLink {
+    fn send(&mut self, mut header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
+        self.sequence.borrow_mut().stamp(&mut header)?;
+        self.deliver(header, bytes.to_vec());
+        Ok(())
+    }
+
+    fn send_in_place(
+        &mut self,
+        mut header: MessageHeader,
+        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
+    ) -> Result<(), StageError> {
+        self.sequence.borrow_mut().stamp(&mut header)?;
+        let mut bytes = vec![0; header.length as usize];
+        write(&mut bytes)?;
+        self.deliver(header, bytes);
+        Ok(())
+    }
+}

@@ -1,0 +1,48 @@
+//! How a link over shared memory fails.
+
+use std::fmt;
+
+/// A link over shared memory could not be made or used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LinkError {
+    /// iceoryx2 refused something.
+    #[error("cannot {doing}: iceoryx2 says {cause}; {}", HELP)]
+    Shared {
+        /// What was being done.
+        doing: String,
+        /// What iceoryx2 says.
+        cause: String,
+    },
+    /// A sample does not follow the protocol.
+    #[error("cannot read a sample of {link}: {problem}")]
+    Sample {
+        /// The link.
+        link: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A reader has not taken a sample although it had given credit for it.
+    #[error("a sample of {link} reached {reached} of {readers} readers; a reader must have gone away")]
+    Lost {
+        /// The link.
+        link: String,
+        /// Readers that got it.
+        reached: usize,
+        /// Readers there are.
+        readers: usize,
+    },
+    /// The run is being stopped because something else has failed.
+    #[error("the run is being stopped")]
+    Stopped,
+}
+
+/// What mends most failures of shared memory.
+const HELP: &str = "check that /dev/shm has room and can be written";
+
+impl LinkError {
+    /// An error of iceoryx2 while `doing` something.
+    pub(crate) fn shared(doing: impl Into<String>) -> impl FnOnce(&dyn fmt::Debug) -> Self {
+        let doing = doing.into();
+        move |cause| Self::Shared { doing, cause: format!("{cause:?}") }
+    }
+}

@@ -1,0 +1,73 @@
+//! The names of a run's services.
+
+use super::LinkError;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::prelude::{Config, FileName, Path, SemanticString, ServiceName, SignalHandlingMode};
+use iceoryx2::service::Service;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What keeps the services of one run apart from those of all others.
+#[derive(Clone, Debug)]
+pub struct RunNames {
+    prefix: String,
+    root: Option<String>,
+}
+
+impl RunNames {
+    /// Names that no other run of this machine has: from the process id and a counter.
+    pub fn unique() -> Self {
+        static COUNTER: AtomicU64 = AtomicU64::new(0);
+        let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+        Self { prefix: format!("gw{}_{number}_", std::process::id()), root: None }
+    }
+
+    /// Names with the given prefix (letters, digits and `_`), whose files lie in the folder `root`: for a run of several
+    /// processes, which must all be told the same.
+    pub fn shared(prefix: impl Into<String>, root: impl Into<String>) -> Self {
+        Self { prefix: prefix.into(), root: Some(root.into()) }
+    }
+
+    /// The iceoryx2 node of one thread or process of the run.
+    pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
+        let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
+        let mut config = Config::global_config().clone();
+        config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;
+        if let Some(root) = &self.root {
+            let root = Path::new(root.as_bytes()).map_err(|e| doing()(&e))?;
+            config.global.set_root_path(&root);
+        }
+        NodeBuilder::new()
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .config(&config)
+            .create::<S>()
+            .map_err(|e| doing()(&e))
+    }
+
+    /// Removes what iceoryx2 leaves in `/dev/shm` even when all ports are closed: a file of 16 bytes for each prefix.
+    /// Only for the last one of a run.
+    pub fn remove_rest(&self) {
+        let Ok(entries) = std::fs::read_dir("/dev/shm") else { return };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            if name.to_string_lossy().starts_with(&self.prefix) && name.to_string_lossy().ends_with(".global_mgmt") {
+                // Somebody else may have removed it in between.
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+
+    /// The service of an output port.
+    pub(crate) fn link(&self, stage: &str, port: &str) -> Result<ServiceName, LinkError> {
+        self.service(&format!("link/{stage}/{port}"))
+    }
+
+    /// The service that wakes a stage.
+    pub(crate) fn wake(&self, stage: &str) -> Result<ServiceName, LinkError> {
+        self.service(&format!("wake/{stage}"))
+    }
+
+    fn service(&self, name: &str) -> Result<ServiceName, LinkError> {
+        let name = format!("{}/{name}", self.prefix);
+        ServiceName::new(&name).map_err(|e| LinkError::shared(format!("name the service {name}"))(&e))
+    }
+}

@@ -1,0 +1,105 @@
+//! How messages lie in a sample.
+
+use super::LinkError;
+use crate::message::{Message, MessageHeader, Storage};
+use iceoryx2::prelude::ZeroCopySend;
+use std::rc::Rc;
+
+/// The version of the link protocol. A reader refuses samples of another one.
+pub const PROTOCOL_VERSION: u32 = 1;
+
+/// Where each message of a batch begins.
+const RECORD_ALIGNMENT: usize = 8;
+
+/// The user header of a sample.
+///
+/// With `count` 1 the payload is the bytes of `message`. With more, `message` is the header of the first, and the
+/// payload is for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[type_name("gridweave_sample_header_1")]
+#[repr(C)]
+pub struct SampleHeader {
+    /// [`PROTOCOL_VERSION`].
+    pub version: u32,
+    /// The number of messages.
+    pub count: u32,
+    /// The header of the only message, or of the first.
+    pub message: MessageHeader,
+}
+
+/// Small messages that are gathered to be sent in one sample.
+#[derive(Debug, Default)]
+pub(crate) struct Batch {
+    bytes: Vec<u8>,
+    first: Option<MessageHeader>,
+    count: u32,
+}
+
+impl Batch {
+    /// Adds a message.
+    pub(crate) fn push(&mut self, header: &MessageHeader, bytes: &[u8]) {
+        self.first.get_or_insert(*header);
+        self.count += 1;
+        self.bytes.extend_from_slice(&header.to_bytes());
+        self.bytes.extend_from_slice(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(RECORD_ALIGNMENT), 0);
+    }
+
+    /// Whether there is nothing to send.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// How many bytes a sample of it takes.
+    pub(crate) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// The header and the payload of a sample that holds it. A single message goes without its header in the payload.
+    pub(crate) fn sample(&self) -> (SampleHeader, &[u8]) {
+        let message = self.first.unwrap_or_default();
+        let header = SampleHeader { version: PROTOCOL_VERSION, count: self.count, message };
+        match self.count {
+            1 => (header, &self.bytes[MessageHeader::SIZE..MessageHeader::SIZE + message.length as usize]),
+            _ => (header, &self.bytes),
+        }
+    }
+
+    /// Forgets all messages and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.bytes.clear();
+        self.first = None;
+        self.count = 0;
+    }
+}
+
+/// Takes a sample apart and hands each message to `take`.
+pub(crate) fn unpack(
+    header: &SampleHeader,
+    storage: Rc<dyn Storage>,
+    link: &str,
+    mut take: impl FnMut(Message),
+) -> Result<(), LinkError> {
+    let wrong = |problem: String| LinkError::Sample { link: link.to_owned(), problem };
+    if header.version != PROTOCOL_VERSION {
+        return Err(wrong(format!(
+            "it has protocol version {}, and this program speaks {PROTOCOL_VERSION}",
+            header.version
+        )));
+    }
+    let cut = || wrong("its messages are longer than the sample".to_owned());
+    if header.count == 1 {
+        let length = header.message.length as usize;
+        take(Message::new(header.message, storage, 0..length).ok_or_else(cut)?);
+        return Ok(());
+    }
+    let mut start = 0;
+    for _ in 0..header.count {
+        let body = start + MessageHeader::SIZE;
+        let message = storage.bytes().get(start..body).and_then(MessageHeader::from_bytes).ok_or_else(cut)?;
+        let end = usize::try_from(message.length).ok().and_then(|length| body.checked_add(length)).ok_or_else(cut)?;
+        take(Message::new(message, Rc::clone(&storage), body..end).ok_or_else(cut)?);
+        start = end.next_multiple_of(RECORD_ALIGNMENT);
+    }
+    Ok(())
+}

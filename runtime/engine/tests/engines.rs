@@ -1,0 +1,215 @@
+//! Every engine gives every stage the same inputs in the same order, loses nothing, and says so when a stage fails.
+
+mod worlds;
+
+use gridweave_runtime::engine::{EngineKind, Failure, RunError, RunReport, run};
+use gridweave_runtime::pipeline::Pipeline;
+use std::sync::mpsc;
+use std::time::Duration;
+use worlds::{PipelineBuilder, registry};
+
+const ENGINES: [EngineKind; 3] = [EngineKind::Single, EngineKind::Threads, EngineKind::ThreadsIpc];
+
+/// Runs a pipeline; a run that hangs fails the test.
+fn run_watched(pipeline: &Pipeline, engine: EngineKind) -> Result<RunReport, RunError> {
+    let (sender, receiver) = mpsc::channel();
+    let pipeline = pipeline.clone();
+    std::thread::spawn(move || sender.send(run(&pipeline, engine, &())));
+    receiver.recv_timeout(Duration::from_secs(60)).unwrap_or_else(|_| panic!("the run on {engine} hangs"))
+}
+
+/// What the sinks of a pipeline have seen, by name.
+fn seen(pipeline: &Pipeline, engine: EngineKind) -> Vec<(String, String)> {
+    let report = run_watched(pipeline, engine).unwrap_or_else(|error| panic!("{engine}: {error}"));
+    report.results("recorder").map(|(name, value)| (name.to_owned(), value.to_string())).collect()
+}
+
+fn assert_same_on_every_engine(builder: &PipelineBuilder) {
+    let expected = seen(&builder.build(16), EngineKind::Single);
+    assert!(!expected.is_empty());
+    for engine in ENGINES {
+        for depth in [1, 2, 3, 16] {
+            assert_eq!(seen(&builder.build(depth), engine), expected, "{engine}, depth {depth}");
+        }
+    }
+}
+
+#[test]
+fn a_chain_passes_every_message_on() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 3000\nsize = 40", &[]);
+    builder.stage("relay", "relay", "", &["source.a"]);
+    builder.stage("sink", "recorder", "", &["relay.out"]);
+    let pipeline = builder.build(4);
+    for engine in ENGINES {
+        let report = run_watched(&pipeline, engine).unwrap();
+        let counts: Vec<u64> = report.stages.iter().map(|stage| stage.messages_in).collect();
+        assert_eq!(counts, [0, 3000, 3001], "{engine}");
+    }
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn two_sources_are_merged_by_log_time() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("even", "counter", "count = 700\nstep = 2", &[]);
+    builder.stage("slow", "counter", "count = 50\nstep = 31\nstart = 100\nstall = 300", &[]);
+    builder.stage("sink", "recorder", "", &["even.a", "slow.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn a_diamond_whose_one_side_passes_nothing_does_not_hang() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 4000", &[]);
+    builder.stage("nothing", "filter", "keep_every = 0", &["source.a"]);
+    builder.stage("few", "filter", "keep_every = 97", &["source.a"]);
+    builder.stage("sink", "recorder", "", &["nothing.out", "few.out", "source.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn a_diamond_over_two_ports_of_a_source_does_not_hang_at_equal_times() {
+    let mut builder = PipelineBuilder::new(registry());
+    // All messages bear one log time, so no watermark can ever release them.
+    builder.stage("source", "counter", "count = 2000\nstep = 0\nboth = true", &[]);
+    builder.stage("nothing", "filter", "keep_every = 0", &["source.b"]);
+    builder.stage("sink", "recorder", "", &["nothing.out", "source.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn a_source_that_is_silent_on_one_port_holds_nobody_up() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 3000", &[]);
+    builder.stage("late", "relay", "", &["source.b"]);
+    builder.stage("sink", "recorder", "", &["late.out", "source.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn stages_that_stall_at_random_change_nothing() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("one", "counter", "count = 200\nstep = 3\nstall = 200", &[]);
+    builder.stage("two", "counter", "count = 150\nstep = 4\nboth = true", &[]);
+    builder.stage("left", "relay", "stall = 300", &["one.a"]);
+    builder.stage("right", "filter", "keep_every = 3\nstall = 100", &["two.b"]);
+    builder.stage("cross", "join", "stall = 100", &["left.out", "right.out", "two.a"]);
+    builder.stage("sink", "recorder", "stall = 50", &["cross.out", "two.a", "one.a"]);
+    builder.stage("other", "recorder", "", &["cross.out"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn large_and_small_messages_keep_their_order() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 300\nsize = 60\nlarge_every = 7\nlarge_size = 200000", &[]);
+    builder.stage("relay", "relay", "", &["source.a"]);
+    builder.stage("sink", "recorder", "", &["relay.out", "source.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn a_stage_may_keep_more_messages_than_its_links_are_deep() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 400\nlarge_every = 1\nlarge_size = 9000", &[]);
+    builder.stage("sink", "recorder", "keep = true", &["source.a"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn an_empty_stream_ends() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 0", &[]);
+    builder.stage("relay", "relay", "", &["source.a"]);
+    builder.stage("sink", "recorder", "", &["relay.out", "source.b"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn a_failing_stage_ends_the_run_with_its_name_and_the_cause() {
+    for (how, where_) in [("fail", "relay"), ("panic", "relay"), ("fail_at_start", "relay"), ("fail", "source")] {
+        let mut builder = PipelineBuilder::new(registry());
+        let (source, relay) = match where_ {
+            "source" => (format!("count = 100000\n{how} = true"), String::new()),
+            _ => ("count = 100000".to_owned(), format!("{how} = true")),
+        };
+        builder.stage("source", "counter", &source, &[]);
+        builder.stage("relay", "relay", &relay, &["source.a"]);
+        builder.stage("sink", "recorder", "", &["relay.out", "source.a"]);
+        for engine in ENGINES {
+            let error = run_watched(&builder.build(2), engine).unwrap_err();
+            assert_eq!(error.stage, where_, "{engine} {how}");
+            match (how, &error.failure) {
+                ("panic", Failure::Panic(text)) => assert!(text.contains("on purpose")),
+                (_, Failure::Stage(cause)) => assert!(cause.to_string().contains("on purpose")),
+                (_, other) => panic!("{engine} {how}: {other}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn the_other_stages_are_told_why_the_run_failed() {
+    let mut builder = PipelineBuilder::new(registry());
+    let path = std::env::temp_dir().join(format!("gridweave-abort-{}", std::process::id()));
+    builder.stage("source", "counter", "count = 100000", &[]);
+    builder.stage("relay", "relay", "fail = true", &["source.a"]);
+    builder.stage("sink", "recorder", &format!("abort_file = '{}'", path.display()), &["relay.out"]);
+    for engine in ENGINES {
+        run_watched(&builder.build(2), engine).unwrap_err();
+        let reason = std::fs::read_to_string(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert!(reason.contains("`relay`") && reason.contains("on purpose"), "{engine}: {reason}");
+    }
+}
+
+#[test]
+fn going_back_in_log_time_is_an_error() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 10\nbackwards = true", &[]);
+    builder.stage("sink", "recorder", "", &["source.a"]);
+    for engine in ENGINES {
+        let error = run_watched(&builder.build(2), engine).unwrap_err().to_string();
+        assert!(error.contains("log time"), "{error}");
+    }
+}
+
+#[test]
+fn a_run_leaves_nothing_in_shared_memory() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 500", &[]);
+    builder.stage("relay", "relay", "fail = true", &["source.a"]);
+    builder.stage("sink", "recorder", "", &["relay.out"]);
+    run_watched(&builder.build(2), EngineKind::ThreadsIpc).unwrap_err();
+    let own = format!("gw{}_", std::process::id());
+    // Other tests of this process run beside this one; theirs go away with them.
+    let deadline = std::time::Instant::now() + Duration::from_secs(60);
+    loop {
+        let left: Vec<_> = std::fs::read_dir("/dev/shm")
+            .map(|entries| entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect())
+            .unwrap_or_default();
+        let left: Vec<&String> = left.iter().filter(|name| name.starts_with(&own)).collect();
+        if left.is_empty() {
+            return;
+        }
+        assert!(std::time::Instant::now() < deadline, "left in /dev/shm: {left:?}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_large_message_is_read_where_it_was_written() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("writer", "writer", "size = 1000000", &[]);
+    builder.stage("one", "reader", "", &["writer.out"]);
+    builder.stage("two", "reader", "", &["writer.out"]);
+    for engine in [EngineKind::Single, EngineKind::Threads] {
+        let report = run_watched(&builder.build(2), engine).unwrap();
+        let places: Vec<&serde_json::Value> = report.stages.iter().filter_map(|stage| stage.result.as_ref()).collect();
+        assert_eq!(places.len(), 3);
+        assert!(places[0].as_array().unwrap().len() == 5);
+        assert_eq!(places[0], places[1], "{engine}: the first reader sees the memory that was written");
+        assert_eq!(places[0], places[2], "{engine}: and so does the second");
+    }
+}

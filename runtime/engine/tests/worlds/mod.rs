@@ -1,0 +1,292 @@
+//! Small stages, and a way to wire them, for tests of the engines.
+#![allow(dead_code, missing_docs, unreachable_pub)]
+
+use gridweave_runtime::message::{LogTime, Message, MessageHeader};
+use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};
+use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
+use gridweave_runtime::stage::{
+    Context, InputPort, Output, OutputPort, Parameters, PortType, Registry, Source, Stage, StageError, StageKind,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+pub const TEXT: PortType = PortType::Ros("std_msgs/msg/String");
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TestParameters {
+    pub count: u64,
+    pub start: u64,
+    pub step: u64,
+    pub size: usize,
+    pub large_every: u64,
+    pub large_size: usize,
+    pub both: bool,
+    pub backwards: bool,
+    pub keep_every: u64,
+    pub keep: bool,
+    pub stall: u64,
+    pub fail: bool,
+    pub fail_at_start: bool,
+    pub panic: bool,
+    pub abort_file: PathBuf,
+}
+
+impl Default for TestParameters {
+    fn default() -> Self {
+        Self {
+            count: 100,
+            start: 0,
+            step: 1,
+            size: 8,
+            large_every: 0,
+            large_size: 0,
+            both: false,
+            backwards: false,
+            keep_every: 1,
+            keep: false,
+            stall: 0,
+            fail: false,
+            fail_at_start: false,
+            panic: false,
+            abort_file: PathBuf::new(),
+        }
+    }
+}
+
+impl Parameters for TestParameters {}
+
+/// Waits at random, to shake the order in which threads run. The waits come from a seed, and change no result.
+struct Stall {
+    most: u64,
+    state: u64,
+}
+
+impl Stall {
+    fn wait(&mut self) {
+        self.state = self.state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        if self.most > 0 && (self.state >> 60) == 0 {
+            std::thread::sleep(Duration::from_micros((self.state >> 33) % self.most * 10));
+        }
+    }
+}
+
+struct Counter {
+    parameters: TestParameters,
+    next: u64,
+    stall: Stall,
+}
+
+impl Source for Counter {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        let p = &self.parameters;
+        if self.next == p.count {
+            return Ok(false);
+        }
+        let number = self.next;
+        self.next += 1;
+        self.stall.wait();
+        if p.fail && number == 50 {
+            return Err(StageError::new("count", "on purpose"));
+        }
+        let time = p.start + p.step * if p.backwards { p.count - number } else { number };
+        let size = if p.large_every > 0 && number % p.large_every == 0 { p.large_size } else { p.size };
+        let bytes: Vec<u8> = (0..size).map(|place| (number as usize * 31 + place) as u8).collect();
+        let header = MessageHeader { log_time: LogTime(time), publish_time: number, ..Default::default() };
+        output.set_log_time(LogTime(time));
+        output.send_encoded(0, header, &bytes)?;
+        if p.both && number % 3 == 0 {
+            output.send_encoded(1, header, &bytes)?;
+        }
+        Ok(true)
+    }
+}
+
+struct Relay {
+    parameters: TestParameters,
+    seen: u64,
+    stall: Stall,
+}
+
+impl Relay {
+    fn new(parameters: TestParameters, context: &Context) -> Result<Self, StageError> {
+        if parameters.fail_at_start {
+            return Err(StageError::new("start", "on purpose"));
+        }
+        Ok(Self { stall: Stall { most: parameters.stall, state: context.seed }, parameters, seen: 0 })
+    }
+}
+
+impl Stage for Relay {
+    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        self.seen += 1;
+        self.stall.wait();
+        if self.seen == 20 && self.parameters.fail {
+            return Err(StageError::new("relay", "on purpose"));
+        }
+        assert!(!(self.seen == 20 && self.parameters.panic), "on purpose");
+        if self.parameters.keep_every > 0 && self.seen % self.parameters.keep_every == 0 {
+            let mut bytes = message.bytes().to_vec();
+            bytes.push(port as u8 + message.wire() as u8);
+            output.send_encoded(0, *message.header(), &bytes)?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+        let header = MessageHeader { log_time: output.log_time(), ..Default::default() };
+        output.send_encoded(0, header, &self.seen.to_le_bytes())
+    }
+}
+
+struct Recorder {
+    parameters: TestParameters,
+    hash: u64,
+    count: u64,
+    kept: Vec<Message>,
+    stall: Stall,
+}
+
+impl Recorder {
+    fn add(&mut self, bytes: impl IntoIterator<Item = u8>) {
+        for byte in bytes {
+            self.hash = (self.hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+}
+
+impl Stage for Recorder {
+    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
+        self.stall.wait();
+        self.count += 1;
+        self.add(message.header().log_time.0.to_le_bytes());
+        self.add([message.wire() as u8]);
+        self.add(message.bytes().to_vec());
+        if self.parameters.keep {
+            self.kept.push(message.clone());
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
+        for message in std::mem::take(&mut self.kept) {
+            self.add(message.bytes().to_vec());
+        }
+        Ok(())
+    }
+
+    fn abort(&mut self, reason: &str) {
+        if !self.parameters.abort_file.as_os_str().is_empty() {
+            std::fs::write(&self.parameters.abort_file, reason).unwrap();
+        }
+    }
+
+    fn report(&self) -> Option<serde_json::Value> {
+        Some(serde_json::json!({ "count": self.count, "hash": format!("{:016x}", self.hash) }))
+    }
+}
+
+/// Writes messages in place and notes where.
+struct Writer {
+    size: usize,
+    places: Vec<usize>,
+}
+
+impl Source for Writer {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
+        output.set_log_time(LogTime(self.places.len() as u64));
+        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
+            self.places.push(cells.as_ptr() as usize);
+            cells.fill(7);
+            Ok(())
+        })?;
+        Ok(self.places.len() < 5)
+    }
+
+    fn report(&self) -> Option<serde_json::Value> {
+        Some(self.places.clone().into())
+    }
+}
+
+/// Notes where the cells lie that it reads.
+#[derive(Default)]
+struct Reader(Vec<usize>);
+
+impl Stage for Reader {
+    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
+        let grid: OccupancyGrid<'_> = message.decode().unwrap();
+        assert!(grid.cells().iter().all(|cell| *cell == 7));
+        self.0.push(grid.cells().as_ptr() as usize);
+        Ok(())
+    }
+
+    fn report(&self) -> Option<serde_json::Value> {
+        Some(self.0.clone().into())
+    }
+}
+
+/// The kinds `writer`, `reader`, `counter`, `relay`, `filter` and `join` (a relay of one and of many), and `recorder`.
+pub fn registry() -> Registry {
+    let out = || vec![OutputPort::new("out", TEXT, "what came in")];
+    let one = || vec![InputPort::one("in", TEXT, "anything")];
+    let many = || vec![InputPort::many("in", TEXT, "anything")];
+    Registry::new([
+        StageKind::source(
+            "counter",
+            "Counts.",
+            vec![OutputPort::new("a", TEXT, "all"), OutputPort::new("b", TEXT, "some")],
+            |parameters: TestParameters, context: &Context| {
+                let stall = Stall { most: parameters.stall, state: context.seed };
+                Ok(Counter { parameters, next: 0, stall })
+            },
+        ),
+        StageKind::source("writer", "Writes grids.", out(), |parameters: TestParameters, _: &Context| {
+            Ok(Writer { size: parameters.size, places: Vec::new() })
+        }),
+        StageKind::stage("reader", "Reads grids.", one(), vec![], |_: TestParameters, _: &Context| {
+            Ok(Reader::default())
+        }),
+        StageKind::stage("relay", "Passes on.", one(), out(), Relay::new),
+        StageKind::stage("filter", "Passes some on.", one(), out(), Relay::new),
+        StageKind::stage("join", "Passes on what comes on any.", many(), out(), Relay::new),
+        StageKind::stage("recorder", "Hashes.", many(), vec![], |parameters: TestParameters, context: &Context| {
+            let stall = Stall { most: parameters.stall, state: context.seed };
+            Ok(Recorder { parameters, hash: 0xcbf2_9ce4_8422_2325, count: 0, kept: Vec::new(), stall })
+        }),
+    ])
+}
+
+/// Wires stages, each named after those that feed it.
+pub struct PipelineBuilder {
+    registry: Registry,
+    stages: Vec<StageSpec>,
+}
+
+impl PipelineBuilder {
+    pub fn new(registry: Registry) -> Self {
+        Self { registry, stages: Vec::new() }
+    }
+
+    pub fn stage(&mut self, name: &str, kind: &str, parameters: &str, inputs: &[&str]) {
+        let kind = self.registry.get(kind).unwrap().clone();
+        let inputs = inputs.iter().map(|input| {
+            let (stage, port) = input.split_once('.').unwrap();
+            let from_stage = self.stages.iter().position(|spec| spec.name == stage).unwrap();
+            let outputs = &self.stages[from_stage].kind.outputs;
+            Wire { port: 0, from_stage, from_port: outputs.iter().position(|output| output.name == port).unwrap() }
+        });
+        let inputs = inputs.collect();
+        let topics = kind.outputs.iter().map(|output| format!("/{name}/{}", output.name)).collect();
+        let parameters = parameters.parse().unwrap();
+        self.stages.push(StageSpec { name: name.into(), kind, parameters, inputs, topics, depth: 1 });
+    }
+
+    pub fn build(&self, depth: usize) -> Pipeline {
+        let mut stages = self.stages.clone();
+        stages.iter_mut().for_each(|stage| stage.depth = depth);
+        Pipeline { name: "test".into(), reference: None, seed: 1, robots: Default::default(), stages }
+    }
+}
