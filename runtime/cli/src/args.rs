@@ -1,0 +1,195 @@
+//! What the command line may say.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use gridweave_runtime::engine::EngineKind;
+use std::path::PathBuf;
+
+/// Merges the maps of several robots that explore one building, each with a map frame of its own.
+///
+/// Exit status: 0 done, 1 failed, 2 bad use, 3 done but something could not be merged.
+#[derive(Debug, Parser)]
+#[command(name = "gridweave", version, max_term_width = 110)]
+pub(crate) struct Cli {
+    /// Say more on standard error.
+    #[arg(short, long, global = true)]
+    pub(crate) verbose: bool,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run a pipeline.
+    Run(RunArgs),
+    /// Merge the maps in logs by the shipped pipeline that fits.
+    Merge(MergeArgs),
+    /// Check pipeline files and show everything that is wrong with them.
+    Check(CheckArgs),
+    /// Show which stages a pipeline has and how they are wired.
+    Graph(GraphArgs),
+    /// List the stage kinds with their ports and parameters.
+    Kinds(KindsArgs),
+    /// Show what is in logs: topics, types, counts, times, robots.
+    Info(InfoArgs),
+    /// Compare a summary with the truth.
+    Evaluate(EvaluateArgs),
+    /// Simulate robots in a building, and write a log and its truth.
+    Simulate(SimulateArgs),
+    /// Simulate three robots, merge their maps, and compare with the truth.
+    Demo(DemoArgs),
+}
+
+/// The command line asks for something that cannot be.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct BadUse(pub(crate) String);
+
+/// What all commands that run a pipeline have in common.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct RunOptions {
+    /// Write the result as JSON to this file: frames, alignments, what could not be merged and why.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) summary: Option<PathBuf>,
+    /// Write the merged map as a map file (map_server YAML, with the image beside it).
+    #[arg(long, value_name = "FILE.yaml")]
+    pub(crate) map: Option<PathBuf>,
+    /// Draw the merged maps, each robot's walls in a colour of its own.
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) picture: Option<PathBuf>,
+    /// What runs the stages: single, threads, or threads-ipc. The result is the same.
+    #[arg(long, default_value_t = EngineKind::default())]
+    pub(crate) engine: EngineKind,
+    /// Seeds all randomness.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// The robot whose map frame is the world; the first by name if none is given.
+    #[arg(long, value_name = "ROBOT")]
+    pub(crate) reference: Option<String>,
+    /// Set a parameter of a stage.
+    #[arg(long, value_name = "STAGE.PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Leave the input's messages out of the output.
+    #[arg(long)]
+    pub(crate) results_only: bool,
+    /// Print the summary as JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// A pipeline file, or the name of a shipped pipeline such as `tag_merge`.
+    pub(crate) pipeline: PathBuf,
+    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) input: Vec<PathBuf>,
+    /// The log to write.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// Logs to read (MCAP files or rosbag2 folders).
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The log to write.
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// Pipeline files, or names of shipped pipelines.
+    #[arg(required = true, value_name = "PIPELINE")]
+    pub(crate) pipelines: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct GraphArgs {
+    /// A pipeline file, or the name of a shipped pipeline.
+    pub(crate) pipeline: PathBuf,
+    /// How to show it.
+    #[arg(long, value_enum, default_value_t = GraphFormat::Text)]
+    pub(crate) format: GraphFormat,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum GraphFormat {
+    /// A list for people.
+    Text,
+    /// A Mermaid flowchart, as GitHub draws it.
+    Mermaid,
+    /// A Graphviz graph.
+    Dot,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct KindsArgs {
+    /// Only this kind.
+    pub(crate) kind: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// Logs (MCAP files or rosbag2 folders).
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Take the topic patterns of this pipeline to tell robots apart.
+    #[arg(long)]
+    pub(crate) pipeline: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// What `--summary` has written.
+    pub(crate) summary: PathBuf,
+    /// The true frames, as `gridweave simulate` writes them.
+    #[arg(long)]
+    pub(crate) truth: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// The log to write.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: PathBuf,
+    /// Write the truth here; by default beside the log, as LOG.truth.json.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
+    /// How many robots.
+    #[arg(long)]
+    pub(crate) robots: Option<u32>,
+    /// Another seed makes another building and other drives.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Set a parameter of the simulation; `gridweave kinds simulator` lists them.
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// The folder to write to.
+    #[arg(long, default_value = "demo", value_name = "FOLDER")]
+    pub(crate) out: PathBuf,
+    /// Another seed makes another building and other drives.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// What runs the stages: single, threads, or threads-ipc.
+    #[arg(long, default_value_t = EngineKind::default())]
+    pub(crate) engine: EngineKind,
+}

@@ -1,0 +1,79 @@
+//! The merged map as a map file and as a picture, taken from the log that a run has written.
+
+use crate::args::{BadUse, RunOptions};
+use crate::summary::Summary;
+use anyhow::{Context, Result, bail};
+use gridweave_logs::map_file::{self, GridMap};
+use gridweave_logs::picture::{self, MapLayer};
+use gridweave_logs::reader;
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
+use gridweave_runtime::stage::{RobotTopics, match_robot};
+use nalgebra::{Isometry2, Vector2};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The topic of the merged map.
+const MERGED: &str = "/map";
+
+/// What is to be made of the log that a run writes.
+pub(crate) struct Exports<'a> {
+    log: Option<&'a Path>,
+    map: Option<&'a PathBuf>,
+    picture: Option<&'a PathBuf>,
+}
+
+impl<'a> Exports<'a> {
+    /// What the options ask for. An error if they ask for something that needs an output, and there is none.
+    pub(crate) fn new(options: &'a RunOptions, log: Option<&'a Path>) -> Result<Self> {
+        let exports = Self { log, map: options.map.as_ref(), picture: options.picture.as_ref() };
+        if log.is_none() && (exports.map.is_some() || exports.picture.is_some()) {
+            return Err(BadUse("--map and --picture are made from the output: give --output LOG".to_owned()).into());
+        }
+        Ok(exports)
+    }
+
+    /// Writes the files that were asked for.
+    pub(crate) fn write(&self, summary: &Summary, robots: &RobotTopics) -> Result<()> {
+        let Some(log) = self.log.filter(|_| self.map.is_some() || self.picture.is_some()) else { return Ok(()) };
+        let maps = last_maps(log)?;
+        let Some(merged) = maps.get(MERGED) else {
+            bail!("{} holds no merged map on {MERGED}: there is nothing to draw", log.display());
+        };
+        if let Some(path) = self.map {
+            map_file::save(path, merged).context("cannot write the merged map")?;
+        }
+        if let Some(path) = self.picture {
+            let mut layers: Vec<MapLayer<'_>> = summary
+                .frames()
+                .filter_map(|(robot, [x, y, yaw])| {
+                    let topic = maps.keys().find(|topic| match_robot(&robots.map, topic) == Some(robot))?;
+                    Some(layer(&maps[topic], Isometry2::new(Vector2::new(x, y), yaw)))
+                })
+                .collect();
+            // A log without the input's messages holds the merged map only.
+            let picture = match layers.is_empty() {
+                true => picture::render_map(&layer(merged, Isometry2::identity())),
+                false => {
+                    layers.shrink_to_fit();
+                    picture::render_overlay(&layers)
+                }
+            };
+            picture.and_then(|picture| picture.save_png(path)).context("cannot draw the merged map")?;
+        }
+        Ok(())
+    }
+}
+
+fn layer(map: &GridMap, transform_world_map: Isometry2<f64>) -> MapLayer<'_> {
+    MapLayer { info: map.info, cells: &map.cells, transform_world_map }
+}
+
+/// The last grid on every topic of a log that holds grids.
+fn last_maps(log: &Path) -> Result<BTreeMap<String, GridMap>> {
+    let mut reader = reader::open(&[log.to_owned()])?;
+    let mut maps = BTreeMap::new();
+    while let Some(message) = reader.next_message() {
+        let _ = message;
+    }
+    Ok(maps)
+}

@@ -1,0 +1,84 @@
+//! Pipelines by name or file, and the commands that only look at them: `check`, `graph` and `kinds`.
+
+use crate::Outcome;
+use crate::args::{BadUse, CheckArgs, GraphArgs, GraphFormat, KindsArgs};
+use anyhow::Result;
+use gridweave_runtime::pipeline::{Overrides, Pipeline, kind_text, kinds_json, kinds_text};
+use gridweave_runtime::stage::Registry;
+use std::io::IsTerminal;
+use std::path::Path;
+
+/// The pipelines that ship, by name.
+const SHIPPED: [(&str, &str); 2] = [
+    ("simulate", include_str!("../../../pipelines/simulate.toml")),
+    ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),
+];
+
+/// All stage kinds of this program.
+pub(crate) fn registry() -> Registry {
+    Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()))
+}
+
+/// Loads a pipeline file or a shipped pipeline. `None` if it is wrong: then all its errors have been shown.
+pub(crate) fn load(pipeline: &Path, overrides: &Overrides) -> Result<Option<Pipeline>> {
+    let registry = registry();
+    let shipped = SHIPPED.iter().find(|(name, _)| Path::new(name) == pipeline && !pipeline.exists());
+    let loaded = match shipped {
+        Some((name, text)) => Pipeline::parse(&format!("pipelines/{name}.toml"), text, &registry, overrides),
+        None => Pipeline::load(pipeline, &registry, overrides),
+    };
+    match loaded {
+        Ok(pipeline) => Ok(Some(pipeline)),
+        Err(errors) => {
+            eprintln!("{}", errors.render(std::io::stderr().is_terminal()));
+            Ok(None)
+        }
+    }
+}
+
+/// Checks pipeline files.
+pub(crate) fn check(args: &CheckArgs) -> Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for path in &args.pipelines {
+        match load(path, &Overrides::default())? {
+            Some(pipeline) => println!("{}: {} stages, no errors", path.display(), pipeline.stages.len()),
+            None => outcome = Outcome::BadUse,
+        }
+    }
+    Ok(outcome)
+}
+
+/// Shows a pipeline.
+pub(crate) fn graph(args: &GraphArgs) -> Result<Outcome> {
+    let Some(pipeline) = load(&args.pipeline, &Overrides::default())? else { return Ok(Outcome::BadUse) };
+    print!(
+        "{}",
+        match args.format {
+            GraphFormat::Text => pipeline.to_text(),
+            GraphFormat::Mermaid => pipeline.to_mermaid(),
+            GraphFormat::Dot => pipeline.to_dot(),
+        }
+    );
+    Ok(Outcome::Done)
+}
+
+/// Lists the stage kinds.
+pub(crate) fn kinds(args: &KindsArgs) -> Result<Outcome> {
+    let registry = match &args.kind {
+        None => registry(),
+        Some(name) => {
+            let all = registry();
+            let kind = all.get(name).cloned().ok_or_else(|| {
+                let names: Vec<&str> = all.kinds().map(|kind| kind.name).collect();
+                BadUse(format!("there is no stage kind `{name}`; the kinds are {}", names.join(", ")))
+            })?;
+            Registry::new([kind])
+        }
+    };
+    match (args.json, &args.kind) {
+        (true, _) => println!("{}", serde_json::to_string_pretty(&kinds_json(&registry))?),
+        (false, Some(_)) => registry.kinds().for_each(|kind| print!("{}", kind_text(kind))),
+        (false, None) => print!("{}", kinds_text(&registry)),
+    }
+    Ok(Outcome::Done)
+}

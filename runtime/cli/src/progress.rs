@@ -1,0 +1,81 @@
+//! How far a run is: a bar on a terminal, plain lines elsewhere.
+
+use gridweave_runtime::engine::Observer;
+use gridweave_runtime::message::LogTime;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// The bar has so many steps.
+const STEPS: f64 = 1000.0;
+/// Without a terminal, a line is written at most this often.
+const LINE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Set by the first interrupt of the user.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Lets a run end in order on SIGINT or SIGTERM: the output is closed and says that it is not complete. A second signal
+/// ends the program at once.
+pub(crate) fn stop_on_interrupt() -> &'static AtomicBool {
+    static HANDLER: AtomicBool = AtomicBool::new(false);
+    if !HANDLER.swap(true, Ordering::Relaxed) {
+        let handler = ctrlc::set_handler(|| {
+            if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        if let Err(error) = handler {
+            tracing::warn!("an interrupt will not close the output: {error}");
+        }
+    }
+    &INTERRUPTED
+}
+
+/// Shows how far a run is.
+pub(crate) struct Progress {
+    bar: Option<ProgressBar>,
+    last_line: Mutex<Instant>,
+    start: AtomicU64,
+    stop: &'static AtomicBool,
+}
+
+impl Progress {
+    /// Nothing is done yet. The run ends early when `stop` is set.
+    pub(crate) fn new(stop: &'static AtomicBool) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}");
+            ProgressBar::new(STEPS as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        });
+        Self { bar, last_line: Mutex::new(Instant::now()), start: AtomicU64::new(u64::MAX), stop }
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Observer for Progress {
+    fn progress(&self, stage: &str, share: f64, log_time: LogTime) {
+        let start = LogTime(self.start.fetch_min(log_time.0, Ordering::Relaxed).min(log_time.0));
+        let at = format!("{:.0} s of the log read by `{stage}`", log_time.seconds_since(start));
+        if let Some(bar) = &self.bar {
+            bar.set_position((share * STEPS) as u64);
+            bar.set_message(at);
+            return;
+        }
+        let Ok(mut last_line) = self.last_line.lock() else { return };
+        if last_line.elapsed() >= LINE_INTERVAL {
+            *last_line = Instant::now();
+            eprintln!("{:.0} %, {at}", share * 100.0);
+        }
+    }
+
+    fn should_stop(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

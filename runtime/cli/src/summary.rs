@@ -1,0 +1,148 @@
+//! What a run has found, as JSON and as text.
+
+use crate::table::Table;
+use anyhow::{Result, bail};
+use gridweave_runtime::engine::RunReport;
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+/// What a run has found: the form that `--summary` writes.
+pub(crate) struct Summary {
+    value: Map<String, Value>,
+}
+
+impl Summary {
+    /// The summary of a run: what its frame solver reports, and what every stage has done.
+    pub(crate) fn new(report: &RunReport) -> Self {
+        let mut value = Map::new();
+        for (_, result) in report.results("frame_solver") {
+            if let Value::Object(result) = result {
+                value.extend(result.clone());
+            }
+        }
+        let mut stages = Map::new();
+        for stage in &report.stages {
+            let mut entry = json!({
+                "messages_in": stage.messages_in,
+                "messages_out": stage.messages_out,
+                "busy_ms": (stage.busy.as_secs_f64() * 1e4).round() / 10.0,
+            });
+            if !stage.warnings.is_empty() {
+                entry["warnings"] = json!(stage.warnings);
+            }
+            stages.insert(stage.name.clone(), entry);
+        }
+        value.insert("stages".into(), stages.into());
+        Self { value }
+    }
+
+    /// The JSON text.
+    pub(crate) fn to_json(&self) -> String {
+        serde_json::to_string_pretty(&self.value).unwrap_or_default()
+    }
+
+    /// The poses of the merged robots' map frames: the robot's name, and x, y (metres) and yaw (radians) in the
+    /// reference robot's map frame.
+    pub(crate) fn frames(&self) -> impl Iterator<Item = (&str, [f64; 3])> {
+        self.object("frames").map(|(robot, frame)| {
+            (robot, ["x", "y", "yaw"].map(|field| frame[field].as_f64().unwrap_or_default()))
+        })
+    }
+
+    /// Whether some robot could not be merged.
+    pub(crate) fn has_unmerged(&self) -> bool {
+        self.object("unmerged").next().is_some()
+    }
+
+    /// An error if the run was to merge maps, and there were none.
+    pub(crate) fn check_for_maps(&self) -> Result<()> {
+        let was_to_merge = self.value.contains_key("frames");
+        if was_to_merge && self.object("frames").next().is_none() && !self.has_unmerged() {
+            bail!(
+                "the input holds no map that can be used: a nav_msgs/msg/OccupancyGrid is needed for each robot, by \
+                 default on /ROBOT/map; `gridweave info LOG` shows what there is, and [robots] in the pipeline file \
+                 says what the topics are called{}",
+                self.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>()
+            );
+        }
+        Ok(())
+    }
+
+    /// The summary for people.
+    pub(crate) fn to_text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write_text(&mut text);
+        text
+    }
+
+    fn write_text(&self, out: &mut String) -> std::fmt::Result {
+        if let Some(reference) = self.value.get("reference").and_then(Value::as_str) {
+            self.write_frames(out, reference)?;
+        }
+        for (robot, reason) in self.object("unmerged") {
+            writeln!(out, "not merged: {robot}: {}", reason.as_str().unwrap_or_default())?;
+        }
+        self.write_alignments(out)?;
+        for (stage, what, count) in self.warnings() {
+            let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
+            writeln!(out, "warning: {stage}: {what} ({times})")?;
+        }
+        let mut table = Table::new(["stage", "messages in", "out", "busy ms"]);
+        for (name, stage) in self.object("stages") {
+            let busy = stage["busy_ms"].as_f64().unwrap_or_default();
+            let row = [name.to_owned(), stage["messages_in"].to_string(), stage["messages_out"].to_string()];
+            table.row(row.into_iter().chain([format!("{busy:.1}")]));
+        }
+        write!(out, "\n{table}")
+    }
+
+    fn write_frames(&self, out: &mut String, reference: &str) -> std::fmt::Result {
+        let merged = self.frames().count();
+        let all = merged + self.object("unmerged").count();
+        if all == 1 {
+            writeln!(out, "only {reference} has a map: there is nothing to merge it with")?;
+        } else {
+            writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?;
+        }
+        let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
+        for (robot, [x, y, yaw]) in self.frames() {
+            let covariance = self.value.get("frames").and_then(|frames| frames[robot]["covariance"].as_array());
+            let variance = |place: usize| {
+                covariance.and_then(|values| values.get(place)?.as_f64()).unwrap_or_default().max(0.0)
+            };
+            let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
+            let numbers = [x, y, yaw.to_degrees(), std_position, std_yaw];
+            table.row(std::iter::once(robot.to_owned()).chain(numbers.map(|number| format!("{number:.3}"))));
+        }
+        write!(out, "{table}")
+    }
+
+    fn write_alignments(&self, out: &mut String) -> std::fmt::Result {
+        let Some(alignments) = self.value.get("alignments").and_then(Value::as_array) else { return Ok(()) };
+        if alignments.is_empty() {
+            return Ok(());
+        }
+        let mut table = Table::new(["pair", "accepted", "score", "method", "reason"]);
+        for alignment in alignments {
+            let text = |field: &str| alignment[field].as_str().unwrap_or_default().to_owned();
+            let accepted = if alignment["accepted"] == true { "yes" } else { "no" };
+            let score = format!("{:.3}", alignment["score"].as_f64().unwrap_or_default());
+            table.row([format!("{} {}", text("a"), text("b")), accepted.into(), score, text("method"), text("reason")]);
+        }
+        write!(out, "\n{table}")
+    }
+
+    /// All warnings: stage, text, count.
+    fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
+        self.object("stages").flat_map(|(stage, entry)| {
+            let warnings = entry.get("warnings").and_then(Value::as_object).into_iter().flatten();
+            warnings.map(move |(what, count)| (stage, what.as_str(), count.as_u64().unwrap_or_default()))
+        })
+    }
+
+    fn object(&self, name: &str) -> impl Iterator<Item = (&str, &Value)> {
+        let object = self.value.get(name).and_then(Value::as_object);
+        object.into_iter().flatten().map(|(name, value)| (name.as_str(), value))
+    }
+}

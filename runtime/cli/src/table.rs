@@ -1,0 +1,63 @@
+//! Tables in plain text.
+
+use std::fmt::Write;
+
+/// Lines up columns: the first to the left, the others to the right where they are numbers. A last column of text goes
+/// to the left.
+pub(crate) struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table with the given heads.
+    pub(crate) fn new<'a>(heads: impl IntoIterator<Item = &'a str>) -> Self {
+        Self { rows: vec![heads.into_iter().map(str::to_owned).collect()] }
+    }
+
+    /// Adds a row.
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+}
+
+impl std::fmt::Display for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let cell = |row: &Vec<String>, column: usize| row.get(column).map_or("", String::as_str).to_owned();
+        let widths: Vec<usize> = (0..columns)
+            .map(|column| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
+            .collect();
+        let is_number: Vec<bool> = (0..columns)
+            .map(|column| self.rows[1..].iter().all(|row| is_numeric(&cell(row, column))))
+            .collect();
+        for row in &self.rows {
+            let mut line = String::new();
+            for (column, &width) in widths.iter().enumerate() {
+                let text = cell(row, column);
+                match is_number[column] {
+                    true => write!(line, "  {text:>width$}")?,
+                    false => write!(line, "  {text:<width$}")?,
+                }
+            }
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+fn is_numeric(text: &str) -> bool {
+    text.chars().all(|c| c.is_ascii_digit() || "+-.,% ".contains(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stand_to_the_right_and_text_to_the_left() {
+        let mut table = Table::new(["robot", "x", "why"]);
+        table.row(["robot1".into(), "0.1".into(), "a".into()]);
+        table.row(["r".into(), "-10.1".into(), "bcd".into()]);
+        assert_eq!(table.to_string(), "  robot       x  why\n  robot1    0.1  a\n  r       -10.1  bcd\n");
+    }
+}

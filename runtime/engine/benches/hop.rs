@@ -1,0 +1,191 @@
+//! What one hop between two stages costs, by the size of the message: from the moment that the sender has written the
+//! last byte to the moment that the reader is given the message, wake-up included.
+//!
+//!     cargo bench -p gridweave-runtime --bench hop
+//!
+//! The reference is bare iceoryx2 in the same run: the same payload, a listener, two threads. A hop that copied would
+//! grow with the size; one that does not costs the same for 64 B and 16 MiB.
+
+use gridweave_runtime::engine::{EngineKind, run};
+use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};
+use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid, RosMessage};
+use gridweave_runtime::stage::{
+    Context, InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
+};
+use iceoryx2::prelude::*;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+const SIZES: [usize; 4] = [64, 64 << 10, 1 << 20, 16 << 20];
+const HOPS: u64 = 300;
+
+/// When each message was written, how many were read, and how long each hop took.
+#[derive(Default)]
+struct Clock {
+    written: Mutex<Option<Instant>>,
+    read: AtomicU64,
+    hops: Mutex<Vec<Duration>>,
+}
+
+impl Clock {
+    fn note_written(&self) {
+        *self.written.lock().unwrap() = Some(Instant::now());
+    }
+
+    fn note_read(&self) {
+        let hop = self.written.lock().unwrap().unwrap().elapsed();
+        self.hops.lock().unwrap().push(hop);
+        self.read.fetch_add(1, Ordering::Release);
+    }
+
+    /// Waits until the reader has had `count` messages and has gone to sleep again.
+    fn wait_for(&self, count: u64) {
+        while self.read.load(Ordering::Acquire) < count {
+            std::thread::yield_now();
+        }
+        std::thread::sleep(Duration::from_micros(300));
+    }
+
+    fn median(&self) -> f64 {
+        let mut hops = self.hops.lock().unwrap().clone();
+        hops.sort();
+        hops[hops.len() / 2].as_secs_f64() * 1e6
+    }
+}
+
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(default)]
+struct Size {
+    size: usize,
+}
+
+impl Parameters for Size {}
+
+struct Writer {
+    clock: Arc<Clock>,
+    size: usize,
+    sent: u64,
+}
+
+impl Source for Writer {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        self.clock.wait_for(self.sent);
+        let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
+        output.set_log_time(LogTime(self.sent));
+        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
+            cells.fill(1);
+            self.clock.note_written();
+            Ok(())
+        })?;
+        self.sent += 1;
+        Ok(self.sent < HOPS)
+    }
+}
+
+struct Reader(Arc<Clock>);
+
+impl Stage for Reader {
+    fn receive(&mut self, _: usize, _: &Message, _: &mut Output<'_>) -> Result<(), StageError> {
+        self.0.note_read();
+        Ok(())
+    }
+}
+
+/// The median of a hop of a pipeline, microseconds.
+fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
+    let clock = Arc::new(Clock::default());
+    let (writer, reader) = (Arc::clone(&clock), Arc::clone(&clock));
+    let grid = PortType::Ros(OccupancyGrid::NAME);
+    let source = StageKind::source(
+        "writer",
+        "",
+        vec![OutputPort::new("out", grid, "")],
+        move |parameters: Size, _: &Context| Ok(Writer { clock: Arc::clone(&writer), size: parameters.size, sent: 0 }),
+    );
+    let sink =
+        StageKind::stage("reader", "", vec![InputPort::one("in", grid, "")], vec![], move |_: Size, _: &Context| {
+            Ok(Reader(Arc::clone(&reader)))
+        });
+    let spec = |name: &str, kind: StageKind, inputs: Vec<Wire>| StageSpec {
+        name: name.into(),
+        topics: kind.outputs.iter().map(|_| "/out".into()).collect(),
+        kind,
+        parameters: format!("size = {size}").parse().unwrap(),
+        inputs,
+        depth: 2,
+    };
+    let stages =
+        vec![spec("writer", source, vec![]), spec("reader", sink, vec![Wire { port: 0, from_stage: 0, from_port: 0 }])];
+    let pipeline = Pipeline { name: "hop".into(), reference: None, seed: 0, robots: Default::default(), stages };
+    // A message is sent at once when it is large; small ones wait for more, and for the source to look up.
+    run(&pipeline, engine, &()).unwrap();
+    clock.median()
+}
+
+/// The median of a hop of bare iceoryx2 between two threads, microseconds.
+fn bare_hop<S: iceoryx2::service::Service>(size: usize) -> f64 {
+    let clock = Arc::new(Clock::default());
+    let names = |what: &str| format!("hop/{}/{size}/{what}", std::process::id());
+    let events = |node: &Node<S>| {
+        node.service_builder(&names("event").as_str().try_into().unwrap()).event().open_or_create().unwrap()
+    };
+    let data = |node: &Node<S>| {
+        node.service_builder(&names("data").as_str().try_into().unwrap())
+            .publish_subscribe::<[u8]>()
+            .enable_safe_overflow(false)
+            .open_or_create()
+            .unwrap()
+    };
+    let ready = AtomicU64::new(0);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let node = NodeBuilder::new().create::<S>().unwrap();
+            let listener = events(&node).listener_builder().create().unwrap();
+            let subscriber = data(&node).subscriber_builder().create().unwrap();
+            ready.store(1, Ordering::Release);
+            let mut count = 0;
+            while count < HOPS {
+                listener.timed_wait(|_| {}, Duration::from_secs(1)).unwrap();
+                while let Some(sample) = subscriber.receive().unwrap() {
+                    clock.note_read();
+                    count += 1;
+                    drop(sample);
+                }
+            }
+        });
+        let node = NodeBuilder::new().create::<S>().unwrap();
+        let notifier = events(&node).notifier_builder().create().unwrap();
+        let publisher = data(&node).publisher_builder().initial_max_slice_len(size).create().unwrap();
+        while ready.load(Ordering::Acquire) == 0 {
+            std::thread::yield_now();
+        }
+        for sent in 0..HOPS {
+            clock.wait_for(sent);
+            let mut sample = publisher.loan_slice(size).unwrap();
+            sample.payload_mut().fill(1);
+            clock.note_written();
+            sample.send().unwrap();
+            notifier.notify().unwrap();
+        }
+        clock.wait_for(HOPS);
+    });
+    clock.median()
+}
+
+fn main() {
+    println!("| message | bare iceoryx2, us | threads, us | ratio | threads-ipc, us | bare ipc, us | ratio |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for size in SIZES {
+        let (bare, own) = (bare_hop::<local::Service>(size), pipeline_hop(size, EngineKind::Threads));
+        let (bare_ipc, own_ipc) = (bare_hop::<ipc::Service>(size), pipeline_hop(size, EngineKind::ThreadsIpc));
+        println!(
+            "| {size} B | {bare:.1} | {own:.1} | {:.2} | {own_ipc:.1} | {bare_ipc:.1} | {:.2} |",
+            own / bare,
+            own_ipc / bare_ipc
+        );
+    }
+}
