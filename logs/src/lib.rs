@@ -1,1 +1,11 @@
-//! x
+//! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, maps of nav2's map server,
+//! and pictures of maps.
+
+pub mod schemas;
+
+use gridweave_runtime::stage::StageKind;
+
+/// The stage kinds of this crate.
+pub fn kinds() -> Vec<StageKind> {
+    vec![]
+}
