@@ -2,10 +2,11 @@
 //! and pictures of maps.
 
 pub mod schemas;
+pub mod sink;
 
 use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![]
+    vec![sink::kind()]
 }
