@@ -1,6 +1,7 @@
 //! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, maps of nav2's map server,
 //! and pictures of maps.
 
+pub mod map_file;
 pub mod schemas;
 pub mod sink;
 
