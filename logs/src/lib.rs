@@ -2,6 +2,7 @@
 //! and pictures of maps.
 
 pub mod map_file;
+pub mod picture;
 pub mod schemas;
 pub mod sink;
 
