@@ -77,7 +77,7 @@ pub(super) fn frame_with_scale_bar(map: &RgbImage, view: &View) -> (RgbImage, f6
         let part = (f64::from(u) / pixels * f64::from(parts)) as u32;
         for v in 0..thickness {
             let on_border = v < border || v + border >= thickness || u + border >= pixels.round() as u32;
-            let colour = if part % 2 == 0 || on_border { OCCUPIED } else { PAPER };
+            let colour = if part.is_multiple_of(2) || on_border { OCCUPIED } else { PAPER };
             image.put_pixel(left + u, top + v, colour);
         }
     }

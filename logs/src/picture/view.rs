@@ -42,8 +42,12 @@ impl View {
         }
         let pixels_a_cell = (PLEASANT_SIDE * finest / extent).floor().clamp(1.0, MOST_PIXELS_A_CELL);
         let metres_per_pixel = (finest / pixels_a_cell).max(extent / LONGEST_SIDE);
-        // One layer that is not reduced has its cells on the pixels; several lie askew and need to be smoothed.
-        let least_samples = if layers.len() > 1 { 3.0 } else { 1.0 };
+        // The cells of one map lie on the pixels; those of several lie askew and need to be smoothed.
+        let least_samples = match layers.len() {
+            1 => 1.0,
+            _ if pixels_a_cell >= 2.0 => 2.0,
+            _ => 3.0,
+        };
         let samples = (metres_per_pixel / finest * (1.0 - 1e-9)).ceil().clamp(least_samples, MOST_SAMPLES);
         let pixels = |metres: f64| (metres / metres_per_pixel * (1.0 - 1e-9)).ceil().clamp(1.0, LONGEST_SIDE) as u32;
         Some(Self {

@@ -112,29 +112,26 @@ impl McapSink {
 
     fn write(&mut self, lane: usize, message: &Message) -> Result<(), StageError> {
         self.start()?;
-        // A failed log is closed, and takes no more.
-        let Some(log) = &mut self.log else { return Ok(()) };
+        let log = self.log.as_mut().ok_or_else(|| StageError::new("write the log", "it is closed already"))?;
         let lane = &mut self.lanes[lane];
-        let header = message.header();
-        let mut write = || {
-            let channel_id = match lane.id {
-                Some(id) => id,
-                None => *lane.id.insert(log.channel(&lane.channel)?),
-            };
-            let sequence = match header.channel {
-                0 => lane.next_sequence,
-                _ => header.log_sequence,
-            };
-            let (log_time, publish_time) = (header.log_time.0, header.publish_time);
-            log.write(&mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time }, message.bytes())
+        let channel_id = match lane.id {
+            Some(id) => id,
+            None => *lane.id.insert(log.channel(&lane.channel).map_err(failure)?),
         };
-        let written = write();
+        let header = message.header();
+        let sequence = match header.channel {
+            0 => lane.next_sequence,
+            _ => header.log_sequence,
+        };
+        let (log_time, publish_time) = (header.log_time.0, header.publish_time);
+        let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
+        log.write(&record, message.bytes()).map_err(failure)?;
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }
         lane.messages += 1;
         lane.bytes += message.bytes().len() as u64;
-        written.map_err(failure)
+        Ok(())
     }
 
     fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
