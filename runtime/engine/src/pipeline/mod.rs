@@ -57,6 +57,7 @@ impl Pipeline {
             reference: self.reference.clone(),
             robots: self.robots.clone(),
             input_types: spec.inputs.iter().map(|wire| self.output_type(wire)).collect(),
+            input_topics: spec.inputs.iter().map(|wire| self.output_topic(wire)).collect(),
         }
     }
 
@@ -65,6 +66,16 @@ impl Pipeline {
         match self.stages[wire.from_stage].kind.outputs[wire.from_port].port_type {
             crate::stage::PortType::Ros(name) => name.to_owned(),
             crate::stage::PortType::Any => String::new(),
+        }
+    }
+
+    /// The topic of the messages that a wire carries, with `{robot}` for the robot's name; empty for those of a
+    /// source, which bring their own.
+    fn output_topic(&self, wire: &Wire) -> String {
+        let from = &self.stages[wire.from_stage];
+        match from.kind.inputs.is_empty() {
+            true => String::new(),
+            false => from.topics.get(wire.from_port).cloned().unwrap_or_default(),
         }
     }
 }

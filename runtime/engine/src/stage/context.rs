@@ -15,6 +15,9 @@ pub struct Context {
     pub robots: RobotTopics,
     /// For every input of the stage, in order: the ROS 2 type, empty for any.
     pub input_types: Vec<String>,
+    /// For every input of the stage, in order: the topic that its messages get in a log, with `{robot}` for the
+    /// robot's name; empty if they bring topics of their own, as those of a source do.
+    pub input_topics: Vec<String>,
 }
 
 /// How the topics of a log are told apart: patterns in which `{robot}` stands for any one part of a path.

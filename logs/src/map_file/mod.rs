@@ -1,0 +1,55 @@
+//! Maps as files: the YAML and image of nav2's map server.
+//!
+//! The YAML file names an image (relative to itself), the size of a cell, the pose of the image's lower left corner, and
+//! how the shades of the image are to be read. The image's first row is the map's last.
+
+mod description;
+mod error;
+mod load;
+mod save;
+mod shades;
+
+pub use error::MapFileError;
+pub use load::load;
+pub use save::save;
+
+use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
+
+/// An occupancy grid that owns its cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridMap {
+    /// Size, resolution and origin.
+    pub info: MapMetaData,
+    /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied.
+    pub cells: Vec<i8>,
+}
+
+impl GridMap {
+    /// The map that a message holds.
+    pub fn from_message(message: &OccupancyGrid<'_>) -> Self {
+        Self { info: message.info, cells: message.cells().to_vec() }
+    }
+}
+
+/// How the shades of an image are read as occupancy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Mode {
+    /// Occupied above one threshold, free below the other, and unknown between them.
+    #[default]
+    Trinary,
+    /// As trinary, but between the thresholds occupancy rises from 0 to 100; what is not opaque is unknown.
+    Scale,
+    /// The shade, 0 to 255, is the occupancy; above 100 it is unknown.
+    Raw,
+}
+
+impl Mode {
+    const NAMES: [(&'static str, Self); 3] = [("trinary", Self::Trinary), ("scale", Self::Scale), ("raw", Self::Raw)];
+
+    fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(known, _)| *known == name).map(|(_, mode)| *mode)
+    }
+}
+
+#[cfg(test)]
+mod tests;

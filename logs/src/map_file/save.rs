@@ -1,0 +1,76 @@
+//! Writing a map.
+
+use super::{GridMap, MapFileError};
+use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
+use image::{ExtendedColorType, ImageEncoder, ImageError};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The shade of a cell that is occupied, free or unknown.
+const OCCUPIED_SHADE: u8 = 0;
+const FREE_SHADE: u8 = 254;
+const UNKNOWN_SHADE: u8 = 205;
+/// The least value of an occupied cell, and the first that is no longer free.
+const OCCUPIED_FROM: i8 = 65;
+const FREE_TO: i8 = 25;
+/// The thresholds that read those shades back. The shade of unknown has the occupancy 50 / 255 = 0.19608, so that the
+/// usual 0.25 would turn unknown cells into free ones.
+const OCCUPIED_THRESHOLD: f64 = 0.65;
+const FREE_THRESHOLD: f64 = 0.196;
+
+/// Writes a map: the YAML file at `yaml`, and the image beside it under the same name with the ending `pgm`. Files that
+/// have these names are replaced.
+///
+/// The mode is trinary: cells of 65 and more are occupied, 0 to 24 free, all others unknown. The origin is written in
+/// full precision; height, roll and pitch are left out.
+pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
+    let (text, image, pixels) = describe(yaml, map)
+        .map_err(|problem| MapFileError::Map { path: yaml.to_owned(), problem: problem.to_owned() })?;
+    let mut file = Vec::with_capacity(pixels.len() + 32);
+    let encoder = PnmEncoder::new(&mut file).with_subtype(PnmSubtype::Graymap(SampleEncoding::Binary));
+    let encoded = encoder.write_image(&pixels, map.info.width, map.info.height, ExtendedColorType::L8);
+    encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
+
+    let write = |path: &Path, bytes: &[u8]| {
+        fs::write(path, bytes).map_err(|source| MapFileError::Write { path: path.to_owned(), source })
+    };
+    // The image first, so that there is never a description of a map that is not there.
+    write(&image, &file)?;
+    write(yaml, text.as_bytes())
+}
+
+/// The YAML text, the path of the image, and its pixels. Otherwise what is wrong.
+fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'static str> {
+    let GridMap { info, cells } = map;
+    let (width, height) = (info.width as usize, info.height as usize);
+    if cells.is_empty() || width.checked_mul(height) != Some(cells.len()) {
+        return Err("it must have width x height cells, and at least one");
+    }
+    let origin = info.origin.planar();
+    let (x, y, yaw) = (origin.translation.x, origin.translation.y, origin.rotation.angle());
+    if !(info.resolution.is_finite() && info.resolution > 0.0 && [x, y, yaw].iter().all(|value| value.is_finite())) {
+        return Err("its resolution must be above 0 and its origin finite");
+    }
+    let image = yaml.with_extension("pgm");
+    if image == yaml {
+        return Err("name the YAML file; the image gets the same name with the ending pgm");
+    }
+    let name = image.file_name().and_then(|name| name.to_str()).ok_or("the name of the file must be UTF-8 text")?;
+    let name = serde_norway::to_string(name).map_err(|_| "the name of the file cannot stand in YAML")?;
+    let text = format!(
+        "image: {}\nmode: trinary\nresolution: {}\norigin: [{x}, {y}, {yaw}]\nnegate: 0\n\
+         occupied_thresh: {OCCUPIED_THRESHOLD}\nfree_thresh: {FREE_THRESHOLD}\n",
+        name.trim_end(),
+        info.resolution,
+    );
+    let pixels = cells.chunks_exact(width).rev().flatten().map(|&cell| shade(cell)).collect();
+    Ok((text, image, pixels))
+}
+
+fn shade(cell: i8) -> u8 {
+    match cell {
+        0..FREE_TO => FREE_SHADE,
+        OCCUPIED_FROM..=100 => OCCUPIED_SHADE,
+        _ => UNKNOWN_SHADE,
+    }
+}

@@ -1,0 +1,186 @@
+use super::*;
+use gridweave_runtime::ros::{Point, Pose, Quaternion};
+use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgba, RgbaImage};
+use proptest::prelude::*;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// A folder with `map.yaml`, and the image `map.pgm` with the shades 0, 100, 205 above 254, 255, 50.
+fn folder(yaml: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("map.pgm"), b"P5\n# made by hand\n3 2\n255\n\x00\x64\xcd\xfe\xff\x32").unwrap();
+    let path = folder.path().join("map.yaml");
+    fs::write(&path, yaml).unwrap();
+    (folder, path)
+}
+
+fn yaml(more: &str) -> String {
+    format!(
+        "image: map.pgm\nresolution: 0.05\norigin: [1, -2.5, 0.5]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n{more}"
+    )
+}
+
+fn cells(yaml: &str) -> Vec<i8> {
+    let (_folder, path) = folder(yaml);
+    load(&path).unwrap().cells
+}
+
+fn error(yaml: &str) -> String {
+    let (folder, path) = folder(yaml);
+    load(&path).unwrap_err().to_string().replace(folder.path().to_str().unwrap(), "DIR")
+}
+
+#[test]
+fn a_map_has_its_rows_from_bottom_to_top_and_an_origin_with_yaw() {
+    let (_folder, path) = folder(&yaml("negate: 0"));
+    let map = load(&path).unwrap();
+    assert_eq!((map.info.width, map.info.height, map.info.resolution), (3, 2, 0.05));
+    assert_eq!(map.info.origin.position, Point { x: 1.0, y: -2.5, z: 0.0 });
+    assert!((map.info.origin.orientation.yaw() - 0.5).abs() < 1e-15);
+    assert_eq!(map.cells, [0, 0, 100, 100, -1, 0]);
+}
+
+#[test]
+fn modes_and_negation_read_shades_as_the_map_server_does() {
+    // Occupancies: 254 -> 0.004, 255 -> 0, 50 -> 0.804; 0 -> 1, 100 -> 0.608, 205 -> 0.196.
+    assert_eq!(cells(&yaml("mode: trinary\nnegate: false")), [0, 0, 100, 100, -1, 0]);
+    assert_eq!(cells(&yaml("mode: scale")), [0, 0, 100, 100, 89, 0]);
+    assert_eq!(cells(&yaml("mode: raw")), [-1, -1, 50, 0, 100, -1]);
+    assert_eq!(cells(&yaml("negate: 1")), [100, 100, 0, 0, -1, 100]);
+    assert_eq!(cells(&yaml("negate: true\nmode: scale")), [100, 100, 0, 0, 36, 100]);
+}
+
+#[test]
+fn plain_text_and_other_depths_are_read_alike() {
+    let (folder, path) = folder(&yaml(""));
+    let read = |name: &str, bytes: &[u8]| {
+        fs::write(folder.path().join(name), bytes).unwrap();
+        fs::write(&path, yaml("").replace("map.pgm", name)).unwrap();
+        load(&path).unwrap().cells
+    };
+    assert_eq!(read("ascii.pgm", b"P2\n3 1\n255\n0 205 254\n"), [100, 0, 0]);
+    assert_eq!(read("hundred.pgm", b"P2\n3 1\n100\n0 50 100\n"), [100, -1, 0]);
+    assert_eq!(read("deep.pgm", b"P5\n2 1\n65535\n\x00\x00\xff\xff"), [100, 0]);
+    assert_eq!(read("bits.pbm", b"P1\n2 1\n1 0\n"), [100, 0]);
+    assert_eq!(read("packed.pbm", b"P4\n2 1\n\x80"), [100, 0]);
+    assert_eq!(read("colour.ppm", b"P3\n2 1\n255\n0 0 255  255 255 255\n"), [100, 0]);
+}
+
+#[test]
+fn png_is_read_with_its_opacity() {
+    let (folder, path) = folder("");
+    let read = |image: DynamicImage, more: &str| {
+        image.save(folder.path().join("map.png")).unwrap();
+        fs::write(&path, yaml(more).replace("map.pgm", "map.png")).unwrap();
+        load(&path).unwrap().cells
+    };
+    let rgba = RgbaImage::from_fn(3, 1, |x, _| [[0, 0, 0, 255], [255; 4], [0, 0, 0, 0]].map(Rgba)[x as usize]);
+    // Black and opaque: (0 + 0 + 0 + 255) / 4 is a shade of 0.25.
+    assert_eq!(read(rgba.clone().into(), ""), [100, 0, 100]);
+    assert_eq!(read(rgba.clone().into(), "mode: scale"), [100, 0, -1]);
+    assert_eq!(read(rgba.into(), "mode: raw"), [0, -1, 0]);
+    let grey = ImageBuffer::from_fn(3, 1, |x, _| [[100, 255], [255, 255], [100, 254]].map(LumaA)[x as usize]);
+    // Three times grey and once opacity: (3 * 100 + 255) / 4 is a shade of 0.54.
+    assert_eq!(read(DynamicImage::ImageLumaA8(grey.clone()), ""), [-1, 0, -1]);
+    assert_eq!(read(DynamicImage::ImageLumaA8(grey), "mode: scale"), [89, 0, -1]);
+    let deep = ImageBuffer::from_fn(2, 1, |x, _| Luma([x as u16 * 65535]));
+    assert_eq!(read(DynamicImage::ImageLuma16(deep), ""), [100, 0]);
+}
+
+#[test]
+fn a_map_comes_back_with_every_digit_of_its_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a map: \"two\".yaml");
+    let position = Point { x: -8.850000000000001, y: 1.0 / 3.0, z: 0.0 };
+    let origin = Pose { position, orientation: Quaternion::from_yaw(-2.123456789012345) };
+    let info = MapMetaData { resolution: 0.05, width: 3, height: 1, origin, ..Default::default() };
+    save(&path, &GridMap { info, cells: vec![-1, 0, 100] }).unwrap();
+    let map = load(&path).unwrap();
+    assert_eq!((map.info.origin.position, map.info.resolution, map.cells), (position, 0.05, vec![-1, 0, 100]));
+    assert!((map.info.origin.orientation.yaw() + 2.123456789012345).abs() < 1e-15);
+    assert!(fs::read_to_string(&path).unwrap().contains("free_thresh: 0.196"));
+}
+
+#[test]
+fn cells_between_are_saved_by_the_usual_thresholds() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.yaml");
+    let info = MapMetaData { resolution: 0.1, width: 4, height: 2, ..Default::default() };
+    save(&path, &GridMap { info, cells: vec![0, 24, 25, 64, 65, 100, 101, -128] }).unwrap();
+    assert_eq!(load(&path).unwrap().cells, [0, 0, -1, -1, 100, 100, -1, -1]);
+}
+
+proptest! {
+    #[test]
+    fn what_is_saved_is_what_is_loaded(
+        width in 1..20_usize,
+        values in prop::collection::vec(prop::sample::select(vec![-1_i8, 0, 100]), 20..200),
+        resolution in 0.001_f32..2.0,
+        (x, y) in (-1e4..1e4, -1e4..1e4),
+    ) {
+        let height = values.len() / width;
+        let cells = values[..width * height].to_vec();
+        let position = Point { x, y, z: 0.0 };
+        let (width, height) = (width as u32, height as u32);
+        let origin = Pose { position, ..Default::default() };
+        let map = GridMap { info: MapMetaData { resolution, width, height, origin, ..Default::default() }, cells };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.yaml");
+        save(&path, &map).unwrap();
+        prop_assert_eq!(load(&path).unwrap(), map);
+    }
+}
+
+#[test]
+fn wrong_values_are_told_with_what_would_be_right() {
+    assert!(error("").contains("DIR/map.yaml does not describe a map: missing field `image`"));
+    assert!(error("image: [").contains("does not describe a map"));
+    let without =
+        |field: &str| error(&yaml("").lines().filter(|line| !line.starts_with(field)).collect::<Vec<_>>().join("\n"));
+    for field in ["image", "resolution", "origin", "occupied_thresh", "free_thresh"] {
+        assert!(without(field).contains(&format!("missing field `{field}`")), "{}", without(field));
+    }
+    let with = |from: &str, to: &str| error(&yaml("").replace(from, to));
+    for value in [".nan", "0", "-0.05", "1e-60", ".inf"] {
+        assert!(with("0.05", value).contains("`resolution` is"), "{}", with("0.05", value));
+    }
+    for value in ["[0, 0]", "[0, 0, 0, 0]", "[0, .nan, 0]", "[]"] {
+        assert!(with("[1, -2.5, 0.5]", value).contains("`origin` must be three finite numbers"));
+    }
+    assert!(with("0.65", "65").contains("`occupied_thresh` is 65; it must lie between 0 and 1"));
+    assert!(with("0.65", "0.1").contains("`free_thresh` is 0.25; it must not be above `occupied_thresh`, 0.1"));
+    assert!(error(&yaml("negate: perhaps")).contains("`negate` must be 0 or 1"));
+    assert_eq!(
+        error(&yaml("mode: trinery")),
+        "DIR/map.yaml: `mode` is `trinery`, but only trinary, scale and raw exist; did you mean `trinary`?"
+    );
+}
+
+#[test]
+fn missing_and_broken_files_are_told() {
+    let (folder, path) = folder(&yaml(""));
+    let text = load(&folder.path().join("other.yaml")).unwrap_err().to_string();
+    assert!(text.starts_with("cannot read the map file") && text.contains("other.yaml: No such file"), "{text}");
+    for bytes in [b"P5\n3 2\n255\n\x00".as_slice(), b"no image", b""] {
+        fs::write(folder.path().join("map.pgm"), bytes).unwrap();
+        let text = load(&path).unwrap_err().to_string();
+        assert!(text.contains("map.pgm, the image of the map"), "{text}");
+    }
+    fs::remove_file(folder.path().join("map.pgm")).unwrap();
+    assert!(load(&path).unwrap_err().to_string().contains("No such file"));
+}
+
+#[test]
+fn what_is_no_map_is_not_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let info = MapMetaData { resolution: 0.05, width: 2, height: 2, ..Default::default() };
+    let map = GridMap { info, cells: vec![0; 4] };
+    let error = |name: &str, map: &GridMap| save(&folder.path().join(name), map).unwrap_err().to_string();
+    assert!(error("a.yaml", &GridMap { cells: vec![0; 3], ..map.clone() }).contains("width x height cells"));
+    let info = MapMetaData { resolution: f32::NAN, ..map.info };
+    assert!(error("a.yaml", &GridMap { info, ..map.clone() }).contains("resolution must be above 0"));
+    assert!(error("a.pgm", &map).contains("name the YAML file"));
+    assert!(error("missing/a.yaml", &map).contains("cannot write the map file"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -1,0 +1,109 @@
+//! A map in a picture.
+
+use super::view::View;
+use gridweave_runtime::ros::MapMetaData;
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// Known cells from this value on are walls.
+const WALL_FROM: i8 = 65;
+/// Known cells up to this value are free; those between are drawn as unknown.
+const FREE_TO: i8 = 25;
+
+/// A map, and where it lies.
+#[derive(Clone, Copy, Debug)]
+pub struct MapLayer<'a> {
+    /// Size, resolution and origin.
+    pub info: MapMetaData,
+    /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied.
+    pub cells: &'a [i8],
+    /// The pose of the map's frame in the world of the picture.
+    pub transform_world_map: Isometry2<f64>,
+}
+
+/// How much of a pixel is wall, and how much is free, 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Coverage {
+    pub(super) wall: f64,
+    pub(super) free: f64,
+}
+
+/// A map that has been checked.
+pub(super) struct PlacedLayer<'a> {
+    cells: &'a [i8],
+    width: usize,
+    pub(super) resolution: f64,
+    /// The pose of the outer corner of cell (0, 0) in the world.
+    transform_world_grid: Isometry2<f64>,
+}
+
+impl<'a> PlacedLayer<'a> {
+    /// Checks a map; otherwise says what is wrong.
+    pub(super) fn new(map: &MapLayer<'a>) -> Result<Self, &'static str> {
+        let (width, height) = (map.info.width as usize, map.info.height as usize);
+        if width.checked_mul(height) != Some(map.cells.len()) {
+            return Err("has not width x height cells");
+        }
+        let resolution = f64::from(map.info.resolution);
+        if !(resolution.is_finite() && resolution > 0.0) {
+            return Err("has a resolution that is no positive number");
+        }
+        let transform_world_grid = map.transform_world_map * map.info.origin.planar();
+        let pose = transform_world_grid.translation.vector;
+        if !(pose.iter().all(|value| value.is_finite()) && transform_world_grid.rotation.angle().is_finite()) {
+            return Err("has a pose that is not finite");
+        }
+        Ok(Self { cells: map.cells, width, resolution, transform_world_grid })
+    }
+
+    /// The outer corners of the known cells of every row, in the world.
+    pub(super) fn outline(&self) -> impl Iterator<Item = Point2<f64>> + '_ {
+        let rows = self.cells.chunks_exact(self.width.max(1)).enumerate();
+        rows.flat_map(move |(row, cells)| {
+            let first = cells.iter().position(|&cell| cell >= 0);
+            let last = cells.iter().rposition(|&cell| cell >= 0);
+            first.zip(last).into_iter().flat_map(move |(first, last)| {
+                let corners = [(first, row), (first, row + 1), (last + 1, row), (last + 1, row + 1)];
+                corners.map(|(column, row)| {
+                    let corner = Point2::new(column as f64, row as f64) * self.resolution;
+                    self.transform_world_grid * corner
+                })
+            })
+        })
+    }
+
+    /// What the map has in the pixel in column `u` and row `v`.
+    pub(super) fn coverage(&self, view: &View, u: usize, v: usize) -> Coverage {
+        let samples = view.samples_per_side;
+        let step = 1.0 / samples as f64;
+        let to_grid =
+            |u: f64, v: f64| self.transform_world_grid.inverse_transform_point(&view.world(u, v)) / self.resolution;
+        let (u, v) = (u as f64 + 0.5 * step, v as f64 + 0.5 * step);
+        let first = to_grid(u, v);
+        let across: Vector2<f64> = to_grid(u + step, v) - first;
+        let down: Vector2<f64> = to_grid(u, v + step) - first;
+
+        let (mut walls, mut free) = (0, 0);
+        for i in 0..samples {
+            for j in 0..samples {
+                match self.cell(first + across * i as f64 + down * j as f64) {
+                    WALL_FROM..=i8::MAX => walls += 1,
+                    0..FREE_TO => free += 1,
+                    _ => {}
+                }
+            }
+        }
+        let count = (samples * samples) as f64;
+        // A wall is one cell wide and must not fade when cells are smaller than pixels.
+        let wall = (2.0 * f64::from(walls) / count).min(1.0);
+        Coverage { wall, free: f64::from(free) / (count - f64::from(walls)).max(1.0) }
+    }
+
+    /// The cell at a place in units of cells; unknown outside of the map.
+    fn cell(&self, place: Point2<f64>) -> i8 {
+        if !(place.x >= 0.0 && place.y >= 0.0 && place.x < self.width as f64) {
+            return -1;
+        }
+        let index = (place.y as usize).checked_mul(self.width).and_then(|row| row.checked_add(place.x as usize));
+        index.and_then(|index| self.cells.get(index)).copied().unwrap_or(-1)
+    }
+}

@@ -1,0 +1,131 @@
+use super::*;
+use gridweave_runtime::ros::MapMetaData;
+use nalgebra::{Isometry2, Vector2};
+
+fn info(width: u32, height: u32, resolution: f32) -> MapMetaData {
+    MapMetaData { width, height, resolution, ..Default::default() }
+}
+
+fn layer(info: MapMetaData, cells: &[i8]) -> MapLayer<'_> {
+    MapLayer { info, cells, transform_world_map: Isometry2::identity() }
+}
+
+fn at(x: f64, y: f64, yaw: f64) -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(x, y), yaw)
+}
+
+/// How many pixels have a colour.
+fn count(picture: &Picture, colour: [u8; 3]) -> usize {
+    picture.image.pixels().filter(|pixel| pixel.0 == colour).count()
+}
+
+/// The colour of the cell in a column from the left and a row from the top, each of 8 x 8 pixels.
+fn cell(picture: &Picture, column: u32, row: u32) -> [u8; 3] {
+    picture.image.get_pixel(8 + column * 8 + 4, 8 + row * 8 + 4).0
+}
+
+#[test]
+fn cells_are_grey_white_and_black_with_row_0_at_the_bottom() {
+    // Far from the world's origin, so that no axis covers them.
+    let layer = MapLayer { transform_world_map: at(50.0, 50.0, 0.0), ..layer(info(2, 2, 0.1), &[0, 100, -1, 0]) };
+    let picture = render_map(&layer).unwrap();
+    assert_eq!(picture.image.dimensions(), (16 + 16, 16 + 8 + 20));
+    let cells = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(column, row)| cell(&picture, column, row));
+    assert_eq!(cells, [[205; 3], [255; 3], [255; 3], [0; 3]]);
+    assert!((picture.metres_per_pixel - 0.0125).abs() < 1e-9);
+    assert!((picture.scale_bar - 0.05).abs() < 1e-12);
+}
+
+#[test]
+fn a_turned_map_lies_as_its_pose_says() {
+    // A wall along x, turned a quarter to the left about its corner, goes up.
+    let layer = MapLayer {
+        transform_world_map: at(50.0, 50.0, std::f64::consts::FRAC_PI_2),
+        ..layer(info(5, 1, 0.1), &[100; 5])
+    };
+    let (width, height) = render_map(&layer).unwrap().image.dimensions();
+    assert_eq!((width, height), (8 + 16, 40 + 28));
+    let mut turned = info(5, 1, 0.1);
+    turned.origin = at(50.0, 50.0, std::f64::consts::FRAC_PI_2).into();
+    let by_origin = MapLayer { info: turned, transform_world_map: Isometry2::identity(), ..layer };
+    assert_eq!(render_map(&by_origin).unwrap().image.dimensions(), (width, height));
+}
+
+#[test]
+fn every_robot_has_a_colour_and_what_several_see_stands_out() {
+    let place = at(50.0, 50.0, 0.0);
+    let left = MapLayer { transform_world_map: place, ..layer(info(4, 1, 0.1), &[100, 0, 100, 0]) };
+    let right = MapLayer { cells: &[-1, -1, 100, 0], ..left };
+    let picture = render_overlay(&[left, right]).unwrap();
+    let [own_wall, own_free, common_wall, common_free] = [0, 1, 2, 3].map(|column| cell(&picture, column, 0));
+    assert_eq!(own_wall, robot_colour(0));
+    assert!(own_free[0] < 220 && own_free[2] > 235, "a light blue, not {own_free:?}");
+    assert!(common_wall.iter().all(|&channel| channel < 100), "dark, not {common_wall:?}");
+    assert!(common_free.iter().all(|&channel| channel > 245), "nearly white, not {common_free:?}");
+}
+
+#[test]
+fn no_two_of_six_robots_have_one_colour() {
+    let colours: std::collections::BTreeSet<_> = (0..6).map(robot_colour).collect();
+    assert_eq!(colours.len(), 6);
+    assert_eq!(robot_colour(6), robot_colour(0));
+}
+
+#[test]
+fn a_large_map_is_reduced_and_keeps_its_thin_walls() {
+    let side = 6000;
+    let mut cells = vec![0; side * side];
+    cells[side / 2 * side..][..side].fill(100);
+    let picture = render_map(&layer(info(side as u32, side as u32, 0.05), &cells)).unwrap();
+    let (width, height) = picture.image.dimensions();
+    assert!(width.max(height) < 2600, "{width} x {height}");
+    let middle = (0..height).filter(|&v| picture.image.get_pixel(width / 2, v).0.iter().all(|&c| c < 100)).count();
+    assert!(middle >= 1, "the wall can be seen");
+    assert_eq!(picture.scale_bar, 100.0);
+}
+
+#[test]
+fn axes_are_drawn_at_the_origin_of_the_world() {
+    let map = MapLayer { transform_world_map: at(-5.0, -5.0, 0.0), ..layer(info(100, 100, 0.1), &[0; 10_000]) };
+    let picture = render_map(&map).unwrap();
+    assert!(count(&picture, [200, 30, 30]) > 100 && count(&picture, [30, 150, 30]) > 100);
+    let far = MapLayer { transform_world_map: at(1e300, 1e12, 0.0), ..map };
+    assert!(render_map(&far).is_err() || count(&render_map(&far).unwrap(), [200, 30, 30]) == 0);
+}
+
+#[test]
+fn what_is_no_map_is_an_error() {
+    let text = |layers: &[MapLayer<'_>]| render_overlay(layers).unwrap_err().to_string();
+    let good = layer(info(1, 1, 0.1), &[0]);
+    assert_eq!(text(&[]), "there is nothing to show: no cell of any map is known");
+    assert_eq!(text(&[layer(info(2, 1, 0.1), &[-1, -1])]), "there is nothing to show: no cell of any map is known");
+    assert_eq!(text(&[good, layer(info(2, 2, 0.1), &[0])]), "map 1 of the picture has not width x height cells");
+    assert!(text(&[layer(info(1, 1, f32::NAN), &[0])]).contains("resolution"));
+    assert!(text(&[MapLayer { transform_world_map: at(f64::NAN, 0.0, 0.0), ..good }]).contains("pose"));
+    assert!(text(&[layer(info(0, 0, 0.1), &[])]).contains("nothing to show"));
+}
+
+#[test]
+fn maps_that_lie_far_apart_make_a_picture_of_bounded_size() {
+    let near = layer(info(1, 1, 0.1), &[100]);
+    for distance in [1e3, 1e9, 1e200] {
+        let far = MapLayer { transform_world_map: at(distance, 0.0, 1.0), ..near };
+        if let Ok(picture) = render_overlay(&[near, far]) {
+            assert!(picture.image.width() < 2600 && picture.image.height() < 2600);
+        }
+    }
+}
+
+#[test]
+fn a_picture_is_the_same_every_time_and_can_be_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = MapLayer { transform_world_map: at(1.0, 2.0, 0.3), ..layer(info(3, 1, 0.1), &[0, 100, -1]) };
+    let picture = render_overlay(&[map, map]).unwrap();
+    let path = folder.path().join("picture.png");
+    picture.save_png(&path).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    assert_eq!(bytes, render_overlay(&[map, map]).unwrap().png().unwrap());
+    assert_eq!(image::load_from_memory(&bytes).unwrap().to_rgb8(), picture.image);
+    let error = picture.save_png(&folder.path().join("missing/picture.png")).unwrap_err().to_string();
+    assert!(error.contains("cannot write the picture"), "{error}");
+}

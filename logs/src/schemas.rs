@@ -1,0 +1,83 @@
+//! The definitions of the ROS 2 types that Gridweave writes, from the `.msg` files in `logs/msg`.
+
+/// Stands between a definition and the next of the types that it uses.
+const SEPARATOR: &str = "================================================================================";
+
+macro_rules! definitions {
+    ($($name:literal),* $(,)?) => {
+        /// Name (`package/Type`) and text of every definition, by name.
+        const DEFINITIONS: &[(&str, &str)] = &[$(($name, include_str!(concat!("../msg/", $name, ".msg")))),*];
+    };
+}
+
+definitions![
+    "builtin_interfaces/Duration",
+    "builtin_interfaces/Time",
+    "geometry_msgs/Point",
+    "geometry_msgs/Pose",
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/PoseWithCovariance",
+    "geometry_msgs/Quaternion",
+    "geometry_msgs/Transform",
+    "geometry_msgs/TransformStamped",
+    "geometry_msgs/Twist",
+    "geometry_msgs/TwistWithCovariance",
+    "geometry_msgs/Vector3",
+    "gridweave_msgs/Alignment",
+    "gridweave_msgs/CommonTag",
+    "gridweave_msgs/CommonTags",
+    "gridweave_msgs/MapDirection",
+    "gridweave_msgs/RobotFrame",
+    "gridweave_msgs/RobotFrames",
+    "gridweave_msgs/Segment",
+    "gridweave_msgs/Segments",
+    "gridweave_msgs/TagEstimate",
+    "gridweave_msgs/TagEstimates",
+    "gridweave_msgs/TagRange",
+    "gridweave_msgs/UnmergedRobot",
+    "nav_msgs/MapMetaData",
+    "nav_msgs/OccupancyGrid",
+    "nav_msgs/Odometry",
+    "std_msgs/Header",
+    "tf2_msgs/TFMessage",
+];
+
+/// The schema of a ROS 2 type as a log holds it (encoding `ros2msg`): the definition of the type, and then that of
+/// every type that it uses, each once, after a line of 80 `=` and a line `MSG: package/Type`.
+///
+/// `name` is `package/msg/Type` or `package/Type`. `None` if the type is none that Gridweave writes.
+pub fn schema_text(name: &str) -> Option<String> {
+    let name = name.replacen("/msg/", "/", 1);
+    let mut text = definition(&name)?.to_owned();
+    let mut used = vec![name.as_str()];
+    append_used_types(definition(&name)?, &mut used, &mut text);
+    Some(text)
+}
+
+/// The full names (`package/msg/Type`) of all types that [`schema_text`] knows, by name.
+pub fn schema_names() -> impl Iterator<Item = String> {
+    DEFINITIONS.iter().map(|(name, _)| name.replacen('/', "/msg/", 1))
+}
+
+fn definition(name: &str) -> Option<&'static str> {
+    DEFINITIONS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
+/// Appends the definitions of all types that `text` uses and that are not in `used`, depth first.
+fn append_used_types<'a>(text: &'a str, used: &mut Vec<&'a str>, schema: &mut String) {
+    let types = text.lines().filter_map(|line| line.split('#').next()?.split_whitespace().next());
+    for field_type in types {
+        let name = field_type.split('[').next().unwrap_or(field_type);
+        if used.contains(&name) {
+            continue;
+        }
+        if let Some(used_text) = definition(name) {
+            used.push(name);
+            schema.push_str(&format!("{SEPARATOR}\nMSG: {name}\n{used_text}"));
+            append_used_types(used_text, used, schema);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

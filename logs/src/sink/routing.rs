@@ -1,0 +1,118 @@
+//! Which channel of the log a message is written on.
+
+use super::qos;
+use crate::schemas::schema_text;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{RosMessage, TFMessage};
+use gridweave_runtime::stage::{Context, match_robot};
+
+/// What becomes of the messages of an input's channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Route {
+    /// They are written on this channel.
+    Write(Channel),
+    /// They are left out, for this reason.
+    LeaveOut(String),
+}
+
+/// The topics that the results of a run have, known before its first message.
+pub(super) struct ResultTopics {
+    /// Template of the topic, and ROS 2 type, of every input of the sink that has them.
+    outputs: Vec<(String, String)>,
+}
+
+impl ResultTopics {
+    pub(super) fn new(context: &Context) -> Self {
+        let outputs = context.input_topics.iter().cloned().zip(context.input_types.iter().cloned());
+        Self { outputs: outputs.filter(|(topic, _)| !topic.is_empty()).collect() }
+    }
+
+    /// The type of the result that has this topic.
+    fn type_on(&self, topic: &str) -> Option<&str> {
+        self.outputs.iter().find(|(template, _)| fits(template, topic)).map(|(_, ros_type)| ros_type.as_str())
+    }
+
+    /// Where the messages of a channel of the input go: on the same channel, unless a result has its topic.
+    ///
+    /// A result keeps its topic for itself: a map of the input on `/map` would pass for the merged one. Transforms are
+    /// the exception, since all that are sent on a topic count together; they join the result's channel.
+    pub(super) fn route(&self, channel: &Channel) -> Route {
+        let topic = &channel.topic;
+        match self.type_on(topic) {
+            None => Route::Write(channel.clone()),
+            Some(TFMessage::NAME) if is_tf(channel) => Route::Write(result_channel(topic, TFMessage::NAME)),
+            Some(_) => Route::LeaveOut(format!(
+                "the input's messages on {topic} were left out: a result of this run has that topic"
+            )),
+        }
+    }
+}
+
+/// Whether a topic is one that `template` gives, with a robot's name or without.
+fn fits(template: &str, topic: &str) -> bool {
+    template.replace("/{robot}", "") == topic || match_robot(template, topic).is_some()
+}
+
+fn is_tf(channel: &Channel) -> bool {
+    let name = channel.schema_name.as_str();
+    channel.message_encoding == "cdr" && (name == TFMessage::NAME || name == "tf2_msgs/TFMessage")
+}
+
+/// The channel of a result. Its schema is empty if the type is none that Gridweave has a definition of.
+pub(super) fn result_channel(topic: &str, ros_type: &str) -> Channel {
+    Channel {
+        topic: topic.to_owned(),
+        message_encoding: "cdr".to_owned(),
+        schema_name: ros_type.to_owned(),
+        schema_encoding: "ros2msg".to_owned(),
+        schema: schema_text(ros_type).unwrap_or_default().into_bytes(),
+        metadata: qos::metadata(topic, ros_type),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn results() -> ResultTopics {
+        let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        ResultTopics::new(&Context {
+            input_topics: of(&["", "/map", "/tf_static", "/{robot}/lines/segments"]),
+            input_types: of(&["", "nav_msgs/msg/OccupancyGrid", TFMessage::NAME, "gridweave_msgs/msg/Segments"]),
+            ..Default::default()
+        })
+    }
+
+    fn channel(topic: &str, schema_name: &str) -> Channel {
+        let (message_encoding, schema_name) = ("cdr".into(), schema_name.into());
+        Channel { topic: topic.into(), message_encoding, schema_name, schema: b"?".to_vec(), ..Default::default() }
+    }
+
+    #[test]
+    fn the_input_keeps_its_channels_where_no_result_has_the_topic() {
+        for topic in ["/robot1/map", "/tf", "/maps", "/a/b/lines/segments", "/robot1/lines", ""] {
+            let channel = channel(topic, "nav_msgs/msg/OccupancyGrid");
+            assert_eq!(results().route(&channel), Route::Write(channel));
+        }
+    }
+
+    #[test]
+    fn a_result_keeps_its_topic_for_itself() {
+        for topic in ["/map", "/robot1/lines/segments", "/lines/segments"] {
+            for ros_type in ["nav_msgs/msg/OccupancyGrid", "std_msgs/msg/String"] {
+                let Route::LeaveOut(reason) = results().route(&channel(topic, ros_type)) else { panic!("{topic}") };
+                assert!(reason.starts_with(&format!("the input's messages on {topic} were left out")), "{reason}");
+            }
+        }
+    }
+
+    #[test]
+    fn transforms_of_the_input_join_those_of_the_result() {
+        let expected = result_channel("/tf_static", TFMessage::NAME);
+        for name in [TFMessage::NAME, "tf2_msgs/TFMessage"] {
+            assert_eq!(results().route(&channel("/tf_static", name)), Route::Write(expected.clone()));
+        }
+        let foreign = Channel { message_encoding: "ros1".into(), ..channel("/tf_static", TFMessage::NAME) };
+        assert!(matches!(results().route(&foreign), Route::LeaveOut(_)));
+    }
+}

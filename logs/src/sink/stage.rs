@@ -1,0 +1,211 @@
+//! The stage around [`LogWriter`].
+
+use super::routing::{ResultTopics, Route, result_channel};
+use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
+use gridweave_runtime::message::{Channel, FixedText, Message};
+use gridweave_runtime::stage::{Context, Output, Stage, StageError};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A channel of the log, and what was written on it.
+struct Lane {
+    channel: Channel,
+    /// Its number in the log, from its first message on.
+    id: Option<u16>,
+    /// The sequence number of the next result.
+    next_sequence: u32,
+    messages: u64,
+    bytes: u64,
+}
+
+/// Where the messages of an announced channel go.
+enum Target {
+    Lane(usize),
+    LeaveOut(String),
+}
+
+fn failure(error: LogWriteError) -> StageError {
+    StageError::new("write the log", error)
+}
+
+/// Writes all that comes in to a log.
+///
+/// The log is started with the first message, so that a run that cannot begin leaves the log of an earlier one alone.
+pub(super) struct McapSink {
+    file: PathBuf,
+    options: LogOptions,
+    pass_input: bool,
+    result_topics: ResultTopics,
+    input_types: Vec<String>,
+    log: Option<LogWriter>,
+    /// Whether the log was started: it is not started twice.
+    started: bool,
+    lanes: Vec<Lane>,
+    /// By wire and number: numbers are given by each source for itself.
+    announced: BTreeMap<(usize, u32), Target>,
+    /// By wire and topic.
+    results: BTreeMap<(usize, FixedText<128>), usize>,
+}
+
+impl McapSink {
+    pub(super) fn new(parameters: SinkParameters, context: &Context) -> Result<Self, StageError> {
+        let SinkParameters { file, pass_input, compression, chunk_size } = parameters;
+        if file.as_os_str().is_empty() {
+            let doing = format!("write the log of stage `{}`", context.stage);
+            return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
+        }
+        let sink = Self {
+            options: LogOptions { compression, chunk_size },
+            pass_input,
+            result_topics: ResultTopics::new(context),
+            input_types: context.input_types.clone(),
+            log: None,
+            started: false,
+            lanes: Vec::new(),
+            announced: BTreeMap::new(),
+            results: BTreeMap::new(),
+            file,
+        };
+        LogWriter::check_path(&sink.file).map_err(failure)?;
+        Ok(sink)
+    }
+
+    /// The lane of a channel; equal channels share one.
+    fn lane(&mut self, channel: Channel) -> usize {
+        match self.lanes.iter().position(|lane| lane.channel == channel) {
+            Some(index) => index,
+            None => {
+                self.lanes.push(Lane { channel, id: None, next_sequence: 0, messages: 0, bytes: 0 });
+                self.lanes.len() - 1
+            }
+        }
+    }
+
+    /// The lane of what a stage has made.
+    fn result_lane(&mut self, message: &Message, output: &mut Output<'_>) -> Result<usize, StageError> {
+        let key = (message.wire(), message.header().topic);
+        if let Some(&lane) = self.results.get(&key) {
+            return Ok(lane);
+        }
+        let topic = message.header().topic;
+        let ros_type = self.input_types.get(message.wire()).filter(|name| !name.is_empty()).ok_or_else(|| {
+            StageError::new(format!("write a message on {topic}"), "nothing says what type it has")
+                .with_help("wire an output that has a type, or announce a channel before the message")
+        })?;
+        let channel = result_channel(topic.as_str(), ros_type);
+        if channel.schema.is_empty() {
+            output.warn(format!("{ros_type} is written without a definition: other programs cannot read {topic}"));
+        }
+        let lane = self.lane(channel);
+        self.results.insert(key, lane);
+        Ok(lane)
+    }
+
+    fn start(&mut self) -> Result<(), StageError> {
+        if !self.started {
+            self.started = true;
+            self.log = Some(LogWriter::create(&self.file, self.options).map_err(failure)?);
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, lane: usize, message: &Message) -> Result<(), StageError> {
+        self.start()?;
+        let log = self.log.as_mut().ok_or_else(|| StageError::new("write the log", "it is closed already"))?;
+        let lane = &mut self.lanes[lane];
+        let channel_id = match lane.id {
+            Some(id) => id,
+            None => *lane.id.insert(log.channel(&lane.channel).map_err(failure)?),
+        };
+        let header = message.header();
+        let sequence = match header.channel {
+            0 => lane.next_sequence,
+            _ => header.log_sequence,
+        };
+        let (log_time, publish_time) = (header.log_time.0, header.publish_time);
+        let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
+        log.write(&record, message.bytes()).map_err(failure)?;
+        if header.channel == 0 {
+            lane.next_sequence = lane.next_sequence.wrapping_add(1);
+        }
+        lane.messages += 1;
+        lane.bytes += message.bytes().len() as u64;
+        Ok(())
+    }
+
+    fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
+        self.start()?;
+        match self.log.take() {
+            Some(log) => log.finish(outcome).map_err(failure),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Stage for McapSink {
+    fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+        let target = match self.result_topics.route(channel) {
+            Route::Write(channel) => Target::Lane(self.lane(channel)),
+            Route::LeaveOut(reason) => Target::LeaveOut(reason),
+        };
+        self.announced.insert((wire, number), target);
+        Ok(())
+    }
+
+    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let number = message.header().channel;
+        let lane = match number {
+            0 => self.result_lane(message, output)?,
+            _ if !self.pass_input => return Ok(()),
+            _ => match self.announced.get(&(message.wire(), number)) {
+                Some(Target::Lane(lane)) => *lane,
+                Some(Target::LeaveOut(reason)) => {
+                    output.warn(reason.as_str());
+                    return Ok(());
+                }
+                None => {
+                    let doing = format!("write a message on {}", message.header().topic);
+                    return Err(StageError::new(doing, format!("its channel, {number}, was not announced")));
+                }
+            },
+        };
+        self.write(lane, message)
+    }
+
+    fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
+        self.end(Outcome::Complete)
+    }
+
+    fn abort(&mut self, reason: &str) {
+        if let Err(error) = self.end(Outcome::Incomplete(reason)) {
+            tracing::warn!("{error}");
+        }
+    }
+
+    fn report(&self) -> Option<Value> {
+        let mut topics: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
+        for lane in self.lanes.iter().filter(|lane| lane.messages > 0) {
+            let (messages, bytes) = topics.entry(&lane.channel.topic).or_default();
+            *messages += lane.messages;
+            *bytes += lane.bytes;
+        }
+        let (messages, bytes) = topics.values().fold((0, 0), |sum, topic| (sum.0 + topic.0, sum.1 + topic.1));
+        let topics: Map<String, Value> = topics
+            .into_iter()
+            .map(|(topic, (messages, bytes))| (topic.to_owned(), json!({ "messages": messages, "bytes": bytes })))
+            .collect();
+        Some(json!({ "file": self.file.display().to_string(), "messages": messages, "bytes": bytes, "topics": topics }))
+    }
+}
+
+impl Drop for McapSink {
+    fn drop(&mut self) {
+        if self.log.is_some() {
+            self.abort("the run was stopped before its end");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,380 @@
+use super::*;
+use crate::sink::kind;
+use gridweave_runtime::message::{LogTime, MessageHeader};
+use gridweave_runtime::ros::{self, OccupancyGrid, Segments, TFMessage};
+use gridweave_runtime::stage::{CollectedOutputs, Node};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const GRID: &str = "nav_msgs/msg/OccupancyGrid";
+const TF: &str = "tf2_msgs/msg/TFMessage";
+const SEGMENTS: &str = "gridweave_msgs/msg/Segments";
+
+/// A sink with two sources on wires 0 and 1, and results on wires 2 (`/map`), 3 (`/tf_static`) and 4 (segments).
+struct Run {
+    folder: TempDir,
+    sink: Box<dyn Stage>,
+    outputs: CollectedOutputs,
+}
+
+fn context() -> Context {
+    let of = |names: [&str; 5]| names.map(str::to_owned).to_vec();
+    Context {
+        stage: "sink".into(),
+        input_types: of(["", "", GRID, TF, SEGMENTS]),
+        input_topics: of(["", "", "/map", "/tf_static", "/{robot}/lines/segments"]),
+        ..Default::default()
+    }
+}
+
+fn make(file: &Path, more: &str) -> Result<Box<dyn Stage>, StageError> {
+    let mut parameters: toml::Table = more.parse().unwrap();
+    parameters.insert("file".into(), file.to_str().unwrap().into());
+    match kind().make(parameters, &context())? {
+        Node::Stage(stage) => Ok(stage),
+        Node::Source(_) => panic!("a sink has inputs"),
+    }
+}
+
+impl Run {
+    fn new(more: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let sink = make(&folder.path().join("out.mcap"), more).unwrap();
+        Self { folder, sink, outputs: CollectedOutputs::new(&kind()) }
+    }
+
+    fn file(&self) -> PathBuf {
+        self.folder.path().join("out.mcap")
+    }
+
+    fn announce(&mut self, wire: usize, number: u32, topic: &str, schema_name: &str) {
+        let channel = Channel {
+            topic: topic.into(),
+            message_encoding: "cdr".into(),
+            schema_name: schema_name.into(),
+            schema_encoding: "ros2msg".into(),
+            schema: b"# from the input".to_vec(),
+            metadata: BTreeMap::from([("offered_qos_profiles".into(), "theirs".into())]),
+        };
+        self.sink.announce(wire, number, &channel).unwrap();
+    }
+
+    /// A message of the input's channel `number`.
+    fn input(&mut self, wire: usize, number: u32, time: u64, bytes: &[u8]) -> Result<(), StageError> {
+        self.send(wire, number, "/not/used", time, bytes)
+    }
+
+    /// A message that a stage has made.
+    fn result(&mut self, wire: usize, topic: &str, time: u64, bytes: &[u8]) -> Result<(), StageError> {
+        self.send(wire, 0, topic, time, bytes)
+    }
+
+    fn send(&mut self, wire: usize, channel: u32, topic: &str, time: u64, bytes: &[u8]) -> Result<(), StageError> {
+        let header = MessageHeader {
+            log_time: LogTime(time),
+            publish_time: time + 1,
+            channel,
+            log_sequence: 40 + time as u32,
+            topic: FixedText::new(topic).unwrap(),
+            ..Default::default()
+        };
+        let message = Message::from_vec(header, bytes.to_vec()).on_wire(wire);
+        self.sink.receive(0, &message, &mut self.outputs.output(LogTime(time)))
+    }
+
+    fn finish(&mut self) {
+        self.sink.finish(&mut self.outputs.output(LogTime(0))).unwrap();
+    }
+
+    fn log(&self) -> Log {
+        Log::read(&self.file())
+    }
+}
+
+/// A message as read back: topic, type, sequence, log time, publish time, bytes.
+type Read = (String, String, u32, u64, u64, Vec<u8>);
+
+struct Log {
+    messages: Vec<Read>,
+    channels: Vec<mcap::Channel<'static>>,
+    chunks: usize,
+    outcome: BTreeMap<String, String>,
+}
+
+impl Log {
+    fn read(path: &Path) -> Self {
+        let bytes = fs::read(path).unwrap();
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let messages = mcap::MessageStream::new(&bytes).unwrap().map(|message| {
+            let message = message.unwrap();
+            let schema = message.channel.schema.as_ref().map(|schema| schema.name.clone()).unwrap_or_default();
+            let (log_time, publish_time) = (message.log_time, message.publish_time);
+            (message.channel.topic.clone(), schema, message.sequence, log_time, publish_time, message.data.to_vec())
+        });
+        let outcome = summary.metadata_indexes.iter().find(|index| index.name == "gridweave").unwrap();
+        let mut channels: Vec<_> = summary.channels.values().map(|channel| (**channel).clone()).collect();
+        channels.sort_by_key(|channel| channel.id);
+        Self {
+            messages: messages.collect(),
+            channels,
+            chunks: summary.chunk_indexes.len(),
+            outcome: mcap::read::metadata(&bytes, outcome).unwrap().metadata,
+        }
+    }
+
+    fn topics(&self) -> Vec<&str> {
+        self.messages.iter().map(|message| message.0.as_str()).collect()
+    }
+}
+
+#[test]
+fn results_and_input_are_written_with_all_that_is_known_of_them() {
+    let mut run = Run::new("");
+    run.announce(0, 7, "/robot1/scan", "sensor_msgs/msg/LaserScan");
+    run.input(0, 7, 5, b"scan").unwrap();
+    let grid = ros::encode(&OccupancyGrid::default()).unwrap();
+    run.result(2, "/map", 6, &grid).unwrap();
+    run.result(2, "/map", 9, &grid).unwrap();
+    run.finish();
+
+    let log = run.log();
+    let read = |topic: &str, name: &str, sequence, time, bytes: &[u8]| -> Read {
+        (topic.into(), name.into(), sequence, time, time + 1, bytes.to_vec())
+    };
+    assert_eq!(
+        log.messages,
+        [
+            read("/robot1/scan", "sensor_msgs/msg/LaserScan", 45, 5, b"scan"),
+            read("/map", GRID, 0, 6, &grid),
+            read("/map", GRID, 1, 9, &grid)
+        ]
+    );
+    let [scan, map] = log.channels.as_slice() else { panic!("two channels") };
+    assert_eq!(scan.metadata["offered_qos_profiles"], "theirs");
+    assert_eq!(scan.schema.as_ref().unwrap().data.as_ref(), b"# from the input");
+    let schema = map.schema.as_ref().unwrap();
+    assert_eq!((map.message_encoding.as_str(), schema.encoding.as_str()), ("cdr", "ros2msg"));
+    assert_eq!(schema.data.as_ref(), crate::schemas::schema_text(GRID).unwrap().as_bytes());
+    assert!(map.metadata["offered_qos_profiles"].contains("durability: 1"));
+    assert_eq!(log.outcome, BTreeMap::from([("complete".into(), "true".into())]));
+    assert!(run.outputs.warnings().is_empty());
+}
+
+#[test]
+fn equal_channels_of_two_sources_are_one_and_equal_numbers_are_not() {
+    let mut run = Run::new("");
+    run.announce(0, 1, "/tf", TF);
+    run.announce(1, 1, "/robot2/pose", "geometry_msgs/msg/PoseStamped");
+    run.announce(1, 2, "/tf", TF);
+    for (wire, number, time) in [(0, 1, 1), (1, 1, 2), (1, 2, 3), (0, 1, 4)] {
+        run.input(wire, number, time, b"").unwrap();
+    }
+    run.finish();
+    let log = run.log();
+    assert_eq!(log.topics(), ["/tf", "/robot2/pose", "/tf", "/tf"]);
+    assert_eq!(log.channels.len(), 2);
+}
+
+#[test]
+fn without_the_input_only_results_are_written() {
+    let mut run = Run::new("pass_input = false");
+    run.announce(0, 1, "/tf", TF);
+    run.input(0, 1, 1, b"").unwrap();
+    run.result(4, "/robot1/lines/segments", 2, &ros::encode(&Segments::default()).unwrap()).unwrap();
+    run.finish();
+    assert_eq!(run.log().topics(), ["/robot1/lines/segments"]);
+}
+
+#[test]
+fn the_input_cannot_pass_for_a_result() {
+    let mut run = Run::new("");
+    run.announce(0, 1, "/map", GRID);
+    run.announce(0, 2, "/robot1/lines/segments", "std_msgs/msg/String");
+    run.announce(0, 3, "/robot1/map", GRID);
+    for (number, time) in [(1, 1), (2, 2), (1, 3), (3, 4)] {
+        run.input(0, number, time, b"").unwrap();
+    }
+    run.result(2, "/map", 5, b"ours").unwrap();
+    run.finish();
+    assert_eq!(run.log().topics(), ["/robot1/map", "/map"]);
+    let warnings: Vec<_> = run.outputs.warnings().iter().map(|(text, count)| (text.as_str(), *count)).collect();
+    let text = |topic| format!("the input's messages on {topic} were left out: a result of this run has that topic");
+    assert_eq!(warnings, [(text("/map").as_str(), 2), (text("/robot1/lines/segments").as_str(), 1)]);
+}
+
+#[test]
+fn transforms_of_input_and_result_share_a_channel() {
+    let mut run = Run::new("");
+    run.announce(0, 1, "/tf_static", TF);
+    run.input(0, 1, 1, b"").unwrap();
+    run.result(3, "/tf_static", 2, &ros::encode(&TFMessage::default()).unwrap()).unwrap();
+    run.finish();
+    let log = run.log();
+    assert_eq!(log.topics(), ["/tf_static", "/tf_static"]);
+    assert_eq!(log.channels.len(), 1);
+    assert!(log.channels[0].metadata["offered_qos_profiles"].contains("durability: 1"));
+}
+
+#[test]
+fn the_same_messages_give_the_same_bytes() {
+    let write = |compression: &str| {
+        let mut run = Run::new(&format!("compression = \"{compression}\"\nchunk_size = 5000"));
+        run.announce(0, 1, "/tf", TF);
+        for time in 0..500 {
+            run.input(0, 1, time, &time.to_le_bytes()).unwrap();
+            run.result(2, "/map", time, &[time as u8; 300]).unwrap();
+        }
+        run.finish();
+        assert_eq!(run.log().messages.len(), 1000);
+        assert!(run.log().chunks > 10);
+        fs::read(run.file()).unwrap()
+    };
+    for compression in ["zstd", "lz4", "none"] {
+        assert!(write(compression) == write(compression), "{compression}");
+    }
+}
+
+#[test]
+fn a_large_message_has_a_chunk_of_its_own() {
+    let mut run = Run::new("chunk_size = 10000");
+    for size in [10, 20, 50_000, 10] {
+        run.result(2, "/map", 1, &vec![0; size]).unwrap();
+    }
+    run.finish();
+    assert_eq!(run.log().chunks, 3);
+}
+
+#[test]
+fn a_failed_run_leaves_a_log_that_says_so() {
+    let mut run = Run::new("");
+    run.result(2, "/map", 1, b"grid").unwrap();
+    run.sink.abort("stage `lines` failed");
+    let log = run.log();
+    assert_eq!(log.topics(), ["/map"]);
+    let expected = [("complete", "false"), ("reason", "stage `lines` failed")];
+    assert_eq!(log.outcome, expected.map(|(key, value)| (key.into(), value.into())).into());
+}
+
+#[test]
+fn a_run_that_fails_at_once_replaces_the_log_of_an_earlier_run() {
+    let mut run = Run::new("");
+    fs::write(run.file(), "earlier").unwrap();
+    run.sink.abort("no input");
+    assert_eq!(run.log().outcome["complete"], "false");
+}
+
+#[test]
+fn a_sink_that_is_dropped_leaves_a_log_that_is_not_complete() {
+    let mut run = Run::new("");
+    run.result(2, "/map", 1, b"grid").unwrap();
+    let Run { folder, sink, .. } = run;
+    drop(sink);
+    let log = Log::read(&folder.path().join("out.mcap"));
+    assert_eq!((log.topics(), log.outcome["complete"].as_str()), (vec!["/map"], "false"));
+}
+
+#[test]
+fn what_was_closed_can_be_read_while_the_run_goes_on() {
+    let mut run = Run::new("chunk_size = 1024");
+    for time in 0..100 {
+        run.result(2, "/map", time, &[7; 100]).unwrap();
+    }
+    let bytes = fs::read(run.file()).unwrap();
+    let options = mcap::read::Options::IgnoreEndMagic.into();
+    let stream = mcap::MessageStream::new_with_options(&bytes, options).unwrap();
+    let readable = stream.map_while(Result::ok).count();
+    assert!((92..100).contains(&readable), "{readable} of 100, with 8 in the open chunk");
+}
+
+#[test]
+fn a_program_that_has_the_earlier_file_open_keeps_what_it_reads() {
+    use std::io::Read;
+    let mut run = Run::new("");
+    fs::write(run.file(), "earlier").unwrap();
+    let mut open = fs::File::open(run.file()).unwrap();
+    run.finish();
+    let mut text = String::new();
+    open.read_to_string(&mut text).unwrap();
+    assert_eq!(text, "earlier");
+    assert_eq!(run.log().outcome["complete"], "true");
+}
+
+#[test]
+fn a_sink_that_never_ran_leaves_the_earlier_file_alone() {
+    let run = Run::new("");
+    fs::write(run.file(), "earlier").unwrap();
+    let Run { folder, sink, .. } = run;
+    drop(sink);
+    assert_eq!(fs::read(folder.path().join("out.mcap")).unwrap(), b"earlier");
+}
+
+#[test]
+fn bad_paths_are_refused_with_what_would_mend_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = |path: &Path| make(path, "").err().unwrap().to_string();
+    let at = |name: &str| folder.path().join(name);
+
+    assert_eq!(
+        error(Path::new("")),
+        "cannot write the log of stage `sink`: it has no file; give --output LOG or file = \"LOG\""
+    );
+    assert!(error(folder.path()).ends_with("is a folder; name a file in it"));
+    let missing = at("missing");
+    let expected = format!("there is no folder {}; make it, or name a file elsewhere", missing.display());
+    assert_eq!(error(&missing.join("out.mcap")), format!("cannot write the log: {expected}"));
+    fs::write(at("file"), "").unwrap();
+    assert!(error(&at("file").join("out.mcap")).contains("there is no folder"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_error() {
+    let mut sink = make(Path::new("/dev/full"), "chunk_size = 1024").unwrap();
+    let mut outputs = CollectedOutputs::new(&kind());
+    let message = Message::from_vec(MessageHeader::default(), vec![0; 5000]).on_wire(2);
+    let received = sink.receive(0, &message, &mut outputs.output(LogTime(0)));
+    let error = received.and_then(|()| sink.finish(&mut outputs.output(LogTime(0)))).unwrap_err().to_string();
+    assert!(error.contains("there is no room left for /dev/full; make room on its disk"), "{error}");
+    sink.abort("no room");
+}
+
+#[test]
+fn parameters_out_of_range_are_told() {
+    let check = |text: &str| kind().check_parameters(&text.parse().unwrap());
+    assert!(check("chunk_size = 4096").unwrap().is_empty());
+    assert_eq!(check("chunk_size = 10").unwrap()[0].field, "chunk_size");
+    assert!(check("compression = \"gzip\"").is_err());
+    assert!(check("files = \"a.mcap\"").is_err());
+}
+
+#[test]
+fn a_message_of_which_nothing_is_known_is_an_error() {
+    let mut run = Run::new("");
+    let error = run.result(0, "/other", 1, b"").unwrap_err().to_string();
+    assert!(error.starts_with("cannot write a message on /other: nothing says what type it has"), "{error}");
+    let error = run.input(0, 3, 1, b"").unwrap_err().to_string();
+    assert!(error.contains("its channel, 3, was not announced"), "{error}");
+}
+
+#[test]
+fn the_report_counts_messages_and_bytes_by_topic() {
+    let mut run = Run::new("");
+    run.announce(0, 1, "/scan", "sensor_msgs/msg/LaserScan");
+    run.input(0, 1, 1, &[0; 10]).unwrap();
+    run.input(0, 1, 2, &[0; 10]).unwrap();
+    run.result(2, "/map", 3, &[0; 5]).unwrap();
+    run.finish();
+    let report = run.sink.report().unwrap();
+    assert_eq!((&report["messages"], &report["bytes"]), (&json!(3), &json!(25)));
+    let topics = json!({ "/map": { "messages": 1, "bytes": 5 }, "/scan": { "messages": 2, "bytes": 20 } });
+    assert_eq!(report["topics"], topics);
+}
+
+#[test]
+fn an_empty_run_leaves_an_empty_log() {
+    let mut run = Run::new("");
+    run.finish();
+    let log = run.log();
+    assert_eq!((log.messages.len(), log.outcome["complete"].as_str()), (0, "true"));
+}
