@@ -137,7 +137,9 @@ impl PipelineErrors {
             1 => "an error".to_owned(),
             count => format!("{count} errors"),
         };
-        text.push_str(&renderer.render(&[Group::with_title(Level::ERROR.primary_title(format!("{name} has {count}")))]));
+        text.push_str(
+            &renderer.render(&[Group::with_title(Level::ERROR.primary_title(format!("{name} has {count}")))]),
+        );
         text
     }
 

@@ -75,7 +75,7 @@ pub(super) fn parse(text: &str, problems: &mut Problems) -> Option<Vec<Entry>> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let place = Place { source: 0, offset: 0 };
     if errors.is_empty() {
-        return Some(place.entries(table.into_inner(), problems));
+        return Some(place.entries(table.into_inner()));
     }
     for error in errors {
         let span = error.span().unwrap_or(text.len()..text.len());
@@ -85,9 +85,9 @@ pub(super) fn parse(text: &str, problems: &mut Problems) -> Option<Vec<Entry>> {
 }
 
 /// The value that stands in text `source` from byte `offset` on; nothing if it is not TOML.
-pub(super) fn parse_value(text: &str, source: usize, offset: usize, problems: &mut Problems) -> Option<Item> {
+pub(super) fn parse_value(text: &str, source: usize, offset: usize) -> Option<Item> {
     let value = DeValue::parse(text).ok()?;
-    Some(Place { source, offset }.item(value, problems))
+    Some(Place { source, offset }.item(value))
 }
 
 /// Where the text that is being read stands.
@@ -102,39 +102,40 @@ impl Place {
         Location::new(self.source, self.offset + span.start..self.offset + span.end)
     }
 
-    fn entries(&self, table: DeTable<'_>, problems: &mut Problems) -> Vec<Entry> {
+    fn entries(&self, table: DeTable<'_>) -> Vec<Entry> {
         let mut entries: Vec<Entry> = table
             .into_iter()
             .map(|(key, value)| {
                 let key_at = self.location(&key);
-                Entry { key: key.into_inner().into_owned(), key_at, item: self.item(value, problems) }
+                Entry { key: key.into_inner().into_owned(), key_at, item: self.item(value) }
             })
             .collect();
         entries.sort_by(|a, b| a.key_at.cmp(&b.key_at));
         entries
     }
 
-    fn item(&self, value: Spanned<DeValue<'_>>, problems: &mut Problems) -> Item {
+    fn item(&self, value: Spanned<DeValue<'_>>) -> Item {
         let at = self.location(&value);
         let value = match value.into_inner() {
-            DeValue::Table(table) => Value::Table(self.entries(table, problems)),
-            DeValue::Array(items) => Value::List(items.into_iter().map(|item| self.item(item, problems)).collect()),
+            DeValue::Table(table) => Value::Table(self.entries(table)),
+            DeValue::Array(items) => Value::List(items.into_iter().map(|item| self.item(item)).collect()),
             DeValue::String(text) => Value::Plain(toml::Value::String(text.into_owned())),
             DeValue::Boolean(value) => Value::Plain(toml::Value::Boolean(value)),
             DeValue::Datetime(value) => Value::Plain(toml::Value::Datetime(value)),
-            DeValue::Integer(number) => {
-                let parsed = i64::from_str_radix(number.as_str(), number.radix());
-                if parsed.is_err() {
-                    let label = format!("whole numbers go from {} to {}", i64::MIN, i64::MAX);
-                    problems.push(Diagnostic::new("this number is too large").at(&at, label));
-                }
-                Value::Plain(toml::Value::Integer(parsed.unwrap_or_default()))
-            }
+            DeValue::Integer(number) => Value::Plain(integer(number.as_str(), number.radix())),
             DeValue::Float(number) => {
                 // The parser has checked the form, so what does not parse is no number at all.
                 Value::Plain(toml::Value::Float(number.as_str().parse().unwrap_or(f64::NAN)))
             }
         };
         Item { at, value }
+    }
+}
+
+/// A whole number; as a number with a fraction if it is beyond those of TOML.
+fn integer(text: &str, radix: u32) -> toml::Value {
+    match i64::from_str_radix(text, radix) {
+        Ok(number) => toml::Value::Integer(number),
+        Err(_) => toml::Value::Float(i128::from_str_radix(text, radix).map_or(f64::INFINITY, |number| number as f64)),
     }
 }

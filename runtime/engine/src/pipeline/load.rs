@@ -1,7 +1,7 @@
 //! From the text of a pipeline file to a checked pipeline.
 
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
-use super::document::{self, Entry};
+use super::document::{self, Entry, Value};
 use super::nearest::suggest;
 use super::order::order;
 use super::overrides::Overrides;
@@ -84,7 +84,11 @@ fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<E
         }
     }
     stages.sort_by(|a, b| a.key.cmp(&b.key));
-    if stages.is_empty() && !sections.iter().any(|section| section.key.starts_with("stage")) {
+    // Where the stages are misspelt or no table, that has been said.
+    let reported = |section: &Entry| {
+        section.key.starts_with("stage") && !matches!(&section.item.value, Value::Table(entries) if entries.is_empty())
+    };
+    if stages.is_empty() && !sections.iter().any(reported) {
         let problem = Diagnostic::new("this pipeline has no stages");
         problems.push(problem.help("add one as a section `[stages.NAME]` with `kind = \"...\"`".to_owned()));
     }

@@ -31,6 +31,8 @@
 
 mod diagnostic;
 mod document;
+mod drawing;
+mod kinds;
 mod load;
 mod nearest;
 mod order;
@@ -42,10 +44,15 @@ mod settings;
 mod stage_section;
 #[cfg(test)]
 mod test_kinds;
+#[cfg(test)]
+mod tests;
+mod text_layout;
 mod topics;
 mod wiring;
+mod write;
 
 pub use diagnostic::PipelineErrors;
+pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
 pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};

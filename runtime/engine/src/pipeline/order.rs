@@ -16,7 +16,8 @@ pub(super) fn order(count: usize, edges: &BTreeSet<(usize, usize)>) -> Result<Ve
     let nodes: Vec<NodeIndex> = (0..count).map(|_| graph.add_node(())).collect();
     let ends = |&(from, to): &(usize, usize)| Some((*nodes.get(from)?, *nodes.get(to)?));
     graph.extend_with_edges(edges.iter().filter_map(ends));
-    let mut waiting: Vec<usize> = nodes.iter().map(|&stage| graph.neighbors_directed(stage, Direction::Incoming).count()).collect();
+    let mut waiting: Vec<usize> =
+        nodes.iter().map(|&stage| graph.neighbors_directed(stage, Direction::Incoming).count()).collect();
     let mut ready: BTreeSet<usize> = (0..count).filter(|&stage| waiting[stage] == 0).collect();
     let mut sorted = Vec::with_capacity(count);
     while let Some(stage) = ready.pop_first() {

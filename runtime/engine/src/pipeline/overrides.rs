@@ -93,7 +93,7 @@ impl Overrides {
             let Some(stage) = setting.find_stage(stages, &at, problems) else { continue };
             let Value::Table(entries) = &mut stage.item.value else { continue };
             let value = setting.text.get(setting.value..).unwrap_or_default();
-            let Some(item) = document::parse_value(value, source, setting.value, problems) else {
+            let Some(item) = document::parse_value(value, source, setting.value) else {
                 problems.push(Diagnostic::new("this setting is not TOML").at(&at, ""));
                 continue;
             };
@@ -112,12 +112,7 @@ fn is_word(value: &str) -> bool {
 }
 
 impl Setting {
-    fn find_stage<'a>(
-        &self,
-        stages: &'a mut [Entry],
-        at: &Location,
-        problems: &mut Problems,
-    ) -> Option<&'a mut Entry> {
+    fn find_stage<'a>(&self, stages: &'a mut [Entry], at: &Location, problems: &mut Problems) -> Option<&'a mut Entry> {
         let found: Vec<usize> = match &self.stage {
             Target::Named(name) => (0..stages.len()).filter(|&index| &stages[index].key == name).collect(),
             Target::OnlyOfKind(kind) => (0..stages.len()).filter(|&index| is_of_kind(&stages[index], kind)).collect(),

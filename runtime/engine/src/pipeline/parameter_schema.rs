@@ -126,7 +126,11 @@ fn list_text(root: &Value, schema: &Value) -> String {
 fn choices(schema: &Value) -> Option<Vec<(String, String)>> {
     let plain = |schema: &Value| -> Option<Vec<(String, String)>> {
         let values = schema.get("enum")?.as_array()?;
-        values.iter().filter(|value| !value.is_null()).map(|value| Some((value.as_str()?.to_owned(), String::new()))).collect()
+        values
+            .iter()
+            .filter(|value| !value.is_null())
+            .map(|value| Some((value.as_str()?.to_owned(), String::new())))
+            .collect()
     };
     if let Some(values) = plain(schema) {
         return Some(values);

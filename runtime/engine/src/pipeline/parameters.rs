@@ -1,7 +1,7 @@
 //! The parameters of a stage, each checked by itself so that every wrong one is shown.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
-use super::document::Entry;
+use super::document::{Entry, Item, Value};
 use super::nearest::{nearest, quoted_list};
 use super::parameter_schema::{ParameterInfo, parameters_of};
 use crate::stage::StageKind;
@@ -28,7 +28,7 @@ pub(super) fn read_parameters(
         let alone = toml::Table::from_iter([(entry.key.clone(), entry.item.to_toml())]);
         match kind.check_parameters(&alone) {
             Ok(_) => table.extend(alone),
-            Err(error) => problems.push(wrong_value(entry, info, error.message())),
+            Err(error) => problems.push(wrong_value(kind, entry, info, error.message())),
         }
     }
     match kind.check_parameters(&table) {
@@ -45,7 +45,7 @@ pub(super) fn read_parameters(
             }
         }
         Err(error) => {
-            let title = format!("these parameters do not go together in a `{}`", kind.name);
+            let title = format!("these parameters do not go together in `{}`", kind.name);
             problems.push(Diagnostic::new(title).at(stage_at, error.message()));
         }
     }
@@ -56,7 +56,7 @@ fn unknown_parameter(kind: &StageKind, entry: &Entry, known: &[ParameterInfo]) -
     let names: Vec<&str> = known.iter().map(|info| info.name.as_str()).filter(|name| !name.contains('.')).collect();
     let all = names.iter().copied().chain(RESERVED_KEYS);
     let problem = Diagnostic::new(format!("unknown parameter `{}`", entry.key))
-        .at(&entry.key_at, format!("a `{}` has no such parameter", kind.name));
+        .at(&entry.key_at, format!("`{}` has no such parameter", kind.name));
     match nearest(&entry.key, all) {
         Some(name) => problem.help(format!("did you mean `{name}`?")),
         None if names.is_empty() => problem.note("it has no parameters"),
@@ -64,23 +64,41 @@ fn unknown_parameter(kind: &StageKind, entry: &Entry, known: &[ParameterInfo]) -
     }
 }
 
-fn wrong_value(entry: &Entry, info: Option<&ParameterInfo>, message: &str) -> Diagnostic {
-    let Some(info) = info else {
-        return Diagnostic::new(format!("wrong value of `{}`", entry.key)).at(&entry.item.at, message);
-    };
-    let given = entry.item.as_str();
-    let found = match (given, entry.item.as_integer()) {
-        (Some(text), _) if !info.values.is_empty() => format!("\"{text}\""),
-        (_, Some(number)) => format!("`{number}`"),
-        _ => entry.item.describe().to_owned(),
-    };
-    let problem = Diagnostic::new(format!("wrong value of `{}`", entry.key))
-        .at(&entry.item.at, format!("expected {}, found {found}", info.expected()));
-    if info.values.is_empty() {
-        // What lies inside a list or a table is known to the parser alone.
-        let inside = matches!(entry.item.value, super::document::Value::List(_) | super::document::Value::Table(_));
-        return if inside { problem.note(message) } else { problem };
+fn wrong_value(kind: &StageKind, entry: &Entry, info: Option<&ParameterInfo>, message: &str) -> Diagnostic {
+    let problem = Diagnostic::new(format!("wrong value of `{}`", entry.key));
+    let Some(info) = info else { return problem.at(&entry.item.at, message) };
+    let expected = info.expected();
+    match &entry.item.value {
+        Value::Table(_) if info.type_text == "table" => problem.at(&entry.item.at, message),
+        Value::List(items) if info.type_text.starts_with("list") => {
+            let wrong = items.iter().find(|item| !fits_alone(kind, &entry.key, item));
+            match wrong.filter(|_| fits_empty(kind, &entry.key)) {
+                Some(item) => problem.at(&item.at, format!("expected {expected}, and this is {}", item.describe())),
+                None => problem.at(&entry.item.at, format!("expected {expected}")).note(message),
+            }
+        }
+        _ => {
+            let text = entry.item.as_str();
+            let found = match (text, entry.item.as_integer()) {
+                (Some(text), _) if !info.values.is_empty() => format!("\"{text}\""),
+                (_, Some(number)) => format!("`{number}`"),
+                _ => entry.item.describe().to_owned(),
+            };
+            let near = text.and_then(|text| nearest(text, info.values.iter().map(|(value, _)| value.as_str())));
+            let problem = problem.at(&entry.item.at, format!("expected {expected}, found {found}"));
+            let problem = problem.help(near.map(|value| format!("did you mean \"{value}\"?")));
+            // A whole number of which the schema does not say why it is wrong is too large.
+            let too_large = entry.item.as_integer().is_some_and(|number| number > i64::from(u8::MAX));
+            if too_large { problem.note(message) } else { problem }
+        }
     }
-    let near = given.and_then(|text| nearest(text, info.values.iter().map(|(value, _)| value.as_str())));
-    problem.help(near.map(|value| format!("did you mean \"{value}\"?")))
+}
+
+fn fits_alone(kind: &StageKind, key: &str, item: &Item) -> bool {
+    let list = toml::Value::Array(vec![item.to_toml()]);
+    kind.check_parameters(&toml::Table::from_iter([(key.to_owned(), list)])).is_ok()
+}
+
+fn fits_empty(kind: &StageKind, key: &str) -> bool {
+    kind.check_parameters(&toml::Table::from_iter([(key.to_owned(), toml::Value::Array(Vec::new()))])).is_ok()
 }

@@ -71,7 +71,7 @@ pub(super) fn resolve(text: &str, at: &Location, reader: usize, drafts: &[Draft<
             return resolved;
         }
         (None, outputs) => Diagnostic::new(format!("it is not clear which output of `{name}` is meant"))
-            .at(at, format!("a `{}` has {} outputs", kind.name, outputs.len()))
+            .at(at, format!("`{}` has {} outputs", kind.name, outputs.len()))
             .help(format!("name one: {several}")),
         (Some("*"), _) => {
             (resolved.outputs, resolved.all) = (all(), true);
@@ -85,7 +85,7 @@ pub(super) fn resolve(text: &str, at: &Location, reader: usize, drafts: &[Draft<
             let ports: Vec<&str> = outputs.iter().map(|output| output.name).collect();
             let port_at = at.part(text, name.len() + 1..text.len());
             Diagnostic::new(format!("`{name}` has no output `{port}`"))
-                .at(&port_at, format!("a `{}` has no such output", kind.name))
+                .at(&port_at, format!("`{}` has no such output", kind.name))
                 .help(suggest(port, &ports, "its outputs"))
         }
     };
@@ -116,4 +116,12 @@ pub(super) fn outputs_of_type(port_type: PortType, reader: usize, drafts: &[Draf
         names.extend(fitting.map(|(port, _)| Output { stage, port }.name(drafts)));
     }
     names
+}
+
+/// A type in words.
+pub(super) fn type_text(port_type: PortType) -> String {
+    match port_type {
+        PortType::Any => "any type".to_owned(),
+        PortType::Ros(name) => name.to_owned(),
+    }
 }

@@ -34,20 +34,20 @@ impl Settings {
         const KEYS: [&str; 4] = ["name", "reference", "seed", "depth"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
-                "name" => match text(item, problems) {
+                "name" => match text(key, item, problems) {
                     Some("") => problems.push(empty("the name of the pipeline", &item.at)),
                     Some(name) => self.name = name.to_owned(),
                     None => {}
                 },
                 "reference" => {
-                    if let Some(robot) = text(item, problems) {
+                    if let Some(robot) = text(key, item, problems) {
                         check_reference(robot, &item.at, problems);
                         self.reference = Some(robot.to_owned());
                     }
                 }
-                "seed" => match item.as_integer().map(u64::try_from) {
-                    Some(Ok(seed)) => self.seed = seed,
-                    _ => problems.push(wrong_type(item, "a whole number, at least 0")),
+                "seed" => match read_seed(item) {
+                    Some(seed) => self.seed = seed,
+                    None => problems.push(wrong_type(key, item, "a whole number, at least 0")),
                 },
                 "depth" => self.depth = depth(item, problems).unwrap_or(DEFAULT_DEPTH),
                 _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
@@ -72,7 +72,7 @@ impl Settings {
                     continue;
                 }
             };
-            let Some(pattern) = text(item, problems) else { continue };
+            let Some(pattern) = text(key, item, problems) else { continue };
             check_pattern(pattern, &item.at, problems);
             if !pattern.starts_with('/') {
                 let label = "a topic starts with `/`";
@@ -95,6 +95,14 @@ impl Settings {
     }
 }
 
+/// TOML has no whole numbers above 2^63, so a larger seed stands in quotes.
+fn read_seed(item: &Item) -> Option<u64> {
+    match item.as_str() {
+        Some(text) => text.parse().ok(),
+        None => item.as_integer()?.try_into().ok(),
+    }
+}
+
 fn read_frames(item: &Item, key_at: &Location, problems: &mut Problems) -> Option<TfFrames> {
     const KEYS: [&str; 2] = ["map_frame", "base_frame"];
     let (mut map_frame, mut base_frame) = (None, None);
@@ -107,7 +115,7 @@ fn read_frames(item: &Item, key_at: &Location, problems: &mut Problems) -> Optio
                 continue;
             }
         };
-        let pattern = text(item, problems);
+        let pattern = text(key, item, problems);
         if let Some(pattern) = pattern {
             check_pattern(pattern, &item.at, problems);
         }
@@ -128,9 +136,11 @@ fn check_pattern(pattern: &str, at: &Location, problems: &mut Problems) {
     let others = pattern.replace("{robot}", "");
     let place = others.find(['{', '}']).map(|_| pattern.find('{').unwrap_or_default());
     if count != 1 {
-        let label = format!("expected `{{robot}}` once, found it {}", if count == 0 { "nowhere" } else { "twice or more" });
+        let label =
+            format!("expected `{{robot}}` once, found it {}", if count == 0 { "nowhere" } else { "twice or more" });
         let problem = Diagnostic::new("this pattern does not tell the robots apart").at(at, label);
-        problems.push(problem.help("write `{robot}` where the name of the robot stands, as in `/{robot}/map`".to_owned()));
+        problems
+            .push(problem.help("write `{robot}` where the name of the robot stands, as in `/{robot}/map`".to_owned()));
     } else if place.is_some() {
         let label = "only `{robot}` may stand in braces";
         problems.push(Diagnostic::new("this pattern holds an unknown placeholder").at(at, label));
@@ -154,7 +164,7 @@ pub(super) fn depth(item: &Item, problems: &mut Problems) -> Option<usize> {
     let depth = item.as_integer().and_then(|depth| usize::try_from(depth).ok());
     let depth = depth.filter(|depth| (1..=MAX_DEPTH).contains(depth));
     if depth.is_none() {
-        let problem = wrong_type(item, &format!("a whole number from 1 to {MAX_DEPTH}"));
+        let problem = wrong_type("depth", item, &format!("a whole number from 1 to {MAX_DEPTH}"));
         problems.push(problem.note("`depth` is how many samples an input may hold before the sender waits"));
     }
     depth
@@ -170,22 +180,22 @@ pub(super) fn entries<'a>(item: &'a Item, what: &str, problems: &mut Problems) -
     &[]
 }
 
-/// The text of an item; an error if it is none.
-pub(super) fn text<'a>(item: &'a Item, problems: &mut Problems) -> Option<&'a str> {
+/// The text that `key` is set to; an error if it is none.
+pub(super) fn text<'a>(key: &str, item: &'a Item, problems: &mut Problems) -> Option<&'a str> {
     let text = item.as_str();
     if text.is_none() {
-        problems.push(wrong_type(item, "text in quotes"));
+        problems.push(wrong_type(key, item, "text in quotes"));
     }
     text
 }
 
-/// A value is not what it should be.
-pub(super) fn wrong_type(item: &Item, expected: &str) -> Diagnostic {
+/// What `key` is set to is not what it should be.
+pub(super) fn wrong_type(key: &str, item: &Item, expected: &str) -> Diagnostic {
     let found = match item.as_integer() {
         Some(number) => format!("`{number}`"),
         None => item.describe().to_owned(),
     };
-    Diagnostic::new("wrong value").at(&item.at, format!("expected {expected}, found {found}"))
+    Diagnostic::new(format!("wrong value of `{key}`")).at(&item.at, format!("expected {expected}, found {found}"))
 }
 
 /// A key that a section does not have.

@@ -89,14 +89,16 @@ fn read_kind<'a>(
 ) -> Option<&'a StageKind> {
     let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
     let Some(entry) = kind else {
-        let problem = Diagnostic::new(format!("the stage `{}` has no kind", stage.key)).at(&stage.key_at, "expected `kind = \"...\"`");
+        let problem = Diagnostic::new(format!("the stage `{}` has no kind", stage.key))
+            .at(&stage.key_at, "expected `kind = \"...\"`");
         problems.push(problem.help(suggest(&stage.key, &names, "there are")));
         return None;
     };
-    let name = text(&entry.item, problems)?;
+    let name = text("kind", &entry.item, problems)?;
     let found = registry.get(name);
     if found.is_none() {
-        let problem = Diagnostic::new(format!("unknown kind of stage `{name}`")).at(&entry.item.at, "there is no such kind");
+        let problem =
+            Diagnostic::new(format!("unknown kind of stage `{name}`")).at(&entry.item.at, "there is no such kind");
         problems.push(problem.help(suggest(name, &names, "there are")));
     }
     found

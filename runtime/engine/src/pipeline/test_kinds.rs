@@ -143,12 +143,18 @@ pub(super) fn registry() -> Registry {
             vec![InputPort::one("map", GRID, "Maps."), InputPort::many("alignment", ALIGNMENT, "How they lie.")],
             vec![OutputPort::new("map", GRID, "The merged map.").on_topic("/map")],
         ),
-        stage::<File>("mcap_sink", "Writes a log.", vec![InputPort::many("in", PortType::Any, "What to write.")], vec![]),
+        stage::<File>(
+            "mcap_sink",
+            "Writes a log.",
+            vec![InputPort::many("in", PortType::Any, "What to write.")],
+            vec![],
+        ),
     ])
 }
 
 /// A pipeline without errors.
-pub(super) const VALID: &str = r#"[pipeline]
+pub(super) const VALID: &str = r#"# Aligns maps by their walls.
+[pipeline]
 name = "walls"
 reference = "robot1"
 seed = 7

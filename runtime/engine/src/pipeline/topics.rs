@@ -25,10 +25,7 @@ pub(super) fn read_topics(
     let mut topics: Vec<Topic> = kind
         .outputs
         .iter()
-        .map(|port| Topic {
-            template: port.topic.map_or_else(|| standard(port.name), own),
-            at: stage.key_at.clone(),
-        })
+        .map(|port| Topic { template: port.topic.map_or_else(|| standard(port.name), own), at: stage.key_at.clone() })
         .collect();
     for Entry { key, key_at, item } in given.map(|item| entries(item, "topics", problems)).unwrap_or_default() {
         let port = kind.outputs.iter().position(|port| port.name == key);
@@ -36,7 +33,7 @@ pub(super) fn read_topics(
             problems.push(unknown_output(kind, key, key_at));
             continue;
         };
-        if let Some(template) = text(item, problems) {
+        if let Some(template) = text(key, item, problems) {
             *topic = Topic { template: own(template), at: item.at.clone() };
             check_form(topic, problems);
         }
@@ -50,8 +47,8 @@ pub(super) fn read_topics(
 fn unknown_output(kind: &StageKind, port: &str, at: &Location) -> Diagnostic {
     let names: Vec<&str> = kind.outputs.iter().map(|port| port.name).collect();
     let label = match names.is_empty() {
-        true => format!("a `{}` has no outputs", kind.name),
-        false => format!("a `{}` has no such output", kind.name),
+        true => format!("`{}` has no outputs", kind.name),
+        false => format!("`{}` has no such output", kind.name),
     };
     Diagnostic::new(format!("unknown output `{port}`")).at(at, label).help(suggest(port, &names, "its outputs"))
 }
@@ -98,8 +95,9 @@ pub(super) fn check_distinct(drafts: &[Draft<'_>], is_read: impl Fn(usize, usize
             };
             let (name, port, template) = (draft.name, output.name, topic.template.as_str());
             let other_name = other.name;
-            let problem = Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
-                .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
+            let problem =
+                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
+                    .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
             let problem = match topic.at == other_topic.at {
                 true => problem,
                 false => problem.context(&other_topic.at, format!("`{other_name}.{other_port}` goes there too")),

@@ -3,7 +3,7 @@
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::nearest::{quoted_list, suggest};
-use super::reference::{Output, outputs_of_type, resolve};
+use super::reference::{Output, outputs_of_type, resolve, type_text};
 use super::settings::{text, wrong_type};
 use super::stage_section::Draft;
 use crate::stage::{InputPort, PortType, Registry, StageKind};
@@ -41,7 +41,8 @@ impl Wiring {
     pub(super) fn new(drafts: &[Draft<'_>], registry: &Registry, problems: &mut Problems) -> Self {
         let mut wiring = Self::default();
         for (stage, draft) in drafts.iter().enumerate() {
-            let mut binder = Binder { drafts, stage, inputs: Vec::new(), failed: Vec::new(), wiring: &mut wiring, problems };
+            let mut binder =
+                Binder { drafts, stage, inputs: Vec::new(), failed: Vec::new(), wiring: &mut wiring, problems };
             if let Some(inputs) = draft.inputs {
                 binder.read(inputs);
             }
@@ -83,7 +84,7 @@ impl Binder<'_> {
         if let Some(kind) = self.drafts[self.stage].kind
             && kind.inputs.is_empty()
         {
-            let label = format!("a `{}` takes no inputs", kind.name);
+            let label = format!("`{}` takes no inputs", kind.name);
             self.problems.push(Diagnostic::new("a source has no inputs").at(&inputs.at, label));
             return;
         }
@@ -91,7 +92,7 @@ impl Binder<'_> {
             Value::List(items) => items.iter().for_each(|item| self.read_entry(item, None)),
             Value::Table(entries) => entries.iter().for_each(|entry| self.read_port(entry)),
             Value::Plain(_) => {
-                let problem = wrong_type(inputs, "a list of outputs or a table of ports");
+                let problem = wrong_type("inputs", inputs, "a list of outputs or a table of ports");
                 let example = inputs.as_str().unwrap_or("STAGE.PORT");
                 self.problems.push(problem.help(format!("write `inputs = [\"{example}\"]`")));
                 self.failed.extend(self.reader().1.iter().map(|_| None).collect::<Vec<_>>());
@@ -106,7 +107,7 @@ impl Binder<'_> {
         if let (None, Some(kind)) = (port, self.drafts[self.stage].kind) {
             let names: Vec<&str> = ports.iter().map(|port| port.name).collect();
             let problem = Diagnostic::new(format!("unknown input `{key}`"))
-                .at(key_at, format!("a `{}` has no such input", kind.name))
+                .at(key_at, format!("`{}` has no such input", kind.name))
                 .help(suggest(key, &names, "its inputs"));
             self.problems.push(problem);
             self.failed.push(None);
@@ -120,7 +121,7 @@ impl Binder<'_> {
 
     /// One entry, for the given port or for the first that it fits.
     fn read_entry(&mut self, item: &Item, port: Option<usize>) {
-        let Some(text) = text(item, self.problems) else {
+        let Some(text) = text("inputs", item, self.problems) else {
             self.failed.push(port);
             return;
         };
@@ -158,9 +159,12 @@ impl Binder<'_> {
             Some(index) => match ports.get(index) {
                 Some(port) if fits(port) => index,
                 Some(port) => {
-                    return Err(Diagnostic::new(format!("`{name}` does not fit the input `{}` of `{reader}`", port.name))
-                        .at(at, format!("expected {}, found {port_type}", type_text(port.port_type)))
-                        .help(self.suggest_feeders(index)));
+                    return Err(Diagnostic::new(format!(
+                        "`{name}` does not fit the input `{}` of `{reader}`",
+                        port.name
+                    ))
+                    .at(at, format!("expected {}, found {}", type_text(port.port_type), type_text(port_type)))
+                    .help(self.suggest_feeders(index)));
                 }
                 None => return Ok(()),
             },
@@ -212,12 +216,12 @@ impl Binder<'_> {
         }
         let problem = Diagnostic::new(format!("`{name}` fits no input of `{reader}`"));
         if let [port] = ports {
-            let label = format!("expected {}, found {port_type}", type_text(port.port_type));
+            let label = format!("expected {}, found {}", type_text(port.port_type), type_text(port_type));
             return problem.at(at, label).help(self.suggest_feeders(0));
         }
         let taken = ports.iter().map(|port| format!("`{}` takes {}", port.name, type_text(port.port_type)));
         problem
-            .at(at, format!("it gives {port_type}"))
+            .at(at, format!("it gives {}", type_text(port_type)))
             .note(format!("its inputs: {}", taken.collect::<Vec<_>>().join(", ")))
     }
 
@@ -252,13 +256,6 @@ impl Binder<'_> {
         let port = self.reader().1.get(port)?;
         let names = outputs_of_type(port.port_type, self.stage, self.drafts);
         (!names.is_empty()).then(|| format!("`{}` could be fed by {}", port.name, quoted_list(&names)))
-    }
-}
-
-fn type_text(port_type: PortType) -> String {
-    match port_type {
-        PortType::Any => "any type".to_owned(),
-        PortType::Ros(name) => name.to_owned(),
     }
 }
 
