@@ -41,8 +41,8 @@ struct SourceText {
 #[derive(Clone, Debug)]
 pub(super) struct Diagnostic {
     title: String,
-    at: Option<(Location, String)>,
-    context: Vec<(Location, String)>,
+    /// The places that it is about, each with its label: first the one that is wrong.
+    marks: Vec<(Location, String)>,
     notes: Vec<String>,
     helps: Vec<String>,
 }
@@ -50,18 +50,18 @@ pub(super) struct Diagnostic {
 impl Diagnostic {
     /// An error about the pipeline as a whole.
     pub(super) fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), at: None, context: Vec::new(), notes: Vec::new(), helps: Vec::new() }
+        Self { title: title.into(), marks: Vec::new(), notes: Vec::new(), helps: Vec::new() }
     }
 
     /// Underlines the place, with what is wrong with it or what was expected there.
     pub(super) fn at(mut self, location: &Location, label: impl Into<String>) -> Self {
-        self.at = Some((location.clone(), label.into()));
+        self.marks.insert(0, (location.clone(), label.into()));
         self
     }
 
     /// Underlines another place that has to do with it.
     pub(super) fn context(mut self, location: &Location, label: impl Into<String>) -> Self {
-        self.context.push((location.clone(), label.into()));
+        self.marks.push((location.clone(), label.into()));
         self
     }
 
@@ -105,7 +105,8 @@ impl Problems {
 
     /// The errors in the order of the file.
     pub(super) fn into_errors(mut self) -> PipelineErrors {
-        self.0.list.sort_by(|a, b| a.at.as_ref().map(|at| &at.0).cmp(&b.at.as_ref().map(|at| &at.0)));
+        let place = |diagnostic: &Diagnostic| diagnostic.marks.first().map(|(location, _)| location.clone());
+        self.0.list.sort_by_cached_key(place);
         self.0
     }
 }
@@ -145,9 +146,8 @@ impl PipelineErrors {
 
     fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> Group<'a> {
         let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
-        let primary = diagnostic.at.iter().map(|at| (at, AnnotationKind::Primary));
-        let context = diagnostic.context.iter().map(|at| (at, AnnotationKind::Context));
-        let marks: Vec<_> = primary.chain(context).collect();
+        let kinds = std::iter::once(AnnotationKind::Primary).chain(std::iter::repeat(AnnotationKind::Context));
+        let marks: Vec<_> = diagnostic.marks.iter().zip(kinds).collect();
         // The text that holds the primary mark comes first.
         let mut order: Vec<usize> = marks.iter().map(|((location, _), _)| location.source).collect();
         let mut seen = std::collections::BTreeSet::new();

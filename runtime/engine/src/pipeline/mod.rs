@@ -29,6 +29,7 @@
 //! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
 //! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
 
+mod binding;
 mod diagnostic;
 mod document;
 mod drawing;

@@ -14,7 +14,7 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
 }
 
 /// "did you mean `...`?", or else what there is to choose from.
-pub(super) fn suggest<'a>(wrong: &str, names: &[&'a str], what: &str) -> Option<String> {
+pub(super) fn suggest(wrong: &str, names: &[&str], what: &str) -> Option<String> {
     match nearest(wrong, names.iter().copied()) {
         Some(name) => Some(format!("did you mean `{name}`?")),
         None if names.is_empty() => None,

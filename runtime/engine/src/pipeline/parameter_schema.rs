@@ -179,3 +179,70 @@ impl ParameterInfo {
         json.into()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn shown(root: &Value) -> Vec<(String, String, bool)> {
+        let mut parameters = Vec::new();
+        collect(root, root, "", 0, &mut parameters);
+        parameters.into_iter().map(|info| (info.name, info.type_text, info.optional)).collect()
+    }
+
+    #[test]
+    fn types_are_put_in_words() {
+        let cases = [
+            (json!({ "type": "number" }), "number"),
+            (json!({ "type": ["number", "null"] }), "number"),
+            (
+                json!({ "type": "integer", "format": "uint8", "minimum": 0, "maximum": 255 }),
+                "whole number from 0 to 255",
+            ),
+            (json!({ "type": "integer", "format": "int64" }), "whole number"),
+            (json!({ "type": "array", "items": { "type": "string" } }), "list of texts"),
+            (
+                json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } }),
+                "list of whole numbers, at least 0",
+            ),
+            (
+                json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 }),
+                "list of 3 numbers",
+            ),
+            (
+                json!({ "type": "array", "items": { "type": "array", "items": { "type": "number" } } }),
+                "list of (list of numbers)",
+            ),
+            (json!({ "type": "string", "enum": ["a", "b"] }), "\"a\" | \"b\""),
+            (json!(true), "value"),
+        ];
+        for (schema, expected) in cases {
+            assert_eq!(type_text(&schema, &schema), expected);
+        }
+    }
+
+    #[test]
+    fn an_optional_choice_and_a_table_in_a_table_are_resolved() {
+        let root = json!({
+            "properties": {
+                "mode": { "anyOf": [{ "$ref": "#/$defs/Mode" }, { "type": "null" }] },
+                "tf": { "$ref": "#/$defs/Frames" },
+            },
+            "$defs": {
+                "Mode": { "oneOf": [{ "const": "a", "description": "First." }, { "type": "string", "enum": ["b", "c"] }] },
+                "Frames": { "type": "object", "properties": { "map_frame": { "type": "string" } } },
+            },
+        });
+        let expected =
+            [("mode", "\"a\" | \"b\" | \"c\"", true), ("tf", "table", false), ("tf.map_frame", "text", false)];
+        let expected = expected.map(|(name, text, optional)| (name.to_owned(), text.to_owned(), optional));
+        assert_eq!(shown(&root), expected);
+    }
+
+    #[test]
+    fn a_schema_that_names_itself_comes_to_an_end() {
+        let root = json!({ "properties": { "a": { "$ref": "#/properties/a" }, "b": { "$ref": "#" } } });
+        assert!(shown(&root).len() < 100);
+    }
+}
