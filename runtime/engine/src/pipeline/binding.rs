@@ -125,77 +125,75 @@ impl<'a> Binder<'a> {
             let problem = Diagnostic::new(format!("`{name}` is given twice")).at(at, "the second time");
             return Err(problem.context(&first.at, "the first time"));
         }
-        let (reader, ports) = self.reader();
         let port_type = from.port_type(self.drafts);
-        let fits = |port: &InputPort| port.port_type == port_type || port.port_type == PortType::Any;
         let port = match port {
-            Some(index) => match ports.get(index) {
-                Some(port) if fits(port) => index,
-                Some(port) => {
-                    return Err(Diagnostic::new(format!(
-                        "`{name}` does not fit the input `{}` of `{reader}`",
-                        port.name
-                    ))
-                    .at(at, format!("expected {}, found {}", type_text(port.port_type), type_text(port_type)))
-                    .help(self.suggest_feeders(index)));
-                }
-                None => return Ok(()),
-            },
+            Some(port) => port,
             None => self.choose(port_type, all).ok_or_else(|| self.no_port(from, all, at))?,
         };
-        let declaration = &ports[port];
-        let feeder = self.inputs.iter().find(|input| input.port == port).filter(|_| !declaration.many);
-        if let Some(first) = feeder {
-            let problem = Diagnostic::new(format!("the input `{}` of `{reader}` takes one output", declaration.name));
-            let problem = problem.at(at, format!("`{name}` is one too many"));
-            let by = first.from.name(self.drafts);
-            return Err(if first.at == *at { problem } else { problem.context(&first.at, format!("fed by `{by}`")) });
+        let Some(declaration) = self.reader().1.get(port) else { return Ok(()) };
+        if !accepts(declaration, port_type) {
+            return Err(self.wrong_port(from, port, at));
         }
-        if all && !declaration.many {
-            let problem = Diagnostic::new(format!("the input `{}` of `{reader}` takes one output", declaration.name));
-            return Err(problem.at(at, "`*` means all outputs of a stage"));
+        if !self.has_room(port, all) {
+            return Err(self.no_room(from, all, port, at));
         }
         self.inputs.push(Input { port, from, at: at.clone() });
         Ok(())
     }
 
-    /// The first port that is free and of exactly this type or, failing that, of any type.
+    /// The first port that has room and is of exactly this type or, failing that, of any type.
     fn choose(&self, port_type: PortType, all: bool) -> Option<usize> {
         let (_, ports) = self.reader();
-        let free = |&index: &usize| match ports[index].many {
-            true => true,
-            false => !all && self.inputs.iter().all(|input| input.port != index),
-        };
-        let of_type = |wanted| (0..ports.len()).filter(free).find(|&index| ports[index].port_type == wanted);
+        let room = || (0..ports.len()).filter(|&port| self.has_room(port, all));
+        let of_type = |wanted| room().find(|&port| ports[port].port_type == wanted);
         of_type(port_type).or_else(|| of_type(PortType::Any))
     }
 
-    /// Why an output fits no port of the stage.
+    /// Whether a port takes another output; with `all`, any number of others.
+    fn has_room(&self, port: usize, all: bool) -> bool {
+        let many = self.reader().1.get(port).is_some_and(|port| port.many);
+        many || (!all && self.inputs.iter().all(|input| input.port != port))
+    }
+
+    /// An output fits no port that has room.
     fn no_port(&self, from: Output, all: bool, at: &Location) -> Diagnostic {
         let (reader, ports) = self.reader();
-        let name = from.name(self.drafts);
         let port_type = from.port_type(self.drafts);
-        if let Some(port) = ports.iter().position(|port| port.port_type == port_type) {
-            let port_name = ports[port].name;
-            let problem = Diagnostic::new(format!("the input `{port_name}` of `{reader}` takes one output"));
-            if all {
-                return problem.at(at, "`*` means all outputs of a stage").help(self.suggest_feeders(port));
-            }
-            let problem = problem.at(at, format!("`{name}` is one too many"));
-            let first = self.inputs.iter().find(|input| input.port == port);
-            return first.into_iter().fold(problem, |problem, first| {
-                problem.context(&first.at, format!("`{port_name}` is fed by `{}`", first.from.name(self.drafts)))
-            });
+        if let Some(port) = ports.iter().position(|port| accepts(port, port_type)) {
+            return self.no_room(from, all, port, at);
         }
-        let problem = Diagnostic::new(format!("`{name}` fits no input of `{reader}`"));
-        if let [port] = ports {
-            let label = format!("expected {}, found {}", type_text(port.port_type), type_text(port_type));
-            return problem.at(at, label).help(self.suggest_feeders(0));
+        if ports.len() == 1 {
+            return self.wrong_port(from, 0, at);
         }
-        let taken = ports.iter().map(|port| format!("`{}` takes {}", port.name, type_text(port.port_type)));
-        problem
+        let inputs = ports.iter().map(|port| format!("`{}` takes {}", port.name, type_text(port.port_type)));
+        Diagnostic::new(format!("`{}` fits no input of `{reader}`", from.name(self.drafts)))
             .at(at, format!("it gives {}", type_text(port_type)))
-            .note(format!("its inputs: {}", taken.collect::<Vec<_>>().join(", ")))
+            .note(format!("its inputs: {}", inputs.collect::<Vec<_>>().join(", ")))
+    }
+
+    /// An output has not the type that the port takes.
+    fn wrong_port(&self, from: Output, port: usize, at: &Location) -> Diagnostic {
+        let (reader, ports) = self.reader();
+        let (name, expected) = ports.get(port).map_or(("", PortType::Any), |port| (port.name, port.port_type));
+        let (expected, found) = (type_text(expected), type_text(from.port_type(self.drafts)));
+        Diagnostic::new(format!("`{}` does not fit the input `{name}` of `{reader}`", from.name(self.drafts)))
+            .at(at, format!("expected {expected}, found {found}"))
+            .help(self.suggest_feeders(port))
+    }
+
+    /// The port takes one output, and has one or is given several.
+    fn no_room(&self, from: Output, all: bool, port: usize, at: &Location) -> Diagnostic {
+        let (reader, ports) = self.reader();
+        let name = ports.get(port).map_or("", |port| port.name);
+        let problem = Diagnostic::new(format!("the input `{name}` of `{reader}` takes one output"));
+        if all {
+            return problem.at(at, "`*` means all outputs of a stage").help(self.suggest_feeders(port));
+        }
+        let problem = problem.at(at, format!("`{}` is one too many", from.name(self.drafts)));
+        let first = self.inputs.iter().find(|input| input.port == port);
+        first.into_iter().fold(problem, |problem, first| {
+            problem.context(&first.at, format!("`{name}` is fed by `{}`", first.from.name(self.drafts)))
+        })
     }
 
     /// Reports every input that must be wired and is not, unless an entry that was to feed it has been reported.
@@ -230,4 +228,8 @@ impl<'a> Binder<'a> {
         let names = outputs_of_type(port.port_type, self.stage, self.drafts);
         (!names.is_empty()).then(|| format!("`{}` could be fed by {}", port.name, quoted_list(&names)))
     }
+}
+
+fn accepts(port: &InputPort, port_type: PortType) -> bool {
+    port.port_type == port_type || port.port_type == PortType::Any
 }

@@ -2,7 +2,7 @@
 
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
 use super::document::{self, Entry, Value};
-use super::nearest::suggest;
+use super::nearest::did_you_mean;
 use super::order::order;
 use super::overrides::Overrides;
 use super::settings::{Settings, entries};
@@ -78,8 +78,7 @@ fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<E
             _ => {
                 let problem = Diagnostic::new(format!("unknown section `{key}`"));
                 let label = "expected `pipeline`, `robots` or `stages`";
-                let help = suggest(key, &SECTIONS, "").filter(|help| help.contains('?'));
-                problems.push(problem.at(key_at, label).help(help));
+                problems.push(problem.at(key_at, label).help(did_you_mean(key, SECTIONS)));
             }
         }
     }

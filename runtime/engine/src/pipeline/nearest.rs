@@ -13,13 +13,15 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
     best.map(|(_, name)| name)
 }
 
+/// "did you mean `...`?", if a name is near enough.
+pub(super) fn did_you_mean<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    nearest(wrong, names).map(|name| format!("did you mean `{name}`?"))
+}
+
 /// "did you mean `...`?", or else what there is to choose from.
 pub(super) fn suggest(wrong: &str, names: &[&str], what: &str) -> Option<String> {
-    match nearest(wrong, names.iter().copied()) {
-        Some(name) => Some(format!("did you mean `{name}`?")),
-        None if names.is_empty() => None,
-        None => Some(format!("{what}: {}", quoted_list(names))),
-    }
+    let list = || (!names.is_empty()).then(|| format!("{what}: {}", quoted_list(names)));
+    did_you_mean(wrong, names.iter().copied()).or_else(list)
 }
 
 /// "`a`, `b`, `c`", cut after the first few.

@@ -2,7 +2,7 @@
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
-use super::nearest::{quoted_list, suggest};
+use super::nearest::{did_you_mean, quoted_list};
 use super::overrides::Overrides;
 use crate::message::FixedText;
 use crate::stage::{RobotTopics, TfFrames};
@@ -201,8 +201,7 @@ pub(super) fn wrong_type(key: &str, item: &Item, expected: &str) -> Diagnostic {
 /// A key that a section does not have.
 pub(super) fn unknown_key(key: &str, at: &Location, section: &str, keys: &[&str]) -> Diagnostic {
     let problem = Diagnostic::new(format!("unknown key `{key}` in `{section}`"));
-    let help = suggest(key, keys, "its keys");
-    problem.at(at, format!("expected one of {}", quoted_list(keys))).help(help.filter(|help| help.contains('?')))
+    problem.at(at, format!("expected one of {}", quoted_list(keys))).help(did_you_mean(key, keys.iter().copied()))
 }
 
 fn empty(what: &str, at: &Location) -> Diagnostic {

@@ -111,7 +111,7 @@ fn a_stage_with_several_outputs_needs_its_port_named() {
 #[test]
 fn a_type_that_does_not_fit_is_shown_beside_the_one_expected() {
     let says = [
-        "`log.pose` fits no input of `lines`",
+        "`log.pose` does not fit the input `map` of `lines`",
         "expected nav_msgs/msg/OccupancyGrid, found geometry_msgs/msg/PoseStamped",
         "`map` could be fed by `fuse.map`, `log.map`",
     ];
