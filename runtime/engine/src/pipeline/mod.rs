@@ -1,4 +1,62 @@
 //! Pipelines: which stages there are, and which output feeds which input.
+//!
+//! A pipeline is a TOML file:
+//!
+//! ```toml
+//! [pipeline]
+//! name = "walls"
+//! reference = "robot1"            # whose map frame is the world; the first robot by name if left out
+//! seed = 7                        # seeds all randomness; 0 if left out
+//! depth = 16                      # how many samples an input may hold before the sender waits
+//!
+//! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
+//! map = "/{robot}/map"
+//!
+//! [stages.log]
+//! kind = "mcap_source"
+//! files = ["a.mcap"]              # any key but `kind`, `inputs`, `topics` and `depth` is a parameter
+//!
+//! [stages.lines]
+//! kind = "line_extractor"
+//! inputs = ["log.map"]            # STAGE.PORT, or STAGE where it has one output only
+//! topics = { segments = "/{robot}/walls" }
+//!
+//! [stages.out]
+//! kind = "mcap_sink"
+//! inputs = { in = ["log.*", "lines"] }    # by port; `*` is all outputs
+//! ```
+//!
+//! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
+//! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
+
+mod binding;
+mod diagnostic;
+mod document;
+mod drawing;
+mod kinds;
+mod load;
+mod nearest;
+mod order;
+mod overrides;
+mod parameter_schema;
+mod parameters;
+mod reference;
+mod settings;
+mod stage_section;
+#[cfg(test)]
+mod test_kinds;
+#[cfg(test)]
+mod tests;
+mod text_layout;
+mod topics;
+mod wiring;
+mod write;
+
+pub use diagnostic::PipelineErrors;
+pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
+pub use overrides::{Overrides, SettingError};
+pub use parameter_schema::{ParameterInfo, parameters_of};
+pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
 
 use crate::stage::{Context, RobotTopics, StageKind};
 

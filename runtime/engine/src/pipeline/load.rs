@@ -1,0 +1,149 @@
+//! From the text of a pipeline file to a checked pipeline.
+
+use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
+use super::document::{self, Entry, Value};
+use super::nearest::did_you_mean;
+use super::order::order;
+use super::overrides::Overrides;
+use super::settings::{Settings, entries};
+use super::stage_section::{Draft, read_stage};
+use super::topics::check_distinct;
+use super::wiring::{Mention, Wiring, check_used};
+use super::{Pipeline, StageSpec, Wire};
+use crate::stage::Registry;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+impl Pipeline {
+    /// Reads and checks a pipeline file.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is wrong with it, or that it cannot be read.
+    pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
+        let name = path.display().to_string();
+        let problem = match std::fs::read(path).map(String::from_utf8) {
+            Ok(Ok(text)) => return Self::parse(&name, &text, registry, overrides),
+            Ok(Err(error)) => {
+                let byte = error.utf8_error().valid_up_to();
+                format!("cannot read the pipeline `{name}`: byte {byte} is not UTF-8 text")
+            }
+            Err(error) => format!("cannot read the pipeline `{name}`: {error}"),
+        };
+        let mut problems = Problems::new(name, "");
+        problems.push(Diagnostic::new(problem));
+        Err(problems.into_errors())
+    }
+
+    /// Checks the text of a pipeline file; errors call it `source_name`.
+    ///
+    /// # Errors
+    ///
+    /// Everything that is wrong with it.
+    pub fn parse(
+        source_name: &str,
+        text: &str,
+        registry: &Registry,
+        overrides: &Overrides,
+    ) -> Result<Self, PipelineErrors> {
+        let mut problems = Problems::new(source_name, text);
+        let Some(sections) = document::parse(text, &mut problems) else { return Err(problems.into_errors()) };
+
+        let name = Path::new(source_name).file_stem().map_or(source_name.into(), |stem| stem.to_string_lossy());
+        let mut settings = Settings::new(&name);
+        let mut stages = Vec::new();
+        read_sections(&sections, &mut settings, &mut stages, &mut problems);
+        settings.override_with(overrides, &mut problems);
+        overrides.apply(&mut stages, &mut problems);
+
+        let drafts: Vec<Draft<'_>> =
+            stages.iter().map(|stage| read_stage(stage, settings.depth, registry, &mut problems)).collect();
+        let wiring = Wiring::new(&drafts, registry, &mut problems);
+        check_used(&drafts, &wiring, &mut problems);
+        check_distinct(&drafts, |stage, port| wiring.is_read(stage, port), &mut problems);
+        let order = check_order(&drafts, &wiring.mentions, &mut problems);
+
+        if problems.is_empty() { Ok(assemble(settings, drafts, &wiring, &order)) } else { Err(problems.into_errors()) }
+    }
+}
+
+/// Reads the sections, the stages by name.
+fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<Entry>, problems: &mut Problems) {
+    const SECTIONS: [&str; 3] = ["pipeline", "robots", "stages"];
+    for Entry { key, key_at, item } in sections {
+        match key.as_str() {
+            "pipeline" => settings.read_pipeline(item, problems),
+            "robots" => settings.read_robots(item, problems),
+            "stages" => stages.extend_from_slice(entries(item, "stages", problems)),
+            _ => {
+                let problem = Diagnostic::new(format!("unknown section `{key}`"));
+                let label = "expected `pipeline`, `robots` or `stages`";
+                problems.push(problem.at(key_at, label).help(did_you_mean(key, SECTIONS)));
+            }
+        }
+    }
+    stages.sort_by(|a, b| a.key.cmp(&b.key));
+    // Where the stages are misspelt or no table, that has been said.
+    let reported = |section: &Entry| {
+        section.key.starts_with("stage") && !matches!(&section.item.value, Value::Table(entries) if entries.is_empty())
+    };
+    if stages.is_empty() && !sections.iter().any(reported) {
+        let problem = Diagnostic::new("this pipeline has no stages");
+        problems.push(problem.help("add one as a section `[stages.NAME]` with `kind = \"...\"`".to_owned()));
+    }
+}
+
+/// The order of the stages, each behind those that feed it; if there are circles they are reported.
+fn check_order(drafts: &[Draft<'_>], mentions: &[Mention], problems: &mut Problems) -> Vec<usize> {
+    let certain = mentions.iter().filter(|mention| !mention.guessed);
+    let edges: BTreeSet<(usize, usize)> = certain.map(|mention| (mention.from, mention.to)).collect();
+    order(drafts.len(), &edges).unwrap_or_else(|circles| {
+        for circle in circles {
+            problems.push(describe_circle(&circle, drafts, mentions));
+        }
+        Vec::new()
+    })
+}
+
+fn describe_circle(circle: &[usize], drafts: &[Draft<'_>], mentions: &[Mention]) -> Diagnostic {
+    let closed: Vec<usize> = circle.iter().chain(circle.first()).copied().collect();
+    let path: Vec<&str> = closed.iter().map(|&stage| drafts[stage].name).collect();
+    let mut problem = Diagnostic::new(format!("these stages feed each other in a circle: {}", path.join(" -> ")));
+    let mut marked = false;
+    for step in closed.windows(2) {
+        let [from, to] = *step else { continue };
+        let Some(mention) = mentions.iter().find(|mention| mention.from == from && mention.to == to) else { continue };
+        let label = format!("`{}` reads `{}`", drafts[to].name, drafts[from].name);
+        problem = if marked { problem.context(&mention.at, label) } else { problem.at(&mention.at, label) };
+        marked = true;
+    }
+    problem
+}
+
+/// Puts a pipeline without errors together; `order` tells which draft comes where.
+fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: &[usize]) -> Pipeline {
+    let mut place = vec![0; drafts.len()];
+    order.iter().enumerate().for_each(|(new, &old)| place[old] = new);
+    let mut stages: Vec<(usize, StageSpec)> = Vec::with_capacity(drafts.len());
+    for (index, draft) in drafts.into_iter().enumerate() {
+        let Some(kind) = draft.kind else { continue };
+        let wire = |input: &super::wiring::Input| Wire {
+            port: input.port,
+            from_stage: place[input.from.stage],
+            from_port: input.from.port,
+        };
+        let spec = StageSpec {
+            name: draft.name.to_owned(),
+            kind: kind.clone(),
+            parameters: draft.parameters,
+            inputs: wiring.inputs[index].iter().map(wire).collect(),
+            topics: draft.topics.into_iter().map(|topic| topic.template).collect(),
+            depth: draft.depth,
+        };
+        stages.push((place[index], spec));
+    }
+    stages.sort_by_key(|(place, _)| *place);
+    let stages = stages.into_iter().map(|(_, spec)| spec).collect();
+    let Settings { name, reference, seed, robots, .. } = settings;
+    Pipeline { name, reference, seed, robots, stages }
+}

@@ -1,0 +1,209 @@
+//! The sections `[pipeline]` and `[robots]`.
+
+use super::diagnostic::{Diagnostic, Location, Problems};
+use super::document::{Entry, Item, Value};
+use super::nearest::{did_you_mean, quoted_list};
+use super::overrides::Overrides;
+use crate::message::FixedText;
+use crate::stage::{RobotTopics, TfFrames};
+
+/// How many samples an input may hold where the pipeline does not say.
+pub const DEFAULT_DEPTH: usize = 16;
+
+/// The most samples that an input may hold.
+pub const MAX_DEPTH: usize = 4096;
+
+/// What stands in `[pipeline]` and `[robots]`.
+#[derive(Debug)]
+pub(super) struct Settings {
+    pub(super) name: String,
+    pub(super) reference: Option<String>,
+    pub(super) seed: u64,
+    pub(super) depth: usize,
+    pub(super) robots: RobotTopics,
+}
+
+impl Settings {
+    /// A pipeline called `name` that says nothing of itself.
+    pub(super) fn new(name: &str) -> Self {
+        Self { name: name.into(), reference: None, seed: 0, depth: DEFAULT_DEPTH, robots: RobotTopics::default() }
+    }
+
+    /// Takes in the section `[pipeline]`.
+    pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
+        const KEYS: [&str; 4] = ["name", "reference", "seed", "depth"];
+        for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
+            match key.as_str() {
+                "name" => match text(key, item, problems) {
+                    Some("") => problems.push(empty("the name of the pipeline", &item.at)),
+                    Some(name) => self.name = name.to_owned(),
+                    None => {}
+                },
+                "reference" => {
+                    if let Some(robot) = text(key, item, problems) {
+                        check_reference(robot, &item.at, problems);
+                        self.reference = Some(robot.to_owned());
+                    }
+                }
+                "seed" => match read_seed(item) {
+                    Some(seed) => self.seed = seed,
+                    None => problems.push(wrong_type(key, item, "a whole number, at least 0")),
+                },
+                "depth" => self.depth = depth(item, problems).unwrap_or(DEFAULT_DEPTH),
+                _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
+            }
+        }
+    }
+
+    /// Takes in the section `[robots]`.
+    pub(super) fn read_robots(&mut self, section: &Item, problems: &mut Problems) {
+        const KEYS: [&str; 4] = ["map", "pose", "tags", "tf"];
+        for Entry { key, key_at, item } in entries(section, "[robots]", problems) {
+            let topic = match key.as_str() {
+                "map" => &mut self.robots.map,
+                "pose" => &mut self.robots.pose,
+                "tags" => &mut self.robots.tags,
+                "tf" => {
+                    self.robots.tf = read_frames(item, key_at, problems);
+                    continue;
+                }
+                _ => {
+                    problems.push(unknown_key(key, key_at, "[robots]", &KEYS));
+                    continue;
+                }
+            };
+            let Some(pattern) = text(key, item, problems) else { continue };
+            check_pattern(pattern, &item.at, problems);
+            if !pattern.starts_with('/') {
+                let label = "a topic starts with `/`";
+                problems.push(Diagnostic::new("this pattern fits no topic").at(&item.at, label));
+            }
+            pattern.clone_into(topic);
+        }
+    }
+
+    /// Takes in what the command line sets.
+    pub(super) fn override_with(&mut self, overrides: &Overrides, problems: &mut Problems) {
+        if let Some(robot) = &overrides.reference {
+            let text = format!("reference = \"{robot}\"");
+            let value = text.len() - robot.len() - 2..text.len();
+            let source = problems.add_source("command line", text);
+            check_reference(robot, &Location::new(source, value), problems);
+            self.reference = Some(robot.clone());
+        }
+        self.seed = overrides.seed.unwrap_or(self.seed);
+    }
+}
+
+/// TOML has no whole numbers above 2^63, so a larger seed stands in quotes.
+fn read_seed(item: &Item) -> Option<u64> {
+    match item.as_str() {
+        Some(text) => text.parse().ok(),
+        None => item.as_integer()?.try_into().ok(),
+    }
+}
+
+fn read_frames(item: &Item, key_at: &Location, problems: &mut Problems) -> Option<TfFrames> {
+    const KEYS: [&str; 2] = ["map_frame", "base_frame"];
+    let (mut map_frame, mut base_frame) = (None, None);
+    for Entry { key, key_at, item } in entries(item, "tf", problems) {
+        let frame = match key.as_str() {
+            "map_frame" => &mut map_frame,
+            "base_frame" => &mut base_frame,
+            _ => {
+                problems.push(unknown_key(key, key_at, "tf", &KEYS));
+                continue;
+            }
+        };
+        let pattern = text(key, item, problems);
+        if let Some(pattern) = pattern {
+            check_pattern(pattern, &item.at, problems);
+        }
+        *frame = Some(pattern.unwrap_or_default().to_owned());
+    }
+    if map_frame.is_none() || base_frame.is_none() {
+        let example = "tf = { map_frame = \"{robot}/map\", base_frame = \"{robot}/base_link\" }";
+        let missing = if map_frame.is_none() { "map_frame" } else { "base_frame" };
+        let problem = Diagnostic::new(format!("`tf` has no `{missing}`")).at(key_at, "a pose needs both frames");
+        problems.push(problem.help(format!("write `{example}`")));
+    }
+    Some(TfFrames { map_frame: map_frame?, base_frame: base_frame? })
+}
+
+/// A robot is told by the one part of the path where `{robot}` stands.
+fn check_pattern(pattern: &str, at: &Location, problems: &mut Problems) {
+    let count = pattern.matches("{robot}").count();
+    let others = pattern.replace("{robot}", "");
+    let place = others.find(['{', '}']).map(|_| pattern.find('{').unwrap_or_default());
+    if count != 1 {
+        let label =
+            format!("expected `{{robot}}` once, found it {}", if count == 0 { "nowhere" } else { "twice or more" });
+        let problem = Diagnostic::new("this pattern does not tell the robots apart").at(at, label);
+        problems
+            .push(problem.help("write `{robot}` where the name of the robot stands, as in `/{robot}/map`".to_owned()));
+    } else if place.is_some() {
+        let label = "only `{robot}` may stand in braces";
+        problems.push(Diagnostic::new("this pattern holds an unknown placeholder").at(at, label));
+    }
+}
+
+fn check_reference(robot: &str, at: &Location, problems: &mut Problems) {
+    if robot.is_empty() {
+        let problem = empty("the reference robot", at);
+        problems.push(problem.help("leave `reference` out to take the first robot by name".to_owned()));
+    } else if let Err(error) = FixedText::<32>::new(robot) {
+        problems.push(Diagnostic::new("the name of the reference robot is too long").at(at, error.to_string()));
+    } else if robot.contains('/') {
+        let label = "a robot's name is one part of a path";
+        problems.push(Diagnostic::new("the reference is no robot's name").at(at, label));
+    }
+}
+
+/// The number of samples that an input may hold.
+pub(super) fn depth(item: &Item, problems: &mut Problems) -> Option<usize> {
+    let depth = item.as_integer().and_then(|depth| usize::try_from(depth).ok());
+    let depth = depth.filter(|depth| (1..=MAX_DEPTH).contains(depth));
+    if depth.is_none() {
+        let problem = wrong_type("depth", item, &format!("a whole number from 1 to {MAX_DEPTH}"));
+        problems.push(problem.note("`depth` is how many samples an input may hold before the sender waits"));
+    }
+    depth
+}
+
+/// The entries of a table; an error and no entries if it is none.
+pub(super) fn entries<'a>(item: &'a Item, what: &str, problems: &mut Problems) -> &'a [Entry] {
+    if let Value::Table(entries) = &item.value {
+        return entries;
+    }
+    let label = format!("expected a table, found {}", item.describe());
+    problems.push(Diagnostic::new(format!("`{what}` is not a table")).at(&item.at, label));
+    &[]
+}
+
+/// The text that `key` is set to; an error if it is none.
+pub(super) fn text<'a>(key: &str, item: &'a Item, problems: &mut Problems) -> Option<&'a str> {
+    let text = item.as_str();
+    if text.is_none() {
+        problems.push(wrong_type(key, item, "text in quotes"));
+    }
+    text
+}
+
+/// What `key` is set to is not what it should be.
+pub(super) fn wrong_type(key: &str, item: &Item, expected: &str) -> Diagnostic {
+    let found = match item.as_integer() {
+        Some(number) => format!("`{number}`"),
+        None => item.describe().to_owned(),
+    };
+    Diagnostic::new(format!("wrong value of `{key}`")).at(&item.at, format!("expected {expected}, found {found}"))
+}
+
+/// A key that a section does not have.
+pub(super) fn unknown_key(key: &str, at: &Location, section: &str, keys: &[&str]) -> Diagnostic {
+    let problem = Diagnostic::new(format!("unknown key `{key}` in `{section}`"));
+    problem.at(at, format!("expected one of {}", quoted_list(keys))).help(did_you_mean(key, keys.iter().copied()))
+}
+
+fn empty(what: &str, at: &Location) -> Diagnostic {
+    Diagnostic::new(format!("{what} is empty")).at(at, "expected a name")
+}

@@ -1,0 +1,105 @@
+//! The sections `[stages.NAME]`, before they are wired.
+
+use super::diagnostic::{Diagnostic, Location, Problems};
+use super::document::{Entry, Item, Value};
+use super::nearest::suggest;
+use super::parameters::{RESERVED_KEYS, read_parameters};
+use super::settings::{depth, text};
+use super::topics::read_topics;
+use crate::stage::{Registry, StageKind};
+
+/// The longest name of a stage, in bytes. It is part of the names of topics and of links.
+const LONGEST_NAME: usize = 64;
+
+/// A stage whose inputs are not wired yet.
+#[derive(Debug)]
+pub(super) struct Draft<'a> {
+    /// Its name.
+    pub(super) name: &'a str,
+    /// Where its name stands.
+    pub(super) at: &'a Location,
+    /// Its kind; nothing if that was wrong, which has been reported.
+    pub(super) kind: Option<&'a StageKind>,
+    pub(super) parameters: toml::Table,
+    /// What stands in `inputs`.
+    pub(super) inputs: Option<&'a Item>,
+    /// For every output port of the kind its topic.
+    pub(super) topics: Vec<Topic>,
+    pub(super) depth: usize,
+}
+
+/// The topic of an output port, and where it was given.
+#[derive(Debug)]
+pub(super) struct Topic {
+    pub(super) template: String,
+    pub(super) at: Location,
+}
+
+/// Reads a stage. `pipeline_depth` is its depth if it does not say.
+pub(super) fn read_stage<'a>(
+    stage: &'a Entry,
+    pipeline_depth: usize,
+    registry: &'a Registry,
+    problems: &mut Problems,
+) -> Draft<'a> {
+    check_name(&stage.key, &stage.key_at, problems);
+    let mut draft = Draft {
+        name: &stage.key,
+        at: &stage.key_at,
+        kind: None,
+        parameters: toml::Table::new(),
+        inputs: None,
+        topics: Vec::new(),
+        depth: pipeline_depth,
+    };
+    let Value::Table(entries) = &stage.item.value else {
+        let label = format!("expected a table, found {}", stage.item.describe());
+        let problem = Diagnostic::new(format!("the stage `{}` is not a table", stage.key)).at(&stage.item.at, label);
+        problems.push(problem.help(format!("write a section `[stages.{}]` with `kind = \"...\"`", stage.key)));
+        return draft;
+    };
+    let find = |key: &str| entries.iter().find(|entry| entry.key == key);
+    draft.kind = read_kind(stage, find("kind"), registry, problems);
+    draft.inputs = find("inputs").map(|entry| &entry.item);
+    draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(pipeline_depth);
+    if let Some(kind) = draft.kind {
+        let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
+        draft.parameters = read_parameters(kind, &given, &stage.key_at, problems);
+        draft.topics = read_topics(stage, kind, find("topics").map(|entry| &entry.item), problems);
+    }
+    draft
+}
+
+fn check_name(name: &str, at: &Location, problems: &mut Problems) {
+    let allowed = |char: char| char.is_ascii_lowercase() || char.is_ascii_digit() || char == '_' || char == '-';
+    let problem = Diagnostic::new(format!("`{name}` is no name for a stage"));
+    if name.len() > LONGEST_NAME {
+        let label = format!("expected at most {LONGEST_NAME} characters, found {}", name.len());
+        problems.push(Diagnostic::new("the name of this stage is too long").at(at, label));
+    } else if name.is_empty() || !name.chars().all(allowed) {
+        problems.push(problem.at(at, "expected lower-case letters a-z, digits, `_` and `-`"));
+    }
+}
+
+fn read_kind<'a>(
+    stage: &Entry,
+    kind: Option<&Entry>,
+    registry: &'a Registry,
+    problems: &mut Problems,
+) -> Option<&'a StageKind> {
+    let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
+    let Some(entry) = kind else {
+        let problem = Diagnostic::new(format!("the stage `{}` has no kind", stage.key))
+            .at(&stage.key_at, "expected `kind = \"...\"`");
+        problems.push(problem.help(suggest(&stage.key, &names, "there are")));
+        return None;
+    };
+    let name = text("kind", &entry.item, problems)?;
+    let found = registry.get(name);
+    if found.is_none() {
+        let problem =
+            Diagnostic::new(format!("unknown kind of stage `{name}`")).at(&entry.item.at, "there is no such kind");
+        problems.push(problem.help(suggest(name, &names, "there are")));
+    }
+    found
+}

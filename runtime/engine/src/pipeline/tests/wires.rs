@@ -1,0 +1,75 @@
+//! Which output feeds which input.
+
+use super::*;
+
+/// The inputs of a stage as `PORT<STAGE.PORT`.
+fn inputs(pipeline: &Pipeline, stage: &str) -> Vec<String> {
+    let spec = pipeline.stages.iter().find(|spec| spec.name == stage).unwrap();
+    let name = |wire: &crate::pipeline::Wire| {
+        let from = &pipeline.stages[wire.from_stage];
+        let output = from.kind.outputs[wire.from_port].name;
+        format!("{}<{}.{output}", spec.kind.inputs[wire.port].name, from.name)
+    };
+    spec.inputs.iter().map(name).collect()
+}
+
+#[test]
+fn an_entry_of_a_list_feeds_the_first_free_port_of_its_type() {
+    let pipeline = parse(&changed("[\"log.map\", \"lines\"]", "[\"lines\", \"log.map\"]")).unwrap();
+    assert_eq!(inputs(&pipeline, "align"), ["map<log.map", "segments<lines.segments"]);
+}
+
+#[test]
+fn wires_are_sorted_by_port_and_within_a_port_by_the_file() {
+    let text = changed("[\"log.map\", \"lines\"]", "{ segments = \"lines\", map = \"log.map\" }");
+    assert_eq!(inputs(&parse(&text).unwrap(), "align"), ["map<log.map", "segments<lines.segments"]);
+    let text = changed("[\"log.*\", \"lines\", ", "[\"lines\", \"log.*\", ");
+    let expected =
+        ["in<lines.segments", "in<log.map", "in<log.pose", "in<log.other", "in<align.alignment", "in<fuse.map"];
+    assert_eq!(inputs(&parse(&text).unwrap(), "out"), expected);
+}
+
+#[test]
+fn one_output_may_feed_two_ports_that_are_named() {
+    let text = changed(
+        "inputs = [\"log.map\", \"lines\"]",
+        "inputs = { map = \"log.map\", segments = \"lines\", guess = \"pre\" }",
+    );
+    let text = text
+        .replace("[stages.out]", "[stages.pre]\nkind = \"aligner\"\ninputs = [\"log.map\", \"lines\"]\n[stages.out]");
+    assert_eq!(
+        inputs(&parse(&text).unwrap(), "align"),
+        ["map<log.map", "segments<lines.segments", "guess<pre.alignment"]
+    );
+}
+
+#[test]
+fn topics_come_from_the_stage_then_from_the_port_then_from_the_names() {
+    let topics = |text: &str, stage: &str| {
+        let pipeline = parse(text).unwrap();
+        pipeline.stages.iter().find(|spec| spec.name == stage).unwrap().topics.clone()
+    };
+    assert_eq!(topics(VALID, "lines"), ["/{robot}/lines/segments"]);
+    assert_eq!(topics(VALID, "fuse"), ["/map"]);
+    let text = changed("depth = 4", "topics = { map = \"/merged/{stage}\" }");
+    assert_eq!(topics(&text, "fuse"), ["/merged/fuse"]);
+}
+
+#[test]
+fn depths_come_from_the_stage_then_from_the_pipeline() {
+    let pipeline = parse(&changed("seed = 7", "depth = 32")).unwrap();
+    let depths: Vec<(&str, usize)> = pipeline.stages.iter().map(|stage| (stage.name.as_str(), stage.depth)).collect();
+    assert_eq!(depths, [("log", 32), ("lines", 32), ("align", 32), ("fuse", 4), ("out", 32)]);
+}
+
+#[test]
+fn a_pipeline_written_out_is_the_same_when_read_again() {
+    let mut overrides = Overrides::default();
+    overrides.seed = Some(u64::MAX);
+    overrides.set("lines.starts=[0.5, 1]").unwrap();
+    let frames = "[robots]\ntf = { map_frame = \"{robot}/map\", base_frame = \"{robot}/base_link\" }";
+    let text = changed("[robots]", frames);
+    let first = Pipeline::parse("walls.toml", &text, &registry(), &overrides).unwrap();
+    let second = Pipeline::parse("other.toml", &first.to_toml(), &registry(), &Overrides::default()).unwrap();
+    assert_eq!(format!("{first:?}"), format!("{second:?}"));
+}

@@ -1,0 +1,109 @@
+//! The topics that the outputs of stages get in a log.
+
+use super::diagnostic::{Diagnostic, Location, Problems};
+use super::document::{Entry, Item};
+use super::nearest::suggest;
+use super::settings::{entries, text};
+use super::stage_section::{Draft, Topic};
+use crate::stage::StageKind;
+use std::collections::BTreeMap;
+
+/// What a message header has room for, in bytes.
+const LONGEST_TOPIC: usize = 128;
+const LONGEST_ROBOT: usize = 32;
+
+/// The topics of a stage's outputs: the one given in `topics`, or else the port's own, or else
+/// `/{robot}/STAGE/PORT`.
+pub(super) fn read_topics(
+    stage: &Entry,
+    kind: &StageKind,
+    given: Option<&Item>,
+    problems: &mut Problems,
+) -> Vec<Topic> {
+    let standard = |port: &str| format!("/{{robot}}/{}/{port}", stage.key);
+    let own = |topic: &str| topic.replace("{stage}", &stage.key);
+    let mut topics: Vec<Topic> = kind
+        .outputs
+        .iter()
+        .map(|port| Topic { template: port.topic.map_or_else(|| standard(port.name), own), at: stage.key_at.clone() })
+        .collect();
+    for Entry { key, key_at, item } in given.map(|item| entries(item, "topics", problems)).unwrap_or_default() {
+        let port = kind.outputs.iter().position(|port| port.name == key);
+        let Some(topic) = port.and_then(|port| topics.get_mut(port)) else {
+            problems.push(unknown_output(kind, key, key_at));
+            continue;
+        };
+        if let Some(template) = text(key, item, problems) {
+            *topic = Topic { template: own(template), at: item.at.clone() };
+            check_form(topic, problems);
+        }
+    }
+    for (topic, port) in topics.iter().zip(&kind.outputs) {
+        check_length(topic, port.name, problems);
+    }
+    topics
+}
+
+fn unknown_output(kind: &StageKind, port: &str, at: &Location) -> Diagnostic {
+    let names: Vec<&str> = kind.outputs.iter().map(|port| port.name).collect();
+    let label = match names.is_empty() {
+        true => format!("`{}` has no outputs", kind.name),
+        false => format!("`{}` has no such output", kind.name),
+    };
+    Diagnostic::new(format!("unknown output `{port}`")).at(at, label).help(suggest(port, &names, "its outputs"))
+}
+
+fn check_form(topic: &Topic, problems: &mut Problems) {
+    let template = topic.template.as_str();
+    let parts: Vec<&str> = template.split('/').collect();
+    let robots = parts.iter().filter(|part| **part == "{robot}").count();
+    let wrong = if !template.starts_with('/') {
+        "a topic starts with `/`"
+    } else if template.ends_with('/') || template.contains("//") {
+        "a part of this path is empty"
+    } else if parts.iter().any(|part| *part != "{robot}" && part.contains(['{', '}'])) {
+        "only `{robot}` and `{stage}` may stand in braces, and `{robot}` is a part of the path by itself"
+    } else if robots > 1 || template == "/{robot}" {
+        "expected a path with `{robot}` in it at most once, and more than that"
+    } else {
+        return;
+    };
+    problems.push(Diagnostic::new("this is no topic").at(&topic.at, wrong));
+}
+
+fn check_length(topic: &Topic, port: &str, problems: &mut Problems) {
+    let length = topic.template.replace("{robot}", "").len()
+        + if topic.template.contains("{robot}") { LONGEST_ROBOT } else { 0 };
+    if length > LONGEST_TOPIC {
+        let label = format!("up to {length} bytes with the robot's name, and at most {LONGEST_TOPIC} fit");
+        problems.push(Diagnostic::new(format!("the topic of the output `{port}` is too long")).at(&topic.at, label));
+    }
+}
+
+/// Two outputs that are read and have one topic would mix in a log. `is_read` is asked for stage and port.
+pub(super) fn check_distinct(drafts: &[Draft<'_>], is_read: impl Fn(usize, usize) -> bool, problems: &mut Problems) {
+    let mut first: BTreeMap<&str, (&Draft<'_>, &str, &Topic)> = BTreeMap::new();
+    for (stage, draft) in drafts.iter().enumerate() {
+        let ports = draft.kind.map(|kind| kind.outputs.as_slice()).unwrap_or_default();
+        for (port, (topic, output)) in draft.topics.iter().zip(ports).enumerate() {
+            if !is_read(stage, port) {
+                continue;
+            }
+            let Some((other, other_port, other_topic)) = first.get(topic.template.as_str()) else {
+                first.insert(&topic.template, (draft, output.name, topic));
+                continue;
+            };
+            let (name, port, template) = (draft.name, output.name, topic.template.as_str());
+            let other_name = other.name;
+            let problem =
+                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
+                    .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
+            let problem = match topic.at == other_topic.at {
+                true => problem,
+                false => problem.context(&other_topic.at, format!("`{other_name}.{other_port}` goes there too")),
+            };
+            let own = format!("/{name}/{port}");
+            problems.push(problem.help(format!("give one a topic of its own: `topics = {{ {port} = \"{own}\" }}`")));
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! A pipeline as a file in which nothing is left to defaults, overrides or the order of inputs.
+
+use super::Pipeline;
+use crate::stage::RobotTopics;
+use toml::{Table, Value};
+
+impl Pipeline {
+    /// The text of a pipeline file that gives this same pipeline without any overrides: to hand it to another process,
+    /// or to keep it with its results.
+    pub fn to_toml(&self) -> String {
+        let seed = i64::try_from(self.seed).map_or_else(|_| Value::from(self.seed.to_string()), Value::from);
+        let mut pipeline =
+            Table::from_iter([("name".to_owned(), Value::from(self.name.as_str())), ("seed".into(), seed)]);
+        if let Some(reference) = &self.reference {
+            pipeline.insert("reference".into(), reference.as_str().into());
+        }
+        let stages =
+            (0..self.stages.len()).map(|index| (self.stages[index].name.clone(), self.stage_table(index).into()));
+        let file: [(String, Value); 3] = [
+            ("pipeline".into(), pipeline.into()),
+            ("robots".into(), robots_table(&self.robots).into()),
+            ("stages".into(), Table::from_iter(stages).into()),
+        ];
+        Table::from_iter(file).to_string()
+    }
+
+    fn stage_table(&self, index: usize) -> Table {
+        let stage = &self.stages[index];
+        let mut table = stage.parameters.clone();
+        table.insert("kind".into(), stage.kind.name.into());
+        table.insert("depth".into(), Value::Integer(i64::try_from(stage.depth).unwrap_or(i64::MAX)));
+        let mut inputs = Table::new();
+        for wire in &stage.inputs {
+            let from = &self.stages[wire.from_stage];
+            let output = format!("{}.{}", from.name, from.kind.outputs[wire.from_port].name);
+            let port = inputs.entry(stage.kind.inputs[wire.port].name).or_insert_with(|| Value::Array(Vec::new()));
+            if let Value::Array(outputs) = port {
+                outputs.push(output.into());
+            }
+        }
+        if !inputs.is_empty() {
+            table.insert("inputs".into(), inputs.into());
+        }
+        let topics = stage.kind.outputs.iter().zip(&stage.topics);
+        let topics = Table::from_iter(topics.map(|(port, topic)| (port.name.to_owned(), topic.as_str().into())));
+        if !topics.is_empty() {
+            table.insert("topics".into(), topics.into());
+        }
+        table
+    }
+}
+
+fn robots_table(robots: &RobotTopics) -> Table {
+    let RobotTopics { map, pose, tags, tf } = robots;
+    let topics = [("map", map), ("pose", pose), ("tags", tags)];
+    let mut table = Table::from_iter(topics.map(|(key, topic)| (key.to_owned(), topic.as_str().into())));
+    if let Some(tf) = tf {
+        let frames = [("map_frame", &tf.map_frame), ("base_frame", &tf.base_frame)];
+        let frames = Table::from_iter(frames.map(|(key, frame)| (key.to_owned(), frame.as_str().into())));
+        table.insert("tf".into(), frames.into());
+    }
+    table
+}
