@@ -140,7 +140,12 @@ fn messages_that_are_cut_or_of_another_type() {
         log.map(0.0, "robot1", &TestMap::room());
         log.raw(0.1, "/robot1/map", "nav_msgs/msg/OccupancyGrid", &[0, 1, 0, 0, 7]);
         log.raw(0.1, "/robot1/pose", "geometry_msgs/msg/PoseStamped", &[]);
-        log.raw(0.1, "/robot1/tag_ranges", "gridweave_msgs/msg/TagRange", b"\0\x01\0\0\xff\xff\xff\xff\xff\xff\xff\xff\xff");
+        log.raw(
+            0.1,
+            "/robot1/tag_ranges",
+            "gridweave_msgs/msg/TagRange",
+            b"\0\x01\0\0\xff\xff\xff\xff\xff\xff\xff\xff\xff",
+        );
         log.raw(0.2, "/robot1/tag_ranges", "std_msgs/msg/String", &[0, 1, 0, 0, 1, 0, 0, 0, 0]);
     })
     .assert(0, &["warning"]);
@@ -155,8 +160,7 @@ fn messages_of_unknown_types_are_passed_through() {
     log.finish();
     merge(&folder).assert(0, &[]);
     let output = fs::read(folder.path().join("out.mcap")).unwrap();
-    let messages: Vec<mcap::Message<'_>> =
-        mcap::MessageStream::new(&output).unwrap().map(Result::unwrap).collect();
+    let messages: Vec<mcap::Message<'_>> = mcap::MessageStream::new(&output).unwrap().map(Result::unwrap).collect();
     let strange = messages.iter().find(|message| message.channel.topic == "/robot1/camera").unwrap();
     assert_eq!(strange.data.as_ref(), [1, 2, 3, 4, 5]);
     assert_eq!(strange.channel.schema.as_ref().unwrap().name, "my_msgs/msg/Strange");

@@ -4,9 +4,7 @@
 use gridweave_logs::schemas::schema_text;
 use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::message::{Channel, LogTime};
-use gridweave_runtime::ros::{
-    Header, MapMetaData, OccupancyGrid, Pose, PoseStamped, RosMessage, TagRange, encode,
-};
+use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, Pose, PoseStamped, RosMessage, TagRange, encode};
 use mcap::records::MessageHeader;
 use nalgebra::{Isometry2, Vector2};
 use serde::Serialize;
@@ -170,8 +168,7 @@ impl TestMap {
                 }
             }
         }
-        let info =
-            MapMetaData { resolution: 0.05, width: width as u32, height: height as u32, ..Default::default() };
+        let info = MapMetaData { resolution: 0.05, width: width as u32, height: height as u32, ..Default::default() };
         Self { info, cells }
     }
 }

@@ -15,7 +15,8 @@ pub(crate) fn demo(args: &DemoArgs) -> Result<Outcome> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let (log, truth) = (folder.join("robots.mcap"), folder.join("robots.truth.json"));
     println!("simulating three robots in one building ...");
-    let overrides = Overrides { seed: Some(args.seed), ..Default::default() };
+    let mut overrides = Overrides::default();
+    overrides.seed = Some(args.seed);
     if simulate::write_log(&log, &truth, overrides)?.is_none() {
         return Ok(Outcome::BadUse);
     }
@@ -30,8 +31,7 @@ pub(crate) fn demo(args: &DemoArgs) -> Result<Outcome> {
     };
     let merged = folder.join("merged.mcap");
     let inputs = [log];
-    let job =
-        Job { pipeline: Path::new("tag_merge"), inputs: &inputs, output: Some(&merged), options: &options };
+    let job = Job { pipeline: Path::new("tag_merge"), inputs: &inputs, output: Some(&merged), options: &options };
     let Some(summary) = job.run()? else { return Ok(Outcome::BadUse) };
     print!("{}", summary.to_text());
 

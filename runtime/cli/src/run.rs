@@ -78,8 +78,9 @@ impl Job<'_> {
     }
 
     fn overrides(&self) -> Result<Overrides> {
-        let mut overrides =
-            Overrides { reference: self.options.reference.clone(), seed: self.options.seed, ..Default::default() };
+        let mut overrides = Overrides::default();
+        overrides.reference.clone_from(&self.options.reference);
+        overrides.seed = self.options.seed;
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
             overrides.set_for_kind("mcap_source", "files", files);

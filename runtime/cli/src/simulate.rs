@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Simulates robots, and writes a log and its truth.
 pub(crate) fn simulate(args: &SimulateArgs) -> Result<Outcome> {
-    let mut overrides = Overrides { seed: Some(args.seed), ..Default::default() };
+    let mut overrides = Overrides::default();
+    overrides.seed = Some(args.seed);
     if let Some(robots) = args.robots {
         overrides.set_for_kind("simulator", "robots", i64::from(robots));
     }

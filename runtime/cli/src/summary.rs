@@ -44,9 +44,8 @@ impl Summary {
     /// The poses of the merged robots' map frames: the robot's name, and x, y (metres) and yaw (radians) in the
     /// reference robot's map frame.
     pub(crate) fn frames(&self) -> impl Iterator<Item = (&str, [f64; 3])> {
-        self.object("frames").map(|(robot, frame)| {
-            (robot, ["x", "y", "yaw"].map(|field| frame[field].as_f64().unwrap_or_default()))
-        })
+        self.object("frames")
+            .map(|(robot, frame)| (robot, ["x", "y", "yaw"].map(|field| frame[field].as_f64().unwrap_or_default())))
     }
 
     /// Whether some robot could not be merged.
@@ -108,9 +107,8 @@ impl Summary {
         let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
         for (robot, [x, y, yaw]) in self.frames() {
             let covariance = self.value.get("frames").and_then(|frames| frames[robot]["covariance"].as_array());
-            let variance = |place: usize| {
-                covariance.and_then(|values| values.get(place)?.as_f64()).unwrap_or_default().max(0.0)
-            };
+            let variance =
+                |place: usize| covariance.and_then(|values| values.get(place)?.as_f64()).unwrap_or_default().max(0.0);
             let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
             let numbers = [x, y, yaw.to_degrees(), std_position, std_yaw];
             table.row(std::iter::once(robot.to_owned()).chain(numbers.map(|number| format!("{number:.3}"))));

@@ -27,9 +27,8 @@ impl std::fmt::Display for Table {
         let widths: Vec<usize> = (0..columns)
             .map(|column| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
             .collect();
-        let is_number: Vec<bool> = (0..columns)
-            .map(|column| self.rows[1..].iter().all(|row| is_numeric(&cell(row, column))))
-            .collect();
+        let is_number: Vec<bool> =
+            (0..columns).map(|column| self.rows[1..].iter().all(|row| is_numeric(&cell(row, column)))).collect();
         for row in &self.rows {
             let mut line = String::new();
             for (column, &width) in widths.iter().enumerate() {

@@ -120,8 +120,8 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
     };
     let stages =
         vec![spec("writer", source, vec![]), spec("reader", sink, vec![Wire { port: 0, from_stage: 0, from_port: 0 }])];
-    let pipeline = Pipeline { name: "hop".into(), reference: None, seed: 0, robots: Default::default(), stages };
-    // A message is sent at once when it is large; small ones wait for more, and for the source to look up.
+    let pipeline =
+        Pipeline { name: "hop".into(), reference: None, seed: 0, batch: false, robots: Default::default(), stages };
     run(&pipeline, engine, &()).unwrap();
     clock.median()
 }

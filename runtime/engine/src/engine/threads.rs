@@ -230,7 +230,16 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             let depth = plan.port_depth(pipeline, stage, port);
             let name = spec.kind.outputs[port].name;
             *place = Some(senders.len());
-            senders.push(LinkSender::new(&node, names, &spec.name, name, depth, Rc::clone(&wake), ends, true)?);
+            senders.push(LinkSender::new(
+                &node,
+                names,
+                &spec.name,
+                name,
+                depth,
+                Rc::clone(&wake),
+                ends,
+                pipeline.batch,
+            )?);
         }
         let outputs = SharedOutputs::new(senders, Rc::clone(&wake));
         let sent = Runner::outputs(pipeline, stage, |port| {

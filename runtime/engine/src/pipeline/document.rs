@@ -38,6 +38,13 @@ impl Item {
         }
     }
 
+    pub(super) fn as_bool(&self) -> Option<bool> {
+        match &self.value {
+            Value::Plain(value) => value.as_bool(),
+            _ => None,
+        }
+    }
+
     pub(super) fn as_integer(&self) -> Option<i64> {
         match &self.value {
             Value::Plain(value) => value.as_integer(),

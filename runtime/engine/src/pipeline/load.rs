@@ -144,6 +144,6 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
     }
     stages.sort_by_key(|(place, _)| *place);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, reference, seed, robots, .. } = settings;
-    Pipeline { name, reference, seed, robots, stages }
+    let Settings { name, reference, seed, batch, robots, .. } = settings;
+    Pipeline { name, reference, seed, batch, robots, stages }
 }

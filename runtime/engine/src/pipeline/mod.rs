@@ -8,6 +8,7 @@
 //! reference = "robot1"            # whose map frame is the world; the first robot by name if left out
 //! seed = 7                        # seeds all randomness; 0 if left out
 //! depth = 16                      # how many samples an input may hold before the sender waits
+//! batch = true                    # gather small messages in one sample; false sends each at once
 //!
 //! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
 //! map = "/{robot}/map"
@@ -70,6 +71,9 @@ pub struct Pipeline {
     pub reference: Option<String>,
     /// Seeds all randomness.
     pub seed: u64,
+    /// Whether small messages are gathered and sent together. It saves wake-ups where many are sent at a time; without
+    /// it each is on its way at once.
+    pub batch: bool,
     /// How topics are told apart.
     pub robots: RobotTopics,
     /// The stages, each behind those that feed it; among those that could be next, by name.

@@ -20,18 +20,20 @@ pub(super) struct Settings {
     pub(super) reference: Option<String>,
     pub(super) seed: u64,
     pub(super) depth: usize,
+    pub(super) batch: bool,
     pub(super) robots: RobotTopics,
 }
 
 impl Settings {
     /// A pipeline called `name` that says nothing of itself.
     pub(super) fn new(name: &str) -> Self {
-        Self { name: name.into(), reference: None, seed: 0, depth: DEFAULT_DEPTH, robots: RobotTopics::default() }
+        let robots = RobotTopics::default();
+        Self { name: name.into(), reference: None, seed: 0, depth: DEFAULT_DEPTH, batch: true, robots }
     }
 
     /// Takes in the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 4] = ["name", "reference", "seed", "depth"];
+        const KEYS: [&str; 5] = ["name", "reference", "seed", "depth", "batch"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
                 "name" => match text(key, item, problems) {
@@ -50,6 +52,10 @@ impl Settings {
                     None => problems.push(wrong_type(key, item, "a whole number, at least 0")),
                 },
                 "depth" => self.depth = depth(item, problems).unwrap_or(DEFAULT_DEPTH),
+                "batch" => match item.as_bool() {
+                    Some(batch) => self.batch = batch,
+                    None => problems.push(wrong_type(key, item, "true or false")),
+                },
                 _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
             }
         }

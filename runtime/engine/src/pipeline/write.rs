@@ -9,8 +9,11 @@ impl Pipeline {
     /// or to keep it with its results.
     pub fn to_toml(&self) -> String {
         let seed = i64::try_from(self.seed).map_or_else(|_| Value::from(self.seed.to_string()), Value::from);
-        let mut pipeline =
-            Table::from_iter([("name".to_owned(), Value::from(self.name.as_str())), ("seed".into(), seed)]);
+        let mut pipeline = Table::from_iter([
+            ("name".to_owned(), Value::from(self.name.as_str())),
+            ("seed".into(), seed),
+            ("batch".into(), self.batch.into()),
+        ]);
         if let Some(reference) = &self.reference {
             pipeline.insert("reference".into(), reference.as_str().into());
         }

@@ -287,6 +287,6 @@ impl PipelineBuilder {
     pub fn build(&self, depth: usize) -> Pipeline {
         let mut stages = self.stages.clone();
         stages.iter_mut().for_each(|stage| stage.depth = depth);
-        Pipeline { name: "test".into(), reference: None, seed: 1, robots: Default::default(), stages }
+        Pipeline { name: "test".into(), reference: None, seed: 1, batch: depth > 2, robots: Default::default(), stages }
     }
 }
