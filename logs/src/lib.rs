@@ -1,8 +1,12 @@
 //! Logs for Gridweave: MCAP files in and out, and what they hold.
 
+pub mod info;
 pub mod reader;
 pub mod source;
 pub mod tf;
+
+#[cfg(test)]
+mod test_log;
 
 use gridweave_runtime::stage::StageKind;
 

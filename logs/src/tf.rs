@@ -173,3 +173,6 @@ fn full_name(prefix: &str, frame: &str) -> String {
     let has_prefix = frame.strip_prefix(prefix).is_some_and(|rest| prefix.is_empty() || rest.starts_with('/'));
     if has_prefix { frame.to_owned() } else { format!("{prefix}/{frame}") }
 }
+
+#[cfg(test)]
+mod tests;

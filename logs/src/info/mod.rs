@@ -9,6 +9,7 @@ mod tests;
 pub use robots::RobotInfo;
 
 use crate::reader::{self, Damage, LogFile, LogReader, ReadError};
+use crate::source::Role;
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::RobotTopics;
 use robots::RobotSurvey;
@@ -88,7 +89,7 @@ pub fn inspect(paths: &[PathBuf], robots: &RobotTopics) -> Result<LogInfo, ReadE
     while let Some(message) = reader.next_message() {
         let (index, time) = (message.file, message.log_time);
         let Some(file) = info.files.get_mut(index) else { continue };
-        let Some(entry) = topics.find(&files, index, message.channel) else {
+        let Some(entry) = topics.find(&files, index, message.channel, &mut survey) else {
             file.add(&Damage::UnknownChannel { channel: message.channel });
             continue;
         };
@@ -96,14 +97,14 @@ pub fn inspect(paths: &[PathBuf], robots: &RobotTopics) -> Result<LogInfo, ReadE
         times = Some((first, time));
         file.messages += 1;
         info.messages += 1;
-        let Entry { channel, info: topic } = entry;
+        let Entry { role, robot, info: topic, .. } = entry;
         if topic.messages == 0 {
             topic.first = time.seconds();
         }
         topic.last = time.seconds();
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
-        survey.take(channel, message.data);
+        survey.take(*role, robot, &topic.topic, message.data);
     }
     add_late_damage(&mut reader, &mut info);
     if let Some((first, last)) = times {
@@ -150,36 +151,48 @@ struct Topics {
 }
 
 struct Entry {
-    channel: Channel,
+    role: Role,
+    robot: String,
     info: TopicInfo,
 }
 
 impl Topics {
-    fn find(&mut self, files: &[LogFile], file: usize, number: u16) -> Option<&mut Entry> {
+    fn find(&mut self, files: &[LogFile], file: usize, number: u16, survey: &mut RobotSurvey) -> Option<&mut Entry> {
         let known = self.known.get_mut(file)?;
-        let number_index = usize::from(number);
-        if known.len() <= number_index {
-            known.resize(number_index + 1, None);
+        let place = usize::from(number);
+        if known.len() <= place {
+            known.resize(place + 1, None);
         }
-        if known[number_index].is_none() {
-            let channel = files.get(file)?.channel(number)?;
-            let same = |entry: &Entry| {
-                entry.channel.topic == channel.topic
-                    && entry.channel.schema_name == channel.schema_name
-                    && entry.channel.message_encoding == channel.message_encoding
-            };
-            let index = self.entries.iter().position(same).unwrap_or_else(|| {
-                let info = TopicInfo {
-                    topic: channel.topic.clone(),
-                    type_name: channel.schema_name.clone(),
-                    encoding: channel.message_encoding.clone(),
-                    ..Default::default()
-                };
-                self.entries.push(Entry { channel, info });
-                self.entries.len() - 1
-            });
-            known[number_index] = Some(index);
-        }
-        self.entries.get_mut(known[number_index]?)
+        let index = match known[place] {
+            Some(index) => index,
+            None => {
+                let channel = files.get(file)?.channel(number)?;
+                let index = self.entries.iter().position(|entry| entry.is_of(&channel)).unwrap_or(self.entries.len());
+                if index == self.entries.len() {
+                    let (role, robot) = survey.classify(&channel);
+                    self.entries.push(Entry { role, robot, info: topic_info(channel) });
+                }
+                known[place] = Some(index);
+                index
+            }
+        };
+        self.entries.get_mut(index)
+    }
+}
+
+impl Entry {
+    fn is_of(&self, channel: &Channel) -> bool {
+        self.info.topic == channel.topic
+            && self.info.type_name == channel.schema_name
+            && self.info.encoding == channel.message_encoding
+    }
+}
+
+fn topic_info(channel: Channel) -> TopicInfo {
+    TopicInfo {
+        topic: channel.topic,
+        type_name: channel.schema_name,
+        encoding: channel.message_encoding,
+        ..Default::default()
     }
 }

@@ -135,7 +135,7 @@ impl Walk {
     }
 
     fn extend_run(&mut self, record: &Record<'_>, time: u64) {
-        let run = self.run.get_or_insert_with(|| Block {
+        let run = self.run.get_or_insert(Block {
             first_time: time,
             last_time: time,
             records: Records::Bare(record.position..record.position),

@@ -10,9 +10,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use count::RobotCount;
-pub(crate) use pose::to_pose_stamped;
-pub(crate) use route::{Role, classify};
+pub(crate) use route::{Classified, Role, classify, full_type_name};
 pub use stage::McapSource;
 
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, TagRange};
