@@ -26,10 +26,10 @@ pub struct RobotInfo {
 
 /// The fields of a range reading up to the tag's name.
 #[derive(Deserialize)]
-struct TagRangeStart<'a> {
+struct TagRangeStart {
     #[serde(rename = "header")]
     _header: Header,
-    tag_id: &'a str,
+    tag_id: String,
 }
 
 /// Takes up messages one by one.
@@ -83,11 +83,11 @@ impl RobotSurvey {
             Role::Pose | Role::PoseSource(_) => info.poses += 1,
             Role::Tags => {
                 info.readings += 1;
-                match decode::<TagRangeStart<'_>>(data) {
-                    Ok(reading) => match info.tags.get_mut(reading.tag_id) {
+                match decode::<TagRangeStart>(data) {
+                    Ok(reading) => match info.tags.get_mut(&reading.tag_id) {
                         Some(count) => *count += 1,
                         None => {
-                            info.tags.insert(reading.tag_id.to_owned(), 1);
+                            info.tags.insert(reading.tag_id, 1);
                         }
                     },
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
