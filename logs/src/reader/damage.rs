@@ -41,6 +41,9 @@ pub enum Damage {
     /// The index at the end does not match its checksum, so it was not used.
     #[error("the index at the end of the file has a wrong checksum and was not used")]
     BadIndex,
+    /// Another program has changed the file meanwhile.
+    #[error("the file was changed while it was read; what comes behind the change was not read")]
+    Changed,
     /// A chunk holds messages that are older than its header and its index both say.
     #[error("a message was found out of order, because the index of its chunk is wrong; it was given a later log time")]
     LateMessage,

@@ -106,9 +106,12 @@ impl LogReader {
         let Reverse(due) = self.active.peek()?;
         self.given = true;
         let file = due.id.file;
-        let message = due.block.message(self.files.get(file)?.bytes(), due.index)?;
-        let late = message.log_time < self.last_time;
-        if late {
+        let Some(message) = due.block.message(self.files.get(file)?.bytes(), due.index) else {
+            // The message was there when its block was loaded.
+            self.damage.push((file, Damage::Changed));
+            return None;
+        };
+        if message.log_time < self.last_time {
             self.damage.push((file, Damage::LateMessage));
         }
         self.last_time = self.last_time.max(message.log_time);
