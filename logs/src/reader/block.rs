@@ -1,0 +1,156 @@
+//! Blocks: the pieces in which a file is read. A block is a chunk, or a run of records that lie in the file by
+//! themselves.
+
+use super::chunk::Chunk;
+use super::damage::ChunkFault;
+use super::definitions::Definitions;
+use super::record::{MessageRecord, record_at};
+use mcap::records::op;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// A piece of a file, and the time that its messages span.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    /// The least log time in it.
+    pub(crate) first_time: u64,
+    /// The greatest log time in it.
+    pub(crate) last_time: u64,
+    /// Where its records are.
+    pub(crate) records: Records,
+}
+
+/// Where the records of a block are.
+#[derive(Clone, Debug)]
+pub(crate) enum Records {
+    /// In this part of the file, as they are.
+    Bare(Range<usize>),
+    /// In a chunk.
+    Chunk(Chunk),
+}
+
+impl Block {
+    /// How much memory its records take when they are loaded.
+    pub(crate) fn size(&self) -> u64 {
+        match &self.records {
+            Records::Bare(range) => range.len() as u64,
+            // The size of a chunk that is cut may not have been written yet.
+            Records::Chunk(chunk) if chunk.cut => chunk.data.len() as u64,
+            Records::Chunk(chunk) => chunk.size,
+        }
+    }
+
+    /// The block's records, uncompressed.
+    pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
+        match &self.records {
+            Records::Bare(range) => file.get(range.clone()).map(Cow::Borrowed).ok_or(ChunkFault::Records),
+            Records::Chunk(chunk) => chunk.contents(file),
+        }
+    }
+
+    /// Whether it may end with a part of a record.
+    pub(crate) fn may_be_cut(&self) -> bool {
+        matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
+    }
+
+    /// Makes the block's messages ready to be given out.
+    pub(crate) fn load(&self, file: &[u8]) -> Result<LoadedBlock, ChunkFault> {
+        let contents = self.contents(file)?;
+        let messages = index_messages(&contents, self.may_be_cut())?;
+        let records = match contents {
+            Cow::Owned(bytes) => LoadedRecords::Memory(bytes),
+            Cow::Borrowed(_) => LoadedRecords::File(match &self.records {
+                Records::Bare(range) => range.clone(),
+                Records::Chunk(chunk) => chunk.data.clone(),
+            }),
+        };
+        Ok(LoadedBlock { records, messages })
+    }
+
+    /// Reads the block through for what its header does not say, or does not say reliably.
+    pub(crate) fn survey(&self, file: &[u8]) -> Result<Survey, ChunkFault> {
+        let contents = self.contents(file)?;
+        let mut survey = Survey { times: None, definitions: Definitions::default() };
+        let mut position = 0;
+        while let Some(record) = record_at(&contents, position) {
+            position = record.end();
+            match record.opcode {
+                op::MESSAGE => {
+                    let time = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?.log_time;
+                    let (first, last) = survey.times.unwrap_or((time, time));
+                    survey.times = Some((first.min(time), last.max(time)));
+                }
+                _ => survey.definitions.read(&record),
+            }
+        }
+        match position == contents.len() || self.may_be_cut() {
+            true => Ok(survey),
+            false => Err(ChunkFault::Records),
+        }
+    }
+}
+
+/// What reading a block through has shown.
+pub(crate) struct Survey {
+    /// The least and the greatest log time; `None` if there is no message.
+    pub(crate) times: Option<(u64, u64)>,
+    /// The channels that it describes.
+    pub(crate) definitions: Definitions,
+}
+
+/// A block whose messages can be given out.
+pub(crate) struct LoadedBlock {
+    records: LoadedRecords,
+    /// By log time, and at equal times by position.
+    messages: Vec<MessagePlace>,
+}
+
+enum LoadedRecords {
+    /// Borrowed from the file.
+    File(Range<usize>),
+    /// Decompressed.
+    Memory(Vec<u8>),
+}
+
+/// Where a message lies in its block.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct MessagePlace {
+    log_time: u64,
+    position: usize,
+}
+
+/// The places of the messages among `records`, in the order they are given out.
+fn index_messages(records: &[u8], may_be_cut: bool) -> Result<Vec<MessagePlace>, ChunkFault> {
+    let mut messages = Vec::with_capacity(records.len() / 256);
+    let mut position = 0;
+    while let Some(record) = record_at(records, position) {
+        if record.opcode == op::MESSAGE {
+            let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
+            messages.push(MessagePlace { log_time: message.log_time, position });
+        }
+        position = record.end();
+    }
+    if position != records.len() && !may_be_cut {
+        return Err(ChunkFault::Records);
+    }
+    if !messages.is_sorted() {
+        messages.sort_unstable();
+    }
+    Ok(messages)
+}
+
+impl LoadedBlock {
+    /// The log time of the message with the given index.
+    pub(crate) fn time(&self, index: usize) -> Option<u64> {
+        self.messages.get(index).map(|place| place.log_time)
+    }
+
+    /// The message with the given index.
+    pub(crate) fn message<'a>(&'a self, file: &'a [u8], index: usize) -> Option<MessageRecord<'a>> {
+        let records = match &self.records {
+            LoadedRecords::File(range) => file.get(range.clone())?,
+            LoadedRecords::Memory(bytes) => bytes,
+        };
+        MessageRecord::parse(record_at(records, self.messages.get(index)?.position)?.body)
+    }
+}

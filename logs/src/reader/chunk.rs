@@ -1,0 +1,109 @@
+//! Chunks: many records, compressed together.
+
+use super::damage::ChunkFault;
+use super::record::{Fields, HEAD, Record};
+use std::borrow::Cow;
+use std::io::Read;
+use std::ops::Range;
+
+/// A chunk, as its header describes it.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunk {
+    pub(crate) first_time: u64,
+    pub(crate) last_time: u64,
+    pub(crate) compression: String,
+    /// Bytes of its contents, uncompressed.
+    pub(crate) size: u64,
+    /// CRC-32 of its contents, uncompressed; 0 if it was not taken.
+    pub(crate) checksum: u32,
+    /// Where its contents lie in the file.
+    pub(crate) data: Range<usize>,
+    /// Whether the file breaks off inside of it.
+    pub(crate) cut: bool,
+}
+
+impl Chunk {
+    /// Reads a chunk record. `None` if its lengths contradict each other.
+    pub(crate) fn parse(record: &Record<'_>) -> Option<Self> {
+        let (mut chunk, length) = Self::parse_header(record.body, record.position + HEAD)?;
+        chunk.data.end = chunk.data.start + usize::try_from(length).ok()?;
+        (chunk.data.end == record.end()).then_some(chunk)
+    }
+
+    /// Reads a chunk at `position` that the end of `file` cuts.
+    pub(crate) fn parse_cut(file: &[u8], position: usize) -> Option<Self> {
+        let start = position.checked_add(HEAD)?;
+        let (mut chunk, _) = Self::parse_header(file.get(start..)?, start)?;
+        chunk.data.end = file.len();
+        chunk.cut = true;
+        Some(chunk)
+    }
+
+    /// The chunk that a body at `start` describes, its data still empty, and the length that the data should have.
+    fn parse_header(body: &[u8], start: usize) -> Option<(Self, u64)> {
+        let mut fields = Fields(body);
+        let (first_time, last_time) = (fields.u64()?, fields.u64()?);
+        let (size, checksum) = (fields.u64()?, fields.u32()?);
+        let (compression, length) = (fields.text()?, fields.u64()?);
+        let data = start + body.len() - fields.0.len();
+        Some((Self { first_time, last_time, compression, size, checksum, data: data..data, cut: false }, length))
+    }
+
+    /// The chunk's records, uncompressed and checked. Those of a chunk that is cut: as far as they go, unchecked.
+    pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
+        let data = file.get(self.data.clone()).ok_or(ChunkFault::Records)?;
+        let contents = match (self.compression.as_str(), self.cut) {
+            ("", _) => Cow::Borrowed(data),
+            ("zstd", false) => Cow::Owned(decompress_zstd(data, reserve(self.size)?)?),
+            ("zstd", true) => Cow::Owned(decompress_cut(zstd::stream::read::Decoder::new(data))),
+            ("lz4", false) => Cow::Owned(decompress_lz4(data, reserve(self.size)?)?),
+            ("lz4", true) => Cow::Owned(decompress_cut(lz4::Decoder::new(data))),
+            (other, _) => return Err(ChunkFault::UnknownCompression(other.to_owned())),
+        };
+        if !self.cut {
+            if contents.len() as u64 != self.size {
+                return Err(ChunkFault::Decompression);
+            }
+            if self.checksum != 0 && crc32fast::hash(&contents) != self.checksum {
+                return Err(ChunkFault::Checksum);
+            }
+        }
+        Ok(contents)
+    }
+}
+
+/// An empty buffer with room for `size` bytes. The size is the file's word only, so it may be absurd.
+fn reserve(size: u64) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = Vec::new();
+    let size = usize::try_from(size).map_err(|_| ChunkFault::TooLarge)?;
+    buffer.try_reserve_exact(size).map_err(|_| ChunkFault::TooLarge)?;
+    Ok(buffer)
+}
+
+fn decompress_zstd(data: &[u8], mut buffer: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+    let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
+    decompressor.decompress_to_buffer(data, &mut buffer).map_err(|_| ChunkFault::Decompression)?;
+    Ok(buffer)
+}
+
+fn decompress_lz4(data: &[u8], mut buffer: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+    let mut rest = data;
+    // The data may be several frames; a decoder reads one, and stops behind it.
+    while !rest.is_empty() {
+        let room = (buffer.capacity() - buffer.len()) as u64;
+        let decoder = lz4::Decoder::new(&mut rest).map_err(|_| ChunkFault::Decompression)?;
+        // One byte more than there is room for shows that the header's size is wrong.
+        decoder.take(room + 1).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
+    }
+    Ok(buffer)
+}
+
+/// What a decoder gives until it fails or its input ends.
+fn decompress_cut(decoder: std::io::Result<impl Read>) -> Vec<u8> {
+    let mut buffer = Vec::new();
+    if let Ok(mut decoder) = decoder {
+        // The error at the end is expected: the input breaks off. What came before it is kept.
+        let _ = decoder.read_to_end(&mut buffer);
+    }
+    buffer
+}

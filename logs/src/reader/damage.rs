@@ -1,0 +1,72 @@
+//! What can be wrong with a log of which some can be read all the same.
+
+use serde::Serialize;
+
+/// Damage to a log that was read as far as it goes.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
+#[serde(tag = "damage", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Damage {
+    /// The file breaks off: its recorder was stopped before it could close it, or the copy is not complete.
+    #[error(
+        "the file has no end (it breaks off at byte {position}): its recorder was killed, or the copy is not whole"
+    )]
+    NoEnd {
+        /// Where the last record that is whole ends.
+        position: usize,
+    },
+    /// Bytes between two records mean nothing.
+    #[error("{length} bytes from byte {position} on are not readable")]
+    Unreadable {
+        /// Where they begin.
+        position: usize,
+        /// How many there are.
+        length: usize,
+    },
+    /// A chunk was left out.
+    #[error("a chunk was skipped: {fault}")]
+    BadChunk {
+        /// What is wrong with it.
+        fault: ChunkFault,
+    },
+    /// A message names a channel that the log does not describe.
+    #[error("a message was skipped: the log does not describe its channel {channel}")]
+    UnknownChannel {
+        /// The channel's number in the log.
+        channel: u16,
+    },
+    /// One number stands for two channels or schemas. The first one is used.
+    #[error("the log describes a channel or schema twice, and differently; the first description is used")]
+    Redefined,
+    /// The index at the end does not match its checksum, so it was not used.
+    #[error("the index at the end of the file has a wrong checksum and was not used")]
+    BadIndex,
+    /// Another program has changed the file meanwhile.
+    #[error("the file was changed while it was read; what comes behind the change was not read")]
+    Changed,
+    /// A chunk holds messages that are older than its header and its index both say.
+    #[error("a message was found out of order, because the index of its chunk is wrong; it was given a later log time")]
+    LateMessage,
+}
+
+/// What is wrong with a chunk.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ChunkFault {
+    /// The checksum of its contents does not fit them.
+    #[error("its checksum is wrong")]
+    Checksum,
+    /// Its contents cannot be decompressed.
+    #[error("it cannot be decompressed")]
+    Decompression,
+    /// It is compressed in a way that this program does not know.
+    #[error("its compression `{0}` is not known (none, lz4 and zstd are)")]
+    UnknownCompression(String),
+    /// It does not consist of whole records.
+    #[error("it does not consist of whole records")]
+    Records,
+    /// Its contents do not fit into memory.
+    #[error("there is not enough memory for its contents")]
+    TooLarge,
+}

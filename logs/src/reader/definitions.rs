@@ -1,0 +1,115 @@
+//! What a log says of its channels.
+
+use super::record::{Fields, Record};
+use gridweave_runtime::message::Channel;
+use mcap::records::op;
+use std::collections::BTreeMap;
+
+/// The channels and schemas of one file, by their numbers in it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Definitions {
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, ChannelRecord>,
+    /// How many were described a second time, and differently.
+    pub(crate) redefined: usize,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Schema {
+    name: String,
+    encoding: String,
+    text: Vec<u8>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct ChannelRecord {
+    schema: u16,
+    topic: String,
+    message_encoding: String,
+    metadata: BTreeMap<String, String>,
+}
+
+impl Definitions {
+    /// Takes up a record if it describes a channel or a schema. What is cut is left out.
+    pub(crate) fn read(&mut self, record: &Record<'_>) {
+        match record.opcode {
+            op::SCHEMA => {
+                if let Some((id, schema)) = read_schema(record.body) {
+                    self.redefined += usize::from(differs(&mut self.schemas, id, schema));
+                }
+            }
+            op::CHANNEL => {
+                if let Some((id, channel)) = read_channel(record.body) {
+                    self.redefined += usize::from(differs(&mut self.channels, id, channel));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes up what another part of the same file says.
+    pub(crate) fn merge(&mut self, other: Self) {
+        self.redefined += other.redefined;
+        for (id, schema) in other.schemas {
+            self.redefined += usize::from(differs(&mut self.schemas, id, schema));
+        }
+        for (id, channel) in other.channels {
+            self.redefined += usize::from(differs(&mut self.channels, id, channel));
+        }
+    }
+
+    /// How many channels are known.
+    pub(crate) fn channel_count(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Whether every channel is known together with its schema.
+    pub(crate) fn schemas_complete(&self) -> bool {
+        self.channels.values().all(|channel| channel.schema == 0 || self.schemas.contains_key(&channel.schema))
+    }
+
+    /// The channel of the given number.
+    pub(crate) fn channel(&self, id: u16) -> Option<Channel> {
+        let channel = self.channels.get(&id)?;
+        // Number 0 stands for a channel without a schema.
+        let schema = self.schemas.get(&channel.schema).filter(|_| channel.schema != 0);
+        Some(Channel {
+            topic: channel.topic.clone(),
+            message_encoding: channel.message_encoding.clone(),
+            schema_name: schema.map(|schema| schema.name.clone()).unwrap_or_default(),
+            schema_encoding: schema.map(|schema| schema.encoding.clone()).unwrap_or_default(),
+            schema: schema.map(|schema| schema.text.clone()).unwrap_or_default(),
+            metadata: channel.metadata.clone(),
+        })
+    }
+}
+
+/// Keeps what is there; whether the new one differs from it.
+fn differs<T: PartialEq>(known: &mut BTreeMap<u16, T>, id: u16, new: T) -> bool {
+    match known.get(&id) {
+        Some(old) => *old != new,
+        None => {
+            known.insert(id, new);
+            false
+        }
+    }
+}
+
+fn read_schema(body: &[u8]) -> Option<(u16, Schema)> {
+    let mut fields = Fields(body);
+    let id = fields.u16()?;
+    let (name, encoding) = (fields.text()?, fields.text()?);
+    Some((id, Schema { name, encoding, text: fields.block()?.0.to_vec() }))
+}
+
+fn read_channel(body: &[u8]) -> Option<(u16, ChannelRecord)> {
+    let mut fields = Fields(body);
+    let (id, schema) = (fields.u16()?, fields.u16()?);
+    let (topic, message_encoding) = (fields.text()?, fields.text()?);
+    let mut pairs = fields.block()?;
+    let mut metadata = BTreeMap::new();
+    while !pairs.0.is_empty() {
+        metadata.insert(pairs.text()?, pairs.text()?);
+    }
+    Some((id, ChannelRecord { schema, topic, message_encoding, metadata }))
+}

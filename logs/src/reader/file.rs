@@ -1,0 +1,90 @@
+//! One log file: its bytes, mapped into memory, and its layout.
+
+use super::damage::Damage;
+use super::error::ReadError;
+use super::guess::looks_like;
+use super::layout::Layout;
+use gridweave_runtime::message::Channel;
+use mcap::MAGIC;
+use memmap2::Mmap;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// One MCAP file, opened for reading.
+#[derive(Debug)]
+pub struct LogFile {
+    path: PathBuf,
+    map: Mmap,
+    pub(crate) layout: Layout,
+}
+
+impl LogFile {
+    /// Opens a file and finds out what it consists of. Only what its own index leaves open is read through.
+    pub fn open(path: impl Into<PathBuf>) -> Result<Self, ReadError> {
+        let path = path.into();
+        let map = map_file(&path).map_err(|error| ReadError::io(&path, error))?;
+        if map.is_empty() {
+            return Err(ReadError::Empty { path });
+        }
+        if !map.starts_with(MAGIC) {
+            // A file that breaks off within the magic bytes is a log of which nothing is left.
+            if MAGIC.starts_with(&map) {
+                return Err(ReadError::NothingLeft { path, damage: Damage::NoEnd { position: 0 } });
+            }
+            let (looks_like, cure) = looks_like(&map);
+            return Err(ReadError::NotMcap { path, looks_like, cure });
+        }
+        let layout = Layout::of(&map);
+        match layout.damage.first() {
+            Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
+            _ => Ok(Self { path, map, layout }),
+        }
+    }
+
+    /// The file's path, as it was given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The file's bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.map
+    }
+
+    /// The channel with the given number in this file.
+    pub fn channel(&self, id: u16) -> Option<Channel> {
+        self.layout.definitions.channel(id)
+    }
+
+    /// What was found wrong when the file was opened. Bad chunks may show only when they are read.
+    pub fn damage(&self) -> &[Damage] {
+        &self.layout.damage
+    }
+
+    /// How many chunks the file has.
+    pub fn chunks(&self) -> usize {
+        self.layout.chunks
+    }
+
+    /// How the file's chunks are compressed, such as `zstd`; an empty text for those that are not.
+    pub fn compressions(&self) -> &BTreeSet<String> {
+        &self.layout.compressions
+    }
+
+    /// The least log time in the file; `None` if it has no messages.
+    pub fn first_time(&self) -> Option<u64> {
+        self.layout.blocks.iter().map(|block| block.first_time).min()
+    }
+}
+
+#[allow(unsafe_code)]
+fn map_file(path: &Path) -> std::io::Result<Mmap> {
+    let file = File::open(path)?;
+    // SAFETY: the map is read-only and private to this process, and is only ever read as bytes, for which every value
+    // is valid; every length and offset in it is checked against the map's size, which is fixed. What remains is that
+    // another process changes the file meanwhile: a log is only appended to while it is recorded, which does not touch
+    // the bytes mapped here. (One that is cut short while it is read ends this process with SIGBUS, as with every
+    // program that maps files.)
+    unsafe { Mmap::map(&file) }
+}

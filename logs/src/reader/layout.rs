@@ -1,0 +1,201 @@
+//! The layout of a file: its blocks, found by walking over its records without reading what is in them.
+
+use super::block::{Block, Records};
+use super::chunk::Chunk;
+use super::damage::{ChunkFault, Damage};
+use super::definitions::Definitions;
+use super::record::{Fields, MessageRecord, Record, record_at};
+use super::summary::Summary;
+use mcap::MAGIC;
+use mcap::records::op;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+/// Records without a chunk are read in runs of about this many bytes.
+const RUN_LENGTH: usize = 1 << 20;
+
+/// What a file consists of.
+#[derive(Debug, Default)]
+pub(crate) struct Layout {
+    /// The blocks that hold messages, by position.
+    pub(crate) blocks: Vec<Block>,
+    pub(crate) definitions: Definitions,
+    pub(crate) damage: Vec<Damage>,
+    /// How many chunks there are, the bad ones among them.
+    pub(crate) chunks: usize,
+    /// The compressions of the chunks; empty text for none.
+    pub(crate) compressions: BTreeSet<String>,
+}
+
+impl Layout {
+    /// Finds the blocks of `file`, which begins with the magic bytes.
+    pub(crate) fn of(file: &[u8]) -> Self {
+        let summary = Summary::read(file);
+        let mut walk = Walk { layout: Self::default(), unsure: Vec::new(), run: None };
+        walk.data_section(file, &summary);
+        let Walk { mut layout, mut unsure, .. } = walk;
+        if summary.bad_checksum {
+            layout.damage.push(Damage::BadIndex);
+        }
+        if !summary.definitions_complete {
+            // The chunks may describe channels that nothing else does.
+            unsure = layout.blocks.iter().map(|block| matches!(block.records, Records::Chunk(_))).collect();
+        }
+        layout.definitions.merge(summary.definitions);
+        layout.survey(file, &unsure);
+        layout.damage.extend(std::iter::repeat_n(Damage::Redefined, layout.definitions.redefined));
+        layout
+    }
+
+    /// Reads the unsure blocks through, for the time they span and the channels they describe.
+    fn survey(&mut self, file: &[u8], unsure: &[bool]) {
+        let blocks = std::mem::take(&mut self.blocks);
+        let surveys: Vec<_> =
+            blocks.par_iter().zip(unsure).map(|(block, &unsure)| unsure.then(|| block.survey(file))).collect();
+        for (mut block, survey) in blocks.into_iter().zip(surveys) {
+            match survey {
+                None => self.blocks.push(block),
+                Some(Err(fault)) => self.damage.push(Damage::BadChunk { fault }),
+                Some(Ok(survey)) => {
+                    self.definitions.merge(survey.definitions);
+                    if let Some((first, last)) = survey.times {
+                        (block.first_time, block.last_time) = (first, last);
+                        self.blocks.push(block);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The walk over the records of a file.
+struct Walk {
+    layout: Layout,
+    /// For every block, whether the time that it claims to span is still to be checked.
+    unsure: Vec<bool>,
+    /// The run of records without a chunk that the walk is in.
+    run: Option<Block>,
+}
+
+impl Walk {
+    fn data_section(&mut self, file: &[u8], summary: &Summary) {
+        let mut index = ChunkTimes::default();
+        let mut position = MAGIC.len();
+        loop {
+            let record = record_at(file, position);
+            match record.filter(|record| self.take(file, record, &mut index)) {
+                Some(record) if matches!(record.opcode, op::DATA_END | op::FOOTER) => break,
+                Some(record) => position = record.end(),
+                None => {
+                    // The next chunk that the summary knows of is where reading can go on.
+                    let next = summary.chunk_starts.partition_point(|&start| start <= position);
+                    let Some(&next) = summary.chunk_starts.get(next).filter(|&&next| next < file.len()) else {
+                        self.cut_chunk(file, position);
+                        self.layout.damage.push(Damage::NoEnd { position });
+                        break;
+                    };
+                    self.layout.damage.push(Damage::Unreadable { position, length: next - position });
+                    position = next;
+                }
+            }
+        }
+        self.end_run();
+        self.settle(&mut index);
+        let ended = matches!(self.layout.damage.last(), Some(Damage::NoEnd { .. }));
+        if !summary.closed && !ended {
+            self.layout.damage.push(Damage::NoEnd { position });
+        }
+    }
+
+    /// Takes up one record; `false` if it cannot be one.
+    fn take(&mut self, file: &[u8], record: &Record<'_>, index: &mut ChunkTimes) -> bool {
+        match record.opcode {
+            0 => return false,
+            op::MESSAGE => match MessageRecord::parse(record.body) {
+                Some(message) => self.extend_run(record, message.log_time),
+                None => return false,
+            },
+            op::SCHEMA | op::CHANNEL => self.layout.definitions.read(record),
+            op::CHUNK => {
+                self.end_run();
+                self.settle(index);
+                match Chunk::parse(record) {
+                    Some(chunk) => self.push_chunk(chunk),
+                    None => {
+                        self.layout.damage.push(Damage::BadChunk { fault: ChunkFault::Records });
+                        // Of the lengths that contradict each other, the record's is right if another record follows.
+                        return record_at(file, record.end()).is_some_and(|next| next.opcode != 0);
+                    }
+                }
+            }
+            op::MESSAGE_INDEX => index.read(record.body),
+            _ => {}
+        }
+        true
+    }
+
+    fn extend_run(&mut self, record: &Record<'_>, time: u64) {
+        let run = self.run.get_or_insert(Block {
+            first_time: time,
+            last_time: time,
+            records: Records::Bare(record.position..record.position),
+        });
+        run.first_time = run.first_time.min(time);
+        run.last_time = run.last_time.max(time);
+        let Records::Bare(range) = &mut run.records else { return };
+        range.end = record.end();
+        if range.len() >= RUN_LENGTH {
+            self.end_run();
+        }
+    }
+
+    fn end_run(&mut self) {
+        if let Some(run) = self.run.take() {
+            self.layout.blocks.push(run);
+            self.unsure.push(false);
+        }
+    }
+
+    fn push_chunk(&mut self, chunk: Chunk) {
+        self.layout.chunks += 1;
+        self.layout.compressions.insert(chunk.compression.clone());
+        let (first_time, last_time) = (chunk.first_time, chunk.last_time);
+        self.layout.blocks.push(Block { first_time, last_time, records: Records::Chunk(chunk) });
+        self.unsure.push(true);
+    }
+
+    /// The chunk that the end of the file cuts: a recorder that was killed leaves one.
+    fn cut_chunk(&mut self, file: &[u8], position: usize) {
+        if file.get(position) == Some(&op::CHUNK)
+            && let Some(chunk) = Chunk::parse_cut(file, position)
+        {
+            self.end_run();
+            self.push_chunk(chunk);
+        }
+    }
+
+    /// Believes the last chunk's header if the index records behind the chunk say the same.
+    fn settle(&mut self, index: &mut ChunkTimes) {
+        let times = std::mem::take(index).0;
+        if let (Some(block), Some(unsure)) = (self.layout.blocks.last(), self.unsure.last_mut())
+            && matches!(&block.records, Records::Chunk(chunk) if !chunk.cut)
+        {
+            *unsure = times != Some((block.first_time, block.last_time));
+        }
+    }
+}
+
+/// The least and the greatest log time that the index records behind a chunk list.
+#[derive(Default)]
+struct ChunkTimes(Option<(u64, u64)>);
+
+impl ChunkTimes {
+    fn read(&mut self, body: &[u8]) {
+        let mut fields = Fields(body);
+        let Some(mut entries) = fields.u16().and_then(|_| fields.block()) else { return };
+        while let (Some(time), Some(_)) = (entries.u64(), entries.u64()) {
+            let (first, last) = self.0.unwrap_or((time, time));
+            self.0 = Some((first.min(time), last.max(time)));
+        }
+    }
+}

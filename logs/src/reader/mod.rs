@@ -1,0 +1,51 @@
+//! Reads MCAP files in the order of log time.
+//!
+//! A file is mapped into memory and walked over once, from record to record, which finds its **blocks**: its chunks,
+//! and runs of records without a chunk. A block's time span is taken from its header where the index behind it says
+//! the same, and is looked up in the block itself otherwise. Blocks are then loaded (decompressed and checked) a few
+//! ahead of their use, in the order of their first message, and merged: by log time, then by file, then by position in
+//! the file. A message is borrowed from its block; nothing is copied.
+//!
+//! A damaged file is read as far as it can be. A chunk with a wrong checksum is left out, a file without an end is
+//! read up to its last whole record, and each [`Damage`] is told.
+//!
+//! ```no_run
+//! use gridweave_logs::reader::{LogFile, LogReader};
+//!
+//! let mut reader = LogReader::new(vec![LogFile::open("a.mcap")?, LogFile::open("b.mcap")?]);
+//! while let Some(message) = reader.next_message() {
+//!     println!("{} {} bytes", message.log_time, message.data.len());
+//! }
+//! # Ok::<(), gridweave_logs::reader::ReadError>(())
+//! ```
+
+mod ahead;
+mod block;
+mod chunk;
+mod damage;
+mod definitions;
+mod error;
+mod file;
+mod guess;
+mod layout;
+mod merge;
+mod paths;
+mod record;
+mod summary;
+
+#[cfg(test)]
+mod tests;
+
+pub use damage::{ChunkFault, Damage};
+pub use error::ReadError;
+pub use file::LogFile;
+pub use merge::{LogMessage, LogReader};
+pub use paths::log_files;
+
+use std::path::PathBuf;
+
+/// Opens the logs at `paths`: MCAP files, and folders of ROS 2 bags.
+pub fn open(paths: &[PathBuf]) -> Result<LogReader, ReadError> {
+    let files = log_files(paths)?;
+    Ok(LogReader::new(files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?))
+}

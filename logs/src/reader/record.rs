@@ -1,0 +1,115 @@
+//! Records, the parts of an MCAP file: an opcode, the body's length, and the body, borrowed where it lies.
+
+/// The bytes before a record's body: the opcode and the body's length.
+pub(crate) const HEAD: usize = 9;
+
+/// One record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Record<'a> {
+    pub(crate) opcode: u8,
+    /// Where the record begins.
+    pub(crate) position: usize,
+    pub(crate) body: &'a [u8],
+}
+
+impl Record<'_> {
+    /// Where the next record begins.
+    pub(crate) fn end(&self) -> usize {
+        self.position + HEAD + self.body.len()
+    }
+}
+
+/// The record at `position`; `None` if the bytes end before it does.
+pub(crate) fn record_at(bytes: &[u8], position: usize) -> Option<Record<'_>> {
+    let mut fields = Fields(bytes.get(position..)?);
+    let opcode = fields.u8()?;
+    let length = usize::try_from(fields.u64()?).ok()?;
+    Some(Record { opcode, position, body: fields.bytes(length)? })
+}
+
+/// A message, as it stands in a record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MessageRecord<'a> {
+    pub(crate) channel: u16,
+    pub(crate) sequence: u32,
+    pub(crate) log_time: u64,
+    pub(crate) publish_time: u64,
+    pub(crate) data: &'a [u8],
+}
+
+impl<'a> MessageRecord<'a> {
+    /// Reads the body of a message record; `None` if it is too short.
+    pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut fields = Fields(body);
+        Some(Self {
+            channel: fields.u16()?,
+            sequence: fields.u32()?,
+            log_time: fields.u64()?,
+            publish_time: fields.u64()?,
+            data: fields.0,
+        })
+    }
+}
+
+/// Little-endian fields, taken off the front of a body one by one; `None` past its end.
+pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
+
+impl<'a> Fields<'a> {
+    pub(crate) fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    pub(crate) fn u8(&mut self) -> Option<u8> {
+        self.array().map(u8::from_le_bytes)
+    }
+
+    pub(crate) fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub(crate) fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub(crate) fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    /// A text with its length before it. Bytes that are no UTF-8 are replaced.
+    pub(crate) fn text(&mut self) -> Option<String> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        self.bytes(length).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+    }
+
+    /// The bytes of a block with its length before it.
+    pub(crate) fn block(&mut self) -> Option<Fields<'a>> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        self.bytes(length).map(Fields)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_that_is_cut_is_none() {
+        let mut bytes = vec![5, 3, 0, 0, 0, 0, 0, 0, 0, 7, 8, 9];
+        assert_eq!(record_at(&bytes, 0).unwrap().body, [7, 8, 9]);
+        assert_eq!(record_at(&bytes, 0).unwrap().end(), bytes.len());
+        for length in 0..bytes.len() {
+            assert!(record_at(&bytes[..length], 0).is_none());
+        }
+        bytes[1..9].fill(0xff);
+        assert!(record_at(&bytes, 0).is_none());
+        assert!(record_at(&bytes, usize::MAX).is_none());
+    }
+}

@@ -1,0 +1,81 @@
+//! What cannot be read at all is refused with the reason and a cure.
+
+use super::*;
+
+fn error(path: PathBuf) -> ReadError {
+    match open(&[path]) {
+        Err(error) => error,
+        Ok(_) => panic!("it was opened"),
+    }
+}
+
+#[test]
+fn missing_and_empty_files_are_told_apart() {
+    let folder = Folder::new();
+    assert!(matches!(error(folder.path().join("none.mcap")), ReadError::Missing { .. }));
+    assert!(matches!(error(folder.write("empty.mcap", b"")), ReadError::Empty { .. }));
+    assert!(matches!(open(&[]), Err(ReadError::NothingGiven)));
+    assert!(matches!(error(folder.path()), ReadError::Empty { .. }), "a folder stands for the logs in it");
+    let bare = Folder::new();
+    assert!(matches!(error(bare.path()), ReadError::NotABag { .. }));
+}
+
+#[test]
+fn another_kind_of_file_is_named_with_a_cure() {
+    let folder = Folder::new();
+    let text = error(folder.write("a.bag", b"#ROSBAG V2.0\n\x45\0\0\0op=\x03")).to_string();
+    assert!(text.contains("a.bag") && text.contains("ROS 1 bag"), "{text}");
+    let text = error(folder.write("a.db3", b"SQLite format 3\0")).to_string();
+    assert!(text.contains("ros2 bag convert"), "{text}");
+}
+
+#[test]
+fn a_log_cut_before_its_first_message_is_an_error() {
+    let folder = Folder::new();
+    let whole = three_chunks(layouts()[3].clone());
+    for length in [1, 5, 8, 12, 40, 60] {
+        let error = error(folder.write("cut.mcap", &whole[..length]));
+        assert!(matches!(error, ReadError::NothingLeft { .. }), "{length}: {error}");
+    }
+}
+
+#[test]
+fn a_log_without_messages_is_no_error() {
+    let folder = Folder::new();
+    for options in layouts() {
+        let (seen, damage) = read_all(open(&[folder.write("a.mcap", &TestLog::new(options).finish())]).unwrap());
+        assert!(seen.is_empty() && damage.is_empty());
+    }
+}
+
+#[test]
+fn a_bag_folder_is_read_in_the_order_of_its_description() {
+    let folder = Folder::new();
+    let mut log = TestLog::new(layouts()[0].clone());
+    let one = folder.write("bag_0.mcap", &{
+        log.raw("/a", "p/msg/A", 3, b"0");
+        log.finish()
+    });
+    let mut log = TestLog::new(layouts()[3].clone());
+    log.raw("/a", "p/msg/A", 3, b"1");
+    folder.write("bag_1.mcap", &log.finish());
+    let seen = read_all(open(&[folder.path()]).unwrap()).0;
+    assert_eq!(seen.iter().map(|seen| &seen.3[..]).collect::<Vec<_>>(), [b"0", b"1"], "by name without a description");
+    let description = folder.write(
+        "metadata.yaml",
+        b"rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_1.mcap\n    - bag_0.mcap\n",
+    );
+    for path in [folder.path(), description.clone()] {
+        let seen = read_all(open(&[path]).unwrap()).0;
+        assert_eq!(seen.iter().map(|seen| &seen.3[..]).collect::<Vec<_>>(), [b"1", b"0"]);
+    }
+    assert!(matches!(open(&[folder.path(), one]), Err(ReadError::Duplicate { .. })));
+    std::fs::write(
+        &description,
+        "rosbag2_bagfile_information: {storage_identifier: sqlite3, relative_file_paths: [a.db3]}",
+    )
+    .unwrap();
+    assert!(error(folder.path()).to_string().contains("ros2 bag convert"));
+    std::fs::write(&description, "hello: [").unwrap();
+    assert!(matches!(error(folder.path()), ReadError::BagDescription { .. }));
+}

@@ -1,0 +1,41 @@
+//! Tests of the reader as a whole.
+
+mod damaged;
+mod errors;
+mod order;
+
+use super::*;
+use crate::test_log::{Folder, TestLog, layouts};
+
+/// A message as the reader gave it: file, channel's topic, log time and bytes.
+type Seen = (usize, String, u64, Vec<u8>);
+
+/// All messages, and all damage that was told.
+fn read_all(mut reader: LogReader) -> (Vec<Seen>, Vec<Damage>) {
+    let files = reader.files().clone();
+    let mut damage: Vec<_> = files.iter().flat_map(|file| file.damage().to_vec()).collect();
+    let mut seen = Vec::new();
+    while let Some(message) = reader.next_message() {
+        let topic = files[message.file].channel(message.channel).map(|channel| channel.topic).unwrap_or_default();
+        seen.push((message.file, topic, message.log_time.0, message.data.to_vec()));
+    }
+    damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
+    (seen, damage)
+}
+
+/// Three chunks of a few messages each.
+fn three_chunks(options: mcap::WriteOptions) -> Vec<u8> {
+    let mut log = TestLog::new(options);
+    for chunk in 0..3 {
+        for message in 0..4 {
+            let time = 10 * chunk + message;
+            log.raw("/a", "p/msg/A", time, &[time as u8; 40]);
+        }
+        log.flush();
+    }
+    log.finish()
+}
+
+fn times(seen: &[Seen]) -> Vec<u64> {
+    seen.iter().map(|(_, _, time, _)| *time).collect()
+}

@@ -1,0 +1,136 @@
+//! Messages come by log time, file and position.
+
+use super::*;
+use proptest::prelude::*;
+
+/// Where the body of each record with the given opcode begins.
+fn bodies(file: &[u8], opcode: u8) -> Vec<usize> {
+    let mut found = Vec::new();
+    let mut position = mcap::MAGIC.len();
+    while let Some(record) = record::record_at(file, position) {
+        if record.opcode == opcode {
+            found.push(position + record::HEAD);
+        }
+        position = record.end();
+    }
+    found
+}
+
+fn write_files(folder: &Folder, files: &[Vec<(u8, u64, bool)>], options: &mcap::WriteOptions) -> Vec<PathBuf> {
+    let write = |(index, messages): (usize, &Vec<(u8, u64, bool)>)| {
+        let mut log = TestLog::new(options.clone());
+        for (place, (topic, time, ends_chunk)) in messages.iter().enumerate() {
+            log.raw(&format!("/topic{topic}"), "p/msg/A", *time, &(place as u32).to_le_bytes());
+            if *ends_chunk {
+                log.flush();
+            }
+        }
+        folder.write(&format!("{index}.mcap"), &log.finish())
+    };
+    files.iter().enumerate().map(write).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn messages_come_by_time_then_file_then_position(
+        files in prop::collection::vec(
+            prop::collection::vec((0u8..3, 0u64..20, prop::bool::weighted(0.2)), 0..40),
+            1..4,
+        ),
+        layout in 0usize..4,
+        summary: bool,
+        indexes: bool,
+    ) {
+        let folder = Folder::new();
+        let options = layouts()[layout].clone().emit_summary_records(summary).emit_message_indexes(indexes);
+        let (seen, damage) = read_all(open(&write_files(&folder, &files, &options)).unwrap());
+        let mut expected: Vec<_> = files
+            .iter()
+            .enumerate()
+            .flat_map(|(file, messages)| {
+                messages.iter().enumerate().map(move |(place, (topic, time, _))| (*time, file, place, *topic))
+            })
+            .collect();
+        expected.sort_unstable();
+        let expected: Vec<Seen> = expected
+            .into_iter()
+            .map(|(time, file, place, topic)| {
+                (file, format!("/topic{topic}"), time, (place as u32).to_le_bytes().to_vec())
+            })
+            .collect();
+        prop_assert_eq!(seen, expected);
+        prop_assert!(damage.is_empty(), "{:?}", damage);
+    }
+}
+
+#[test]
+fn a_chunk_header_that_its_index_contradicts_is_not_believed() {
+    let folder = Folder::new();
+    for options in &layouts()[1..] {
+        let mut file = TestLog::new(options.clone());
+        file.raw("/a", "p/msg/A", 5, b"5").raw("/a", "p/msg/A", 9, b"9").flush().raw("/a", "p/msg/A", 1, b"1");
+        let mut file = file.finish();
+        // The last chunk says that it begins at time 8.
+        let chunk = *bodies(&file, mcap::records::op::CHUNK).last().unwrap();
+        file[chunk..chunk + 8].copy_from_slice(&8u64.to_le_bytes());
+        let (seen, damage) = read_all(open(&[folder.write("a.mcap", &file)]).unwrap());
+        assert_eq!(times(&seen), [1, 5, 9]);
+        assert_eq!(damage, []);
+    }
+}
+
+#[test]
+fn an_index_that_hides_an_early_message_does_not_make_time_run_backwards() {
+    let folder = Folder::new();
+    let mut file = TestLog::new(layouts()[1].clone());
+    file.raw("/a", "p/msg/A", 5, b"5").raw("/a", "p/msg/A", 9, b"9").flush().raw("/a", "p/msg/A", 1, b"1");
+    let mut file = file.finish();
+    let late = 8u64.to_le_bytes();
+    let chunk = *bodies(&file, mcap::records::op::CHUNK).last().unwrap();
+    file[chunk..chunk + 8].copy_from_slice(&late);
+    file[chunk + 8..chunk + 16].copy_from_slice(&late);
+    let index = *bodies(&file, mcap::records::op::MESSAGE_INDEX).last().unwrap();
+    file[index + 6..index + 14].copy_from_slice(&late);
+    let (seen, damage) = read_all(open(&[folder.write("a.mcap", &file)]).unwrap());
+    assert_eq!(times(&seen), [5, 5, 9]);
+    assert_eq!(seen[1].3, b"1");
+    assert_eq!(damage, [Damage::LateMessage]);
+}
+
+#[test]
+fn the_fields_of_a_message_come_through() {
+    let folder = Folder::new();
+    for options in layouts() {
+        let mut log = TestLog::new(options);
+        log.raw("/a", "p/msg/A", 7, b"seven").raw("/b", "p/msg/B", 8, b"");
+        let mut reader = open(&[folder.write("a.mcap", &log.finish())]).unwrap();
+        let message = reader.next_message().unwrap();
+        assert_eq!(
+            (message.sequence, message.log_time.0, message.publish_time, message.data),
+            (1, 7, 6, &b"seven"[..])
+        );
+        let number = reader.next_message().unwrap().channel;
+        let channel = reader.files()[0].channel(number).unwrap();
+        assert_eq!((channel.topic.as_str(), channel.schema_name.as_str()), ("/b", "p/msg/B"));
+        assert_eq!((channel.message_encoding.as_str(), channel.schema_encoding.as_str()), ("cdr", "ros2msg"));
+        assert_eq!(channel.schema, b"# a schema");
+        assert!(reader.next_message().is_none());
+        assert!(reader.next_message().is_none());
+        assert_eq!(reader.progress(), 1.0);
+    }
+}
+
+#[test]
+fn more_chunks_than_are_loaded_ahead_all_come() {
+    let folder = Folder::new();
+    let mut log = TestLog::new(layouts()[3].clone().chunk_size(Some(100_000)));
+    for time in 0..400u64 {
+        let noise: Vec<u8> = (0..5000u64).map(|byte| ((byte * time * 31) >> 3) as u8).collect();
+        log.raw("/a", "p/msg/A", time, &noise);
+    }
+    let (seen, damage) = read_all(open(&[folder.write("a.mcap", &log.finish())]).unwrap());
+    assert_eq!(times(&seen), (0..400).collect::<Vec<_>>());
+    assert_eq!(damage, []);
+}

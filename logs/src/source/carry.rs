@@ -1,0 +1,93 @@
+//! The part of a log that is read, and the latched messages before it.
+
+use crate::reader::LogMessage;
+use gridweave_runtime::message::{Channel, LogTime};
+use std::collections::BTreeMap;
+
+/// The part of the time line that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Window {
+    pub(crate) start: LogTime,
+    pub(crate) end: LogTime,
+}
+
+impl Window {
+    /// The part from `start` to `end` seconds after `origin`.
+    pub(crate) fn new(origin: LogTime, start: f64, end: Option<f64>) -> Self {
+        // A start of zero means everything, also what a wrong index hides before the origin.
+        let start = if start > 0.0 { origin.plus_seconds(start) } else { LogTime::MIN };
+        Self { start, end: end.map_or(LogTime::MAX, |end| origin.plus_seconds(end)) }
+    }
+}
+
+/// How many of a channel's messages before the start still hold at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Latch {
+    /// None.
+    No,
+    /// The last one.
+    Last,
+    /// All: each may tell of other frames.
+    All,
+}
+
+impl Latch {
+    /// How `channel` latches. Maps always do, whatever their publisher offered.
+    pub(crate) fn of(channel: &Channel, is_map: bool) -> Self {
+        let offered = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
+        // ROS 2 writes the durability as a number up to Iron, and as a word since.
+        let is_transient_local = |line: &str| matches!(line.trim(), "durability: 1" | "durability: transient_local");
+        if channel.topic.ends_with("/tf_static") {
+            Self::All
+        } else if is_map || offered.lines().any(is_transient_local) {
+            Self::Last
+        } else {
+            Self::No
+        }
+    }
+}
+
+/// A message that is kept until the start.
+#[derive(Debug)]
+pub(crate) struct Carried {
+    pub(crate) sequence: u32,
+    pub(crate) publish_time: u64,
+    pub(crate) data: Vec<u8>,
+    order: usize,
+}
+
+/// The latched messages before the start, by route.
+#[derive(Debug, Default)]
+pub(crate) struct Carry {
+    kept: BTreeMap<usize, Vec<Carried>>,
+    count: usize,
+}
+
+impl Carry {
+    /// Keeps a message of the given route for the start.
+    pub(crate) fn keep(&mut self, route: usize, latch: Latch, message: &LogMessage<'_>) {
+        if latch == Latch::No {
+            return;
+        }
+        let kept = self.kept.entry(route).or_default();
+        if latch == Latch::Last {
+            kept.clear();
+        }
+        self.count += 1;
+        kept.push(Carried {
+            sequence: message.sequence,
+            publish_time: message.publish_time,
+            data: message.data.to_vec(),
+            order: self.count,
+        });
+    }
+
+    /// What was kept, with its routes, in the order it was logged.
+    pub(crate) fn take(&mut self) -> Vec<(usize, Carried)> {
+        let kept = std::mem::take(&mut self.kept);
+        let mut all: Vec<_> =
+            kept.into_iter().flat_map(|(route, kept)| kept.into_iter().map(move |carried| (route, carried))).collect();
+        all.sort_by_key(|(_, carried)| carried.order);
+        all
+    }
+}

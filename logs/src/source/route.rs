@@ -1,0 +1,109 @@
+//! What a channel carries, by its topic and its type.
+
+use crate::tf::{TF_TYPE, tf_topic};
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TagRange};
+use gridweave_runtime::stage::{RobotTopics, match_robot};
+use std::borrow::Cow;
+
+/// What a channel carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Occupancy grids of a robot.
+    Map,
+    /// Poses of a robot.
+    Pose,
+    /// Messages of another type from which poses of a robot are made.
+    PoseSource(PoseSource),
+    /// Tag readings of a robot.
+    Tags,
+    /// Transforms from which poses of robots are made.
+    Tf,
+    /// Anything else.
+    Other,
+}
+
+/// A type that holds a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PoseSource {
+    /// `nav_msgs/msg/Odometry`.
+    Odometry,
+    /// `geometry_msgs/msg/PoseWithCovarianceStamped`.
+    PoseWithCovariance,
+}
+
+/// What was found out about a channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Classified<'a> {
+    /// What it carries.
+    pub(crate) role: Role,
+    /// The robot that it is about; empty if none in particular.
+    pub(crate) robot: &'a str,
+    /// Why it is not what its topic lets one expect.
+    pub(crate) mismatch: Option<String>,
+}
+
+/// Tells what `channel` carries.
+pub(crate) fn classify<'a>(robots: &RobotTopics, channel: &'a Channel) -> Classified<'a> {
+    let topic = channel.topic.as_str();
+    let type_name = full_type_name(&channel.schema_name);
+    let is_cdr = channel.message_encoding == "cdr";
+    if robots.tf.is_some()
+        && type_name == TF_TYPE
+        && is_cdr
+        && let Some(robot) = tf_topic(topic)
+    {
+        return Classified { role: Role::Tf, robot, mismatch: None };
+    }
+    let expectations = [
+        ("map", Some(&robots.map), OccupancyGrid::NAME, role_of_map as fn(&str) -> Option<Role>),
+        // Poses come from tf alone if the pipeline says so.
+        ("pose", robots.tf.is_none().then_some(&robots.pose), PoseStamped::NAME, role_of_pose),
+        ("tags", Some(&robots.tags), TagRange::NAME, role_of_tags),
+    ];
+    let mut other = Classified { role: Role::Other, robot: "", mismatch: None };
+    for (field, pattern, expected, role_of) in expectations {
+        let Some(robot) = pattern.and_then(|pattern| match_robot(pattern, topic)) else { continue };
+        match role_of(&type_name).filter(|_| is_cdr) {
+            Some(role) => return Classified { role, robot, mismatch: None },
+            None if is_cdr => {
+                other.robot = robot;
+                let found = if type_name.is_empty() { "messages without a schema" } else { &type_name };
+                other.mismatch =
+                    Some(format!("`{topic}` fits `robots.{field}` but carries {found} where {expected} is expected"));
+            }
+            None => {
+                other.robot = robot;
+                let encoding = &channel.message_encoding;
+                other.mismatch =
+                    Some(format!("`{topic}` fits `robots.{field}` but is encoded as `{encoding}`, not as `cdr`"));
+            }
+        }
+    }
+    other
+}
+
+fn role_of_map(type_name: &str) -> Option<Role> {
+    (type_name == OccupancyGrid::NAME).then_some(Role::Map)
+}
+
+fn role_of_pose(type_name: &str) -> Option<Role> {
+    match type_name {
+        PoseStamped::NAME => Some(Role::Pose),
+        "nav_msgs/msg/Odometry" => Some(Role::PoseSource(PoseSource::Odometry)),
+        "geometry_msgs/msg/PoseWithCovarianceStamped" => Some(Role::PoseSource(PoseSource::PoseWithCovariance)),
+        _ => None,
+    }
+}
+
+fn role_of_tags(type_name: &str) -> Option<Role> {
+    (type_name == TagRange::NAME).then_some(Role::Tags)
+}
+
+/// The name with its `/msg/`, which some old logs leave out.
+pub(crate) fn full_type_name(name: &str) -> Cow<'_, str> {
+    match name.split_once('/') {
+        Some((package, message)) if !message.contains('/') => Cow::Owned(format!("{package}/msg/{message}")),
+        _ => Cow::Borrowed(name),
+    }
+}

@@ -1,0 +1,278 @@
+//! Sends each message of the logs to the port of its channel.
+
+use super::carry::{Carried, Carry, Latch};
+use super::count::{RobotCount, SourceCount};
+use super::pose::to_pose_stamped;
+use super::route::{PoseSource, Role, classify};
+use super::{MAP, OTHER, POSE, TAGS};
+use crate::reader::{Damage, LogFile, LogMessage};
+use crate::tf::TfPoses;
+use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
+use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What is known of one channel. Channels of several files that are the same share it.
+struct Route {
+    channel: Channel,
+    role: Role,
+    robot: String,
+    /// What all headers of the channel's messages have in common.
+    header: MessageHeader,
+    latch: Latch,
+    announced: bool,
+    messages: u64,
+}
+
+/// What a message is, besides its bytes.
+#[derive(Clone, Copy)]
+struct Stamp {
+    sequence: u32,
+    publish_time: u64,
+}
+
+/// Sends messages to the ports that their channels call for.
+pub(crate) struct Router {
+    robots: RobotTopics,
+    files: Arc<[LogFile]>,
+    routes: Vec<Route>,
+    /// For every file and channel number: the route's index, once it is known.
+    by_number: Vec<Vec<Option<usize>>>,
+    by_channel: BTreeMap<Channel, usize>,
+    tf: Option<TfPoses>,
+    /// How many poses were made from other messages, by robot.
+    poses_made: BTreeMap<String, u64>,
+    bytes: u64,
+}
+
+impl Router {
+    pub(crate) fn new(robots: RobotTopics, files: Arc<[LogFile]>) -> Self {
+        Self {
+            tf: robots.tf.clone().map(TfPoses::new),
+            robots,
+            by_number: vec![Vec::new(); files.len()],
+            files,
+            routes: Vec::new(),
+            by_channel: BTreeMap::new(),
+            poses_made: BTreeMap::new(),
+            bytes: 0,
+        }
+    }
+
+    /// Sends a message. The output's log time is the message's.
+    pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &mut Output<'_>) -> Result<(), StageError> {
+        let Some(route) = self.route(message, output)? else { return Ok(()) };
+        let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
+        self.send_on(route, stamp, message.data, output)
+    }
+
+    /// Takes up a message before the start: keeps what is latched, and learns the frames.
+    pub(crate) fn keep(
+        &mut self,
+        message: &LogMessage<'_>,
+        carry: &mut Carry,
+        output: &mut Output<'_>,
+    ) -> Result<(), StageError> {
+        let Some(index) = self.route(message, output)? else { return Ok(()) };
+        let Some(route) = self.routes.get(index) else { return Ok(()) };
+        carry.keep(index, route.latch, message);
+        if let (Role::Tf, Some(tf)) = (route.role, &mut self.tf)
+            && let Ok(transforms) = decode::<TFMessage>(message.data)
+        {
+            tf.update(&route.robot, &transforms);
+        }
+        Ok(())
+    }
+
+    /// Sends a message that was kept.
+    pub(crate) fn send_carried(
+        &mut self,
+        route: usize,
+        carried: &Carried,
+        output: &mut Output<'_>,
+    ) -> Result<(), StageError> {
+        let stamp = Stamp { sequence: carried.sequence, publish_time: carried.publish_time };
+        self.send_on(route, stamp, &carried.data, output)
+    }
+
+    fn send_on(&mut self, index: usize, stamp: Stamp, data: &[u8], output: &mut Output<'_>) -> Result<(), StageError> {
+        let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        let port = match route.role {
+            Role::Map => MAP,
+            Role::Pose => POSE,
+            Role::Tags => TAGS,
+            Role::PoseSource(_) | Role::Tf | Role::Other => OTHER,
+        };
+        if !route.announced {
+            route.announced = true;
+            output.announce(port, route.header.channel, &route.channel)?;
+        }
+        route.messages += 1;
+        self.bytes += data.len() as u64;
+        let header = MessageHeader {
+            log_time: output.log_time(),
+            publish_time: stamp.publish_time,
+            log_sequence: stamp.sequence,
+            ..route.header
+        };
+        output.send_encoded(port, header, data)?;
+        match route.role {
+            Role::PoseSource(source) => self.send_pose(index, source, data, output),
+            Role::Tf => self.send_tf_poses(index, data, output),
+            _ => Ok(()),
+        }
+    }
+
+    fn send_pose(
+        &mut self,
+        route: usize,
+        source: PoseSource,
+        data: &[u8],
+        output: &mut Output<'_>,
+    ) -> Result<(), StageError> {
+        let Some(route) = self.routes.get(route).filter(|_| output.is_read(POSE)) else { return Ok(()) };
+        match to_pose_stamped(source, data) {
+            Ok(pose) => {
+                count(&mut self.poses_made, &route.robot);
+                output.send(POSE, &route.robot, &pose)
+            }
+            Err(_) => {
+                output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
+                Ok(())
+            }
+        }
+    }
+
+    fn send_tf_poses(&mut self, route: usize, data: &[u8], output: &mut Output<'_>) -> Result<(), StageError> {
+        let (Some(route), Some(tf)) = (self.routes.get(route), &mut self.tf) else { return Ok(()) };
+        if !output.is_read(POSE) {
+            return Ok(());
+        }
+        let Ok(message) = decode::<TFMessage>(data) else {
+            output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
+            return Ok(());
+        };
+        let (poses, unusable) = tf.update(&route.robot, &message);
+        for _ in 0..unusable {
+            output.warn("transforms with values that are not finite, or between a frame and itself");
+        }
+        for (robot, pose) in poses {
+            count(&mut self.poses_made, &robot);
+            output.send(POSE, &robot, &pose)?;
+        }
+        Ok(())
+    }
+
+    /// The index of the message's route; `None` if the log does not describe its channel.
+    fn route(&mut self, message: &LogMessage<'_>, output: &mut Output<'_>) -> Result<Option<usize>, StageError> {
+        let number = usize::from(message.channel);
+        let known = self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten());
+        if known.is_some() {
+            return Ok(known);
+        }
+        let Some(file) = self.files.get(message.file) else { return Ok(None) };
+        let Some(channel) = file.channel(message.channel) else {
+            let damage = Damage::UnknownChannel { channel: message.channel };
+            output.warn(format!("{}: {damage}", file.path().display()));
+            return Ok(None);
+        };
+        let index = match self.by_channel.get(&channel) {
+            Some(&index) => index,
+            None => self.add_route(channel, output)?,
+        };
+        if let Some(file) = self.by_number.get_mut(message.file) {
+            file.resize(file.len().max(number + 1), None);
+            file[number] = Some(index);
+        }
+        Ok(Some(index))
+    }
+
+    fn add_route(&mut self, channel: Channel, output: &mut Output<'_>) -> Result<usize, StageError> {
+        let index = self.routes.len();
+        let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
+        let classified = classify(&self.robots, &channel);
+        let header = MessageHeader {
+            // 0 stands for messages that no log has described.
+            channel: index as u32 + 1,
+            robot: FixedText::new(classified.robot).map_err(|error| StageError::new(doing("robot's name"), error))?,
+            topic: FixedText::new(&channel.topic).map_err(|error| StageError::new(doing("name"), error))?,
+            ..Default::default()
+        };
+        if let Some(mismatch) = classified.mismatch {
+            output.warn(mismatch);
+        }
+        let (role, robot) = (classified.role, classified.robot.to_owned());
+        self.by_channel.insert(channel.clone(), index);
+        let latch = Latch::of(&channel, role == Role::Map);
+        self.routes.push(Route { channel, role, robot, header, latch, announced: false, messages: 0 });
+        Ok(index)
+    }
+
+    /// Warns of what the logs were expected to hold, and do not.
+    pub(crate) fn warn_of_missing(&self, output: &mut Output<'_>) {
+        let routed = |role: Role| self.routes.iter().any(|route| route.role == role && route.messages > 0);
+        if output.is_read(MAP) && !routed(Role::Map) {
+            let is_map =
+                |route: &&Route| super::route::full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
+            let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
+            let others =
+                if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
+            output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
+        }
+        if output.is_read(POSE) && !routed(Role::Pose) && self.poses_made.is_empty() {
+            match &self.robots.tf {
+                Some(frames) => output.warn(format!(
+                    "no pose was found: tf never ties `{}` to `{}`",
+                    frames.base_frame, frames.map_frame
+                )),
+                None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
+            }
+        }
+        if output.is_read(TAGS) && !routed(Role::Tags) {
+            output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
+        }
+        if let Some(tf) = self.tf.as_ref().filter(|_| output.is_read(POSE)) {
+            for robot in tf.robots_without_pose() {
+                output.warn(format!("tf does not tie the base of {robot} to its map"));
+            }
+        }
+    }
+
+    /// What was sent.
+    pub(crate) fn count(&self) -> SourceCount {
+        let mut robots: BTreeMap<String, RobotCount> = BTreeMap::new();
+        for (robot, &poses) in &self.poses_made {
+            robots.entry(robot.clone()).or_default().poses += poses;
+        }
+        for route in &self.routes {
+            let robot = match route.role {
+                Role::Tf | Role::Other => continue,
+                _ => robots.entry(route.robot.clone()).or_default(),
+            };
+            match route.role {
+                Role::Map => robot.maps += route.messages,
+                Role::Pose => robot.poses += route.messages,
+                Role::Tags => robot.readings += route.messages,
+                Role::PoseSource(_) | Role::Tf | Role::Other => {}
+            }
+        }
+        SourceCount {
+            files: self.files.len(),
+            messages: self.routes.iter().map(|route| route.messages).sum(),
+            bytes: self.bytes,
+            chunks: self.files.iter().map(LogFile::chunks).sum(),
+            chunks_skipped: 0,
+            robots,
+        }
+    }
+}
+
+fn count(counts: &mut BTreeMap<String, u64>, robot: &str) {
+    match counts.get_mut(robot) {
+        Some(count) => *count += 1,
+        None => {
+            counts.insert(robot.to_owned(), 1);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The stage `mcap_source`.
+
+use super::SourceParameters;
+use super::carry::{Carry, Window};
+use super::router::Router;
+use crate::reader::{self, Damage, LogFile, LogReader};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::stage::{Context, Output, Source, StageError};
+
+/// How many messages are read at a time.
+const BATCH: usize = 64;
+
+/// Reads logs; see the [module](super).
+pub struct McapSource {
+    reader: LogReader,
+    router: Router,
+    window: Window,
+    /// What is latched before the start; `None` once it has been sent.
+    carry: Option<Carry>,
+    begun: bool,
+    chunks_skipped: u64,
+}
+
+impl McapSource {
+    /// Opens the logs.
+    pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
+        let doing = || format!("read the log of stage `{}`", context.stage);
+        if parameters.files.is_empty() {
+            return Err(StageError::new(doing(), "no file is given").with_help("give --input LOG or files = [...]"));
+        }
+        if let Some(tf) = &context.robots.tf
+            && !(tf.map_frame.contains("{robot}") && tf.base_frame.contains("{robot}"))
+        {
+            return Err(StageError::new(
+                doing(),
+                "the frames of `robots.tf` do not say which part is the robot's name",
+            )
+            .with_help("write them as in map_frame = \"{robot}/map\""));
+        }
+        let reader = reader::open(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
+        Ok(Self {
+            router: Router::new(context.robots.clone(), reader.files().clone()),
+            reader,
+            window: Window::new(origin, parameters.start, parameters.end),
+            carry: Some(Carry::default()),
+            begun: false,
+            chunks_skipped: 0,
+        })
+    }
+
+    fn warn_of_damage(&mut self, output: &mut Output<'_>) {
+        let files = self.reader.files().clone();
+        let mut damage = self.reader.take_damage();
+        if !std::mem::replace(&mut self.begun, true) {
+            let found_at_opening = |(index, file): (usize, &LogFile)| {
+                file.damage().iter().map(move |damage| (index, damage.clone())).collect::<Vec<_>>()
+            };
+            damage.extend(files.iter().enumerate().flat_map(found_at_opening));
+        }
+        for (file, damage) in damage {
+            self.chunks_skipped += u64::from(matches!(damage, Damage::BadChunk { .. }));
+            if let Some(file) = files.get(file) {
+                output.warn(format!("{}: {damage}", file.path().display()));
+            }
+        }
+    }
+
+    fn end(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
+        self.warn_of_damage(output);
+        self.router.warn_of_missing(output);
+        Ok(false)
+    }
+}
+
+impl Source for McapSource {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        for _ in 0..BATCH {
+            let Some(message) = self.reader.next_message() else { return self.end(output) };
+            if message.log_time > self.window.end {
+                return self.end(output);
+            }
+            if message.log_time < self.window.start
+                && let Some(carry) = &mut self.carry
+            {
+                self.router.keep(&message, carry, output)?;
+                continue;
+            }
+            send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
+            output.set_log_time(message.log_time);
+            self.router.send(&message, output)?;
+        }
+        self.warn_of_damage(output);
+        Ok(true)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(self.reader.progress())
+    }
+
+    fn report(&self) -> Option<serde_json::Value> {
+        let mut count = self.router.count();
+        count.chunks_skipped = self.chunks_skipped;
+        serde_json::to_value(count).ok()
+    }
+}
+
+/// Sends what was latched before the start, as of the start, if that has not been done yet.
+fn send_carried(
+    carry: &mut Option<Carry>,
+    start: LogTime,
+    router: &mut Router,
+    output: &mut Output<'_>,
+) -> Result<(), StageError> {
+    for (route, carried) in carry.take().map(|mut carry| carry.take()).unwrap_or_default() {
+        output.set_log_time(start);
+        router.send_carried(route, &carried, output)?;
+    }
+    Ok(())
+}

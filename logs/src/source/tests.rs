@@ -1,0 +1,338 @@
+use super::*;
+use crate::test_log::{Folder, TestLog, layouts};
+use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader};
+use gridweave_runtime::ros::{
+    Header, MapMetaData, Odometry, Pose, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
+};
+use gridweave_runtime::stage::{
+    CollectedOutputs, Context, Node, Output, OutputSink, RobotTopics, Sent, Source, StageError, TfFrames,
+};
+use nalgebra::{Isometry2, Vector2};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+const ODOMETRY: &str = Odometry::NAME;
+const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
+
+/// What was sent: the port, the header and the bytes.
+type Sending = (usize, MessageHeader, Vec<u8>);
+
+/// All that was sent, announcements among it.
+#[derive(Clone, Default)]
+struct Everything(Rc<RefCell<Vec<Sending>>>);
+
+struct Port(usize, Everything);
+
+impl OutputSink for Port {
+    fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
+        self.1.0.borrow_mut().push((self.0, header, bytes.to_vec()));
+        Ok(())
+    }
+
+    fn send_in_place(
+        &mut self,
+        _: MessageHeader,
+        _: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
+    ) -> Result<(), StageError> {
+        Ok(())
+    }
+}
+
+struct Run {
+    sent: Vec<Sending>,
+    warnings: BTreeMap<String, u64>,
+    report: serde_json::Value,
+}
+
+impl Run {
+    /// The messages of a port.
+    fn on(&self, port: usize) -> Vec<Message> {
+        let is_data = |(at, header, _): &&Sending| *at == port && header.flags.contains(MessageFlags::DATA);
+        self.sent.iter().filter(is_data).map(|(_, header, bytes)| Message::from_vec(*header, bytes.clone())).collect()
+    }
+
+    /// The topics and numbers announced on a port.
+    fn announced(&self, port: usize) -> Vec<(u32, String)> {
+        let is_channel = |(at, header, _): &&Sending| *at == port && header.flags.contains(MessageFlags::CHANNEL);
+        let channel = |bytes: &[u8]| Channel::decode(bytes).unwrap().topic;
+        self.sent.iter().filter(is_channel).map(|(_, header, bytes)| (header.channel, channel(bytes))).collect()
+    }
+
+    fn times(&self, port: usize) -> Vec<u64> {
+        self.on(port).iter().map(|message| message.header().log_time.0).collect()
+    }
+}
+
+fn make(parameters: SourceParameters, robots: RobotTopics) -> Result<McapSource, StageError> {
+    McapSource::new(parameters, &Context { stage: "log".into(), robots, ..Default::default() })
+}
+
+fn try_run(parameters: SourceParameters, robots: RobotTopics) -> Result<Run, StageError> {
+    let mut source = make(parameters, robots)?;
+    let everything = Everything::default();
+    let mut ports: Vec<Sent> = kind()
+        .outputs
+        .iter()
+        .enumerate()
+        .map(|(index, port)| {
+            Sent::new(
+                port.name,
+                format!("/{{robot}}/log/{}", port.name),
+                Some(Box::new(Port(index, everything.clone()))),
+            )
+        })
+        .collect();
+    let mut warnings = BTreeMap::new();
+    while source.next(&mut Output::new(&mut ports, LogTime(0), &mut warnings))? {}
+    let sent = everything.0.take();
+    Ok(Run { sent, warnings, report: source.report().unwrap() })
+}
+
+fn run(files: Vec<PathBuf>) -> Run {
+    try_run(SourceParameters { files, ..Default::default() }, RobotTopics::default()).unwrap()
+}
+
+fn write(fill: impl FnOnce(&mut TestLog)) -> (Folder, Vec<PathBuf>) {
+    let folder = Folder::new();
+    let mut log = TestLog::new(layouts()[3].clone());
+    fill(&mut log);
+    let path = folder.write("a.mcap", &log.finish());
+    (folder, vec![path])
+}
+
+fn at(x: f64) -> Pose {
+    Isometry2::new(Vector2::new(x, 0.0), 0.5).into()
+}
+
+fn grid() -> OccupancyGrid<'static> {
+    OccupancyGrid {
+        info: MapMetaData { width: 2, height: 1, ..Default::default() },
+        data: &[0, 100],
+        ..Default::default()
+    }
+}
+
+fn reading() -> TagRange {
+    TagRange { tag_id: "tag1".into(), range: 1.5, ..Default::default() }
+}
+
+#[test]
+fn each_message_comes_on_its_port_as_it_was_logged() {
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/map", OccupancyGrid::NAME, 10, &grid())
+            .add("/robot1/pose", PoseStamped::NAME, 11, &PoseStamped { pose: at(1.0), ..Default::default() })
+            .add("/robot2/tag_ranges", TagRange::NAME, 12, &reading())
+            .raw("/robot1/scan", "sensor_msgs/msg/LaserScan", 13, b"scan");
+    });
+    let run = run(files);
+    for (port, robot, topic, number) in [
+        (MAP, "robot1", "/robot1/map", 1),
+        (POSE, "robot1", "/robot1/pose", 2),
+        (TAGS, "robot2", "/robot2/tag_ranges", 3),
+        (OTHER, "", "/robot1/scan", 4),
+    ] {
+        let messages = run.on(port);
+        let header = messages[0].header();
+        assert_eq!(messages.len(), 1);
+        assert_eq!((messages[0].robot(), header.topic.as_str(), header.channel), (robot, topic, number));
+        assert_eq!((header.log_time.0, header.publish_time), (10 + port as u64, 9 + port as u64));
+        assert_eq!(header.log_sequence, number);
+        assert_eq!(run.announced(port), [(number, topic.to_owned())]);
+    }
+    assert_eq!(run.on(MAP)[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
+    assert_eq!(run.on(OTHER)[0].bytes(), b"scan");
+    assert_eq!(run.report["messages"], 4);
+    assert_eq!(run.report["robots"]["robot1"], serde_json::json!({ "maps": 1, "poses": 1, "readings": 0 }));
+    assert!(run.warnings.is_empty(), "{:?}", run.warnings);
+}
+
+#[test]
+fn a_channel_is_announced_before_its_first_message_and_shared_between_files() {
+    let (_one, mut files) = write(|log| {
+        log.raw("/x", "p/msg/X", 1, b"1").raw("/x", "p/msg/X", 3, b"3");
+    });
+    let (_two, more) = write(|log| {
+        log.raw("/y", "p/msg/Y", 0, b"0").raw("/x", "p/msg/X", 2, b"2").raw("/x", "p/msg/Z", 4, b"4");
+    });
+    files.extend(more);
+    let run = run(files);
+    assert_eq!(run.announced(OTHER), [(1, "/y".into()), (2, "/x".into()), (3, "/x".into())]);
+    let sent: Vec<_> = run.sent.iter().map(|(_, header, _)| (header.flags.0, header.channel)).collect();
+    let (data, channel) = (MessageFlags::DATA.0, MessageFlags::CHANNEL.0);
+    assert_eq!(sent, [(channel, 1), (data, 1), (channel, 2), (data, 2), (data, 2), (data, 2), (channel, 3), (data, 3)]);
+    assert_eq!(run.times(OTHER), [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn odometry_and_poses_with_covariance_are_made_poses_and_kept() {
+    let odometry = Odometry {
+        header: Header::new(LogTime(7), "odom"),
+        child_frame_id: "base".into(),
+        pose: PoseWithCovariance { pose: at(3.0), ..Default::default() },
+        ..Default::default()
+    };
+    let with_covariance = (Header::new(LogTime(8), "map"), PoseWithCovariance { pose: at(4.0), ..Default::default() });
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/pose", ODOMETRY, 10, &odometry)
+            .add("/robot2/pose", POSE_WITH_COVARIANCE, 11, &with_covariance)
+            .raw("/robot1/pose", ODOMETRY, 12, b"cut");
+    });
+    let run = run(files);
+    let poses: Vec<PoseStamped> = run.on(POSE).iter().map(|message| message.decode().unwrap()).collect();
+    assert_eq!(poses[0], PoseStamped { header: odometry.header.clone(), pose: at(3.0) });
+    assert_eq!(poses[1], PoseStamped { header: with_covariance.0.clone(), pose: at(4.0) });
+    let header = *run.on(POSE)[0].header();
+    assert_eq!((header.channel, header.topic.as_str(), header.robot.as_str()), (0, "/robot1/log/pose", "robot1"));
+    assert_eq!(header.log_time.0, 10);
+    assert!(run.announced(POSE).is_empty(), "what was made here was not logged");
+    assert_eq!(run.times(OTHER), [10, 11, 12], "what it was made of goes on");
+    assert_eq!(run.on(OTHER)[0].decode::<Odometry>().unwrap(), odometry);
+    assert!(run.warnings.keys().any(|warning| warning.contains("could not be read as a pose")));
+}
+
+#[test]
+fn a_topic_that_fits_with_another_type_goes_to_other_and_is_warned_of() {
+    let (_folder, files) = write(|log| {
+        log.raw("/robot1/map", "nav_msgs/msg/GridCells", 1, b"?").raw("/robot1/map", "nav_msgs/msg/GridCells", 2, b"?");
+    });
+    let run = run(files);
+    assert_eq!((run.on(MAP).len(), run.on(OTHER).len()), (0, 2));
+    let warning = "`/robot1/map` fits `robots.map` but carries nav_msgs/msg/GridCells where nav_msgs/msg/OccupancyGrid is expected";
+    assert!(run.warnings.contains_key(warning), "{:?}", run.warnings);
+    assert!(run.warnings.keys().any(|warning| warning.starts_with("no map was found")));
+}
+
+#[test]
+fn a_type_name_without_msg_is_known() {
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/map", "nav_msgs/OccupancyGrid", 1, &grid());
+    });
+    assert_eq!(run(files).on(MAP).len(), 1);
+    assert_eq!(full_type_name("nav_msgs/msg/OccupancyGrid"), "nav_msgs/msg/OccupancyGrid");
+    assert_eq!(full_type_name("foxglove.Pose"), "foxglove.Pose");
+}
+
+#[test]
+fn tf_gives_poses_and_goes_on_as_it_is() {
+    let transforms = |x: f64| TFMessage {
+        transforms: vec![TransformStamped {
+            header: Header::new(LogTime(5), "map"),
+            child_frame_id: "base_link".into(),
+            transform: Isometry2::new(Vector2::new(x, 0.0), 0.0).into(),
+        }],
+    };
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/tf", TFMessage::NAME, 1, &transforms(1.0))
+            .add("/robot2/tf", TFMessage::NAME, 2, &transforms(2.0))
+            .add("/robot1/tf", TFMessage::NAME, 3, &transforms(f64::NAN))
+            .raw("/robot1/tf", TFMessage::NAME, 4, b"\0\x01\0\0cut")
+            .add("/robot1/pose", PoseStamped::NAME, 5, &PoseStamped::default());
+    });
+    let frames = |map: &str| TfFrames { map_frame: map.into(), base_frame: "{robot}/base_link".into() };
+    let robots = RobotTopics { tf: Some(frames("{robot}/map")), ..Default::default() };
+    let parameters = SourceParameters { files, ..Default::default() };
+    let run = try_run(parameters.clone(), robots).unwrap();
+    let poses: Vec<_> = run.on(POSE).iter().map(|message| message.robot().to_owned()).collect();
+    assert_eq!(poses, ["robot1", "robot2"]);
+    assert_eq!(run.on(POSE)[1].decode::<PoseStamped>().unwrap().header.frame_id, "robot2/map");
+    assert_eq!(run.times(OTHER), [1, 2, 3, 4, 5]);
+    assert_eq!(run.report["robots"]["robot2"]["poses"], 1);
+    assert_eq!(run.warnings.len(), 4, "not finite, not readable, no map, no tags: {:?}", run.warnings);
+    let robots = RobotTopics { tf: Some(frames("map")), ..Default::default() };
+    assert!(try_run(parameters, robots).err().unwrap().to_string().contains("{robot}/map"));
+}
+
+#[test]
+fn what_is_latched_before_the_start_is_carried_over() {
+    let latched = BTreeMap::from([("offered_qos_profiles".to_owned(), "- history: 3\n  durability: 1\n".to_owned())]);
+    let second = 1_000_000_000;
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/map", OccupancyGrid::NAME, 0, &OccupancyGrid::default())
+            .add("/robot1/map", OccupancyGrid::NAME, second, &grid())
+            .raw("/tf_static", TFMessage::NAME, second, b"a")
+            .raw("/tf_static", TFMessage::NAME, second + 1, b"b")
+            .with_metadata("/description", "p/msg/D", second, b"d", &latched)
+            .raw("/scan", "p/msg/S", second, b"s")
+            .raw("/scan", "p/msg/S", 2 * second, b"S")
+            .raw("/scan", "p/msg/S", 3 * second, b"S")
+            .raw("/scan", "p/msg/S", 4 * second, b"s");
+    });
+    let parameters = SourceParameters { files: files.clone(), start: 1.5, end: Some(3.0) };
+    let run = try_run(parameters, RobotTopics::default()).unwrap();
+    assert_eq!(run.times(MAP), [second * 3 / 2]);
+    assert_eq!(run.on(MAP)[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
+    let others: Vec<_> = run.on(OTHER).iter().map(|message| message.bytes().to_vec()).collect();
+    assert_eq!(others, [b"a", b"d", b"b", b"S", b"S"]);
+    let times: Vec<_> = run.sent.iter().map(|(_, header, _)| header.log_time).collect();
+    assert!(times.is_sorted());
+    // A log that ends before the start still gives its last map.
+    let parameters = SourceParameters { files, start: 100.0, end: None };
+    let run = try_run(parameters, RobotTopics::default()).unwrap();
+    assert_eq!((run.on(MAP).len(), run.on(OTHER).len()), (1, 3));
+}
+
+#[test]
+fn names_that_are_too_long_are_an_error_that_says_which() {
+    let robot = "r".repeat(33);
+    let (_folder, files) = write(|log| {
+        log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, 1, &grid());
+    });
+    let parameters = |files| SourceParameters { files, ..Default::default() };
+    let error = try_run(parameters(files), RobotTopics::default()).err().unwrap().to_string();
+    assert!(error.contains("robot's name") && error.contains("32"), "{error}");
+    let (_folder, files) = write(|log| {
+        log.raw(&format!("/{}", "t".repeat(128)), "p/msg/X", 1, b"");
+    });
+    let error = try_run(parameters(files), RobotTopics::default()).err().unwrap().to_string();
+    assert!(error.contains("128"), "{error}");
+}
+
+#[test]
+fn a_source_without_files_says_how_to_give_them() {
+    let error = make(SourceParameters::default(), RobotTopics::default()).err().unwrap().to_string();
+    assert!(error.contains("--input"), "{error}");
+    let files = vec!["/nowhere/a.mcap".into()];
+    let error = make(SourceParameters { files, ..Default::default() }, RobotTopics::default()).err().unwrap();
+    assert!(error.to_string().contains("/nowhere/a.mcap"));
+}
+
+#[test]
+fn parameters_out_of_range_are_told() {
+    let wrong = SourceParameters { files: Vec::new(), start: -1.0, end: Some(f64::NAN) };
+    assert_eq!(wrong.check().iter().map(|error| error.field).collect::<Vec<_>>(), ["start", "end"]);
+    assert!(SourceParameters::default().check().is_empty());
+}
+
+#[test]
+fn damage_is_warned_of_and_counted() {
+    let folder = Folder::new();
+    let mut log = TestLog::new(layouts()[1].clone());
+    for _ in 0..3 {
+        log.raw("/x", "p/msg/X", 1, &[7; 50]).flush();
+    }
+    let mut bytes = log.finish();
+    let place = bytes.windows(50).rposition(|window| window == [7; 50]).unwrap();
+    bytes[place] = 8;
+    bytes.truncate(bytes.len() - 20);
+    let run = run(vec![folder.write("a.mcap", &bytes)]);
+    assert_eq!(run.report["chunks_skipped"], 1);
+    assert_eq!(run.on(OTHER).len(), 2);
+    assert!(run.warnings.keys().any(|warning| warning.contains("has no end")), "{:?}", run.warnings);
+    assert!(run.warnings.keys().any(|warning| warning.contains("checksum")), "{:?}", run.warnings);
+}
+
+#[test]
+fn the_kind_makes_a_source_from_a_table() {
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
+    });
+    let kind = kind();
+    let mut table = toml::Table::new();
+    table.insert("files".into(), vec![files[0].display().to_string()].into());
+    let Ok(Node::Source(mut source)) = kind.make(table, &Context::default()) else { panic!() };
+    let mut outputs = CollectedOutputs::new(&kind);
+    while source.next(&mut outputs.output(LogTime(0))).unwrap() {}
+    assert_eq!(outputs.take(MAP).iter().filter(|message| message.header().flags == MessageFlags::DATA).count(), 1);
+    assert_eq!(source.progress(), Some(1.0));
+}

@@ -1,0 +1,178 @@
+//! Robot poses from tf, the tree of frames that ROS programs publish one edge at a time.
+
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, TFMessage, Time, Transform};
+use gridweave_runtime::stage::{TfFrames, match_robot};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The name of the type of tf messages.
+pub(crate) const TF_TYPE: &str = "tf2_msgs/msg/TFMessage";
+
+/// Whether tf messages come on `topic`, and the prefix of the frames in them: `/tf` and `/tf_static` have frames with
+/// their full names, `/robot1/tf` and `/robot1/tf_static` frames that lack the `robot1/` before them.
+pub fn tf_topic(topic: &str) -> Option<&str> {
+    let (namespace, last) = topic.rsplit_once('/')?;
+    let robot = namespace.rsplit_once('/').map_or(namespace, |(_, robot)| robot);
+    matches!(last, "tf" | "tf_static").then_some(robot)
+}
+
+/// The latest transform of every frame to its parent.
+#[derive(Clone, Debug, Default)]
+pub struct FrameTree {
+    /// By child.
+    edges: BTreeMap<String, Edge>,
+}
+
+#[derive(Clone, Debug)]
+struct Edge {
+    parent: String,
+    transform_parent_child: Isometry3<f64>,
+}
+
+/// How one frame lies in another, and the edges that say so.
+struct Chain<'a> {
+    transform_target_source: Isometry3<f64>,
+    /// The child frames of the edges between the two.
+    children: Vec<&'a str>,
+}
+
+impl FrameTree {
+    /// Puts in an edge, in place of the one that the child had. `false` if it cannot be used: it has values that are
+    /// not finite, or ties a frame to itself.
+    pub fn insert(&mut self, parent: &str, child: &str, transform: &Transform) -> bool {
+        let Some(transform_parent_child) = isometry(transform).filter(|_| parent != child && !child.is_empty()) else {
+            return false;
+        };
+        match self.edges.get_mut(child) {
+            Some(edge) => {
+                edge.transform_parent_child = transform_parent_child;
+                if edge.parent != parent {
+                    parent.clone_into(&mut edge.parent);
+                }
+            }
+            None => {
+                self.edges.insert(child.to_owned(), Edge { parent: parent.to_owned(), transform_parent_child });
+            }
+        }
+        true
+    }
+
+    /// The pose of the frame `source` in the frame `target`; `None` if nothing ties them together.
+    pub fn lookup(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
+        self.chain(target, source).map(|chain| chain.transform_target_source)
+    }
+
+    fn chain<'a>(&'a self, target: &'a str, source: &'a str) -> Option<Chain<'a>> {
+        let to_root: Vec<_> = self.ancestors(source).collect();
+        // The first ancestor of the target that is also one of the source's is where the two meet.
+        for (steps, (frame, transform_ancestor_target)) in self.ancestors(target).enumerate() {
+            let Some(meeting) = to_root.iter().position(|(other, _)| *other == frame) else { continue };
+            let children = self.ancestors(target).take(steps).chain(to_root[..meeting].iter().copied());
+            return Some(Chain {
+                transform_target_source: transform_ancestor_target.inverse() * to_root[meeting].1,
+                children: children.map(|(frame, _)| frame).collect(),
+            });
+        }
+        None
+    }
+
+    /// `frame` and then its ancestors, each with the pose of `frame` in it.
+    fn ancestors<'a>(&'a self, frame: &'a str) -> impl Iterator<Item = (&'a str, Isometry3<f64>)> {
+        let step = |(child, transform): &(&'a str, Isometry3<f64>)| {
+            let edge = self.edges.get(*child)?;
+            Some((edge.parent.as_str(), edge.transform_parent_child * transform))
+        };
+        // A path that is longer than there are edges goes round in a circle.
+        std::iter::successors(Some((frame, Isometry3::identity())), step).take(self.edges.len() + 1)
+    }
+}
+
+/// `None` if a value is not finite. A rotation of four zeros, which many programs write, is no rotation.
+fn isometry(transform: &Transform) -> Option<Isometry3<f64>> {
+    let (t, r) = (transform.translation, transform.rotation);
+    let finite = [t.x, t.y, t.z, r.x, r.y, r.z, r.w].iter().all(|value| value.is_finite());
+    let quaternion = nalgebra::Quaternion::new(r.w, r.x, r.y, r.z);
+    let rotation = UnitQuaternion::try_new(quaternion, 1e-12).unwrap_or_default();
+    finite.then(|| Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
+}
+
+fn pose(isometry: &Isometry3<f64>) -> Pose {
+    let (t, r) = (&isometry.translation, &isometry.rotation);
+    Pose { position: Point { x: t.x, y: t.y, z: t.z }, orientation: Quaternion { x: r.i, y: r.j, z: r.k, w: r.w } }
+}
+
+/// Gives the pose of each robot's base in its map whenever tf says something of it.
+#[derive(Clone, Debug)]
+pub struct TfPoses {
+    frames: TfFrames,
+    tree: FrameTree,
+    /// The robots of which one of the two frames was seen: their map frame and their base frame.
+    robots: BTreeMap<String, (String, String)>,
+}
+
+impl TfPoses {
+    /// Poses between the two frames, in which `{robot}` stands for the robot's name.
+    pub fn new(frames: TfFrames) -> Self {
+        Self { frames, tree: FrameTree::default(), robots: BTreeMap::new() }
+    }
+
+    /// Takes up a tf message in which the frames lack the given prefix (empty: none). Gives the poses that it changes,
+    /// by robot, and how many of its transforms could not be used.
+    pub fn update(&mut self, prefix: &str, message: &TFMessage) -> (Vec<(String, PoseStamped)>, usize) {
+        let mut changed: BTreeMap<String, Time> = BTreeMap::new();
+        let mut unusable = 0;
+        for edge in &message.transforms {
+            let parent = full_name(prefix, &edge.header.frame_id);
+            let child = full_name(prefix, &edge.child_frame_id);
+            if !self.tree.insert(&parent, &child, &edge.transform) {
+                unusable += 1;
+                continue;
+            }
+            self.recognise(&parent);
+            self.recognise(&child);
+            changed.insert(child, edge.header.stamp);
+        }
+        (self.poses(&changed), unusable)
+    }
+
+    fn recognise(&mut self, frame: &str) {
+        for pattern in [&self.frames.map_frame, &self.frames.base_frame] {
+            if let Some(robot) = match_robot(pattern, frame)
+                && !self.robots.contains_key(robot)
+            {
+                let named = |pattern: &str| pattern.replace("{robot}", robot);
+                let frames = (named(&self.frames.map_frame), named(&self.frames.base_frame));
+                self.robots.insert(robot.to_owned(), frames);
+            }
+        }
+    }
+
+    fn poses(&self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
+        let pose_of = |(robot, (map, base)): (&String, &(String, String))| {
+            let chain = self.tree.chain(map, base)?;
+            let stamps = chain.children.iter().filter_map(|child| changed.get(*child));
+            // The pose is as recent as the latest of the edges that have changed it.
+            let stamp = stamps.max_by_key(|stamp| LogTime::from(**stamp))?;
+            let header = Header { stamp: *stamp, frame_id: map.clone() };
+            Some((robot.clone(), PoseStamped { header, pose: pose(&chain.transform_target_source) }))
+        };
+        self.robots.iter().filter_map(pose_of).collect()
+    }
+
+    /// The robots of which a frame was seen and whose base was never tied to their map.
+    pub fn robots_without_pose(&self) -> BTreeSet<&str> {
+        let untied = |(_, (map, base)): &(&String, &(String, String))| self.tree.chain(map, base).is_none();
+        self.robots.iter().filter(untied).map(|(robot, _)| robot.as_str()).collect()
+    }
+}
+
+/// A frame's name with the prefix of its robot, if it lacks it, and without the slash that ROS 1 put before names.
+fn full_name(prefix: &str, frame: &str) -> String {
+    let frame = frame.trim_start_matches('/');
+    let has_prefix = frame.strip_prefix(prefix).is_some_and(|rest| prefix.is_empty() || rest.starts_with('/'));
+    if has_prefix { frame.to_owned() } else { format!("{prefix}/{frame}") }
+}
+
+#[cfg(test)]
+mod tests;

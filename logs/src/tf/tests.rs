@@ -1,0 +1,123 @@
+use super::*;
+use gridweave_runtime::ros::{TransformStamped, Vector3};
+use nalgebra::{Isometry2, Vector2};
+use std::f64::consts::FRAC_PI_2;
+
+fn edge(parent: &str, child: &str, x: f64, y: f64, yaw: f64) -> TransformStamped {
+    TransformStamped {
+        header: Header::new(LogTime((x.abs() * 1e9) as u64), parent),
+        child_frame_id: child.into(),
+        transform: Isometry2::new(Vector2::new(x, y), yaw).into(),
+    }
+}
+
+fn message(transforms: impl Into<Vec<TransformStamped>>) -> TFMessage {
+    TFMessage { transforms: transforms.into() }
+}
+
+fn poses_of(frames: (&str, &str)) -> TfPoses {
+    TfPoses::new(TfFrames { map_frame: frames.0.into(), base_frame: frames.1.into() })
+}
+
+fn robots() -> TfPoses {
+    poses_of(("{robot}/map", "{robot}/base_link"))
+}
+
+#[test]
+fn a_pose_is_the_product_of_the_chain_from_map_to_base() {
+    let mut tf = robots();
+    assert!(tf.update("", &message([edge("r1/map", "r1/odom", 1.0, 2.0, FRAC_PI_2)])).0.is_empty());
+    assert_eq!(tf.robots_without_pose(), BTreeSet::from(["r1"]));
+    let (poses, unusable) = tf.update("", &message([edge("r1/odom", "r1/base_link", 3.0, 0.0, 0.5)]));
+    let [(robot, pose)] = &poses[..] else { panic!("{poses:?}") };
+    assert_eq!((robot.as_str(), pose.header.frame_id.as_str(), unusable), ("r1", "r1/map", 0));
+    assert_eq!(pose.header.stamp.sec, 3, "the stamp of the edge that changed the pose");
+    let planar = pose.pose.planar();
+    assert!((planar.translation.vector - Vector2::new(1.0, 5.0)).norm() < 1e-9);
+    assert!((planar.rotation.angle() - (FRAC_PI_2 + 0.5)).abs() < 1e-9);
+    assert!(tf.robots_without_pose().is_empty());
+}
+
+#[test]
+fn a_pose_is_told_only_when_its_chain_changes_and_once_a_message() {
+    let mut tf = robots();
+    let chain = [edge("r1/map", "r1/odom", 1.0, 0.0, 0.0), edge("r1/odom", "r1/base_link", 2.0, 0.0, 0.0)];
+    assert_eq!(tf.update("", &message(chain.clone())).0.len(), 1);
+    assert!(tf.update("", &message([edge("r1/base_link", "r1/laser", 0.1, 0.0, 0.0)])).0.is_empty());
+    assert!(tf.update("", &message([edge("world", "r1/map", 9.0, 0.0, 0.0)])).0.is_empty());
+    assert!(tf.update("", &message([])).0.is_empty());
+    assert_eq!(tf.update("", &message([chain[0].clone()])).0.len(), 1);
+}
+
+#[test]
+fn frames_without_prefix_get_the_robots() {
+    let mut tf = robots();
+    let prefix = tf_topic("/robot2/tf").unwrap();
+    let transforms = message([edge("map", "/odom", 1.0, 0.0, 0.0), edge("odom", "robot2/base_link", 1.0, 0.0, 0.0)]);
+    let (poses, _) = tf.update(prefix, &transforms);
+    assert_eq!(poses[0].0, "robot2");
+    assert_eq!(poses[0].1.pose.position.x, 2.0);
+    assert_eq!(full_name("r1", "r10/map"), "r1/r10/map");
+    assert_eq!(full_name("", "/map"), "map");
+}
+
+#[test]
+fn tf_topics_are_told_from_others() {
+    let found: Vec<_> = ["/tf", "tf", "/tf_static", "/robot1/tf", "/fleet/r2/tf_static", "/tf2", "/robot1/tf/x"]
+        .map(tf_topic)
+        .into_iter()
+        .collect();
+    assert_eq!(found, [Some(""), None, Some(""), Some("robot1"), Some("r2"), None, None]);
+}
+
+#[test]
+fn a_base_and_a_map_that_meet_in_another_frame_are_tied() {
+    let mut tree = FrameTree::default();
+    for edge in [edge("odom", "map", -1.0, 0.0, 0.0), edge("odom", "base", 4.0, 0.0, 0.0)] {
+        assert!(tree.insert(&edge.header.frame_id, &edge.child_frame_id, &edge.transform));
+    }
+    assert!((tree.lookup("map", "base").unwrap().translation.x - 5.0).abs() < 1e-12);
+    assert!((tree.lookup("base", "map").unwrap().translation.x + 5.0).abs() < 1e-12);
+    assert_eq!(tree.lookup("map", "map"), Some(Isometry3::identity()));
+    assert_eq!(tree.lookup("map", "elsewhere"), None);
+}
+
+#[test]
+fn a_circle_of_frames_ends() {
+    let mut tf = robots();
+    let circle = [
+        edge("r1/a", "r1/base_link", 1.0, 0.0, 0.0),
+        edge("r1/b", "r1/a", 1.0, 0.0, 0.0),
+        edge("r1/base_link", "r1/b", 1.0, 0.0, 0.0),
+        edge("r1/c", "r1/map", 1.0, 0.0, 0.0),
+        edge("r1/map", "r1/c", 1.0, 0.0, 0.0),
+        edge("r1/map", "r1/map", 1.0, 0.0, 0.0),
+    ];
+    let (poses, unusable) = tf.update("", &message(circle));
+    assert_eq!((poses.len(), unusable), (0, 1));
+    assert_eq!(tf.robots_without_pose(), BTreeSet::from(["r1"]));
+}
+
+#[test]
+fn transforms_that_are_not_finite_are_left_out() {
+    let mut tf = robots();
+    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", f64::NAN, 0.0, 0.0)])), (Vec::new(), 1));
+    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", f64::INFINITY, 0.0, 0.0)])).1, 1);
+    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", 2.0, 0.0, 0.0)])).0[0].1.pose.position.x, 2.0);
+}
+
+#[test]
+fn a_rotation_of_zeros_is_none_and_a_tilted_frame_is_honoured() {
+    let mut tree = FrameTree::default();
+    let zeros = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 0.0 };
+    let ahead = Vector3 { x: 1.0, y: 0.0, z: 0.0 };
+    tree.insert("map", "odom", &Transform { translation: ahead, rotation: zeros });
+    // Upside down: what is to its left is to the right of its parent.
+    let upside_down = Quaternion { x: 1.0, y: 0.0, z: 0.0, w: 0.0 };
+    tree.insert("odom", "mount", &Transform { translation: ahead, rotation: upside_down });
+    let left = Vector3 { x: 0.0, y: 1.0, z: 0.0 };
+    tree.insert("mount", "base", &Transform { translation: left, rotation: upside_down });
+    let base = tree.lookup("map", "base").unwrap();
+    assert!((base.translation.vector - nalgebra::Vector3::new(2.0, -1.0, 0.0)).norm() < 1e-12);
+    assert!(base.rotation.angle() < 1e-9);
+}
