@@ -1,0 +1,163 @@
+//! Radio tags on walls, and the readings of their range.
+//!
+//! The model: a tag is read when it is within reach of the robot's middle and nothing stands between. The range has
+//! Gaussian noise; some readings are lost, and some have come over a reflection and are too long by 0.3 m to 2 m. The
+//! signal strength falls with the square of the distance, from -45 dBm at one metre, with a deviation of 2 dB.
+
+use super::floor_plan::{FloorPlan, WALL};
+use super::free_space::FreeSpace;
+use super::ray_caster::RayCaster;
+use super::shape::{Rectangle, between};
+use crate::geometry::{Point2, Pose2};
+use nalgebra::Vector2;
+use rand::seq::SliceRandom;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+/// A tag sits so far off its wall, metres.
+const OFF_WALL: f64 = 0.02;
+/// Tags are not nearer to each other than this, metres.
+const SPACING: f64 = 1.0;
+/// A corridor counts as one place for tags in this length, metres.
+const CORRIDOR_SECTION: f64 = 6.0;
+/// How often a place is looked for in one round over all rooms.
+const TRIES: usize = 20;
+
+/// A radio tag.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tag {
+    /// Its name.
+    pub id: String,
+    /// Where it is in the building, metres.
+    pub place: Point2,
+}
+
+/// What reads tags.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagReader {
+    /// The longest distance of a reading, metres.
+    pub reach: f64,
+    /// Standard deviation of a range, metres.
+    pub noise: f64,
+    /// Share of the readings that are lost, 0 to 1.
+    pub lost: f64,
+    /// Share of the readings that come over a reflection, 0 to 1.
+    pub reflected: f64,
+}
+
+/// One reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagReading {
+    /// Which tag: its place in the list of tags.
+    pub tag: usize,
+    /// Metres.
+    pub range: f64,
+    /// Signal strength, dBm.
+    pub rssi: f32,
+}
+
+impl TagReader {
+    /// Reads all tags from a true pose in the building, in the order of the list.
+    pub fn read(
+        &self,
+        tags: &[Tag],
+        world: &RayCaster,
+        robot_pose: &Pose2,
+        random: &mut impl Rng,
+        mut reading: impl FnMut(TagReading),
+    ) {
+        let antenna = Point2::from(robot_pose.translation.vector);
+        for (tag, Tag { place, .. }) in tags.iter().enumerate() {
+            let distance = (place - antenna).norm();
+            if !(distance <= self.reach) || !world.sees(&antenna, place) {
+                continue;
+            }
+            let lost = random.random::<f64>() < self.lost;
+            let reflected = random.random::<f64>() < self.reflected;
+            let detour = between(random, 0.3, 2.0);
+            let noise: f64 = random.sample(StandardNormal);
+            let fading: f64 = random.sample(StandardNormal);
+            if lost {
+                continue;
+            }
+            let way = if reflected { distance + detour } else { distance };
+            let rssi = -45.0 - 20.0 * way.max(0.1).log10() + 2.0 * fading;
+            reading(TagReading { tag, range: (way + self.noise * noise).max(0.0), rssi: rssi as f32 });
+        }
+    }
+}
+
+/// Puts tags on the walls of a building, spread over its rooms and corridors, where a robot can come near and see them.
+/// There may be fewer than `count` where walls are short.
+pub fn place_tags(
+    plan: &FloorPlan,
+    space: &FreeSpace,
+    world: &RayCaster,
+    count: usize,
+    random: &mut impl Rng,
+) -> Vec<Tag> {
+    let mut areas: Vec<Rectangle> = plan.rooms.iter().map(|room| room.bounds).collect();
+    areas.extend(plan.corridors.iter().flat_map(sections));
+    areas.shuffle(random);
+    let mut places: Vec<Point2> = Vec::with_capacity(count);
+    loop {
+        let before = places.len();
+        for area in &areas {
+            if places.len() == count {
+                break;
+            }
+            let mut candidates = (0..TRIES).map(|_| on_border(area, random));
+            let fits = |(place, inwards): &(Point2, Vector2<f64>)| {
+                places.iter().all(|other| (other - place).norm() >= SPACING)
+                    && is_visible(plan, space, world, place, inwards)
+            };
+            if let Some((place, _)) = candidates.find(fits) {
+                places.push(place);
+            }
+        }
+        if places.len() == count || places.len() == before {
+            break;
+        }
+    }
+    places.into_iter().enumerate().map(|(number, place)| Tag { id: format!("tag{number:02}"), place }).collect()
+}
+
+/// Cuts a corridor into pieces of about one section each.
+fn sections(corridor: &Rectangle) -> Vec<Rectangle> {
+    let along_x = corridor.width() > corridor.height();
+    let count = (corridor.width().max(corridor.height()) / CORRIDOR_SECTION).round().max(1.0);
+    let size = if along_x {
+        Vector2::new(corridor.width() / count, corridor.height())
+    } else {
+        Vector2::new(corridor.width(), corridor.height() / count)
+    };
+    let step = if along_x { Vector2::new(size.x, 0.0) } else { Vector2::new(0.0, size.y) };
+    (0..count as usize)
+        .map(|piece| corridor.min + step * piece as f64)
+        .map(|min| Rectangle { min, max: min + size })
+        .collect()
+}
+
+/// A random point just inside the border of an area, and the direction from the border inwards.
+fn on_border(area: &Rectangle, random: &mut impl Rng) -> (Point2, Vector2<f64>) {
+    let inner = area.expanded(-OFF_WALL);
+    let along = random.random::<f64>() * 2.0 * (inner.width() + inner.height());
+    let (x, y) = (inner.min.x + along, inner.min.y + along - inner.width());
+    if along < inner.width() {
+        (Point2::new(x, inner.min.y), Vector2::y())
+    } else if along < inner.width() + inner.height() {
+        (Point2::new(inner.max.x, y), -Vector2::x())
+    } else if along < 2.0 * inner.width() + inner.height() {
+        (Point2::new(x - inner.width() - inner.height(), inner.max.y), -Vector2::y())
+    } else {
+        (Point2::new(inner.min.x, y - inner.width() - inner.height()), Vector2::x())
+    }
+}
+
+/// Whether there is a wall behind a place and a robot in front of it could read a tag there.
+fn is_visible(plan: &FloorPlan, space: &FreeSpace, world: &RayCaster, place: &Point2, inwards: &Vector2<f64>) -> bool {
+    let outwards = (-inwards.y).atan2(-inwards.x);
+    world.cast(place, outwards, WALL / 2.0).is_some()
+        && plan.solids.iter().all(|solid| solid.distance(place) > OFF_WALL / 2.0)
+        && space.places_in(&Rectangle::round(*place, 3.0, 3.0)).iter().any(|robot| world.sees(robot, place))
+}
