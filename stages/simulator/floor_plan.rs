@@ -246,3 +246,59 @@ fn corridor_door((left, right): (f64, f64), y: f64, random: &mut impl Rng) -> Do
     let margin = width / 2.0 + 0.2;
     Door { centre: Point2::new(between(random, left + margin, right - margin), y), width, along_x: true }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::free_space::FreeSpace;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn size() -> impl Strategy<Value = BuildingSize> {
+        (10.0..45.0, 9.0..45.0, 2.5..8.0, 1.4..3.0, 0.0..0.5).prop_map(
+            |(width, height, room_width, corridor_width, clutter)| BuildingSize {
+                width,
+                height,
+                room_width,
+                corridor_width,
+                clutter,
+            },
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn every_room_and_corridor_can_be_reached(size in size(), seed: u64) {
+            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
+            prop_assert!(plan.rooms.len() >= 2);
+            let space = FreeSpace::new(&plan.bounds, &plan.solids, &plan.corridors[0].centre());
+            for area in plan.rooms.iter().map(|room| &room.bounds).chain(&plan.corridors) {
+                let places = space.places_in(area).len();
+                let cells = area.expanded(-0.3).width() * area.expanded(-0.3).height() / 0.01;
+                prop_assert!(places as f64 > 0.15 * cells, "{places} of {cells} cells of {area:?}");
+            }
+        }
+
+        #[test]
+        fn the_building_is_closed_and_its_rooms_do_not_overlap(size in size(), seed: u64) {
+            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
+            let space = FreeSpace::new(&plan.bounds.expanded(1.0), &plan.solids, &plan.corridors[0].centre());
+            for place in space.places_in(&plan.bounds.expanded(2.0)) {
+                prop_assert!(plan.bounds.contains(&place), "{place} is outside");
+            }
+            for (index, room) in plan.rooms.iter().enumerate() {
+                prop_assert!(plan.rooms[..index].iter().all(|other| !other.bounds.overlaps(&room.bounds)));
+                prop_assert!(plan.corridors.iter().all(|corridor| !corridor.overlaps(&room.bounds)));
+            }
+        }
+    }
+
+    #[test]
+    fn doors_are_gaps_in_walls() {
+        let doors = [3.0, 1.0].map(|x| Door { centre: Point2::new(x, 0.0), width: 1.0, along_x: true });
+        let parts = between_gaps(0.0, 5.0, &doors);
+        assert_eq!(parts, [(-WALL / 2.0, 0.5), (1.5, 2.5), (3.5, 5.0 + WALL / 2.0)]);
+    }
+}

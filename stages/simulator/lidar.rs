@@ -51,3 +51,42 @@ impl Lidar {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use crate::simulator::shape::{Rectangle, Solid};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn scan(lidar: &Lidar) -> Vec<Beam> {
+        let wall = Solid::from(Rectangle::new(3.0, -50.0, 3.2, 50.0));
+        let behind = Solid::from(Rectangle::new(-4.0, -1.0, -3.8, 1.0));
+        let mut beams = Vec::new();
+        let world = RayCaster::new(&[wall, behind]);
+        lidar.scan(&world, &pose(0.0, 0.0, 0.5), &mut ChaCha8Rng::seed_from_u64(1), &mut beams);
+        beams
+    }
+
+    #[test]
+    fn beams_meet_the_wall_within_the_noise_and_none_beyond_the_reach() {
+        let beams = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.02, dropped: 0.0 });
+        let errors: Vec<f64> = beams
+            .iter()
+            .map(|beam| (beam, (0.5 + beam.angle).cos()))
+            .filter(|(_, cosine)| *cosine > 0.0)
+            .map(|(beam, cosine)| beam.range - 3.0 / cosine)
+            .collect();
+        let deviation = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((deviation - 0.02).abs() < 0.002, "{deviation}");
+        assert!(beams.iter().all(|beam| beam.range < 10.1));
+    }
+
+    #[test]
+    fn as_many_beams_are_dropped_as_asked() {
+        let all = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.0 }).len() as f64;
+        let some = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.25 }).len() as f64;
+        assert!((some / all - 0.75).abs() < 0.03);
+    }
+}

@@ -72,3 +72,55 @@ pub(super) fn smooth_path(space: &FreeSpace, path: &mut [Point2]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulator::shape::{Rectangle, Solid};
+
+    /// A room cut in two by a wall with a gap at its upper end, and a closed box in the right half.
+    fn space() -> FreeSpace {
+        let solids: Vec<Solid> = [
+            Rectangle::new(0.0, -0.1, 6.0, 0.0),
+            Rectangle::new(0.0, 4.0, 6.0, 4.1),
+            Rectangle::new(-0.1, 0.0, 0.0, 4.0),
+            Rectangle::new(6.0, 0.0, 6.1, 4.0),
+            Rectangle::new(2.9, 0.0, 3.1, 3.0),
+            Rectangle::new(4.5, 0.0, 4.6, 1.6),
+            Rectangle::new(4.5, 1.5, 6.0, 1.6),
+        ]
+        .map(Solid::from)
+        .to_vec();
+        FreeSpace::new(&Rectangle::new(0.0, 0.0, 6.0, 4.0), &solids, &Point2::new(1.0, 1.0))
+    }
+
+    #[test]
+    fn a_way_leads_round_a_wall_and_never_where_the_robot_does_not_fit() {
+        let space = space();
+        let mut way = plan_path(&space, &Point2::new(1.0, 1.0), &Point2::new(4.0, 0.6)).unwrap();
+        smooth_path(&space, &mut way);
+        assert!(way.iter().all(|point| space.clearance(point) >= ROBOT_RADIUS));
+        assert!(way.iter().any(|point| point.y > 3.2), "it takes the gap");
+        assert!(way.windows(2).all(|pair| (pair[1] - pair[0]).norm() < 0.2));
+        let length: f64 = way.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+        assert!(length < 7.5, "{length}");
+    }
+
+    #[test]
+    fn there_is_no_way_into_a_closed_box_or_into_a_wall() {
+        let space = space();
+        let start = Point2::new(1.0, 1.0);
+        for goal in [Point2::new(5.3, 0.8), Point2::new(3.0, 1.0), Point2::new(-50.0, f64::NAN)] {
+            assert_eq!(plan_path(&space, &start, &goal), None);
+        }
+    }
+
+    #[test]
+    fn smoothing_keeps_the_ends_and_takes_ways_of_no_points() {
+        let space = space();
+        let mut way = [Point2::new(1.0, 1.0), Point2::new(1.5, 1.2), Point2::new(2.0, 1.0)];
+        smooth_path(&space, &mut way);
+        assert_eq!((way[0], way[2]), (Point2::new(1.0, 1.0), Point2::new(2.0, 1.0)));
+        smooth_path(&space, &mut []);
+    }
+}

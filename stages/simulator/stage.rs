@@ -175,3 +175,80 @@ fn send_map(output: &mut Output<'_>, log: &RobotLog, index: usize) -> Result<(),
         Ok(())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Grid;
+    use gridweave_runtime::message::Message;
+    use gridweave_runtime::stage::{CollectedOutputs, Node};
+
+    const WORLD: &str = "robots = 2\nwidth = 10\nheight = 9\nbeams = 60\ntags = 8\nduration = 20";
+
+    fn run(parameters: &str, seed: u64) -> Result<(Vec<Vec<Message>>, Option<Value>), StageError> {
+        let kind = kind();
+        let context = Context { stage: "world".into(), seed, ..Default::default() };
+        let Node::Source(mut source) = kind.make(parameters.parse().unwrap(), &context)? else { panic!("a source") };
+        let mut outputs = CollectedOutputs::new(&kind);
+        while source.next(&mut outputs.output(LogTime::MIN))? {
+            assert!((0.0..1.0).contains(&source.progress().unwrap()));
+        }
+        assert_eq!(source.progress(), Some(1.0));
+        assert!(!source.next(&mut outputs.output(LogTime::MIN))?, "it stays at its end");
+        Ok(((0..4).map(|port| outputs.take(port)).collect(), source.report()))
+    }
+
+    #[test]
+    fn the_messages_are_those_of_a_log() {
+        let (ports, report) = run(WORLD, 1).unwrap();
+        assert_eq!(ports[MAP].len(), 6);
+        assert_eq!(ports[POSE].len(), 400);
+        assert_eq!(ports[TF].len(), 400);
+        let topics = [MAP, POSE, TAGS, TF].map(|port| ports[port][0].header().topic);
+        assert_eq!(topics[MAP].as_str(), "/robot1/map");
+        assert_eq!(topics[POSE].as_str(), "/robot1/pose");
+        assert!(topics[TAGS].as_str().ends_with("/tag_ranges"));
+        assert_eq!(topics[TF].as_str(), "/tf");
+
+        let pose: PoseStamped = ports[POSE][0].decode().unwrap();
+        assert_eq!((pose.header.frame_id.as_str(), ports[POSE][0].header().log_time), ("robot1/map", START));
+        let tf: TFMessage = ports[TF][0].decode().unwrap();
+        assert_eq!(tf.transforms[0].child_frame_id, "robot1/base_link");
+        assert!((tf.transforms[0].transform.translation.x - pose.pose.position.x).abs() < 1e-12);
+        let range: TagRange = ports[TAGS][0].decode().unwrap();
+        assert!(range.header.frame_id.ends_with("/base_link") && range.range_stddev == 0.05);
+        for message in &ports[MAP] {
+            let map: OccupancyGrid<'_> = message.decode().unwrap();
+            assert!(Grid::from_message(&map).unwrap().occupied().count() > 50);
+            assert_eq!(map.header.frame_id, format!("{}/map", message.robot()));
+        }
+        let report = report.unwrap();
+        assert_eq!(report["frames"].as_object().unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_bytes() {
+        let bytes = |seed| {
+            let (ports, report) = run(WORLD, seed).unwrap();
+            let bytes: Vec<Vec<u8>> = ports.iter().flatten().map(|message| message.bytes().to_vec()).collect();
+            (bytes, report)
+        };
+        assert!(bytes(7) == bytes(7));
+        assert!(bytes(7) != bytes(8));
+    }
+
+    #[test]
+    fn every_port_is_in_the_order_of_time() {
+        let (ports, _) = run(WORLD, 3).unwrap();
+        for port in ports {
+            assert!(port.is_sorted_by_key(|message| message.header().log_time));
+        }
+    }
+
+    #[test]
+    fn parameters_out_of_range_and_unknown_ones_are_refused() {
+        for wrong in ["robots = 0", "overlap = 1.5", "resolution = []", "robot = 3", "speed = \"fast\""] {
+            assert!(run(wrong, 1).is_err(), "{wrong}");
+        }
+    }
+}

@@ -161,3 +161,68 @@ fn is_visible(plan: &FloorPlan, space: &FreeSpace, world: &RayCaster, place: &Po
         && plan.solids.iter().all(|solid| solid.distance(place) > OFF_WALL / 2.0)
         && space.places_in(&Rectangle::round(*place, 3.0, 3.0)).iter().any(|robot| world.sees(robot, place))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use crate::simulator::shape::Solid;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    const READER: TagReader = TagReader { reach: 3.0, noise: 0.05, lost: 0.0, reflected: 0.0 };
+
+    fn world() -> (Vec<Tag>, RayCaster) {
+        let walls = [Rectangle::new(2.0, -5.0, 2.2, 5.0), Rectangle::new(-6.0, -5.0, -5.8, 5.0)];
+        let tag = |id: &str, x, y| Tag { id: id.into(), place: Point2::new(x, y) };
+        let tags = vec![tag("near", 1.98, 1.0), tag("behind", 2.22, 1.0), tag("far", -5.78, 0.0)];
+        (tags, RayCaster::new(&walls.map(Solid::from)))
+    }
+
+    fn readings(reader: TagReader) -> Vec<TagReading> {
+        let (tags, world) = world();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut readings = Vec::new();
+        for _ in 0..4000 {
+            reader.read(&tags, &world, &pose(0.0, 0.0, 1.0), &mut random, |reading| readings.push(reading));
+        }
+        readings
+    }
+
+    #[test]
+    fn only_tags_in_reach_and_in_sight_are_read_and_with_the_noise_that_was_asked_for() {
+        let readings = readings(READER);
+        assert_eq!(readings.len(), 4000);
+        assert!(readings.iter().all(|reading| reading.tag == 0));
+        let distance = f64::hypot(1.98, 1.0);
+        let squares: f64 = readings.iter().map(|reading| (reading.range - distance).powi(2)).sum();
+        let deviation = (squares / 4000.0).sqrt();
+        assert!((deviation - 0.05).abs() < 0.004, "{deviation}");
+        let strength = readings.iter().map(|reading| f64::from(reading.rssi)).sum::<f64>() / 4000.0;
+        assert!((strength + 45.0 + 20.0 * distance.log10()).abs() < 0.2, "{strength} dBm");
+    }
+
+    #[test]
+    fn readings_are_lost_and_reflected_as_often_as_asked() {
+        let readings = readings(TagReader { lost: 0.3, reflected: 0.1, ..READER });
+        assert!((readings.len() as f64 / 4000.0 - 0.7).abs() < 0.03);
+        let long = readings.iter().filter(|reading| reading.range > 2.45).count();
+        assert!((long as f64 / readings.len() as f64 - 0.1).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_reach_or_a_pose_that_is_no_number_reads_nothing() {
+        let (tags, world) = world();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let nan = TagReader { reach: f64::NAN, ..READER };
+        nan.read(&tags, &world, &pose(0.0, 0.0, 0.0), &mut random, |_| panic!("read"));
+        READER.read(&tags, &world, &pose(f64::NAN, 0.0, 0.0), &mut random, |_| panic!("read"));
+    }
+
+    #[test]
+    fn a_long_corridor_is_several_places_for_tags() {
+        let sections = sections(&Rectangle::new(1.0, 2.0, 19.0, 4.0));
+        assert_eq!(sections.len(), 3);
+        assert_eq!(sections[2], Rectangle::new(13.0, 2.0, 19.0, 4.0));
+    }
+}

@@ -36,3 +36,25 @@ impl Truth {
 fn object<T>(entries: &[(String, T)], value: impl Fn(&T) -> Value) -> Value {
     Value::Object(entries.iter().map(|(name, entry)| (name.clone(), value(entry))).collect::<Map<_, _>>())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+
+    #[test]
+    fn the_truth_has_the_form_of_a_truth_file() {
+        let truth = Truth {
+            resolution: 0.05,
+            frames: vec![("robot1".into(), Pose2::identity()), ("robot2".into(), pose(1.0, 2.0, 0.5))],
+            tags: vec![("tag00".into(), Point2::new(3.0, 4.0))],
+            centres: vec![("robot1".into(), Point2::new(5.0, 6.0))],
+        };
+        let json = truth.to_json();
+        assert_eq!(json["resolution"], 0.05);
+        assert_eq!(json["frames"]["robot2"], json!({ "x": 1.0, "y": 2.0, "yaw": 0.5 }));
+        assert_eq!(json["tags"]["tag00"], json!([3.0, 4.0]));
+        assert_eq!(json["centres"]["robot1"], json!([5.0, 6.0]));
+        assert!(json["note"].is_string());
+    }
+}
