@@ -11,22 +11,22 @@ const TURN_ON_THE_SPOT: f64 = 1.0;
 
 /// What a robot's drive is limited by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DriveLimits {
+pub(super) struct DriveLimits {
     /// Metres a second.
-    pub speed: f64,
+    pub(super) speed: f64,
     /// Metres a second squared.
-    pub acceleration: f64,
+    pub(super) acceleration: f64,
     /// Radians a second.
-    pub turn_rate: f64,
+    pub(super) turn_rate: f64,
     /// The drive ends after this time, seconds.
-    pub duration: f64,
+    pub(super) duration: f64,
 }
 
 /// Follows a way; gives a pose (in the frame of the way) every [`TICK_SECONDS`], at least one unless the way is empty.
 ///
 /// The robot stays on the way, looks a little ahead, slows down where it bends and turns on the spot where it doubles
 /// back.
-pub fn drive(way: &[Point2], limits: &DriveLimits) -> Vec<Pose2> {
+pub(super) fn drive(way: &[Point2], limits: &DriveLimits) -> Vec<Pose2> {
     let mut track = Track { way, leg: 0, along: 0.0 };
     let Some(mut place) = track.point(0.0) else { return Vec::new() };
     let mut heading = track.direction_from(&place).unwrap_or(0.0);

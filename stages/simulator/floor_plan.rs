@@ -18,17 +18,17 @@ const WIDE: f64 = 30.0;
 
 /// What a building is asked to be, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BuildingSize {
+pub(super) struct BuildingSize {
     /// Along x.
-    pub width: f64,
+    pub(super) width: f64,
     /// Along y.
-    pub height: f64,
+    pub(super) height: f64,
     /// The mean size of a room along its corridor.
-    pub room_width: f64,
+    pub(super) room_width: f64,
     /// Between the walls of a corridor, centre to centre.
-    pub corridor_width: f64,
+    pub(super) corridor_width: f64,
     /// Pieces of furniture a square metre.
-    pub clutter: f64,
+    pub(super) clutter: f64,
 }
 
 /// A gap in a wall.
@@ -89,7 +89,7 @@ struct Row {
 impl FloorPlan {
     /// A random building. Sizes below 2 m a room are not made: see the limits of
     /// [`Parameters`](super::Parameters).
-    pub fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
+    pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
         let BuildingSize { width, height, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);
         let mut plan = Self { bounds, rooms: Vec::new(), corridors: Vec::new(), solids: Vec::new() };

@@ -5,7 +5,7 @@ use crate::geometry::Point2;
 use std::collections::VecDeque;
 
 /// A robot is a disc of this radius, metres.
-pub const ROBOT_RADIUS: f64 = 0.28;
+pub(super) const ROBOT_RADIUS: f64 = 0.28;
 /// The side of a raster cell, metres.
 const CELL: f64 = 0.1;
 /// Distances above this are all the same to a robot, metres.
@@ -13,7 +13,7 @@ pub(super) const FREE_CLEARANCE: f64 = 0.8;
 
 /// The distance from the nearest obstacle for every cell of a raster over a building.
 #[derive(Clone, Debug)]
-pub struct FreeSpace {
+pub(super) struct FreeSpace {
     min: Point2,
     columns: usize,
     rows: usize,
@@ -23,7 +23,7 @@ pub struct FreeSpace {
 
 impl FreeSpace {
     /// The free space of a building. What can be driven to from near `start` is reachable.
-    pub fn new(bounds: &Rectangle, solids: &[Solid], start: &Point2) -> Self {
+    pub(super) fn new(bounds: &Rectangle, solids: &[Solid], start: &Point2) -> Self {
         let columns = (bounds.width() / CELL).ceil().max(1.0) as usize;
         let rows = (bounds.height() / CELL).ceil().max(1.0) as usize;
         let count = columns * rows;
@@ -100,7 +100,7 @@ impl FreeSpace {
     }
 
     /// The distance from the nearest obstacle at a point, metres, at most 0.8 m.
-    pub fn clearance(&self, point: &Point2) -> f64 {
+    pub(super) fn clearance(&self, point: &Point2) -> f64 {
         self.clearance_at(self.index(point))
     }
 
@@ -110,7 +110,7 @@ impl FreeSpace {
     }
 
     /// Whether a robot can stand at a point and can be driven there.
-    pub fn is_reachable(&self, point: &Point2) -> bool {
+    pub(super) fn is_reachable(&self, point: &Point2) -> bool {
         self.is_reachable_at(self.index(point))
     }
 
@@ -120,7 +120,7 @@ impl FreeSpace {
     }
 
     /// The places within `area` that a robot can be driven to, row by row.
-    pub fn places_in(&self, area: &Rectangle) -> Vec<Point2> {
+    pub(super) fn places_in(&self, area: &Rectangle) -> Vec<Point2> {
         let low = ((area.min - self.min) / CELL).map(|v| v.max(0.0) as usize);
         let high = ((area.max - self.min) / CELL).map(|v| v.max(0.0) as usize);
         let rows = low.y..=high.y.min(self.rows - 1);

@@ -12,29 +12,29 @@ use std::f64::consts::TAU;
 
 /// A lidar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lidar {
+pub(super) struct Lidar {
     /// Beams of one scan.
-    pub beams: usize,
+    pub(super) beams: usize,
     /// The longest range, metres.
-    pub reach: f64,
+    pub(super) reach: f64,
     /// Standard deviation of a range, metres.
-    pub noise: f64,
+    pub(super) noise: f64,
     /// Share of the beams that return nothing, 0 to 1.
-    pub dropped: f64,
+    pub(super) dropped: f64,
 }
 
 /// One beam that has returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beam {
+pub(super) struct Beam {
     /// Its direction from the robot's heading, radians.
-    pub angle: f64,
+    pub(super) angle: f64,
     /// What was measured, metres.
-    pub range: f64,
+    pub(super) range: f64,
 }
 
 impl Lidar {
     /// Scans the true world from a pose in the building; puts the beams that return into `beams`.
-    pub fn scan(&self, world: &RayCaster, pose: &Pose2, random: &mut impl Rng, beams: &mut Vec<Beam>) {
+    pub(super) fn scan(&self, world: &RayCaster, pose: &Pose2, random: &mut impl Rng, beams: &mut Vec<Beam>) {
         beams.clear();
         let origin = Point2::from(pose.translation.vector);
         let heading = pose.rotation.angle();

@@ -14,10 +14,11 @@ const LIMIT: f32 = 4.0;
 
 /// An occupancy grid that grows with scans.
 #[derive(Clone, Debug)]
-pub struct Mapper {
+pub(super) struct Mapper {
     geometry: GridGeometry,
     log_odds: Vec<f32>,
-    /// The ends of the last scan's beams: kept to spare the allocation.
+    /// The beams of the last scan, in cells from the robot, and the cells they end in: kept to spare the allocations.
+    ways: Vec<Vector2<f64>>,
     ends: Vec<usize>,
 }
 
@@ -32,7 +33,7 @@ pub struct SnapshotMap {
 
 impl Mapper {
     /// An empty grid over `area` of the map frame. Cell borders are multiples of the resolution.
-    pub fn new(area: &Rectangle, resolution: f64) -> Self {
+    pub(super) fn new(area: &Rectangle, resolution: f64) -> Self {
         let low = (area.min / resolution).map(f64::floor);
         let high = (area.max / resolution).map(f64::ceil);
         let geometry = GridGeometry {
@@ -41,35 +42,36 @@ impl Mapper {
             resolution,
             origin: pose(low.x * resolution, low.y * resolution, 0.0),
         };
-        Self { geometry, log_odds: vec![0.0; geometry.cell_count()], ends: Vec::new() }
+        Self { geometry, log_odds: vec![0.0; geometry.cell_count()], ways: Vec::new(), ends: Vec::new() }
     }
 
     /// Adds a scan taken at `robot_pose` of the map frame. What lies outside of the grid is left out.
     ///
     /// Beams pass free cells; a cell in which a beam of this scan ends is a hit, whatever else passes it in the same
     /// scan.
-    pub fn add_scan(&mut self, robot_pose: &Pose2, beams: &[Beam]) {
+    pub(super) fn add_scan(&mut self, robot_pose: &Pose2, beams: &[Beam]) {
         let origin = self.to_cells(&Point2::from(robot_pose.translation.vector));
         let heading = robot_pose.rotation.angle();
-        let mut ends = std::mem::take(&mut self.ends);
-        ends.clear();
         let scale = 1.0 / self.geometry.resolution;
-        let ways = beams.iter().map(|beam| {
+        let (mut ways, mut ends) = (std::mem::take(&mut self.ways), std::mem::take(&mut self.ends));
+        ways.clear();
+        ways.extend(beams.iter().map(|beam| {
             let (sine, cosine) = (heading + beam.angle).sin_cos();
             Vector2::new(cosine, sine) * beam.range * scale
-        });
-        ends.extend(ways.clone().filter_map(|way| self.index(&(origin + way))));
+        }));
+        ends.clear();
+        ends.extend(ways.iter().filter_map(|way| self.index(&(origin + way))));
         ends.sort_unstable();
         ends.dedup();
         // To give hit cells back what they had before this scan's misses is cheaper than to ask at every passed cell.
         let before: Vec<f32> = ends.iter().map(|&index| self.log_odds[index]).collect();
-        for way in ways {
-            self.pass(&origin, &way);
+        for way in &ways {
+            self.pass(&origin, way);
         }
         for (&index, before) in ends.iter().zip(before) {
             self.log_odds[index] = (before + HIT).min(LIMIT);
         }
-        self.ends = ends;
+        (self.ways, self.ends) = (ways, ends);
     }
 
     /// Marks the cells from `origin` along `way` (in cells) as passed, but the last (Amanatides and Woo, "A fast voxel
@@ -100,7 +102,7 @@ impl Mapper {
     }
 
     /// The map so far, cut to the cells that are known; `None` if there are none.
-    pub fn snapshot(&self) -> Option<SnapshotMap> {
+    pub(super) fn snapshot(&self) -> Option<SnapshotMap> {
         let GridGeometry { width, resolution, origin, .. } = self.geometry;
         let known_rows: Vec<(usize, usize, usize)> = self
             .log_odds

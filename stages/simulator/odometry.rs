@@ -10,16 +10,16 @@ use rand_distr::StandardNormal;
 
 /// How poses drift.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drift {
+pub(super) struct Drift {
     /// Standard deviation after one metre of driving: of the heading in radians, and of the distance in metres. It grows
     /// with the root of the way. A turn of one radian counts as a tenth of a metre.
-    pub deviation: f64,
+    pub(super) deviation: f64,
     /// The length of way over which an error decays to 37 %, metres; 0 for no correction.
-    pub correction_length: f64,
+    pub(super) correction_length: f64,
 }
 
 /// What a SLAM system believes the poses `truth` to be. The first is exact.
-pub fn estimate_poses(truth: &[Pose2], drift: &Drift, random: &mut impl Rng) -> Vec<Pose2> {
+pub(super) fn estimate_poses(truth: &[Pose2], drift: &Drift, random: &mut impl Rng) -> Vec<Pose2> {
     let Some(first) = truth.first() else { return Vec::new() };
     let mut estimates = Vec::with_capacity(truth.len());
     estimates.push(*first);

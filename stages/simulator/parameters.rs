@@ -17,8 +17,8 @@ const MOST_CELLS: f64 = 6e7;
 pub struct Parameters {
     /// How many robots there are, 1 to 64. They are called `robot1`, `robot2`, ...
     pub robots: u32,
-    /// Size of the building along its corridors, metres, 10 to 300. With three robots, a drive takes about a minute and
-    /// a half in a building of the default size; it grows with the floor area a robot.
+    /// Size of the building along its corridors, metres, 10 to 300. In a building of the default size three robots
+    /// drive for about two minutes; it grows with the floor area that each of them covers.
     pub width: f64,
     /// Size of the building across its corridors, metres, 9 to 300. There is one corridor in about 14 m.
     pub height: f64,
@@ -56,7 +56,8 @@ pub struct Parameters {
     pub map_yaw: f64,
     /// The origins of the map frames lie at most this far from where the robots start, in x and in y, metres.
     pub map_offset: f64,
-    /// How many radio tags there are on the walls.
+    /// How many radio tags there are on the walls. Robots share enough of them with about one in 8 square metres of
+    /// floor.
     pub tags: u32,
     /// The longest distance at which a tag is read, metres. The paper's is 3 m.
     pub tag_reach: f64,
@@ -77,7 +78,7 @@ impl Default for Parameters {
             room_width: 4.5,
             corridor_width: 2.0,
             clutter: 0.12,
-            overlap: 0.5,
+            overlap: 0.65,
             speed: 0.7,
             duration: 600.0,
             beams: 360,

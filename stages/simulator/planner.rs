@@ -14,7 +14,7 @@ const SMOOTHING: usize = 40;
 
 /// The cheapest way between two places, as points about 0.1 m apart; `None` if one cannot be reached from the other.
 /// Near walls a metre costs more.
-pub fn plan_path(space: &FreeSpace, from: &Point2, to: &Point2) -> Option<Vec<Point2>> {
+pub(super) fn plan_path(space: &FreeSpace, from: &Point2, to: &Point2) -> Option<Vec<Point2>> {
     let (start, goal) = (space.index(from), space.index(to));
     if !(space.is_reachable_at(start) && space.is_reachable_at(goal)) {
         return None;

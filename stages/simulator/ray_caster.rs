@@ -9,7 +9,7 @@ const BUCKET: f64 = 0.5;
 
 /// The sides of solids, sorted into square buckets so that a ray tests only what lies along it.
 #[derive(Clone, Debug)]
-pub struct RayCaster {
+pub(super) struct RayCaster {
     min: Point2,
     columns: usize,
     rows: usize,
@@ -26,12 +26,12 @@ struct Side {
 
 impl RayCaster {
     /// Sorts the sides of `solids`. Without solids every ray goes on for ever.
-    pub fn new(solids: &[Solid]) -> Self {
+    pub(super) fn new(solids: &[Solid]) -> Self {
         let bounds = Rectangle::bounding(solids.iter().flat_map(|solid| &solid.corners))
             .unwrap_or(Rectangle::new(0.0, 0.0, 0.0, 0.0))
             .expanded(BUCKET);
-        let columns = (bounds.width() / BUCKET).ceil() as usize;
-        let rows = (bounds.height() / BUCKET).ceil() as usize;
+        let columns = (bounds.width() / BUCKET).ceil().max(1.0) as usize;
+        let rows = (bounds.height() / BUCKET).ceil().max(1.0) as usize;
         let mut buckets: Vec<Vec<Side>> = vec![Vec::new(); columns * rows];
         for (from, to) in solids.iter().flat_map(Solid::sides) {
             let low = (from.inf(&to) - bounds.min) / BUCKET;
@@ -56,7 +56,7 @@ impl RayCaster {
 
     /// The distance from `origin` to the first side in the direction `angle` (radians, building frame), metres;
     /// `None` if there is none within `reach`, or if `origin` lies outside of the building.
-    pub fn cast(&self, origin: &Point2, angle: f64, reach: f64) -> Option<f64> {
+    pub(super) fn cast(&self, origin: &Point2, angle: f64, reach: f64) -> Option<f64> {
         let direction = Vector2::new(angle.cos(), angle.sin());
         let start = (origin - self.min) / BUCKET;
         if !(start.x >= 0.0 && start.y >= 0.0 && start.x < self.columns as f64 && start.y < self.rows as f64) {
@@ -73,7 +73,7 @@ impl RayCaster {
             if hit <= leaves_at + 1e-9 {
                 return (hit <= reach).then_some(hit);
             }
-            if !(leaves_at <= reach) {
+            if leaves_at > reach {
                 return None;
             }
             let moved = if next.x < next.y {
@@ -91,7 +91,7 @@ impl RayCaster {
 
     /// Whether nothing stands between two points. A side nearer than 3 cm to `to` does not count, so that what is fixed
     /// to a wall can be seen.
-    pub fn sees(&self, from: &Point2, to: &Point2) -> bool {
+    pub(super) fn sees(&self, from: &Point2, to: &Point2) -> bool {
         let way = to - from;
         self.cast(from, way.y.atan2(way.x), way.norm() - 0.03).is_none()
     }

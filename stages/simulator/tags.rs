@@ -34,15 +34,15 @@ pub struct Tag {
 
 /// What reads tags.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TagReader {
+pub(super) struct TagReader {
     /// The longest distance of a reading, metres.
-    pub reach: f64,
+    pub(super) reach: f64,
     /// Standard deviation of a range, metres.
-    pub noise: f64,
+    pub(super) noise: f64,
     /// Share of the readings that are lost, 0 to 1.
-    pub lost: f64,
+    pub(super) lost: f64,
     /// Share of the readings that come over a reflection, 0 to 1.
-    pub reflected: f64,
+    pub(super) reflected: f64,
 }
 
 /// One reading.
@@ -58,7 +58,7 @@ pub struct TagReading {
 
 impl TagReader {
     /// Reads all tags from a true pose in the building, in the order of the list.
-    pub fn read(
+    pub(super) fn read(
         &self,
         tags: &[Tag],
         world: &RayCaster,
@@ -69,7 +69,8 @@ impl TagReader {
         let antenna = Point2::from(robot_pose.translation.vector);
         for (tag, Tag { place, .. }) in tags.iter().enumerate() {
             let distance = (place - antenna).norm();
-            if !(distance <= self.reach) || !world.sees(&antenna, place) {
+            let in_reach = distance <= self.reach;
+            if !in_reach || !world.sees(&antenna, place) {
                 continue;
             }
             let lost = random.random::<f64>() < self.lost;
@@ -89,7 +90,7 @@ impl TagReader {
 
 /// Puts tags on the walls of a building, spread over its rooms and corridors, where a robot can come near and see them.
 /// There may be fewer than `count` where walls are short.
-pub fn place_tags(
+pub(super) fn place_tags(
     plan: &FloorPlan,
     space: &FreeSpace,
     world: &RayCaster,

@@ -9,6 +9,7 @@ use super::route::share_rooms;
 use super::tags::{Tag, place_tags};
 use super::truth::Truth;
 use crate::geometry::Point2;
+use gridweave_runtime::stage::{ParameterError, Parameters as _};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -16,6 +17,9 @@ use rayon::prelude::*;
 /// Why there is no simulation.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SimulationError {
+    /// A parameter is out of its range.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
     /// None of a robot's rooms can be reached.
     #[error("{robot} finds no way through the building: make it larger, or lower `clutter`")]
     NoWay {
@@ -98,8 +102,12 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
 /// Makes a building, lets the robots drive through it, and says what is true. The same parameters and seed give the
 /// same simulation on any number of threads.
 ///
-/// `parameters` are those that [`check`](gridweave_runtime::stage::Parameters::check) has nothing against.
+/// # Errors
+/// A parameter is out of its range, or the robots have no way to go or see nothing.
 pub fn simulate(parameters: &Parameters, seed: u64) -> Result<Simulation, SimulationError> {
+    if let Some(error) = parameters.check().into_iter().next() {
+        return Err(error.into());
+    }
     let world = World::new(parameters, seed);
     let rooms = share_rooms(world.plan.rooms.len(), parameters.robots as usize, parameters.overlap);
     let robots = rooms
@@ -136,7 +144,6 @@ fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
 mod tests {
     use super::*;
     use crate::geometry::{Cell, Grid, Pose2, is_occupied};
-    use gridweave_runtime::stage::Parameters as _;
 
     /// A small building with two robots, exact poses and an exact lidar.
     fn small() -> Parameters {
@@ -256,6 +263,12 @@ mod tests {
         assert_eq!((simulation.robots.len(), simulation.tags.len()), (1, 0));
         assert!(simulation.robots[0].readings.is_empty());
         assert_eq!(simulation.robots[0].transform_building_map.rotation.angle(), 0.0);
+    }
+
+    #[test]
+    fn a_parameter_out_of_range_is_an_error() {
+        let error = simulate(&Parameters { width: f64::NAN, ..small() }, 1).unwrap_err();
+        assert!(matches!(error, SimulationError::Parameter(ParameterError { field: "width", .. })));
     }
 
     #[test]
