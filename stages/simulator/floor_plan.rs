@@ -87,8 +87,7 @@ struct Row {
 }
 
 impl FloorPlan {
-    /// A random building. Sizes below 2 m a room are not made: see the limits of
-    /// [`Parameters`](super::Parameters).
+    /// A random building. The limits of [`Parameters`](super::Parameters) leave every room about 1.5 m wide and deep, or more.
     pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
         let BuildingSize { width, height, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);
@@ -130,7 +129,7 @@ impl FloorPlan {
         plan
     }
 
-    /// The number of square metres that one piece of furniture has for itself is `1 / clutter`.
+    /// Puts `clutter` pieces of furniture a square metre into the rooms, and pilasters into the corridors.
     fn furnish(&mut self, clutter: f64, random: &mut impl Rng) {
         for room in &self.rooms {
             self.solids.extend(furnish_room(room, clutter, random));
@@ -291,6 +290,7 @@ mod tests {
             for (index, room) in plan.rooms.iter().enumerate() {
                 prop_assert!(plan.rooms[..index].iter().all(|other| !other.bounds.overlaps(&room.bounds)));
                 prop_assert!(plan.corridors.iter().all(|corridor| !corridor.overlaps(&room.bounds)));
+                prop_assert!(room.bounds.width() > 1.3 && room.bounds.height() > 1.3, "{:?}", room.bounds);
             }
         }
     }
