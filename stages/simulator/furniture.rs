@@ -1,0 +1,115 @@
+//! Furniture and pillars, placed so that a robot still gets everywhere.
+//!
+//! A piece either stands against a wall or leaves a passage on all its sides; pieces leave a passage between each
+//! other, and doors stay clear. So no piece can cut a room in two.
+
+use super::floor_plan::Room;
+use super::shape::{Rectangle, Solid, between};
+use crate::geometry::{Point2, pose};
+use rand::{Rng, RngExt};
+use std::f64::consts::FRAC_PI_2;
+
+/// What a robot passes with ease, metres.
+const PASSAGE: f64 = 0.95;
+/// How often a place is looked for before a piece is given up.
+const TRIES: usize = 8;
+/// Metres of corridor for each pilaster when there is one piece of furniture in 10 square metres.
+const PILASTER_SPACING: f64 = 6.0;
+
+/// Furniture of a room: `clutter` pieces a square metre, fewer where they find no place.
+pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> Vec<Solid> {
+    let wanted = room.bounds.width() * room.bounds.height() * clutter;
+    let doors: Vec<Rectangle> = room.doors.iter().map(|door| door.clearing(1.1)).collect();
+    let mut pieces: Vec<(Rectangle, Solid)> = Vec::new();
+    for _ in 0..random_count(wanted, random) {
+        for _ in 0..TRIES {
+            let (against_wall, solid) = random_piece(&room.bounds, random);
+            let Some(bounds) = Rectangle::bounding(&solid.corners) else { break };
+            let wide = bounds.expanded(PASSAGE);
+            let fits = doors.iter().all(|door| !door.overlaps(&bounds))
+                && pieces.iter().all(|(other, _)| !other.overlaps(&wide))
+                && if against_wall { leaves_passage(&room.bounds, &bounds) } else { holds(&room.bounds, &wide) };
+            if fits {
+                pieces.push((bounds, solid));
+                break;
+            }
+        }
+    }
+    pieces.into_iter().map(|(_, solid)| solid).collect()
+}
+
+/// Pilasters along the walls of a corridor, outside of what must stay clear.
+pub(super) fn furnish_corridor(
+    corridor: &Rectangle,
+    clear: &[Rectangle],
+    clutter: f64,
+    random: &mut impl Rng,
+) -> Vec<Solid> {
+    let length = corridor.width().max(corridor.height());
+    let wanted = length / PILASTER_SPACING * clutter * 10.0;
+    let mut solids = Vec::new();
+    for _ in 0..random_count(wanted, random) {
+        let (long, deep) = (between(random, 0.3, 0.6), between(random, 0.12, 0.22));
+        let along = between(random, 0.5, length - 0.5);
+        let side = random.random_bool(0.5);
+        let bounds = if corridor.width() > corridor.height() {
+            let y = if side { corridor.min.y + deep / 2.0 } else { corridor.max.y - deep / 2.0 };
+            Rectangle::round(Point2::new(corridor.min.x + along, y), long, deep)
+        } else {
+            let x = if side { corridor.min.x + deep / 2.0 } else { corridor.max.x - deep / 2.0 };
+            Rectangle::round(Point2::new(x, corridor.min.y + along), deep, long)
+        };
+        if clear.iter().all(|clear| !clear.overlaps(&bounds)) {
+            solids.push(bounds.into());
+        }
+    }
+    solids
+}
+
+/// A whole number whose mean is `wanted`.
+fn random_count(wanted: f64, random: &mut impl Rng) -> usize {
+    (wanted + random.random::<f64>()).floor().clamp(0.0, 10_000.0) as usize
+}
+
+/// A cabinet or desk against a wall (`true`), a free-standing table, or a pillar.
+fn random_piece(room: &Rectangle, random: &mut impl Rng) -> (bool, Solid) {
+    let kind = random.random::<f64>();
+    if kind < 0.6 {
+        return (true, wall_piece(room, random));
+    }
+    let place = Point2::new(between(random, room.min.x, room.max.x), between(random, room.min.y, room.max.y));
+    if kind < 0.8 {
+        let yaw = between(random, -FRAC_PI_2, FRAC_PI_2);
+        let table =
+            Solid::turned_box(&pose(place.x, place.y, yaw), between(random, 0.8, 1.6), between(random, 0.6, 0.9));
+        return (false, table);
+    }
+    (false, Solid::disc(place, between(random, 0.12, 0.3)))
+}
+
+fn wall_piece(room: &Rectangle, random: &mut impl Rng) -> Solid {
+    let (long, deep) = (between(random, 0.6, 1.8), between(random, 0.35, 0.8));
+    let along_x = random.random_bool(0.5);
+    let far = random.random_bool(0.5);
+    let bounds = if along_x {
+        let x = between(random, room.min.x, room.max.x - long);
+        let y = if far { room.max.y - deep } else { room.min.y };
+        Rectangle::new(x, y, x + long, y + deep)
+    } else {
+        let y = between(random, room.min.y, room.max.y - long);
+        let x = if far { room.max.x - deep } else { room.min.x };
+        Rectangle::new(x, y, x + deep, y + long)
+    };
+    bounds.into()
+}
+
+/// Whether a robot can pass a piece against a wall on at least the side across from its wall, and the piece lies in the
+/// room.
+fn leaves_passage(room: &Rectangle, piece: &Rectangle) -> bool {
+    let across = (room.width() - piece.width()).min(room.height() - piece.height());
+    across >= PASSAGE && holds(&room.expanded(1e-6), piece)
+}
+
+fn holds(outer: &Rectangle, inner: &Rectangle) -> bool {
+    outer.contains(&inner.min) && outer.contains(&inner.max)
+}

@@ -1,0 +1,92 @@
+//! A lidar that scans in the plane.
+//!
+//! The model: beams are spread evenly over the full circle, the first one straight ahead. A beam meets the first solid
+//! in its direction; its range has Gaussian noise of constant deviation. A beam that meets nothing within the lidar's
+//! reach, and one in so many at random, returns nothing. The robot does not move during a scan.
+
+use super::ray_caster::RayCaster;
+use crate::geometry::{Point2, Pose2};
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use std::f64::consts::TAU;
+
+/// A lidar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lidar {
+    /// Beams of one scan.
+    pub(super) beams: usize,
+    /// The longest range, metres.
+    pub(super) reach: f64,
+    /// Standard deviation of a range, metres.
+    pub(super) noise: f64,
+    /// Share of the beams that return nothing, 0 to 1.
+    pub(super) dropped: f64,
+}
+
+/// One beam that has returned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Beam {
+    /// Its direction from the robot's heading, radians.
+    pub(super) angle: f64,
+    /// What was measured, metres.
+    pub(super) range: f64,
+}
+
+impl Lidar {
+    /// Scans the true world from a pose in the building; puts the beams that return into `beams`.
+    pub(super) fn scan(&self, world: &RayCaster, pose: &Pose2, random: &mut impl Rng, beams: &mut Vec<Beam>) {
+        beams.clear();
+        let origin = Point2::from(pose.translation.vector);
+        let heading = pose.rotation.angle();
+        for beam in 0..self.beams {
+            // Both draws are made for every beam, so that what one beam meets does not change the noise of the others.
+            let dropped = random.random::<f64>() < self.dropped;
+            let noise: f64 = random.sample(StandardNormal);
+            let angle = TAU * beam as f64 / self.beams as f64;
+            if let Some(range) = world.cast(&origin, heading + angle, self.reach)
+                && !dropped
+            {
+                beams.push(Beam { angle, range: (range + self.noise * noise).max(0.0) });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use crate::simulator::shape::{Rectangle, Solid};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn scan(lidar: &Lidar) -> Vec<Beam> {
+        let wall = Solid::from(Rectangle::new(3.0, -50.0, 3.2, 50.0));
+        let behind = Solid::from(Rectangle::new(-4.0, -1.0, -3.8, 1.0));
+        let mut beams = Vec::new();
+        let world = RayCaster::new(&[wall, behind]);
+        lidar.scan(&world, &pose(0.0, 0.0, 0.5), &mut ChaCha8Rng::seed_from_u64(1), &mut beams);
+        beams
+    }
+
+    #[test]
+    fn beams_meet_the_wall_within_the_noise_and_none_beyond_the_reach() {
+        let beams = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.02, dropped: 0.0 });
+        let errors: Vec<f64> = beams
+            .iter()
+            .map(|beam| (beam, (0.5 + beam.angle).cos()))
+            .filter(|(_, cosine)| *cosine > 0.0)
+            .map(|(beam, cosine)| beam.range - 3.0 / cosine)
+            .collect();
+        let deviation = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((deviation - 0.02).abs() < 0.002, "{deviation}");
+        assert!(beams.iter().all(|beam| beam.range < 10.1));
+    }
+
+    #[test]
+    fn as_many_beams_are_dropped_as_asked() {
+        let all = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.0 }).len() as f64;
+        let some = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.25 }).len() as f64;
+        assert!((some / all - 0.75).abs() < 0.03);
+    }
+}

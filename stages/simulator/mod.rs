@@ -1,0 +1,41 @@
+//! Test worlds: buildings, robots that drive and map them, and the truth that a merge is measured against.
+//!
+//! [`simulate`] makes all of it from [`Parameters`] and a seed, in the order of the files here: a [`FloorPlan`] with
+//! rooms, doors and furniture; a route and a drive for every robot; lidar scans of the true world; poses with the drift
+//! that a SLAM system leaves; a growing occupancy grid per robot, in a map frame of its own; and range readings of radio
+//! tags on the walls. The same parameters and seed give the same simulation, bit by bit, on any number of threads:
+//! everything that is random has a stream of random numbers of its own.
+//!
+//! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
+//! `/robotN/tag_ranges` and `/tf`. Its report is the [`Truth`].
+//!
+//! Nothing moves in these worlds but the robots, which do not see each other; floors are flat, and glass is not there.
+
+mod drive;
+mod floor_plan;
+mod free_space;
+mod furniture;
+mod lidar;
+mod mapper;
+mod odometry;
+mod parameters;
+mod planner;
+mod ray_caster;
+mod robot;
+mod route;
+mod shape;
+mod stage;
+mod tags;
+mod truth;
+mod world;
+
+pub use drive::TICK_SECONDS;
+pub use floor_plan::{Door, FloorPlan, Room};
+pub use mapper::SnapshotMap;
+pub use parameters::Parameters;
+pub use robot::RobotLog;
+pub use shape::{Rectangle, Solid};
+pub use stage::kind;
+pub use tags::{Tag, TagReading};
+pub use truth::Truth;
+pub use world::{Simulation, SimulationError, simulate};

@@ -1,0 +1,222 @@
+//! The parameters of a simulation.
+
+use super::floor_plan::BuildingSize;
+use super::lidar::Lidar;
+use super::tags::TagReader;
+use gridweave_runtime::stage::{ParameterError, Parameters as StageParameters};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::f64::consts::PI;
+
+/// A map has at most this many cells while it is made.
+const MOST_CELLS: f64 = 6e7;
+
+/// What is simulated.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Parameters {
+    /// How many robots there are, 1 to 64. They are called `robot1`, `robot2`, ...
+    pub robots: u32,
+    /// Size of the building along its corridors, metres, 10 to 300. In a building of the default size three robots
+    /// drive for about two minutes; it grows with the floor area that each of them covers.
+    pub width: f64,
+    /// Size of the building across its corridors, metres, 9 to 300. There is one corridor in about 14 m.
+    pub height: f64,
+    /// Mean width of a room, metres, 2.5 to 30.
+    pub room_width: f64,
+    /// Width of the corridors, metres, 1.4 to 3.
+    pub corridor_width: f64,
+    /// Pieces of furniture a square metre of a room, 0 to 1. Where pieces would block a way there are fewer.
+    pub clutter: f64,
+    /// Share of its rooms that a robot has in common with the next one, 0 to 1.
+    pub overlap: f64,
+    /// Top speed of the robots, metres a second.
+    pub speed: f64,
+    /// A drive that takes longer is cut off, seconds, up to 7200.
+    pub duration: f64,
+    /// Beams of one lidar scan, over a full circle.
+    pub beams: u32,
+    /// The longest range of the lidar, metres. A beam that meets nothing within it returns nothing.
+    pub lidar_range: f64,
+    /// Standard deviation of a lidar range, metres.
+    pub lidar_noise: f64,
+    /// Share of the lidar's beams that return nothing although they meet something, 0 to 0.99.
+    pub dropped_beams: f64,
+    /// Drift of the poses that a robot believes in: standard deviation after one metre of driving, of the heading in
+    /// radians and of the distance in metres; it grows with the root of the way. 0 makes poses exact.
+    pub drift: f64,
+    /// The length of way over which loop closures take an error back to 37 %, metres. 0 lets drift grow without end,
+    /// and makes the truth of a merge a matter of where one looks.
+    pub correction_length: f64,
+    /// Metres a cell of the maps. Several values are given to the robots in turn.
+    pub resolution: Vec<f64>,
+    /// How many maps each robot sends, growing, at the ends of equal parts of its drive.
+    pub snapshots: u32,
+    /// The robots' map frames are turned against the walls by at most this, radians. 0 lays all maps along the walls.
+    pub map_yaw: f64,
+    /// The origins of the map frames lie at most this far from where the robots start, in x and in y, metres.
+    pub map_offset: f64,
+    /// How many radio tags there are on the walls. Robots share enough of them with about one in 8 square metres of
+    /// floor.
+    pub tags: u32,
+    /// The longest distance at which a tag is read, metres. The paper's is 3 m.
+    pub tag_reach: f64,
+    /// Standard deviation of a tag's range, metres. The paper's is 0.05 m.
+    pub tag_noise: f64,
+    /// Share of the readings of tags that are lost, 0 to 1.
+    pub lost_readings: f64,
+    /// Share of the readings of tags that come over a reflection and are 0.3 m to 2 m too long, 0 to 1.
+    pub reflections: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            robots: 3,
+            width: 20.0,
+            height: 15.0,
+            room_width: 4.5,
+            corridor_width: 2.0,
+            clutter: 0.12,
+            overlap: 0.65,
+            speed: 0.7,
+            duration: 600.0,
+            beams: 360,
+            lidar_range: 12.0,
+            lidar_noise: 0.015,
+            dropped_beams: 0.02,
+            drift: 0.002,
+            correction_length: 10.0,
+            resolution: vec![0.05],
+            snapshots: 3,
+            map_yaw: PI,
+            map_offset: 5.0,
+            tags: 36,
+            tag_reach: 3.0,
+            tag_noise: 0.05,
+            lost_readings: 0.1,
+            reflections: 0.0,
+        }
+    }
+}
+
+impl Parameters {
+    pub(super) fn building(&self) -> BuildingSize {
+        let Self { width, height, room_width, corridor_width, clutter, .. } = *self;
+        BuildingSize { width, height, room_width, corridor_width, clutter }
+    }
+
+    pub(super) fn lidar(&self) -> Lidar {
+        Lidar {
+            beams: self.beams as usize,
+            reach: self.lidar_range,
+            noise: self.lidar_noise,
+            dropped: self.dropped_beams,
+        }
+    }
+
+    pub(super) fn tag_reader(&self) -> TagReader {
+        TagReader {
+            reach: self.tag_reach,
+            noise: self.tag_noise,
+            lost: self.lost_readings,
+            reflected: self.reflections,
+        }
+    }
+
+    pub(super) fn resolution_of(&self, robot: usize) -> f64 {
+        self.resolution.iter().cycle().nth(robot).copied().unwrap_or(0.05)
+    }
+
+    /// Cells along a side of the largest grid that a robot may need.
+    fn most_cells_a_side(&self, resolution: f64) -> f64 {
+        let diagonal = self.width.hypot(self.height);
+        (diagonal + 2.0 * self.lidar_range.min(diagonal)) / resolution
+    }
+}
+
+impl StageParameters for Parameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let ranges = [
+            ("robots", f64::from(self.robots), 1.0, 64.0),
+            ("width", self.width, 10.0, 300.0),
+            ("height", self.height, 9.0, 300.0),
+            ("room_width", self.room_width, 2.5, 30.0),
+            ("corridor_width", self.corridor_width, 1.4, 3.0),
+            ("clutter", self.clutter, 0.0, 1.0),
+            ("overlap", self.overlap, 0.0, 1.0),
+            ("speed", self.speed, 0.05, 5.0),
+            ("duration", self.duration, 1.0, 7200.0),
+            ("beams", f64::from(self.beams), 1.0, 10_000.0),
+            ("lidar_range", self.lidar_range, 0.5, 300.0),
+            ("lidar_noise", self.lidar_noise, 0.0, 1.0),
+            ("dropped_beams", self.dropped_beams, 0.0, 0.99),
+            ("drift", self.drift, 0.0, 1.0),
+            ("correction_length", self.correction_length, 0.0, 1e6),
+            ("snapshots", f64::from(self.snapshots), 1.0, 1000.0),
+            ("map_yaw", self.map_yaw, 0.0, PI),
+            ("map_offset", self.map_offset, 0.0, 1e5),
+            ("tags", f64::from(self.tags), 0.0, 10_000.0),
+            ("tag_reach", self.tag_reach, 0.0, 100.0),
+            ("tag_noise", self.tag_noise, 0.0, 10.0),
+            ("lost_readings", self.lost_readings, 0.0, 1.0),
+            ("reflections", self.reflections, 0.0, 1.0),
+        ];
+        let mut errors: Vec<ParameterError> = ranges
+            .into_iter()
+            .filter(|(_, value, low, high)| !(low..=high).contains(&value))
+            .map(|(field, value, low, high)| {
+                ParameterError::new(field, format!("must be between {low} and {high}, and is {value}"))
+            })
+            .collect();
+        if self.resolution.is_empty() {
+            errors.push(ParameterError::new("resolution", "must hold at least one value"));
+        }
+        for &resolution in &self.resolution {
+            if !(0.005..=1.0).contains(&resolution) {
+                let problem = format!("must be between 0.005 and 1 m a cell, and is {resolution}");
+                errors.push(ParameterError::new("resolution", problem));
+            } else if self.most_cells_a_side(resolution).powi(2) > MOST_CELLS {
+                let problem = format!(
+                    "must be coarser than {resolution} m a cell for a building of {} m x {} m and a lidar of {} m, or \
+                     maps would have more than {MOST_CELLS:e} cells",
+                    self.width, self.height, self.lidar_range
+                );
+                errors.push(ParameterError::new("resolution", problem));
+            }
+        }
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wrong(change: impl FnOnce(&mut Parameters)) -> Vec<&'static str> {
+        let mut parameters = Parameters::default();
+        change(&mut parameters);
+        parameters.check().into_iter().map(|error| error.field).collect()
+    }
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        assert!(Parameters::default().check().is_empty());
+    }
+
+    #[test]
+    fn values_out_of_range_are_named() {
+        assert_eq!(wrong(|p| p.robots = 0), ["robots"]);
+        assert_eq!(wrong(|p| p.robots = 65), ["robots"]);
+        assert_eq!(wrong(|p| p.overlap = f64::NAN), ["overlap"]);
+        assert_eq!(wrong(|p| (p.width, p.tag_noise) = (5.0, -1.0)), ["width", "tag_noise"]);
+        assert_eq!(wrong(|p| p.resolution = vec![]), ["resolution"]);
+        assert_eq!(wrong(|p| p.resolution = vec![0.05, 0.0, f64::NAN]), ["resolution", "resolution"]);
+    }
+
+    #[test]
+    fn a_map_that_would_fill_the_memory_is_refused() {
+        let huge = |p: &mut Parameters| (p.width, p.height, p.resolution) = (300.0, 300.0, vec![0.01]);
+        assert_eq!(wrong(huge), ["resolution"]);
+    }
+}

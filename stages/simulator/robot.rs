@@ -1,0 +1,112 @@
+//! One robot's part of a simulation: its drive, and what it believes and logs.
+
+use super::drive::{DriveLimits, drive};
+use super::mapper::{Mapper, SnapshotMap};
+use super::odometry::{Drift, estimate_poses};
+use super::parameters::Parameters;
+use super::route::plan_route;
+use super::shape::{Rectangle, between};
+use super::tags::TagReading;
+use super::world::{SimulationError, Stream, World};
+use crate::geometry::{Point2, Pose2, pose};
+use std::ops::Range;
+
+/// Metres a second squared.
+const ACCELERATION: f64 = 0.6;
+/// Radians a second.
+const TURN_RATE: f64 = 1.2;
+
+/// What one robot has logged, by ticks of [`TICK_SECONDS`](super::TICK_SECONDS) from the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotLog {
+    /// Its name: `robot1`, `robot2`, ...
+    pub name: String,
+    /// `T_building_map`: where its map frame is.
+    pub transform_building_map: Pose2,
+    /// Where it was in the building, a pose a tick.
+    pub true_poses: Vec<Pose2>,
+    /// Where it believes it was in its map frame, a pose a tick.
+    pub poses: Vec<Pose2>,
+    /// The tags it has read, with their ticks.
+    pub readings: Vec<(usize, TagReading)>,
+    /// The maps it has sent, with the ticks of their last scans.
+    pub maps: Vec<(usize, SnapshotMap)>,
+}
+
+/// Lets one robot drive through its rooms, map them and read tags.
+pub(super) fn simulate_robot(
+    world: &World,
+    robot: usize,
+    rooms: Range<usize>,
+    parameters: &Parameters,
+) -> Result<RobotLog, SimulationError> {
+    let name = format!("robot{}", robot + 1);
+    let route = plan_route(&world.plan, &world.space, rooms, &mut world.random(Stream::Route(robot)));
+    let limits = DriveLimits {
+        speed: parameters.speed,
+        acceleration: ACCELERATION,
+        turn_rate: TURN_RATE,
+        duration: parameters.duration,
+    };
+    let true_poses = drive(&route, &limits);
+    let Some(start) = true_poses.first() else { return Err(SimulationError::NoWay { robot: name }) };
+
+    let transform_building_map = map_frame(start, world, robot, parameters);
+    let transform_map_building = transform_building_map.inverse();
+    let exact: Vec<Pose2> = true_poses.iter().map(|pose| transform_map_building * pose).collect();
+    let drift = Drift { deviation: parameters.drift, correction_length: parameters.correction_length };
+    let poses = estimate_poses(&exact, &drift, &mut world.random(Stream::Drift(robot)));
+
+    let maps = map_building(world, robot, &true_poses, &poses, parameters);
+    if maps.len() != parameters.snapshots as usize {
+        return Err(SimulationError::SeenNothing { robot: name });
+    }
+    let readings = read_tags(world, robot, &true_poses, parameters);
+    Ok(RobotLog { name, transform_building_map, true_poses, poses, readings, maps })
+}
+
+/// A map frame near the start of the drive, turned at random: `T_building_map`.
+fn map_frame(start: &Pose2, world: &World, robot: usize, parameters: &Parameters) -> Pose2 {
+    let mut random = world.random(Stream::MapFrame(robot));
+    let mut offset = || between(&mut random, -parameters.map_offset, parameters.map_offset);
+    let (x, y) = (start.translation.x + offset(), start.translation.y + offset());
+    pose(x, y, between(&mut random, -parameters.map_yaw, parameters.map_yaw))
+}
+
+fn map_building(
+    world: &World,
+    robot: usize,
+    true_poses: &[Pose2],
+    poses: &[Pose2],
+    parameters: &Parameters,
+) -> Vec<(usize, SnapshotMap)> {
+    let lidar = parameters.lidar();
+    let mut random = world.random(Stream::Lidar(robot));
+    let places: Vec<Point2> = poses.iter().map(|pose| Point2::from(pose.translation.vector)).collect();
+    let Some(driven) = Rectangle::bounding(&places) else { return Vec::new() };
+    let in_sight = lidar.reach.min(world.plan.bounds.width().hypot(world.plan.bounds.height())) + 0.5;
+    let mut mapper = Mapper::new(&driven.expanded(in_sight), parameters.resolution_of(robot));
+    let snapshots = parameters.snapshots as usize;
+    let mut maps = Vec::with_capacity(snapshots);
+    let mut beams = Vec::with_capacity(lidar.beams);
+    for (tick, (true_pose, pose)) in true_poses.iter().zip(poses).enumerate() {
+        lidar.scan(&world.caster, true_pose, &mut random, &mut beams);
+        mapper.add_scan(pose, &beams);
+        // The last scan of each of the equal parts of the drive; a very short drive sends some maps twice.
+        while maps.len() < snapshots && (tick + 1) * snapshots >= true_poses.len() * (maps.len() + 1) {
+            let Some(map) = mapper.snapshot() else { return maps };
+            maps.push((tick, map));
+        }
+    }
+    maps
+}
+
+fn read_tags(world: &World, robot: usize, true_poses: &[Pose2], parameters: &Parameters) -> Vec<(usize, TagReading)> {
+    let reader = parameters.tag_reader();
+    let mut random = world.random(Stream::Tags(robot));
+    let mut readings = Vec::new();
+    for (tick, pose) in true_poses.iter().enumerate() {
+        reader.read(&world.tags, &world.caster, pose, &mut random, |reading| readings.push((tick, reading)));
+    }
+    readings
+}
