@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod icp_refiner;
 
 use gridweave_runtime::stage::StageKind;
 
