@@ -10,5 +10,5 @@ use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![]
+    vec![icp_refiner::kind()]
 }

@@ -81,9 +81,10 @@ pub struct IcpParameters {
     pub max_position_deviation: f64,
     /// The greatest standard deviation of the rotation, radians.
     pub max_yaw_deviation: f64,
-    /// A refined transform is kept while the maps stay the same and the first guess moves by less than this, metres.
+    /// An accepted alignment is kept while the maps stay the same and the first guess moves by no more than this in the
+    /// common section, metres.
     pub reuse_within: f64,
-    /// A refined transform is kept while the maps stay the same and the first guess turns by less than this, radians.
+    /// An accepted alignment is kept while the maps stay the same and the first guess turns by no more than this, radians.
     pub reuse_within_yaw: f64,
 }
 
@@ -105,15 +106,15 @@ impl Default for IcpParameters {
             initial_yaw_deviation: 0.05,
             position_slack: 0.1,
             yaw_slack: 0.02,
-            max_step: 4.0,
+            max_step: 5.0,
             wall_tolerance: 0.1,
-            min_overlap: 20.0,
-            min_wall_length: 10.0,
+            min_overlap: 40.0,
+            min_wall_length: 25.0,
             min_wall_agreement: 0.8,
-            max_position_deviation: 0.15,
+            max_position_deviation: 0.2,
             max_yaw_deviation: 0.02,
-            reuse_within: 0.01,
-            reuse_within_yaw: 0.001,
+            reuse_within: 0.05,
+            reuse_within_yaw: 0.01,
         }
     }
 }
