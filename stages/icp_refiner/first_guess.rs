@@ -31,8 +31,8 @@ impl FirstGuess {
 
 /// Small changes of a transform, written as a shift and a turn about a place in frame a.
 ///
-/// Far from the frame's origin a turn moves everything, so x, y and yaw of the transform depend on one another. In these
-/// coordinates they hardly do: (shift x, shift y, turn x `scale`), all metres.
+/// Far from the frame's origin a turn moves everything, so x, y and yaw of the transform depend on one another. In
+/// these coordinates they hardly do: (shift x, shift y, turn x `scale`), all metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LocalFrame {
     pub(super) centre: Point2,
@@ -87,6 +87,56 @@ impl FirstGuess {
         match self.local_covariance(frame, parameters).try_inverse() {
             Some(inverse) => deviation.dot(&(inverse * deviation)).max(0.0).sqrt(),
             None => f64::INFINITY,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_jacobian_is_the_derivative_of_a_small_change(
+            x in -50.0..50.0, y in -50.0..50.0, yaw in -3.0..3.0,
+            centre_x in -50.0..50.0, centre_y in -50.0..50.0, scale in 0.5..20.0,
+            change in prop::array::uniform3(-1e-6..1e-6),
+        ) {
+            let frame = LocalFrame { centre: Point2::new(centre_x, centre_y), scale };
+            let transform = pose(x, y, yaw);
+            let change = Vector3::from(change);
+            let moved = frame.moved(&transform, &change);
+            let shift = moved.translation.vector - transform.translation.vector;
+            let turn = wrap_angle(moved.rotation.angle() - yaw);
+            prop_assert!((frame.jacobian(&transform) * change - shift.push(turn)).norm() < 1e-9);
+            let identity = frame.jacobian(&transform) * frame.inverse_jacobian(&transform);
+            prop_assert!((identity - Matrix3::identity()).norm() < 1e-9);
+        }
+
+        #[test]
+        fn the_deviation_from_the_first_guess_is_the_change_made(
+            x in -50.0..50.0, y in -50.0..50.0, yaw in -3.0..3.0, change in prop::array::uniform3(-0.5..0.5),
+        ) {
+            let frame = LocalFrame { centre: Point2::new(7.0, -30.0), scale: 4.0 };
+            let guess = FirstGuess { transform_a_b: pose(x, y, yaw), covariance: Matrix3::identity() };
+            let change = Vector3::from(change);
+            let moved = frame.moved(&guess.transform_a_b, &change);
+            prop_assert!((guess.local_deviation(&moved, &frame) - change).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_covariance_that_is_none_is_replaced() {
+        let parameters = IcpParameters::default();
+        let usable = Matrix3::identity() * 0.01;
+        let kept = FirstGuess::new(pose(0.0, 0.0, 0.0), usable, &parameters);
+        assert_eq!(kept.covariance, usable);
+        for covariance in [Matrix3::zeros(), -usable, usable * f64::NAN, usable * f64::INFINITY] {
+            let guess = FirstGuess::new(pose(0.0, 0.0, 0.0), covariance, &parameters);
+            assert_eq!(guess.covariance.m11, parameters.initial_position_deviation.powi(2));
+            assert_eq!(guess.covariance.m33, parameters.initial_yaw_deviation.powi(2));
         }
     }
 }

@@ -65,8 +65,8 @@ impl<'a> Iteration<'a> {
         self.state
     }
 
-    /// Pairs every `stride`-th point of b with the wall of a that is nearest within `distance` metres, and finds the change
-    /// that fits these pairs and the first guess best. `None` if there is none that is a number.
+    /// Pairs every `stride`-th point of b with the wall of a that is nearest within `distance` metres, and finds the
+    /// change that fits these pairs and the first guess best. `None` if there is none that is a number.
     pub(super) fn run(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> Option<Change> {
         let (frame, inliers) = self.pair(transform_a_b, distance, stride);
         let equations = NormalEquations::new(&self.measurements);
@@ -95,8 +95,8 @@ impl<'a> Iteration<'a> {
         self.measurements.iter().map(|measurement| measurement.weight).sum()
     }
 
-    /// What turns information for measurements of variance one into information: cells side by side share their errors, and
-    /// no wall is known better than the cells it is drawn in.
+    /// What turns information for measurements of variance one into information: cells side by side share their
+    /// errors, and no wall is known better than the cells it is drawn in.
     fn gain(&self, equations: &NormalEquations, inliers: usize, stride: usize) -> f64 {
         if inliers == 0 {
             return 0.0;
@@ -107,7 +107,8 @@ impl<'a> Iteration<'a> {
         independent / points / equations.mean_square_error.max(drawn)
     }
 
-    /// Puts down what each pair of points says. Gives the local coordinates that it is written in, and the number of pairs.
+    /// Puts down what each pair of points says. Gives the local coordinates that it is written in, and the number of
+    /// pairs.
     fn pair(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> (LocalFrame, usize) {
         let (a, b) = (self.a, self.b);
         self.measurements.clear();

@@ -1,9 +1,9 @@
 //! Refines the alignment of two maps by ICP on their walls, and verifies the result (Tsardoulias et al., section 4.3).
 //!
 //! [`WallMap`] turns a map's occupied cells into wall points with normals, once for each map. [`register`] moves map b
-//! until its walls lie on those of map a, where they lie near each other. [`compare`] then counts on how much wall the maps
-//! agree, and how much wall of one map lies on the other's free space; [`Refusal`] says why an alignment may not be
-//! used. [`refine`] does all three.
+//! until its walls lie on those of map a, where they lie near each other. [`compare`] then counts on how much wall the
+//! maps agree, and how much wall of one map lies on the other's free space; [`Refusal`] says why an alignment may not
+//! be used. [`refine`] does all three.
 
 mod first_guess;
 mod iteration;
@@ -19,6 +19,10 @@ mod wall_map;
 
 #[cfg(test)]
 mod floor_plan;
+#[cfg(test)]
+mod stage_tests;
+#[cfg(test)]
+mod tests;
 
 pub use first_guess::FirstGuess;
 pub use parameters::{IcpParameters, Metric, Weighting};

@@ -8,8 +8,8 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
-    /// The distance of a point from the line of the wall nearest to it. Finds a place between the cells, and lets points
-    /// slide along their wall.
+    /// The distance of a point from the line of the wall nearest to it. Finds a place between the cells, and lets
+    /// points slide along their wall.
     #[default]
     PointToLine,
     /// The distance of a point from the point nearest to it: the paper's.
@@ -29,7 +29,7 @@ pub enum Weighting {
     GemanMcclure,
 }
 
-/// Parameters of the ICP refiner.
+/// Parameters of the ICP refiner. What takes them expects values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IcpParameters {
@@ -37,8 +37,8 @@ pub struct IcpParameters {
     pub metric: Metric,
     /// How much a pair counts by its distance: `geman_mcclure`, `huber`, or `none` (the paper).
     pub weighting: Weighting,
-    /// How far from a wall point of map b its partner in map a may lie at first, metres. It bounds the error of the first
-    /// guess that can be mended.
+    /// How far from a wall point of map b its partner in map a may lie at first, metres. It bounds the error of the
+    /// first guess that can be mended.
     pub max_distance: f64,
     /// How far the partner may lie in the end, metres.
     pub min_distance: f64,
@@ -55,8 +55,8 @@ pub struct IcpParameters {
     pub start_spacing: f64,
     /// The radius in which a wall's direction is measured, metres.
     pub normal_radius: f64,
-    /// The length of wall that counts as one independent measurement, metres: the errors of cells that stand side by side
-    /// are alike. It scales the covariance.
+    /// The length of wall that counts as one independent measurement, metres: the errors of cells that stand side by
+    /// side are alike. It scales the covariance.
     pub correlation_length: f64,
     /// Standard deviation of x and y of a first guess that brings no covariance, metres.
     pub initial_position_deviation: f64,
@@ -74,8 +74,9 @@ pub struct IcpParameters {
     pub min_overlap: f64,
     /// The least length of wall on which the maps agree, metres.
     pub min_wall_length: f64,
-    /// The least share of the walls seen by both maps on which they agree, 0 to 1; what is left is wall in one map and free
-    /// space in the other.
+    /// The least share of the walls seen by both maps on which they agree, 0 to 1; what is left is wall in one map and
+    /// free space in the other. On maps of six buildings that were drawn from laser scans, right alignments have 0.89
+    /// to 0.99; of 17,000 registrations from wrong starts the best that meets the two bounds above has 0.66.
     pub min_wall_agreement: f64,
     /// The greatest standard deviation of the position in the common section, in any direction, metres.
     pub max_position_deviation: f64,
@@ -84,7 +85,8 @@ pub struct IcpParameters {
     /// An accepted alignment is kept while the maps stay the same and the first guess moves by no more than this in the
     /// common section, metres.
     pub reuse_within: f64,
-    /// An accepted alignment is kept while the maps stay the same and the first guess turns by no more than this, radians.
+    /// An accepted alignment is kept while the maps stay the same and the first guess turns by no more than this,
+    /// radians.
     pub reuse_within_yaw: f64,
 }
 

@@ -77,8 +77,8 @@ impl PointIndex {
         &self.points
     }
 
-    /// The point nearest to `point`, if one lies within `radius` metres of it. Of several that are equally near it is the
-    /// first.
+    /// The point nearest to `point`, if one lies within `radius` metres of it. Of several that are equally near it is
+    /// the first.
     pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
         let local = (point - self.corner) / self.side;
         let reach = radius / self.side;

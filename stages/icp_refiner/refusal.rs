@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, SymmetricEigen};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// Nothing to align.
-    #[error("the maps have no walls near each other at the first guess")]
+    #[error("the maps have no walls that lie near each other")]
     NoWalls,
     /// The iteration limit was reached.
     #[error("ICP has not settled after {iterations} iterations")]
@@ -85,7 +85,8 @@ impl Refusal {
     /// The first reason against an alignment, if there is one.
     pub fn of(registration: &Registration, agreement: &Agreement, parameters: &IcpParameters) -> Option<Self> {
         let (agree, against, share) = (agreement.wall_on_wall, agreement.wall_on_free, agreement.wall_agreement());
-        let (along, direction) = widest_deviation(&registration.centre_covariance.fixed_view::<2, 2>(0, 0).into_owned());
+        let (along, direction) =
+            widest_deviation(&registration.centre_covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let turn = registration.centre_covariance.m33.sqrt();
         // Negated comparisons, so that a value that is no number refuses.
         let at_least = |value: f64, least: f64| value >= least;

@@ -37,7 +37,8 @@ pub struct Registration {
 /// Registers map b on map a, starting at the first guess.
 ///
 /// Only points that lie near each other count (the common section of section 4.3). The first guess takes part with its
-/// covariance, so that what the maps cannot see, such as the place along a bare corridor, stays as the first guess has it.
+/// covariance, so that what the maps cannot see, such as the place along a bare corridor, stays as the first guess has
+/// it.
 ///
 /// Far from the middle of the maps a small turn moves a wall by more than the distance to the next wall. So where the
 /// first guess's rotation is vague, several rotations are tried on a sample of the points, and the one that brings most
@@ -91,8 +92,8 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     }
 }
 
-/// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as two
-/// standard deviations to either side.
+/// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as
+/// two standard deviations to either side.
 fn starts(
     iteration: &mut Iteration<'_>,
     first_guess: &FirstGuess,

@@ -116,7 +116,8 @@ impl Stage for IcpRefiner {
             if pair.first_guess.accepted && !missing.is_empty() {
                 let mut alignment = pair.first_guess.clone();
                 alignment.accepted = false;
-                alignment.reason = format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
+                alignment.reason =
+                    format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
                 pair.send(alignment, output)?;
             }
         }

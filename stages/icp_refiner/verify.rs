@@ -3,7 +3,8 @@
 use super::{IcpParameters, WallMap};
 use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_free};
 
-/// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other cells.
+/// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
+/// cells.
 const LEAST_TOLERANCE: f64 = 1.5;
 
 /// A map: its cells, and what was made of them.
@@ -36,13 +37,14 @@ pub struct Agreement {
 impl Agreement {
     /// The share of the walls that both maps have seen on which they agree, 0 to 1; 0 if there are none.
     ///
-    /// This is what tells right alignments from wrong ones: free space, of which maps have most, lies on free space wherever
-    /// one lays it.
+    /// This is what tells right alignments from wrong ones: free space, of which maps have most, lies on free space
+    /// wherever one lays it.
     pub fn wall_agreement(&self) -> f64 {
         share(self.wall_on_wall, self.wall_on_free)
     }
 
-    /// The acceptance index omega of Birk and Carpin (2006): agree / (agree + disagree) over what both maps know, 0 to 1.
+    /// The acceptance index omega of Birk and Carpin (2006): agree / (agree + disagree) over what both maps know, 0 to
+    /// 1.
     pub fn acceptance_index(&self) -> f64 {
         share(self.free_on_free + self.wall_on_wall * self.wall_width, self.wall_on_free * self.wall_width)
     }

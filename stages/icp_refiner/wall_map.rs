@@ -10,7 +10,8 @@ const SAMPLE_SPACING: f64 = 0.2;
 /// A map's walls as points with normals, and samples of its known space.
 #[derive(Clone, Debug, Default)]
 pub struct WallMap {
-    /// The walls: one point for each occupied cell that borders known space, moved onto the line through its neighbours.
+    /// The walls: one point for each occupied cell that borders known space, moved onto the line through its
+    /// neighbours.
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
     pub normals: Vec<Vector2<f64>>,
@@ -43,8 +44,7 @@ impl WallMap {
         }
         let window = Window::new(normal_radius / resolution);
         let fits: Vec<LineFit> = cells.iter().map(|cell| window.fit(grid, &is_wall, *cell)).collect();
-        let points: Vec<Point2> =
-            fits.iter().map(|fit| grid.geometry.origin * (fit.point * resolution)).collect();
+        let points: Vec<Point2> = fits.iter().map(|fit| grid.geometry.origin * (fit.point * resolution)).collect();
         let (walls, order) = PointIndex::new(&points);
         let normals = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
         let (samples, sample_area) = known_samples(grid);
@@ -138,4 +138,68 @@ fn known_samples(grid: &Grid<'_>) -> (Vec<KnownSample>, f64) {
     }
     let side = stride as f64 * resolution;
     (samples, side * side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{GridGeometry, UNKNOWN, pose};
+
+    const SIDE: usize = 60;
+
+    /// A grid in which `value` says what is at a point (x, y), both in cells.
+    fn map_of(value: impl Fn(f64, f64) -> i8) -> WallMap {
+        let geometry = GridGeometry { width: SIDE, height: SIDE, resolution: 0.05, origin: pose(1.0, 2.0, 0.3) };
+        let cells: Vec<i8> =
+            (0..SIDE * SIDE).map(|i| value((i % SIDE) as f64 + 0.5, (i / SIDE) as f64 + 0.5)).collect();
+        WallMap::new(&Grid::new(geometry, &cells).unwrap(), 0.2)
+    }
+
+    #[test]
+    fn points_of_a_slanted_wall_lie_on_its_line_and_not_on_cell_centres() {
+        let normal = Vector2::new(-f64::sin(0.4), f64::cos(0.4));
+        let across = |x: f64, y: f64| normal.dot(&Vector2::new(x - 30.0, y - 30.0));
+        let map = map_of(|x, y| if across(x, y).abs() <= 0.7 { 100 } else { 0 });
+        let transform = pose(1.0, 2.0, 0.3);
+        let (mut worst, mut inside) = (0.0_f64, 0);
+        for (point, found) in map.walls.points().iter().zip(&map.normals) {
+            let cell = transform.inverse() * point / 0.05;
+            // At the border of the grid the neighbours lie to one side only.
+            if (8.0..52.0).contains(&cell.x) && (8.0..52.0).contains(&cell.y) {
+                inside += 1;
+                worst = worst.max(across(cell.x, cell.y).abs());
+                assert!(found.dot(&(transform.rotation * normal)).abs() > 0.98, "{found}");
+            }
+        }
+        assert!(inside > 40);
+        assert!(worst < 0.25, "{worst} cells");
+    }
+
+    #[test]
+    fn the_inside_of_a_thick_wall_and_its_unseen_side_are_left_out() {
+        let map = map_of(|x, _| match x {
+            x if x < 20.0 => 0,
+            x if x < 30.0 => 100,
+            _ => UNKNOWN,
+        });
+        assert_eq!(map.walls.points().len(), SIDE);
+        let transform = pose(1.0, 2.0, 0.3).inverse();
+        for point in map.walls.points() {
+            assert!(((transform * point).x / 0.05 - 20.5).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_single_cell_has_no_direction() {
+        let map = map_of(|x, y| if x == 30.5 && y == 30.5 { 100 } else { 0 });
+        assert_eq!(map.normals, [Vector2::zeros()]);
+    }
+
+    #[test]
+    fn samples_stand_for_the_known_area() {
+        let map = map_of(|x, _| if x < 40.0 { 0 } else { UNKNOWN });
+        let area = map.samples.len() as f64 * map.sample_area;
+        assert!((area - 2.0 * 3.0).abs() < 1e-9, "{area}");
+        assert!(map.samples.iter().all(|sample| sample.free));
+    }
 }
