@@ -68,14 +68,27 @@ impl<'a> Iteration<'a> {
     /// Pairs every `stride`-th point of b with the wall of a that is nearest within `distance` metres, and finds the
     /// change that fits these pairs and the first guess best. `None` if there is none that is a number.
     pub(super) fn run(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> Option<Change> {
-        let (frame, inliers) = self.pair(transform_a_b, distance, stride);
+        self.solve(transform_a_b, distance, stride, self.parameters.metric)
+    }
+
+    /// Measures again what the maps tell at the final transform, if it was found from point to point: that metric takes
+    /// points which may slide along their wall for points that hold on to it, and so would call a place known along a
+    /// bare corridor.
+    pub(super) fn measure_by_lines(&mut self, transform_a_b: &Pose2) {
+        if self.parameters.metric == Metric::PointToPoint {
+            self.solve(transform_a_b, self.parameters.min_distance, 1, Metric::PointToLine);
+        }
+    }
+
+    fn solve(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize, metric: Metric) -> Option<Change> {
+        let (frame, inliers) = self.pair(transform_a_b, distance, stride, metric);
         let equations = NormalEquations::new(&self.measurements);
-        let information = equations.information * self.gain(&equations, inliers, stride);
-        let vector = equations.vector * self.gain(&equations, inliers, stride);
+        let gain = self.gain(&equations, inliers, stride);
+        let information = equations.information * gain;
         let prior = self.first_guess.local_covariance(&frame, self.parameters).try_inverse()?;
         let covariance = (information + prior).try_inverse()?;
         let deviation = self.first_guess.local_deviation(transform_a_b, &frame);
-        let change = covariance * (vector - prior * deviation);
+        let change = covariance * (equations.vector * gain - prior * deviation);
         if !change.iter().chain(covariance.iter()).all(|value| value.is_finite()) {
             return None;
         }
@@ -86,12 +99,12 @@ impl<'a> Iteration<'a> {
 
     /// The middle and the size of the section in which the walls of the two maps lie near each other.
     pub(super) fn common_section(&mut self, transform_a_b: &Pose2, stride: usize) -> LocalFrame {
-        self.pair(transform_a_b, self.parameters.max_distance, stride).0
+        self.pair(transform_a_b, self.parameters.max_distance, stride, self.parameters.metric).0
     }
 
     /// How many points lie on a wall, counted by their weights.
     pub(super) fn matched(&mut self, transform_a_b: &Pose2, stride: usize) -> f64 {
-        self.pair(transform_a_b, self.parameters.min_distance, stride);
+        self.pair(transform_a_b, self.parameters.min_distance, stride, self.parameters.metric);
         self.measurements.iter().map(|measurement| measurement.weight).sum()
     }
 
@@ -109,7 +122,7 @@ impl<'a> Iteration<'a> {
 
     /// Puts down what each pair of points says. Gives the local coordinates that it is written in, and the number of
     /// pairs.
-    fn pair(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> (LocalFrame, usize) {
+    fn pair(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize, metric: Metric) -> (LocalFrame, usize) {
         let (a, b) = (self.a, self.b);
         self.measurements.clear();
         let mut inliers = 0;
@@ -124,7 +137,7 @@ impl<'a> Iteration<'a> {
             let arm = point.coords - origin;
             // Turns about the origin of b; moved to the middle of all pairs once that is known.
             let turned = perpendicular(&arm);
-            match self.parameters.metric {
+            match metric {
                 Metric::PointToLine => {
                     if normal.dot(&(transform_a_b.rotation * normal_b)).abs() < LEAST_NORMAL_AGREEMENT {
                         continue;

@@ -40,8 +40,8 @@ use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
 pub fn kind() -> StageKind {
     StageKind::stage(
         "icp_refiner",
-        "Refines the first guess of how two maps lie to each other by ICP on their walls, and verifies the result: it is \
-         accepted only where walls lie on walls, and refused with the reason otherwise.",
+        "Refines the first guess of how two maps lie to each other by ICP on their walls, and verifies the result: it \
+         is accepted only where walls lie on walls, and refused with the reason otherwise.",
         vec![
             InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps."),
             InputPort::one("alignment", PortType::of::<Alignment>(), "First guesses, one for each pair of robots."),

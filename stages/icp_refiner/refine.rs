@@ -19,8 +19,8 @@ impl Refinement {
         match &self.refusal {
             Some(refusal) => refusal.to_string(),
             None => format!(
-                "{:.0} m of wall agree and {:.0} m lie on free space, in {:.0} m2 that both maps know (acceptance index \
-                 {:.3}); walls lie within {:.3} m of each other",
+                "{:.0} m of wall agree and {:.0} m lie on free space, in {:.0} m2 that both maps know (acceptance \
+                 index {:.3}); walls lie within {:.3} m of each other",
                 self.agreement.wall_on_wall,
                 self.agreement.wall_on_free,
                 self.agreement.overlap,

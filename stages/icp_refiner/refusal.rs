@@ -50,7 +50,8 @@ pub enum Refusal {
     },
     /// The maps pull away from the first guess.
     #[error(
-        "the maps fit {step:.1} standard deviations away from the first guess, which allows {most:.1}; one of the two is wrong"
+        "the maps fit {step:.1} standard deviations away from the first guess, and {most:.1} are allowed: one of the \
+         two is wrong"
     )]
     Step {
         /// Standard deviations of the first guess.
@@ -60,8 +61,8 @@ pub enum Refusal {
     },
     /// The place is open along a direction.
     #[error(
-        "the maps only fix the place across a bare corridor that runs at {direction:.0} degrees; along it, it is known to \
-         {deviation:.2} m, and {most:.2} m are allowed"
+        "the maps only fix the place across a bare corridor that runs at {direction:.0} degrees; along it, it is known \
+         to {deviation:.2} m, and {most:.2} m are allowed"
     )]
     OpenPosition {
         /// The direction that is open, degrees in map a, from -90 to 90.

@@ -74,6 +74,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
             break;
         }
     }
+    iteration.measure_by_lines(&transform_a_b);
     let state = iteration.into_state();
     let frame = state.frame;
     let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));

@@ -9,8 +9,10 @@ use nalgebra::Matrix3;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
-const MAP: usize = 0;
-const ALIGNMENT: usize = 0;
+/// The input port of the maps; the other is that of the first guesses.
+const MAP_INPUT: usize = 0;
+/// The output port of the refined alignments.
+const ALIGNMENT_OUTPUT: usize = 0;
 
 /// Refines the alignments of pairs of robots.
 pub(super) struct IcpRefiner {
@@ -24,6 +26,7 @@ pub(super) struct IcpRefiner {
 /// A robot's last map. The message is kept as it came; the walls are made when they are first asked for.
 struct RobotMap {
     message: Message,
+    /// How many usable maps of the robot came before it.
     number: u64,
     walls: OnceCell<WallMap>,
 }
@@ -31,7 +34,9 @@ struct RobotMap {
 /// A pair of robots: the last first guess, and what was made of it.
 #[derive(Default)]
 struct Pair {
+    /// The robot that the first guess's message was about; empty as a rule.
     robot: String,
+    /// The last first guess, refused or not.
     first_guess: Alignment,
     refined: Option<Refined>,
     sent: Option<Alignment>,
@@ -39,6 +44,7 @@ struct Pair {
 
 /// A refinement and what it was made from.
 struct Refined {
+    /// The numbers of the two maps.
     maps: (u64, u64),
     first_guess: Alignment,
     refinement: Refinement,
@@ -103,7 +109,7 @@ impl IcpRefiner {
 impl Stage for IcpRefiner {
     fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
         match port {
-            MAP => self.receive_map(message, output),
+            MAP_INPUT => self.receive_map(message, output),
             _ => self.receive_alignment(message, output),
         }
     }
@@ -130,15 +136,15 @@ impl Stage for IcpRefiner {
 }
 
 impl Pair {
+    /// Sends an alignment, unless it tells only what was sent last.
     fn send(&mut self, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
-        let same = self.sent.as_ref().is_some_and(|sent| {
-            let header = alignment.header.clone();
-            *sent == alignment || Alignment { header, ..sent.clone() } == alignment
-        });
-        if same {
+        if let Some(sent) = &mut self.sent {
+            sent.header = alignment.header.clone();
+        }
+        if self.sent.as_ref() == Some(&alignment) {
             return Ok(());
         }
-        output.send(ALIGNMENT, &self.robot, &alignment)?;
+        output.send(ALIGNMENT_OUTPUT, &self.robot, &alignment)?;
         self.sent = Some(alignment);
         Ok(())
     }

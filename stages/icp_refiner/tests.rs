@@ -156,6 +156,17 @@ fn along_a_bare_corridor_the_first_guess_stays_and_says_how_well_it_is_known() {
 }
 
 #[test]
+fn points_that_pull_on_points_do_not_close_a_bare_corridor() {
+    let corridor = FloorPlan::corridor();
+    let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
+    let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
+    let first_guess = guess(a.transform_to(&b), 0.0, 0.0, 0.0);
+    let parameters = IcpParameters { metric: Metric::PointToPoint, max_iterations: 200, ..Default::default() };
+    let refinement = refine(&a.view(), &b.view(), &first_guess, &parameters);
+    assert!(matches!(refinement.refusal, Some(Refusal::OpenPosition { .. })), "{}", refinement.reason());
+}
+
+#[test]
 fn along_a_bare_corridor_a_good_first_guess_suffices() {
     let corridor = FloorPlan::corridor();
     let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));

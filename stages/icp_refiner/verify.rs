@@ -88,7 +88,7 @@ fn walls_on(map: &MapView<'_>, other: &WallMap, transform_map_other: &Pose2, tol
         let point = transform_map_other * point;
         // The cell is cheaper to look at than the walls, and most walls of one map are unknown to the other.
         let value = value_at(&map.grid, &point);
-        if value == UNKNOWN {
+        if value < 0 {
             continue;
         }
         if map.walls.walls.nearest(&point, tolerance).is_some() {
