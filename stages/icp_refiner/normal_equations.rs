@@ -7,6 +7,9 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 /// would, by their noise alone, seem to fix the place along it. (The idea is that of X-ICP, Tuna et al. 2023.)
 const LEAST_SINE: f64 = 0.2;
 
+/// More steps than the main axes of three numbers ever take.
+const MOST_SWEEPS: usize = 100;
+
 /// One linear measurement of the change that is looked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measurement {
@@ -39,7 +42,9 @@ impl NormalEquations {
             weight += measurement.weight;
             squares += measurement.weight * measurement.residual * measurement.residual;
         }
-        let axes = SymmetricEigen::new(information).eigenvectors;
+        // Values that overflow have no axes; the solution they give is refused for being no number.
+        let axes = SymmetricEigen::try_new(information, f64::EPSILON, MOST_SWEEPS)
+            .map_or_else(Matrix3::identity, |eigen| eigen.eigenvectors);
         let (mut seen, mut pulled) = (Vector3::zeros(), Vector3::zeros());
         for measurement in measurements {
             let along = axes.tr_mul(&measurement.derivative);

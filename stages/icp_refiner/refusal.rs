@@ -3,6 +3,9 @@
 use super::{Agreement, IcpParameters, Registration};
 use nalgebra::{Matrix2, SymmetricEigen};
 
+/// More steps than the main axes of two numbers ever take.
+const MOST_SWEEPS: usize = 100;
+
 /// Why a refined alignment may not be used. The texts are for the people who run the robots.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
@@ -117,10 +120,9 @@ impl Refusal {
 
 /// The greatest standard deviation of a position, metres, and its direction, radians from -pi/2 to pi/2.
 fn widest_deviation(covariance: &Matrix2<f64>) -> (f64, f64) {
-    if !covariance.iter().all(|value| value.is_finite()) {
+    let Some(eigen) = SymmetricEigen::try_new(*covariance, f64::EPSILON, MOST_SWEEPS) else {
         return (f64::INFINITY, 0.0);
-    }
-    let eigen = SymmetricEigen::new(*covariance);
+    };
     let widest = usize::from(eigen.eigenvalues[1] > eigen.eigenvalues[0]);
     let axis = eigen.eigenvectors.column(widest);
     let direction = if axis.x == 0.0 { std::f64::consts::FRAC_PI_2 } else { (axis.y / axis.x).atan() };

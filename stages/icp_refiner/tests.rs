@@ -5,6 +5,7 @@ use super::{FirstGuess, IcpParameters, Metric, Refusal, WallMap, Weighting, comp
 use crate::geometry::{Grid, GridGeometry, Pose2, pose};
 use gridweave_runtime::stage::Parameters;
 use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The west and the east of the office, in frames of their own.
@@ -112,6 +113,28 @@ fn a_map_without_walls_is_refused() {
             assert!(refinement.refusal.is_some());
             assert!(refinement.registration.transform_a_b.translation.vector.iter().all(|value| value.is_finite()));
             assert!(!refinement.reason().contains("NaN"), "{}", refinement.reason());
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_grid_and_no_first_guess_makes_it_fail(
+        cells in prop::collection::vec(any::<i8>(), 24 * 18),
+        resolution in prop_oneof![0.01..1.0, Just(1e-300), Just(1e300)],
+        origin in prop::array::uniform3(prop_oneof![-9.0..9.0, Just(1e20), Just(-1e200), Just(f64::MAX)]),
+        start in prop::array::uniform3(prop_oneof![-9.0..9.0, Just(1e20), Just(f64::MAX), Just(f64::NAN)]),
+        covariance in prop::array::uniform3(prop_oneof![0.0..9.0, Just(1e-300), Just(1e300), Just(f64::NAN)]),
+    ) {
+        let geometry = GridGeometry { width: 24, height: 18, resolution, origin: pose(origin[0], origin[1], origin[2]) };
+        if let Ok(grid) = Grid::new(geometry, &cells) {
+            let walls = WallMap::new(&grid, 0.2);
+            let map = super::MapView { grid, walls: &walls };
+            let parameters = IcpParameters::default();
+            let start = pose(start[0], start[1], start[2]);
+            let first_guess = FirstGuess::new(start, Matrix3::from_diagonal(&covariance.into()), &parameters);
+            let refinement = refine(&map, &map, &first_guess, &parameters);
+            prop_assert!(!refinement.reason().is_empty());
         }
     }
 }
