@@ -4,11 +4,15 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod icp_refiner;
 pub mod simulator;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![simulator::kind()]
+    vec![
+        icp_refiner::kind(),
+        simulator::kind(),
+    ]
 }

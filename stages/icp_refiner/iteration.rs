@@ -1,0 +1,191 @@
+//! One iteration of ICP: pair the points, weigh the pairs, solve for the change.
+
+use super::first_guess::LocalFrame;
+use super::normal_equations::{Measurement, NormalEquations};
+use super::{FirstGuess, IcpParameters, Metric, WallMap, Weighting};
+use crate::geometry::Pose2;
+use nalgebra::{Matrix3, Vector2, Vector3};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// Walls that cross by more than this are not the same wall: the cosine of 45 degrees.
+const LEAST_NORMAL_AGREEMENT: f64 = FRAC_1_SQRT_2;
+
+/// Least scale of the local coordinates, metres: the points of a tiny common section tell no rotation.
+const LEAST_SCALE: f64 = 0.1;
+
+/// The work of an iteration on two maps, with the memory that iterations share.
+pub(super) struct Iteration<'a> {
+    a: &'a WallMap,
+    b: &'a WallMap,
+    first_guess: &'a FirstGuess,
+    parameters: &'a IcpParameters,
+    measurements: Vec<Measurement>,
+    state: IterationState,
+}
+
+/// What the last iteration knew, in its local coordinates.
+pub(super) struct IterationState {
+    pub(super) frame: LocalFrame,
+    /// What the maps say.
+    pub(super) information: Matrix3<f64>,
+    /// What the maps and the first guess leave open.
+    pub(super) covariance: Matrix3<f64>,
+    /// Pairs of points.
+    pub(super) inliers: usize,
+    /// Weighted mean of the squared residuals, square metres.
+    pub(super) mean_square_error: f64,
+}
+
+/// The transform after an iteration, and how far that moved the points, metres.
+pub(super) struct Change {
+    pub(super) transform_a_b: Pose2,
+    pub(super) length: f64,
+}
+
+impl<'a> Iteration<'a> {
+    pub(super) fn new(
+        a: &'a WallMap,
+        b: &'a WallMap,
+        first_guess: &'a FirstGuess,
+        parameters: &'a IcpParameters,
+    ) -> Self {
+        let frame = LocalFrame { centre: first_guess.transform_a_b.translation.vector.into(), scale: 1.0 };
+        let state = IterationState {
+            frame,
+            information: Matrix3::zeros(),
+            covariance: first_guess.local_covariance(&frame, parameters),
+            inliers: 0,
+            mean_square_error: 0.0,
+        };
+        Self { a, b, first_guess, parameters, measurements: Vec::new(), state }
+    }
+
+    /// What the last iteration knew.
+    pub(super) fn into_state(self) -> IterationState {
+        self.state
+    }
+
+    /// Pairs every `stride`-th point of b with the wall of a that is nearest within `distance` metres, and finds the
+    /// change that fits these pairs and the first guess best. `None` if there is none that is a number.
+    pub(super) fn run(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> Option<Change> {
+        self.solve(transform_a_b, distance, stride, self.parameters.metric)
+    }
+
+    /// Measures again what the maps tell at the final transform, if it was found from point to point: that metric takes
+    /// points which may slide along their wall for points that hold on to it, and so would call a place known along a
+    /// bare corridor.
+    pub(super) fn measure_by_lines(&mut self, transform_a_b: &Pose2) {
+        if self.parameters.metric == Metric::PointToPoint {
+            self.solve(transform_a_b, self.parameters.min_distance, 1, Metric::PointToLine);
+        }
+    }
+
+    fn solve(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize, metric: Metric) -> Option<Change> {
+        let (frame, inliers) = self.pair(transform_a_b, distance, stride, metric);
+        let equations = NormalEquations::new(&self.measurements);
+        let gain = self.gain(&equations, inliers, stride);
+        let information = equations.information * gain;
+        let prior = self.first_guess.local_covariance(&frame, self.parameters).try_inverse()?;
+        let covariance = (information + prior).try_inverse()?;
+        let deviation = self.first_guess.local_deviation(transform_a_b, &frame);
+        let change = covariance * (equations.vector * gain - prior * deviation);
+        if !change.iter().chain(covariance.iter()).all(|value| value.is_finite()) {
+            return None;
+        }
+        let mean_square_error = equations.mean_square_error;
+        self.state = IterationState { frame, information, covariance, inliers, mean_square_error };
+        Some(Change { transform_a_b: frame.moved(transform_a_b, &change), length: change.norm() })
+    }
+
+    /// The middle and the size of the section in which the walls of the two maps lie near each other.
+    pub(super) fn common_section(&mut self, transform_a_b: &Pose2, stride: usize) -> LocalFrame {
+        self.pair(transform_a_b, self.parameters.max_distance, stride, self.parameters.metric).0
+    }
+
+    /// How many points lie on a wall, counted by their weights.
+    pub(super) fn matched(&mut self, transform_a_b: &Pose2, stride: usize) -> f64 {
+        self.pair(transform_a_b, self.parameters.min_distance, stride, self.parameters.metric);
+        self.measurements.iter().map(|measurement| measurement.weight).sum()
+    }
+
+    /// What turns information for measurements of variance one into information: cells side by side share their
+    /// errors, and no wall is known better than the cells it is drawn in.
+    fn gain(&self, equations: &NormalEquations, inliers: usize, stride: usize) -> f64 {
+        if inliers == 0 {
+            return 0.0;
+        }
+        let points = inliers as f64;
+        let independent = (points * stride as f64 * self.b.spacing / self.parameters.correlation_length).min(points);
+        let drawn = (self.a.spacing.powi(2) + self.b.spacing.powi(2)) / 12.0;
+        independent / points / equations.mean_square_error.max(drawn)
+    }
+
+    /// Puts down what each pair of points says. Gives the local coordinates that it is written in, and the number of
+    /// pairs.
+    fn pair(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize, metric: Metric) -> (LocalFrame, usize) {
+        let (a, b) = (self.a, self.b);
+        self.measurements.clear();
+        let mut inliers = 0;
+        let (mut sum, mut squares) = (Vector2::zeros(), 0.0);
+        let origin = transform_a_b.translation.vector;
+        let usual = distance / 3.0;
+        for (point_b, normal_b) in b.walls.points().iter().zip(&b.normals).step_by(stride) {
+            let point = transform_a_b * point_b;
+            let Some(partner) = a.walls.nearest(&point, distance) else { continue };
+            let offset = point - a.walls.points()[partner.index];
+            let normal = a.normals[partner.index];
+            let arm = point.coords - origin;
+            // Turns about the origin of b; moved to the middle of all pairs once that is known.
+            let turned = perpendicular(&arm);
+            match metric {
+                Metric::PointToLine => {
+                    if normal.dot(&(transform_a_b.rotation * normal_b)).abs() < LEAST_NORMAL_AGREEMENT {
+                        continue;
+                    }
+                    let residual = normal.dot(&offset);
+                    let weight = self.parameters.weighting.weight(residual, usual);
+                    let derivative = normal.push(normal.dot(&turned));
+                    self.measurements.push(Measurement { derivative, residual, weight });
+                }
+                Metric::PointToPoint => {
+                    let weight = self.parameters.weighting.weight(offset.norm(), usual);
+                    let x = Vector3::new(1.0, 0.0, turned.x);
+                    let y = Vector3::new(0.0, 1.0, turned.y);
+                    self.measurements.push(Measurement { derivative: x, residual: offset.x, weight });
+                    self.measurements.push(Measurement { derivative: y, residual: offset.y, weight });
+                }
+            }
+            inliers += 1;
+            sum += arm;
+            squares += arm.norm_squared();
+        }
+        let count = f64::max(inliers as f64, 1.0);
+        let mean = sum / count;
+        let scale = (squares / count - mean.norm_squared()).max(0.0).sqrt().max(LEAST_SCALE);
+        let turned = perpendicular(&mean);
+        for Measurement { derivative, .. } in &mut self.measurements {
+            derivative.z = (derivative.z - derivative.xy().dot(&turned)) / scale;
+        }
+        (LocalFrame { centre: (origin + mean).into(), scale }, inliers)
+    }
+}
+
+/// The vector turned left by a quarter.
+fn perpendicular(vector: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-vector.y, vector.x)
+}
+
+impl Weighting {
+    /// The weight of a pair that lies `distance` apart, where `usual` is what is usual, metres.
+    fn weight(self, distance: f64, usual: f64) -> f64 {
+        match self {
+            Self::None => 1.0,
+            Self::Huber => (usual / distance.abs().max(f64::MIN_POSITIVE)).min(1.0),
+            Self::GemanMcclure => {
+                let square = usual * usual;
+                let ratio = square / (square + distance * distance);
+                ratio * ratio
+            }
+        }
+    }
+}

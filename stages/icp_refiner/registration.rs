@@ -1,0 +1,116 @@
+//! ICP: moves map b so that its walls lie on those of map a.
+
+use super::iteration::Iteration;
+use super::{FirstGuess, IcpParameters, WallMap};
+use crate::geometry::{Point2, Pose2};
+use nalgebra::{Matrix3, Vector3};
+
+/// No more than this many rotations to either side of the first guess are tried.
+const MOST_STARTS: usize = 10;
+
+/// The outcome of a registration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registration {
+    /// `T_a_b`, refined: `T_icp * T_initial` (Tsardoulias et al., equations 10 to 13).
+    pub transform_a_b: Pose2,
+    /// Whether the last iteration moved the points by less than the bound.
+    pub converged: bool,
+    /// Iterations made, from the start that was best.
+    pub iterations: usize,
+    /// Points of map b that have a partner in map a.
+    pub inliers: usize,
+    /// Weighted mean of the squared residuals of the last iteration, square metres.
+    pub mean_square_error: f64,
+    /// What the maps alone say about (x, y, yaw): the inverse of a covariance, which need not exist. In a bare corridor
+    /// it is zero along the corridor.
+    pub information: Matrix3<f64>,
+    /// Covariance of (x, y, yaw), metres and radians, from the maps and the first guess together.
+    pub covariance: Matrix3<f64>,
+    /// The middle of the common section, frame a.
+    pub centre: Point2,
+    /// Covariance of the place of that middle and of the turn about it (x, y, yaw), metres and radians.
+    pub centre_covariance: Matrix3<f64>,
+    /// Distance from the first guess in standard deviations of the first guess, slack included.
+    pub step: f64,
+}
+
+/// Registers map b on map a, starting at the first guess.
+///
+/// Only points that lie near each other count (the common section of section 4.3). The first guess takes part with its
+/// covariance, so that what the maps cannot see, such as the place along a bare corridor, stays as the first guess has
+/// it.
+///
+/// Far from the middle of the maps a small turn moves a wall by more than the distance to the next wall. So where the
+/// first guess's rotation is vague, several rotations are tried on a sample of the points, and the one that brings most
+/// of them to a wall goes on.
+pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
+    let mut iteration = Iteration::new(a, b, first_guess, parameters);
+    let stride = b.walls.points().len().div_ceil(parameters.coarse_points.max(1)).max(1);
+    let mut best: Option<(f64, Pose2)> = None;
+    let mut iterations = 0;
+    for start in starts(&mut iteration, first_guess, stride, parameters) {
+        let mut transform_a_b = start;
+        let mut distance = parameters.max_distance;
+        iterations = 0;
+        while distance > parameters.min_distance {
+            let Some(change) = iteration.run(&transform_a_b, distance, stride) else { break };
+            transform_a_b = change.transform_a_b;
+            distance *= parameters.shrink;
+            iterations += 1;
+        }
+        let matched = iteration.matched(&transform_a_b, stride);
+        if best.is_none_or(|(most, _)| matched > most) {
+            best = Some((matched, transform_a_b));
+        }
+    }
+    let mut transform_a_b = best.map_or(first_guess.transform_a_b, |(_, transform)| transform);
+    let mut converged = false;
+    for _ in 0..parameters.max_iterations {
+        let Some(change) = iteration.run(&transform_a_b, parameters.min_distance, 1) else { break };
+        transform_a_b = change.transform_a_b;
+        iterations += 1;
+        converged = change.length < parameters.convergence;
+        if converged {
+            break;
+        }
+    }
+    iteration.measure_by_lines(&transform_a_b);
+    let state = iteration.into_state();
+    let frame = state.frame;
+    let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));
+    let metres_to_radians = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / frame.scale));
+    Registration {
+        transform_a_b,
+        converged,
+        iterations,
+        inliers: state.inliers,
+        mean_square_error: state.mean_square_error,
+        information: inverse.transpose() * state.information * inverse,
+        covariance: jacobian * state.covariance * jacobian.transpose(),
+        centre: frame.centre,
+        centre_covariance: metres_to_radians * state.covariance * metres_to_radians,
+        step: first_guess.distance(&transform_a_b, &frame, parameters),
+    }
+}
+
+/// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as
+/// two standard deviations to either side.
+fn starts(
+    iteration: &mut Iteration<'_>,
+    first_guess: &FirstGuess,
+    stride: usize,
+    parameters: &IcpParameters,
+) -> Vec<Pose2> {
+    let initial = first_guess.transform_a_b;
+    let deviation = first_guess.covariance.m33.sqrt();
+    let count = (2.0 * deviation / parameters.start_spacing).round() as usize;
+    let mut starts = vec![initial];
+    if count > 0 {
+        let frame = iteration.common_section(&initial, stride);
+        for side in 1..=count.min(MOST_STARTS) {
+            let turn = side as f64 * parameters.start_spacing * frame.scale;
+            starts.extend([turn, -turn].map(|turn| frame.moved(&initial, &Vector3::new(0.0, 0.0, turn))));
+        }
+    }
+    starts
+}

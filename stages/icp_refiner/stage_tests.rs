@@ -1,0 +1,184 @@
+//! The stage from outside: messages in, messages out.
+
+use super::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::geometry::{Pose2, pose};
+use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid, RosMessage, encode};
+use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
+use serde::Serialize;
+
+const MAP: usize = 0;
+const ALIGNMENT: usize = 1;
+
+/// The stage, and what it sends.
+struct Bench {
+    stage: Box<dyn Stage>,
+    outputs: CollectedOutputs,
+    time: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let kind = super::kind();
+        let Ok(Node::Stage(stage)) = kind.make(Default::default(), &Context::default()) else { panic!("no stage") };
+        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
+    }
+
+    fn give<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Vec<Alignment> {
+        self.time += 1;
+        let log_time = LogTime(self.time * 1_000_000_000);
+        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
+        let message = Message::from_vec(header, encode(message).unwrap());
+        self.stage.receive(port, &message, &mut self.outputs.output(log_time)).unwrap();
+        self.sent()
+    }
+
+    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
+        let cells: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
+        let info = MapMetaData {
+            resolution: map.geometry.resolution as f32,
+            width: map.geometry.width as u32,
+            height: map.geometry.height as u32,
+            origin: map.geometry.origin.into(),
+            ..Default::default()
+        };
+        self.give(MAP, robot, &OccupancyGrid { info, data: &cells, ..Default::default() })
+    }
+
+    fn finish(&mut self) -> Vec<Alignment> {
+        self.stage.finish(&mut self.outputs.output(LogTime(self.time))).unwrap();
+        self.sent()
+    }
+
+    fn sent(&mut self) -> Vec<Alignment> {
+        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+    }
+}
+
+fn first_guess(transform_a_b: &Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        header: Header::new(LogTime(0), "robot1/map"),
+        a: "robot1".into(),
+        b: "robot2".into(),
+        covariance: [0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.001],
+        score: 0.9,
+        method: "tags".into(),
+        accepted: true,
+        reason: "three tags".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(transform_a_b);
+    alignment
+}
+
+/// West, east, and more of the east.
+fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 18.0, 12.2), drawing(12.0, 6.0, -2.1));
+    let more_of_b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b, more_of_b)
+}
+
+#[test]
+fn a_first_guess_is_refined_once_both_maps_are_there() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = Bench::new();
+    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.1, -0.1, 0.02)))), []);
+    assert_eq!(bench.give_map("robot1", &a), []);
+    let sent = bench.give_map("robot2", &b);
+    let [refined] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(refined.accepted, "{}", refined.reason);
+    assert_eq!(refined.method, "tags+icp");
+    assert_eq!(refined.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert!(refined.score > 0.95);
+    let off = truth.inverse() * refined.transform_a_b();
+    assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
+    assert_eq!(bench.finish(), []);
+    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+}
+
+#[test]
+fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
+    let (a, b, more_of_b) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&truth)).len(), 1);
+    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&truth)), []);
+    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.01, 0.01, 0.001)))), []);
+    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+    assert_eq!(bench.give_map("robot2", &more_of_b).len(), 1);
+    assert_eq!(bench.stage.report().unwrap()["registrations"], 2);
+    bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.2, 0.0, 0.0))));
+    assert_eq!(bench.stage.report().unwrap()["registrations"], 3);
+}
+
+#[test]
+fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    bench.give(ALIGNMENT, "", &first_guess(&truth));
+    let other = Alignment { method: "features".into(), ..first_guess(&truth) };
+    let sent = bench.give(ALIGNMENT, "", &other);
+    assert_eq!(sent.len(), 1);
+    assert_eq!(sent[0].method, "features+icp");
+    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+}
+
+#[test]
+fn a_refused_first_guess_passes_through_unchanged() {
+    let mut bench = Bench::new();
+    let refused = Alignment { accepted: false, reason: "two tags only".into(), ..first_guess(&Pose2::identity()) };
+    assert_eq!(bench.give(ALIGNMENT, "", &refused), std::slice::from_ref(&refused));
+    assert_eq!(bench.give(ALIGNMENT, "", &refused), []);
+    assert_eq!(bench.finish(), []);
+}
+
+#[test]
+fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(2.0, 1.5, 0.5))));
+    assert_eq!(sent.len(), 1);
+    assert!(!sent[0].accepted && !sent[0].reason.is_empty());
+    assert!(bench.give(ALIGNMENT, "", &first_guess(&truth))[0].accepted);
+}
+
+#[test]
+fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
+    let (a, ..) = maps();
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give(ALIGNMENT, "", &first_guess(&Pose2::identity()));
+    let sent = bench.finish();
+    assert_eq!(sent.len(), 1);
+    assert!(!sent[0].accepted);
+    assert!(sent[0].reason.contains("robot2"), "{}", sent[0].reason);
+}
+
+#[test]
+fn what_is_no_map_or_no_transform_is_warned_of() {
+    let (a, b, _) = maps();
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    let info = MapMetaData { resolution: f32::NAN, width: 2, height: 2, ..Default::default() };
+    bench.give(MAP, "robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    let info = MapMetaData { resolution: 0.05, width: 2, height: 3, ..Default::default() };
+    bench.give(MAP, "robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    let message = Message::from_vec(MessageHeader::default(), vec![0, 1, 0, 0]);
+    bench.stage.receive(MAP, &message, &mut bench.outputs.output(LogTime(9))).unwrap();
+    bench.give(ALIGNMENT, "", &Alignment { x: f64::NAN, ..first_guess(&Pose2::identity()) });
+    assert_eq!(bench.outputs.warnings().values().sum::<u64>(), 4, "{:?}", bench.outputs.warnings());
+    bench.give_map("robot2", &b);
+    let sent = bench.give(ALIGNMENT, "", &first_guess(&a.transform_to(&b)));
+    assert!(sent[0].accepted, "the last good map stays");
+}

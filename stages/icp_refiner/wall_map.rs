@@ -1,0 +1,205 @@
+//! What registration and verification need of one map, made once for each map.
+
+use super::PointIndex;
+use crate::geometry::{Cell, Grid, Point2, is_free, is_occupied};
+use nalgebra::Vector2;
+
+/// Distance between the samples of known space, metres.
+const SAMPLE_SPACING: f64 = 0.2;
+
+/// A map's walls as points with normals, and samples of its known space.
+#[derive(Clone, Debug, Default)]
+pub struct WallMap {
+    /// The walls: one point for each occupied cell that borders known space, moved onto the line through its
+    /// neighbours.
+    pub walls: PointIndex,
+    /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
+    pub normals: Vec<Vector2<f64>>,
+    /// Metres of wall that one point stands for.
+    pub spacing: f64,
+    /// Known space, sampled evenly.
+    pub samples: Vec<KnownSample>,
+    /// Square metres that one sample stands for.
+    pub sample_area: f64,
+}
+
+/// A place whose occupancy is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownSample {
+    /// Where, metres, map frame.
+    pub point: Point2,
+    /// Whether it is free of obstacles.
+    pub free: bool,
+}
+
+impl WallMap {
+    /// The walls of a grid. A wall's direction is taken from the wall cells within `normal_radius` metres, and never
+    /// from less than the cells two away.
+    pub fn new(grid: &Grid<'_>, normal_radius: f64) -> Self {
+        let resolution = grid.geometry.resolution;
+        let cells: Vec<Cell> = grid.occupied().filter(|cell| borders_known_space(grid, *cell)).collect();
+        let mut is_wall = vec![false; grid.cells.len()];
+        for cell in &cells {
+            is_wall[grid.geometry.index(*cell)] = true;
+        }
+        let window = Window::new(normal_radius / resolution);
+        let fits: Vec<LineFit> = cells.iter().map(|cell| window.fit(grid, &is_wall, *cell)).collect();
+        let points: Vec<Point2> = fits.iter().map(|fit| grid.geometry.origin * (fit.point * resolution)).collect();
+        let (walls, order) = PointIndex::new(&points);
+        let normals = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
+        let (samples, sample_area) = known_samples(grid);
+        Self { walls, normals, spacing: resolution, samples, sample_area }
+    }
+}
+
+/// Whether a cell lies beside one that is known and holds no obstacle. The inside of a thick wall, and its far side
+/// that nobody has seen, say nothing about where the wall's face is.
+fn borders_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
+    let rows = cell.row.saturating_sub(1)..=cell.row + 1;
+    rows.flat_map(|row| (cell.column.saturating_sub(1)..=cell.column + 1).map(move |column| Cell { column, row }))
+        .any(|cell| matches!(grid.value(cell), value if value >= 0 && !is_occupied(value)))
+}
+
+/// A point on the line through a cell's neighbours, and that line's normal, in cells.
+struct LineFit {
+    point: Point2,
+    normal: Vector2<f64>,
+}
+
+/// The cells within a radius.
+struct Window {
+    offsets: Vec<(isize, isize)>,
+}
+
+impl Window {
+    /// A window of `radius` cells, at least two and at most 32.
+    fn new(radius: f64) -> Self {
+        let radius = radius.clamp(2.0, 32.0);
+        let reach = radius as isize;
+        let offsets = (-reach..=reach)
+            .flat_map(|row| (-reach..=reach).map(move |column| (column, row)))
+            .filter(|(column, row)| ((column * column + row * row) as f64) <= radius * radius)
+            .collect();
+        Self { offsets }
+    }
+
+    /// The line through the wall cells in the window round `cell`: the main axis of their scatter.
+    fn fit(&self, grid: &Grid<'_>, is_wall: &[bool], cell: Cell) -> LineFit {
+        let (width, height) = (grid.geometry.width, grid.geometry.height);
+        let (mut count, mut sum, mut squares, mut product) = (0.0, Vector2::zeros(), Vector2::zeros(), 0.0);
+        for &(column, row) in &self.offsets {
+            let (Some(x), Some(y)) = (cell.column.checked_add_signed(column), cell.row.checked_add_signed(row)) else {
+                continue;
+            };
+            if x < width && y < height && is_wall[y * width + x] {
+                let offset = Vector2::new(column as f64, row as f64);
+                count += 1.0;
+                sum += offset;
+                squares += offset.component_mul(&offset);
+                product += offset.x * offset.y;
+            }
+        }
+        let centre = Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5);
+        // Two cells make a line, but not one that can be trusted.
+        if count < 3.0 {
+            return LineFit { point: centre, normal: Vector2::zeros() };
+        }
+        let mean = sum / count;
+        let variance = squares / count - mean.component_mul(&mean);
+        let covariance = product / count - mean.x * mean.y;
+        let half_difference = (variance.x - variance.y) / 2.0;
+        let spread = half_difference.hypot(covariance);
+        let across = (variance.x + variance.y) / 2.0 - spread;
+        let along = across + 2.0 * spread;
+        // A blob has no direction.
+        if across > 0.35 * along {
+            return LineFit { point: centre, normal: Vector2::zeros() };
+        }
+        let direction = covariance.atan2(half_difference) / 2.0;
+        let normal = Vector2::new(-direction.sin(), direction.cos());
+        LineFit { point: centre + normal * normal.dot(&mean), normal }
+    }
+}
+
+/// Known cells at about [`SAMPLE_SPACING`], and the area that one stands for.
+fn known_samples(grid: &Grid<'_>) -> (Vec<KnownSample>, f64) {
+    let resolution = grid.geometry.resolution;
+    let stride = (SAMPLE_SPACING / resolution).round().clamp(1.0, 1e6) as usize;
+    let (width, height) = (grid.geometry.width, grid.geometry.height);
+    let mut samples = Vec::new();
+    for row in (stride / 2..height).step_by(stride) {
+        for column in (stride / 2..width).step_by(stride) {
+            let cell = Cell { column, row };
+            let value = grid.value(cell);
+            if value >= 0 {
+                samples.push(KnownSample { point: grid.geometry.centre(cell), free: is_free(value) });
+            }
+        }
+    }
+    let side = stride as f64 * resolution;
+    (samples, side * side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{GridGeometry, UNKNOWN, pose};
+
+    const SIDE: usize = 60;
+
+    /// A grid in which `value` says what is at a point (x, y), both in cells.
+    fn map_of(value: impl Fn(f64, f64) -> i8) -> WallMap {
+        let geometry = GridGeometry { width: SIDE, height: SIDE, resolution: 0.05, origin: pose(1.0, 2.0, 0.3) };
+        let cells: Vec<i8> =
+            (0..SIDE * SIDE).map(|i| value((i % SIDE) as f64 + 0.5, (i / SIDE) as f64 + 0.5)).collect();
+        WallMap::new(&Grid::new(geometry, &cells).unwrap(), 0.2)
+    }
+
+    #[test]
+    fn points_of_a_slanted_wall_lie_on_its_line_and_not_on_cell_centres() {
+        let normal = Vector2::new(-f64::sin(0.4), f64::cos(0.4));
+        let across = |x: f64, y: f64| normal.dot(&Vector2::new(x - 30.0, y - 30.0));
+        let map = map_of(|x, y| if across(x, y).abs() <= 0.7 { 100 } else { 0 });
+        let transform = pose(1.0, 2.0, 0.3);
+        let (mut worst, mut inside) = (0.0_f64, 0);
+        for (point, found) in map.walls.points().iter().zip(&map.normals) {
+            let cell = transform.inverse() * point / 0.05;
+            // At the border of the grid the neighbours lie to one side only.
+            if (8.0..52.0).contains(&cell.x) && (8.0..52.0).contains(&cell.y) {
+                inside += 1;
+                worst = worst.max(across(cell.x, cell.y).abs());
+                assert!(found.dot(&(transform.rotation * normal)).abs() > 0.98, "{found}");
+            }
+        }
+        assert!(inside > 40);
+        assert!(worst < 0.25, "{worst} cells");
+    }
+
+    #[test]
+    fn the_inside_of_a_thick_wall_and_its_unseen_side_are_left_out() {
+        let map = map_of(|x, _| match x {
+            x if x < 20.0 => 0,
+            x if x < 30.0 => 100,
+            _ => UNKNOWN,
+        });
+        assert_eq!(map.walls.points().len(), SIDE);
+        let transform = pose(1.0, 2.0, 0.3).inverse();
+        for point in map.walls.points() {
+            assert!(((transform * point).x / 0.05 - 20.5).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_single_cell_has_no_direction() {
+        let map = map_of(|x, y| if x == 30.5 && y == 30.5 { 100 } else { 0 });
+        assert_eq!(map.normals, [Vector2::zeros()]);
+    }
+
+    #[test]
+    fn samples_stand_for_the_known_area() {
+        let map = map_of(|x, _| if x < 40.0 { 0 } else { UNKNOWN });
+        let area = map.samples.len() as f64 * map.sample_area;
+        assert!((area - 2.0 * 3.0).abs() < 1e-9, "{area}");
+        assert!(map.samples.iter().all(|sample| sample.free));
+    }
+}
