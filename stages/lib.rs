@@ -3,11 +3,12 @@
 
 #![forbid(unsafe_code)]
 
+pub mod frame_solver;
 pub mod geometry;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![]
+    vec![frame_solver::kind()]
 }
