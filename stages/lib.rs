@@ -5,10 +5,11 @@
 
 pub mod frame_solver;
 pub mod geometry;
+pub mod grid_fuser;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![frame_solver::kind()]
+    vec![frame_solver::kind(), grid_fuser::kind()]
 }
