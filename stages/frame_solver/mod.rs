@@ -18,6 +18,8 @@ mod parameters;
 mod reasons;
 pub mod solve;
 mod stage;
+#[cfg(test)]
+mod tests;
 pub mod uncertain;
 mod votes;
 
