@@ -16,8 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Contradictions apart from each other beyond which alignments may be outvoted before the search.
 const SEARCHED_DEPTH: usize = 3;
-/// The most pose graphs that are tried for one group of cycles before all its alignments are called disputed.
-const TRIALS: usize = 4000;
+/// How much is tried for one group of cycles before all its alignments are called disputed: pose graphs times edges.
+const MOST_WORK: usize = 400_000;
 
 /// What the cycles say of one alignment.
 #[derive(Clone, Debug)]
@@ -33,7 +33,13 @@ pub enum Verdict {
 /// Judges every edge. A cycle contradicts if it is more than `gate` standard deviations from closing.
 pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict::Right; edges.len()];
-    for group in groups_of_cycles(robots, edges) {
+    let forest = Forest::grow(robots, edges, 0, |_| true);
+    let closing = (0..edges.len()).filter(|&index| !forest.contains(index, &edges[index]));
+    let cycles: Vec<Cycle> = closing.filter_map(|index| forest.cycle(edges, index)).collect();
+    if cycles.iter().all(|cycle| cycle.remainder.distance_from_identity() <= gate) {
+        return verdicts;
+    }
+    for group in groups_of_cycles(&cycles, edges.len()) {
         let mut search = Search::new(robots, edges, &group, gate);
         let contradictions = search.contradictions();
         if contradictions.is_empty() {
@@ -62,19 +68,15 @@ pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
 /// The edges that lie on cycles, in groups: two edges are in one group if a cycle goes through both (the biconnected
 /// components of the graph). Each group by rising index.
 ///
-/// Joining the edges of every cycle that one edge closes over a spanning forest gives just these groups.
-fn groups_of_cycles(robots: usize, edges: &[Edge]) -> Vec<Vec<usize>> {
-    let forest = Forest::grow(robots, edges, 0, |_| true);
-    let mut leader: Vec<usize> = (0..edges.len()).collect();
+/// `cycles` are those that the edges outside of a spanning forest close; joining the edges of each gives the groups.
+fn groups_of_cycles(cycles: &[Cycle], edge_count: usize) -> Vec<Vec<usize>> {
+    let mut leader: Vec<usize> = (0..edge_count).collect();
     let mut on_cycle = BTreeSet::new();
-    for (index, edge) in edges.iter().enumerate() {
-        if forest.contains(index, edge) {
-            continue;
-        }
-        for member in forest.cycle(edges, index).map(|cycle| cycle.edges).unwrap_or_default() {
-            on_cycle.insert(member);
-            let (one, other) = (find(&mut leader, index), find(&mut leader, member));
-            leader[one.max(other)] = one.min(other);
+    for cycle in cycles {
+        for (&one, &next) in cycle.edges.iter().zip(cycle.edges.iter().skip(1)) {
+            on_cycle.extend([one, next]);
+            let (one, next) = (find(&mut leader, one), find(&mut leader, next));
+            leader[one.max(next)] = one.min(next);
         }
     }
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -129,8 +131,7 @@ impl<'a> Search<'a> {
         let closing = self.group.iter().filter(|&&index| in_use(index) && !forest.contains(index, &self.edges[index]));
         let mut cycles: Vec<Cycle> = closing
             .filter_map(|&index| forest.cycle(self.edges, index))
-            // "Not within" instead of "beyond": a value that is no number is no agreement.
-            .filter(|cycle| !(cycle.remainder.distance_from_identity() <= self.gate))
+            .filter(|cycle| cycle.remainder.distance_from_identity() > self.gate)
             .collect();
         cycles.sort_by_key(|cycle| cycle.edges.len());
         cycles
@@ -141,7 +142,7 @@ impl<'a> Search<'a> {
     fn smallest_removals(&mut self, most: usize) -> Vec<BTreeSet<usize>> {
         for size in 0..=most {
             self.descend(size);
-            if self.trials > TRIALS {
+            if self.is_tired() {
                 return Vec::new();
             }
             if !self.found.is_empty() {
@@ -152,7 +153,7 @@ impl<'a> Search<'a> {
     }
 
     fn descend(&mut self, left: usize) {
-        if self.trials > TRIALS {
+        if self.is_tired() {
             return;
         }
         let contradictions = self.contradictions();
@@ -173,6 +174,10 @@ impl<'a> Search<'a> {
             self.choices[index] = Choice::Kept;
         }
         open.iter().for_each(|&index| self.choices[index] = Choice::Open);
+    }
+
+    fn is_tired(&self) -> bool {
+        self.trials.saturating_mul(self.group.len()) > MOST_WORK
     }
 
     fn removed(&self) -> BTreeSet<usize> {

@@ -2,9 +2,8 @@
 //!
 //! Rounding the turned cells leaves gaps (equations 14, 15), which a conditional mean closes.
 
-use super::PlacedGrid;
 use super::evidence::{Evidence, EvidenceTable};
-use super::layout::KnownArea;
+use super::{KnownArea, PlacedGrid};
 use crate::geometry::{Cell, GridGeometry, UNKNOWN, is_occupied};
 use rayon::prelude::*;
 

@@ -1,8 +1,8 @@
 //! Fusing by looking every output cell up in the maps.
 
-use super::PlacedGrid;
 use super::evidence::{Evidence, EvidenceTable};
-use super::layout::KnownArea;
+use super::known::TILE;
+use super::{KnownArea, PlacedGrid};
 use crate::geometry::{Grid, GridGeometry, Point2};
 use rayon::prelude::*;
 
@@ -28,6 +28,7 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
 /// How output cells are found in one map: its column and row are linear in the output's.
 struct Lookup<'a> {
     grid: Grid<'a>,
+    area: &'a KnownArea,
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
     /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
@@ -38,13 +39,14 @@ struct Lookup<'a> {
 }
 
 impl<'a> Lookup<'a> {
-    fn new(map: &PlacedGrid<'a>, area: &KnownArea, output: &GridGeometry) -> Self {
+    fn new(map: &PlacedGrid<'a>, area: &'a KnownArea, output: &GridGeometry) -> Self {
         let transform_grid_output = map.transform_world_grid().inverse() * output.origin;
         let scale = 1.0 / map.grid.geometry.resolution;
         let half = output.resolution / 2.0;
         let (first_row, behind_rows) = area.row_range();
         Self {
             grid: map.grid,
+            area,
             start: (transform_grid_output * Point2::new(half, half)) * scale,
             step: transform_grid_output.rotation * nalgebra::Vector2::new(output.resolution, 0.0) * scale,
             columns: (area.columns.0 as f64, area.columns.1 as f64),
@@ -60,16 +62,29 @@ impl<'a> Lookup<'a> {
         let (from_line, to_line) = range_within(line, self.step.y, self.rows, evidence.len());
         let (from, to) = (from.max(from_line), to.min(to_line));
         let Some(evidence) = evidence.get_mut(from..to) else { return };
-        let width = self.grid.geometry.width;
-        for (index, evidence) in (from..to).zip(evidence) {
-            let (x, y) = (column + index as f64 * self.step.x, line + index as f64 * self.step.y);
-            // Rounding can put the ends of the range outside.
-            if x < self.columns.0 || x >= self.columns.1 || y < self.rows.0 || y >= self.rows.1 {
+        // A stretch of so many cells stays within a tile's length of its middle, up to two map cells a step.
+        let can_skip = self.step.norm() <= 2.0;
+        for (stretch, evidence) in evidence.chunks_mut(TILE).enumerate() {
+            let from = from + stretch * TILE;
+            let place = |index: f64| (column + index * self.step.x, line + index * self.step.y);
+            let (x, y) = place(from as f64 + evidence.len() as f64 / 2.0);
+            if can_skip && !self.area.is_near(x, y) {
                 continue;
             }
-            if let Some(&value) = self.grid.cells.get(y as usize * width + x as usize) {
-                table.add(evidence, value);
+            for (index, evidence) in (from..).zip(evidence) {
+                let (x, y) = place(index as f64);
+                self.add_cell(x, y, table, evidence);
             }
+        }
+    }
+
+    fn add_cell(&self, x: f64, y: f64, table: &EvidenceTable, evidence: &mut Evidence) {
+        // Rounding can put the ends of a range outside.
+        if x < self.columns.0 || x >= self.columns.1 || y < self.rows.0 || y >= self.rows.1 {
+            return;
+        }
+        if let Some(&value) = self.grid.cells.get(y as usize * self.grid.geometry.width + x as usize) {
+            table.add(evidence, value);
         }
     }
 }

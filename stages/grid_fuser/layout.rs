@@ -1,58 +1,7 @@
 //! How large the fused grid is, and where its cells lie.
 
-use super::PlacedGrid;
-use crate::geometry::{Grid, GridGeometry, Point2, pose};
-
-/// The cells of a grid between the first and the last known one of every row.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct KnownArea {
-    rows: Vec<KnownRow>,
-    /// The columns that hold all known cells: the first, and the one behind the last.
-    pub columns: (usize, usize),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct KnownRow {
-    row: usize,
-    first: usize,
-    behind: usize,
-}
-
-impl KnownArea {
-    /// Finds the known cells of a grid. No rows if there are none.
-    pub fn of(grid: &Grid<'_>) -> Self {
-        let mut area = Self { rows: Vec::new(), columns: (usize::MAX, 0) };
-        let is_known = |value: &i8| (0..=100).contains(value);
-        for (row, cells) in grid.cells.chunks_exact(grid.geometry.width.max(1)).enumerate() {
-            let Some(first) = cells.iter().position(is_known) else { continue };
-            let behind = cells.iter().rposition(is_known).map_or(cells.len(), |last| last + 1);
-            area.columns = (area.columns.0.min(first), area.columns.1.max(behind));
-            area.rows.push(KnownRow { row, first, behind });
-        }
-        area
-    }
-
-    /// Whether no cell is known.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    /// The rows that hold all known cells: the first, and the one behind the last.
-    pub fn row_range(&self) -> (usize, usize) {
-        match (self.rows.first(), self.rows.last()) {
-            (Some(first), Some(last)) => (first.row, last.row + 1),
-            _ => (0, 0),
-        }
-    }
-
-    /// The corners of the known parts of all rows, in cells.
-    fn corners(&self) -> impl Iterator<Item = Point2> + '_ {
-        self.rows.iter().flat_map(|&KnownRow { row, first, behind }| {
-            [(first, row), (behind, row), (first, row + 1), (behind, row + 1)]
-                .map(|(x, y)| Point2::new(x as f64, y as f64))
-        })
-    }
-}
+use super::{KnownArea, PlacedGrid};
+use crate::geometry::{GridGeometry, Point2, pose};
 
 /// A rectangle along the world's axes, in cells of the fused grid, counted from the anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,7 +104,7 @@ impl Lattice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Cell, Pose2};
+    use crate::geometry::{Cell, Grid, Pose2};
     use proptest::prelude::*;
 
     const LATTICE: Lattice =
@@ -183,14 +132,6 @@ mod tests {
         -1,  0, -1, -1, -1, -1,
         -1, -1, -1, -1, -1, -1,
     ];
-
-    #[test]
-    fn the_known_area_is_found() {
-        let area = KnownArea::of(&grid(&CELLS));
-        assert_eq!((area.columns, area.row_range()), ((1, 4), (1, 3)));
-        assert!(KnownArea::of(&grid(&[-1; 24])).is_empty());
-        assert!(KnownArea::of(&grid(&[])).is_empty());
-    }
 
     #[test]
     fn the_grid_is_cropped_and_lies_on_the_reference_cells() {

@@ -3,6 +3,7 @@
 //! Every robot's map is carried into the world, which is the reference robot's map frame, and the maps are added in
 //! log-odds. Coverage fields, which are grids too, can be fused by a second stage of this kind.
 //!
+//! - [`known`]: where the known cells of a map lie, so that nothing else is walked.
 //! - [`layout`]: how large the fused grid is, and where its cells lie.
 //! - [`evidence`]: cell values as log-odds, and their sum.
 //! - [`inverse`]: every output cell looked up in the maps; the default.
@@ -11,12 +12,14 @@
 pub mod evidence;
 pub mod forward;
 pub mod inverse;
+pub mod known;
 pub mod layout;
 mod parameters;
 mod stage;
 #[cfg(test)]
 mod tests;
 
+pub use known::KnownArea;
 pub use parameters::{GridFuserParameters, Warp};
 pub use stage::kind;
 

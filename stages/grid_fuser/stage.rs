@@ -1,8 +1,8 @@
 //! The grid fuser as a stage.
 
 use super::evidence::EvidenceTable;
-use super::layout::{KnownArea, Lattice, lay_out};
-use super::{GridFuserParameters, PlacedGrid, Warp, forward, inverse};
+use super::layout::{Lattice, lay_out};
+use super::{GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
 use crate::geometry::{Grid, GridGeometry, Point2, wrap_angle};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
