@@ -3,7 +3,9 @@
 
 #![forbid(unsafe_code)]
 
+pub mod frame_solver;
 pub mod geometry;
+pub mod grid_fuser;
 pub mod icp_refiner;
 pub mod simulator;
 
@@ -12,6 +14,8 @@ use gridweave_runtime::stage::StageKind;
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
     vec![
+        frame_solver::kind(),
+        grid_fuser::kind(),
         icp_refiner::kind(),
         simulator::kind(),
     ]

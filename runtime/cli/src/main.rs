@@ -1,3 +1,4 @@
+<<<<<<< HEAD
 //! The command `gridweave`: merges the maps of several robots.
 
 #![forbid(unsafe_code)]
@@ -75,3 +76,9 @@ fn start_log(verbose: bool) {
         .with_target(false)
         .init();
 }
+=======
+//! x
+#[allow(dead_code)]
+mod evaluate;
+fn main() {}
+>>>>>>> fuse

@@ -1,0 +1,166 @@
+//! The pose graph: robots, the alignments between them, and the cycles that these close.
+
+use super::UncertainPose;
+
+/// An alignment of two robots, which are named by their index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// The robot whose map stays.
+    pub a: usize,
+    /// The robot whose map is moved.
+    pub b: usize,
+    /// `T_a_b`.
+    pub transform_a_b: UncertainPose,
+}
+
+impl Edge {
+    /// The robot at the other end.
+    pub fn other(&self, robot: usize) -> usize {
+        if robot == self.a { self.b } else { self.a }
+    }
+
+    /// `T_robot_other` for the robot at either end.
+    pub fn transform_from(&self, robot: usize) -> UncertainPose {
+        if robot == self.a { self.transform_a_b } else { self.transform_a_b.inverse() }
+    }
+}
+
+/// A cycle of alignments, and what is left when the transforms along it are multiplied: the identity, if they agree.
+#[derive(Clone, Debug)]
+pub struct Cycle {
+    /// The edges; the first is the one that closes the cycle over the forest.
+    pub edges: Vec<usize>,
+    /// The product of the transforms round the cycle.
+    pub remainder: UncertainPose,
+}
+
+/// Spanning trees of the pose graph: for every robot the path of least accumulated variance to the root of its tree.
+#[derive(Clone, Debug)]
+pub struct Forest {
+    /// For every robot: the edge to its parent, and the parent. `None` for a root.
+    parent: Vec<Option<(usize, usize)>>,
+    depth: Vec<usize>,
+    /// The robots in the order they were reached: parents first.
+    order: Vec<usize>,
+}
+
+impl Forest {
+    /// Grows trees over the edges for which `used` holds: one from `first`, then from the robots not yet reached, by
+    /// index (Dijkstra's algorithm on [`UncertainPose::spread`]).
+    pub fn grow(robots: usize, edges: &[Edge], first: usize, used: impl Fn(usize) -> bool) -> Self {
+        let mut neighbours = vec![Vec::new(); robots];
+        for (index, edge) in edges.iter().enumerate().filter(|(index, _)| used(*index)) {
+            neighbours[edge.a].push(index);
+            neighbours[edge.b].push(index);
+        }
+        let mut forest = Self { parent: vec![None; robots], depth: vec![0; robots], order: Vec::with_capacity(robots) };
+        let mut cost = vec![f64::INFINITY; robots];
+        let mut reached = vec![false; robots];
+        for root in std::iter::once(first).chain(0..robots) {
+            if root >= robots || reached[root] {
+                continue;
+            }
+            cost[root] = 0.0;
+            let mut border = vec![root];
+            while let Some(robot) = take_cheapest(&mut border, &cost) {
+                reached[robot] = true;
+                forest.order.push(robot);
+                for &index in &neighbours[robot] {
+                    let next = edges[index].other(robot);
+                    let through = cost[robot] + edges[index].transform_a_b.spread();
+                    if reached[next] || through >= cost[next] {
+                        continue;
+                    }
+                    if forest.parent[next].is_none() {
+                        border.push(next);
+                    }
+                    cost[next] = through;
+                    forest.parent[next] = Some((index, robot));
+                    forest.depth[next] = forest.depth[robot] + 1;
+                }
+            }
+        }
+        forest
+    }
+
+    /// Whether the edge is part of a tree.
+    pub fn contains(&self, index: usize, edge: &Edge) -> bool {
+        [edge.a, edge.b].iter().any(|&robot| self.parent[robot].is_some_and(|(through, _)| through == index))
+    }
+
+    /// The cycle that an edge outside of the trees closes with them. `None` if its ends lie in different trees.
+    pub fn cycle(&self, edges: &[Edge], closing: usize) -> Option<Cycle> {
+        let edge = &edges[closing];
+        let mut sides = [(edge.a, UncertainPose::identity()), (edge.b, UncertainPose::identity())];
+        let mut on_cycle = vec![closing];
+        while sides[0].0 != sides[1].0 {
+            // The deeper side climbs, so that both meet at their nearest common ancestor.
+            let climbs = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
+            let (robot, transform_end_robot) = &mut sides[climbs];
+            let (through, parent) = self.parent[*robot]?;
+            *transform_end_robot = transform_end_robot.then(&edges[through].transform_from(*robot));
+            *robot = parent;
+            on_cycle.push(through);
+        }
+        let [(_, transform_a_meet), (_, transform_b_meet)] = sides;
+        let transform_a_b = transform_a_meet.then(&transform_b_meet.inverse());
+        Some(Cycle { edges: on_cycle, remainder: transform_a_b.then(&edge.transform_a_b.inverse()) })
+    }
+
+    /// `T_root_robot` for every robot in the tree of `root`, along the tree.
+    pub fn poses(&self, edges: &[Edge], root: usize) -> Vec<Option<UncertainPose>> {
+        let mut poses = vec![None; self.parent.len()];
+        for &robot in &self.order {
+            poses[robot] = match self.parent[robot] {
+                None => (robot == root).then(UncertainPose::identity),
+                Some((through, parent)) => {
+                    let step = edges[through].transform_from(parent);
+                    poses[parent].as_ref().map(|pose: &UncertainPose| pose.then(&step))
+                }
+            };
+        }
+        poses
+    }
+}
+
+fn take_cheapest(border: &mut Vec<usize>, cost: &[f64]) -> Option<usize> {
+    let cheapest = (0..border.len()).min_by(|&i, &j| {
+        let (a, b) = (border[i], border[j]);
+        cost[a].total_cmp(&cost[b]).then(a.cmp(&b))
+    })?;
+    Some(border.swap_remove(cheapest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use nalgebra::Matrix3;
+
+    fn edge(a: usize, b: usize, x: f64, variance: f64) -> Edge {
+        let covariance = Matrix3::identity() * variance;
+        Edge { a, b, transform_a_b: UncertainPose { pose: pose(x, 0.0, 0.0), covariance } }
+    }
+
+    #[test]
+    fn a_robot_is_reached_along_the_most_certain_path() {
+        let edges = [edge(0, 1, 1.0, 1.0), edge(1, 2, 1.0, 1.0), edge(0, 2, 5.0, 3.0)];
+        let forest = Forest::grow(3, &edges, 0, |_| true);
+        let poses = forest.poses(&edges, 0);
+        assert_eq!(poses[2].unwrap().pose.translation.x, 2.0);
+        assert!(forest.contains(1, &edges[1]) && !forest.contains(2, &edges[2]));
+        let cycle = forest.cycle(&edges, 2).unwrap();
+        assert_eq!(cycle.edges[0], 2);
+        assert_eq!(cycle.edges.len(), 3);
+        assert_eq!(cycle.remainder.pose.translation.x, -3.0);
+    }
+
+    #[test]
+    fn robots_without_edges_are_trees_of_their_own() {
+        let edges = [edge(1, 2, 1.0, 1.0)];
+        let forest = Forest::grow(4, &edges, 3, |_| true);
+        let placed: Vec<bool> = forest.poses(&edges, 1).iter().map(Option::is_some).collect();
+        assert_eq!(placed, [false, true, true, false]);
+        assert!(Forest::grow(0, &[], 0, |_| true).poses(&[], 0).is_empty());
+    }
+}

@@ -1,0 +1,28 @@
+//! Frame solver: alignments of pairs of robots in, one pose of each robot's map in the reference robot's map out.
+//!
+//! The accepted alignments form a pose graph. Cycles of the graph are checked: alignments that contradict the others
+//! are left out, and where it cannot be told which of several is wrong, the robots that hang on them are not merged,
+//! for a wrong merge is worse than none. All the others are solved together by weighted least squares. Any number of
+//! robots.
+//!
+//! - [`solve`]: names in, poses and reasons out; the whole of the algorithm.
+//! - [`graph`]: the pose graph, its spanning trees and cycles.
+//! - [`consistency`]: which alignments contradict each other.
+//! - [`optimize`]: least squares on SE(2).
+//! - [`uncertain`]: transforms with a covariance.
+
+pub mod consistency;
+pub mod graph;
+pub mod optimize;
+mod parameters;
+mod reasons;
+pub mod solve;
+mod stage;
+#[cfg(test)]
+mod tests;
+pub mod uncertain;
+mod votes;
+
+pub use parameters::FrameSolverParameters;
+pub use stage::kind;
+pub use uncertain::UncertainPose;

@@ -1,0 +1,148 @@
+//! Why an alignment was left out, and why a robot is not merged, in plain words.
+
+use super::UncertainPose;
+use super::solve::{Alignments, OpenCycle, Pair};
+use gridweave_runtime::ros::Alignment;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The reason of an alignment that the others show to be wrong.
+pub(super) fn contradicts(cycle: &OpenCycle) -> String {
+    format!("left out: it contradicts other alignments, which agree with each other ({})", gap(cycle))
+}
+
+/// The reason of an alignment of which it cannot be told whether it is wrong.
+pub(super) fn disputed(cycle: &OpenCycle) -> String {
+    format!("left out: alignments contradict each other, and it cannot be told which is wrong ({})", gap(cycle))
+}
+
+fn gap(cycle: &OpenCycle) -> String {
+    let pairs: Vec<String> = cycle.pairs.iter().map(|(a, b)| format!("{a}-{b}")).collect();
+    format!(
+        "{} do not close by {:.2} m and {:.1} degrees, {:.0} standard deviations",
+        list(&pairs),
+        cycle.metres,
+        cycle.radians.to_degrees(),
+        cycle.deviations
+    )
+}
+
+/// The reason for every robot without a frame.
+pub(super) fn unmerged(
+    robots: &BTreeSet<String>,
+    frames: &BTreeMap<String, UncertainPose>,
+    alignments: &Alignments,
+    left_out: &BTreeMap<Pair, String>,
+    disputed: &BTreeMap<String, String>,
+) -> BTreeMap<String, String> {
+    let outside: BTreeSet<&str> =
+        robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
+    let groups = tied_groups(&outside, alignments, left_out);
+    let reason = |robot: &str| {
+        if let Some(reason) = disputed.get(robot) {
+            return reason.strip_prefix("left out: ").unwrap_or(reason).to_owned();
+        }
+        let group = groups.iter().find(|group| group.contains(robot));
+        let others: Vec<String> =
+            group.into_iter().flatten().filter(|other| **other != robot).map(|&other| other.to_owned()).collect();
+        match others.is_empty() {
+            true => no_tie(robot, frames, alignments, left_out),
+            false => {
+                // What keeps the group apart may be known of another member only.
+                let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
+                let known = members.clone().find_map(|member| {
+                    disputed.get(member).map(|reason| reason.strip_prefix("left out: ").unwrap_or(reason).to_owned())
+                });
+                let refused = || members.clone().find_map(|member| refusal(member, frames, alignments, left_out));
+                let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
+                format!("it is tied to {} only, not to the reference: {why}", list(&others))
+            }
+        }
+    };
+    outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
+}
+
+/// Robots outside that alignments tie to each other.
+fn tied_groups<'a>(
+    outside: &BTreeSet<&'a str>,
+    alignments: &'a Alignments,
+    left_out: &BTreeMap<Pair, String>,
+) -> Vec<BTreeSet<&'a str>> {
+    let mut groups: Vec<BTreeSet<&str>> = Vec::new();
+    let in_use = alignments.iter().filter(|(pair, alignment)| alignment.accepted && !left_out.contains_key(*pair));
+    for ((a, b), _) in in_use.filter(|((a, b), _)| outside.contains(a.as_str()) && outside.contains(b.as_str())) {
+        let mut joined = BTreeSet::from([a.as_str(), b.as_str()]);
+        groups.retain(|group| {
+            let meets = !group.is_disjoint(&joined);
+            if meets {
+                joined.extend(group);
+            }
+            !meets
+        });
+        groups.push(joined);
+    }
+    groups
+}
+
+fn no_tie(
+    robot: &str,
+    frames: &BTreeMap<String, UncertainPose>,
+    alignments: &Alignments,
+    left_out: &BTreeMap<Pair, String>,
+) -> String {
+    refusal(robot, frames, alignments, left_out).unwrap_or_else(|| {
+        format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that others know")
+    })
+}
+
+/// The most telling of a robot's refused alignments: towards merged robots if there are any, and of these the one that
+/// came nearest to being accepted. `None` if none was tried.
+fn refusal(
+    robot: &str,
+    frames: &BTreeMap<String, UncertainPose>,
+    alignments: &Alignments,
+    left_out: &BTreeMap<Pair, String>,
+) -> Option<String> {
+    struct Refusal<'a> {
+        other: &'a str,
+        alignment: &'a Alignment,
+        reason: &'a str,
+    }
+    let mut refusals: Vec<Refusal<'_>> = alignments
+        .iter()
+        .filter_map(|(pair, alignment)| {
+            let other = match robot {
+                _ if robot == pair.0 => pair.1.as_str(),
+                _ if robot == pair.1 => pair.0.as_str(),
+                _ => return None,
+            };
+            let reason = match alignment.accepted {
+                true => left_out.get(pair)?,
+                false => &alignment.reason,
+            };
+            Some(Refusal { other, alignment, reason })
+        })
+        .collect();
+    if refusals.iter().any(|refusal| frames.contains_key(refusal.other)) {
+        refusals.retain(|refusal| frames.contains_key(refusal.other));
+    }
+    refusals.sort_by(|one, next| {
+        next.alignment.score.total_cmp(&one.alignment.score).then_with(|| one.other.cmp(next.other))
+    });
+    let telling = refusals.first()?;
+    let same: Vec<String> = refusals
+        .iter()
+        .filter(|refusal| refusal.reason == telling.reason)
+        .map(|refusal| refusal.other.to_owned())
+        .collect();
+    let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
+    Some(format!("no alignment with {}: {reason}", list(&same)))
+}
+
+/// "a", "a and b", "a, b and c".
+pub(super) fn list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

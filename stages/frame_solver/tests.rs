@@ -1,0 +1,348 @@
+//! The stage from outside.
+
+use super::kind;
+use crate::geometry::{Pose2, pose, wrap_angle};
+use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, encode};
+use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage, StageError};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+struct Run {
+    stage: Box<dyn Stage>,
+    outputs: CollectedOutputs,
+}
+
+impl Run {
+    fn new(reference: Option<&str>) -> Self {
+        let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
+        match kind().make(toml::Table::new(), &context).unwrap() {
+            Node::Stage(stage) => Self { stage, outputs: CollectedOutputs::new(&kind()) },
+            Node::Source(_) => panic!("a stage was expected"),
+        }
+    }
+
+    fn feed(&mut self, port: usize, robot: &str, bytes: Vec<u8>) {
+        let header = MessageHeader { robot: FixedText::new(robot).unwrap(), ..Default::default() };
+        let mut output = self.outputs.output(LogTime(5));
+        self.stage.receive(port, &Message::from_vec(header, bytes), &mut output).unwrap();
+    }
+
+    fn map(&mut self, robot: &str, frame_id: &str) {
+        let grid = OccupancyGrid { header: Header::new(LogTime(5), frame_id), ..Default::default() };
+        self.feed(0, robot, encode(&grid).unwrap());
+    }
+
+    fn align(&mut self, alignment: &Alignment) {
+        self.feed(1, "", encode(alignment).unwrap());
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.stage.finish(&mut self.outputs.output(LogTime(6)))
+    }
+
+    fn frames(&mut self) -> Vec<RobotFrames> {
+        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+    }
+
+    fn report(&self) -> Value {
+        self.stage.report().unwrap()
+    }
+
+    fn pose_of(&self, robot: &str) -> Option<Pose2> {
+        let report = self.report();
+        let frame = report["frames"].get(robot)?;
+        Some(pose(frame["x"].as_f64()?, frame["y"].as_f64()?, frame["yaw"].as_f64()?))
+    }
+
+    fn reason(&self, robot: &str) -> String {
+        self.report()["unmerged"][robot].as_str().unwrap_or_default().to_owned()
+    }
+}
+
+const COVARIANCE: [f64; 9] = [1e-4, 2e-5, 0.0, 2e-5, 2e-4, 1e-6, 0.0, 1e-6, 1e-6];
+
+fn accepted(a: &str, b: &str, transform_a_b: Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        a: a.into(),
+        b: b.into(),
+        covariance: COVARIANCE,
+        score: 0.9,
+        method: "icp".into(),
+        accepted: true,
+        reason: "3 tags agree".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(&transform_a_b);
+    alignment
+}
+
+fn refused(a: &str, b: &str, score: f64, reason: &str) -> Alignment {
+    Alignment { a: a.into(), b: b.into(), score, reason: reason.into(), ..Default::default() }
+}
+
+fn is_near(one: &Pose2, other: &Pose2, tolerance: f64) -> bool {
+    (one.translation.vector - other.translation.vector).norm() < tolerance
+        && wrap_angle(one.rotation.angle() - other.rotation.angle()).abs() < tolerance
+}
+
+/// Where robot `n` (from 1) is in these tests.
+fn place(robot: usize) -> Pose2 {
+    let n = robot as f64 - 1.0;
+    pose(4.0 * n, -3.0 * n * n % 11.0, 0.8 * n)
+}
+
+fn between(a: usize, b: usize) -> Alignment {
+    accepted(&format!("robot{a}"), &format!("robot{b}"), place(a).inverse() * place(b))
+}
+
+#[test]
+fn the_reference_is_exactly_at_the_origin() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    assert_eq!(
+        run.report(),
+        json!({
+            "reference": "robot1",
+            "frames": {"robot1": {"x": 0.0, "y": 0.0, "yaw": 0.0, "covariance": vec![0.0; 9]}},
+            "unmerged": {},
+            "alignments": [],
+        })
+    );
+}
+
+#[test]
+fn another_reference_turns_the_frames_round() {
+    let mut run = Run::new(Some("robot2"));
+    run.map("robot1", "map");
+    assert!(run.frames().is_empty(), "without the reference there is no world");
+    run.map("robot2", "map");
+    run.align(&between(1, 2));
+    assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
+    assert_eq!(run.frames().last().unwrap().reference, "robot2");
+}
+
+#[test]
+fn a_reference_that_never_shows_up_is_an_error_that_names_the_robots() {
+    let mut run = Run::new(Some("robot7"));
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    let error = run.finish().unwrap_err().to_string();
+    assert!(error.contains("robot7") && error.contains("robot1, robot2"), "{error}");
+    assert_eq!(run.report()["reference"], Value::Null);
+}
+
+#[test]
+fn a_log_without_robots_has_no_frames() {
+    let mut run = Run::new(None);
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+    assert_eq!(run.report()["reference"], Value::Null);
+}
+
+#[test]
+fn frames_are_sent_when_something_changes_and_only_then() {
+    let mut run = Run::new(None);
+    run.map("robot1", "robot1/map");
+    assert_eq!(run.frames().len(), 1);
+    run.map("robot1", "robot1/map");
+    assert_eq!(run.frames().len(), 0, "a later map of a known robot");
+    run.map("robot2", "robot2/map");
+    assert_eq!(run.frames().len(), 1, "another robot");
+    run.align(&refused("robot1", "robot2", 0.1, "two tags in common"));
+    assert_eq!(run.frames().len(), 1, "another reason");
+    run.align(&between(1, 2));
+    assert_eq!(run.frames().len(), 1, "a pose");
+    let mut nearly = between(1, 2);
+    run.align(&nearly);
+    nearly.x += 0.0005;
+    run.align(&nearly);
+    assert_eq!(run.frames().len(), 0, "a pose that hardly differs");
+    run.finish().unwrap();
+    assert_eq!(run.frames().last().unwrap().frames[1].x, run.pose_of("robot2").unwrap().translation.x);
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+}
+
+#[test]
+fn transforms_lead_from_the_world_to_frames_with_the_robots_name() {
+    let mut run = Run::new(None);
+    run.map("robot1", "/robot1/map");
+    run.map("robot2", "map");
+    run.map("robot3", "");
+    run.align(&between(1, 2));
+    run.align(&between(2, 3));
+    run.frames();
+    let last = run.outputs.take(1).pop().unwrap();
+    assert_eq!(last.header().topic.as_str(), "/tf_static");
+    let transforms = last.decode::<TFMessage>().unwrap().transforms;
+    let names: Vec<&str> = transforms.iter().map(|transform| transform.child_frame_id.as_str()).collect();
+    assert_eq!(names, ["robot1/map", "robot2/map", "robot3/map"]);
+    assert!(transforms.iter().all(|transform| transform.header.frame_id == "world"));
+    assert!(is_near(&transforms[2].transform.planar(), &place(3), 1e-9));
+}
+
+#[test]
+fn a_robot_without_alignments_says_so() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    assert!(run.reason("robot2").starts_with("no alignment with any robot was found"), "{}", run.reason("robot2"));
+}
+
+#[test]
+fn the_most_telling_refusal_is_the_reason() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    run.align(&refused("robot1", "robot3", 0.0, "no tags in common"));
+    run.align(&refused("robot2", "robot3", 0.0, "no tags in common"));
+    run.align(&refused("robot3", "robot4", 0.9, "not merged either"));
+    assert_eq!(run.reason("robot3"), "no alignment with robot1 and robot2: no tags in common");
+    run.align(&refused("robot2", "robot3", 0.4, "walls agree to 40 % only"));
+    assert_eq!(run.reason("robot3"), "no alignment with robot2: walls agree to 40 % only");
+    assert_eq!(run.reason("robot4"), "no alignment with robot3: not merged either");
+}
+
+#[test]
+fn robots_tied_to_each_other_but_not_to_the_reference_say_so() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.align(&between(2, 3));
+    run.align(&refused("robot1", "robot3", 0.2, "no tags in common"));
+    let expected = "it is tied to robot3 only, not to the reference: no alignment with robot1: no tags in common";
+    assert_eq!(run.reason("robot2"), expected);
+}
+
+#[test]
+fn a_later_alignment_replaces_the_earlier_one() {
+    let mut run = Run::new(None);
+    run.align(&accepted("robot1", "robot2", pose(9.0, 9.0, 1.0)));
+    run.align(&between(1, 2));
+    assert!(is_near(&run.pose_of("robot2").unwrap(), &place(2), 1e-9));
+    run.align(&refused("robot1", "robot2", 0.3, "the larger maps disagree"));
+    assert_eq!(run.reason("robot2"), "no alignment with robot1: the larger maps disagree");
+}
+
+#[test]
+fn a_contradiction_that_cannot_be_told_leaves_its_robots_out() {
+    let mut run = Run::new(None);
+    let mut wrong = between(2, 3);
+    wrong.x += 3.0;
+    [between(1, 2), between(1, 3), wrong, between(3, 4)].iter().for_each(|alignment| run.align(alignment));
+    let report = run.report();
+    assert_eq!(report["frames"].as_object().unwrap().len(), 1);
+    assert!(run.reason("robot2").contains("it cannot be told which is wrong"), "{}", run.reason("robot2"));
+    assert!(run.reason("robot4").contains("it is tied to robot3 only"), "{}", run.reason("robot4"));
+    let accepted: Vec<bool> =
+        report["alignments"].as_array().unwrap().iter().map(|one| one["accepted"].as_bool().unwrap()).collect();
+    assert_eq!(accepted, [false, false, false, true]);
+}
+
+#[test]
+fn a_wrong_alignment_is_left_out_when_the_others_agree() {
+    let mut run = Run::new(None);
+    for a in 1..=4 {
+        (a + 1..=4).for_each(|b| run.align(&between(a, b)));
+    }
+    let mut wrong = between(1, 3);
+    wrong.yaw += 1.5;
+    run.align(&wrong);
+    for robot in 2..=4 {
+        assert!(is_near(&run.pose_of(&format!("robot{robot}")).unwrap(), &place(robot), 1e-6));
+    }
+    let report = run.report();
+    let (left_out, others): (Vec<&Value>, Vec<&Value>) =
+        report["alignments"].as_array().unwrap().iter().partition(|one| one["accepted"] == false);
+    assert_eq!((left_out.len(), others.len()), (1, 5));
+    assert_eq!((&left_out[0]["a"], &left_out[0]["b"]), (&json!("robot1"), &json!("robot3")));
+    assert!(left_out[0]["reason"].as_str().unwrap().contains("contradicts"));
+}
+
+#[test]
+fn garbage_is_left_out_with_a_reason() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    for (x, variance) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (1e300, 1.0), (0.0, f64::NAN), (0.0, -5.0)] {
+        let mut alignment = between(1, 2);
+        (alignment.x, alignment.covariance[0]) = (x, variance);
+        run.align(&alignment);
+        assert!(run.pose_of("robot2").is_none());
+        assert!(run.reason("robot2").contains("its "), "{}", run.reason("robot2"));
+    }
+    run.align(&accepted("robot1", "robot1", pose(1.0, 0.0, 0.0)));
+    run.feed(1, "", vec![0, 1]);
+    run.feed(0, "robot5", vec![0, 1]);
+    run.map("", "map");
+    assert_eq!(run.outputs.warnings().values().sum::<u64>(), 4);
+}
+
+#[test]
+fn a_certain_alignment_counts_for_more() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    run.align(&between(2, 3));
+    let mut vague = between(1, 3);
+    vague.x += 0.5;
+    vague.covariance = std::array::from_fn(|index| if index % 4 == 0 { 1.0 } else { 0.0 });
+    run.align(&vague);
+    assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 0.02));
+}
+
+proptest! {
+    #[test]
+    fn neither_the_order_nor_the_direction_of_alignments_matters(
+        order in Just((0..10usize).collect::<Vec<_>>()).prop_shuffle(),
+        turned in prop::collection::vec(any::<bool>(), 10),
+        noise in prop::collection::vec(-0.02..0.02, 10),
+    ) {
+        let pairs: Vec<(usize, usize)> = (1..=5).flat_map(|a| (a + 1..=5).map(move |b| (a, b))).collect();
+        let alignment = |index: usize, turned: bool| {
+            let (a, b) = pairs[index];
+            let mut alignment = between(a, b);
+            alignment.x += noise[index];
+            alignment.yaw += noise[(index + 3) % 10] / 10.0;
+            if turned {
+                let transform_b_a = super::UncertainPose {
+                    pose: alignment.transform_a_b(),
+                    covariance: nalgebra::Matrix3::from_row_slice(&alignment.covariance),
+                }.inverse();
+                std::mem::swap(&mut alignment.a, &mut alignment.b);
+                alignment.set_transform_a_b(&transform_b_a.pose);
+                alignment.covariance = super::solve::row_by_row(&transform_b_a.covariance);
+            }
+            alignment
+        };
+        let (mut plain, mut mixed) = (Run::new(None), Run::new(None));
+        (0..10).for_each(|index| plain.align(&alignment(index, false)));
+        order.iter().for_each(|&index| mixed.align(&alignment(index, turned[index])));
+        for robot in ["robot1", "robot2", "robot3", "robot4", "robot5"] {
+            let (one, other) = (plain.pose_of(robot).unwrap(), mixed.pose_of(robot).unwrap());
+            prop_assert!(is_near(&one, &other, 1e-7), "{} {} {}", robot, one, other);
+        }
+        // In the same directions it is the same to the last bit.
+        let mut shuffled = Run::new(None);
+        order.iter().for_each(|&index| shuffled.align(&alignment(index, false)));
+        prop_assert_eq!(shuffled.report(), plain.report());
+    }
+
+    #[test]
+    fn a_chain_of_robots_is_recovered(
+        steps in prop::collection::vec((-9.0..9.0, -9.0..9.0, -3.1..3.1), 1..20),
+        reference in 0usize..20,
+    ) {
+        let mut places = vec![Pose2::identity()];
+        for (x, y, yaw) in steps {
+            places.push(places[places.len() - 1] * pose(x, y, yaw));
+        }
+        let name = |robot: usize| format!("robot{robot:02}");
+        let reference = reference.min(places.len() - 1);
+        let mut run = Run::new(Some(&name(reference)));
+        for robot in 1..places.len() {
+            run.align(&accepted(&name(robot - 1), &name(robot), places[robot - 1].inverse() * places[robot]));
+        }
+        for (robot, place) in places.iter().enumerate() {
+            let solved = run.pose_of(&name(robot)).unwrap();
+            prop_assert!(is_near(&solved, &(places[reference].inverse() * place), 1e-7));
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Fusing by looking every output cell up in the maps.
+
+use super::evidence::{Evidence, EvidenceTable};
+use super::known::TILE;
+use super::{KnownArea, PlacedGrid};
+use crate::geometry::{Grid, GridGeometry, Point2};
+use rayon::prelude::*;
+
+/// Writes the fused map of `maps` to `cells`, the rows of `geometry`, which lies along the world's axes.
+///
+/// Every cell takes what each map says of the cell that its centre falls in. Rows are independent of each other and
+/// made in parallel.
+pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, cells: &mut [i8]) {
+    let width = geometry.width.max(1);
+    let lookups: Vec<Lookup<'_>> = maps.iter().map(|(map, area)| Lookup::new(map, area, geometry)).collect();
+    cells.par_chunks_mut(width).enumerate().for_each_init(
+        || vec![Evidence::NONE; width],
+        |evidence, (row, cells)| {
+            evidence.fill(Evidence::NONE);
+            lookups.iter().for_each(|lookup| lookup.add_row(row, table, evidence));
+            for (cell, evidence) in cells.iter_mut().zip(evidence) {
+                *cell = table.value(*evidence);
+            }
+        },
+    );
+}
+
+/// How output cells are found in one map: its column and row are linear in the output's.
+struct Lookup<'a> {
+    grid: Grid<'a>,
+    area: &'a KnownArea,
+    /// Column and row, with fractions, of the centre of output cell (0, 0).
+    start: Point2,
+    /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
+    step: nalgebra::Vector2<f64>,
+    /// The known columns and rows: the first, and the one behind the last.
+    columns: (f64, f64),
+    rows: (f64, f64),
+}
+
+impl<'a> Lookup<'a> {
+    fn new(map: &PlacedGrid<'a>, area: &'a KnownArea, output: &GridGeometry) -> Self {
+        let transform_grid_output = map.transform_world_grid().inverse() * output.origin;
+        let scale = 1.0 / map.grid.geometry.resolution;
+        let half = output.resolution / 2.0;
+        let (first_row, behind_rows) = area.row_range();
+        Self {
+            grid: map.grid,
+            area,
+            start: (transform_grid_output * Point2::new(half, half)) * scale,
+            step: transform_grid_output.rotation * nalgebra::Vector2::new(output.resolution, 0.0) * scale,
+            columns: (area.columns.0 as f64, area.columns.1 as f64),
+            rows: (first_row as f64, behind_rows as f64),
+        }
+    }
+
+    /// Adds what the map says of the cells of one output row.
+    fn add_row(&self, row: usize, table: &EvidenceTable, evidence: &mut [Evidence]) {
+        let row = row as f64;
+        let (column, line) = (self.start.x - row * self.step.y, self.start.y + row * self.step.x);
+        let (from, to) = range_within(column, self.step.x, self.columns, evidence.len());
+        let (from_line, to_line) = range_within(line, self.step.y, self.rows, evidence.len());
+        let (from, to) = (from.max(from_line), to.min(to_line));
+        let Some(evidence) = evidence.get_mut(from..to) else { return };
+        // A stretch of so many cells stays within a tile's length of its middle, up to two map cells a step.
+        let can_skip = self.step.norm() <= 2.0;
+        for (stretch, evidence) in evidence.chunks_mut(TILE).enumerate() {
+            let from = from + stretch * TILE;
+            let place = |index: f64| (column + index * self.step.x, line + index * self.step.y);
+            let (x, y) = place(from as f64 + evidence.len() as f64 / 2.0);
+            if can_skip && !self.area.is_near(x, y) {
+                continue;
+            }
+            for (index, evidence) in (from..).zip(evidence) {
+                let (x, y) = place(index as f64);
+                self.add_cell(x, y, table, evidence);
+            }
+        }
+    }
+
+    fn add_cell(&self, x: f64, y: f64, table: &EvidenceTable, evidence: &mut Evidence) {
+        // Rounding can put the ends of a range outside.
+        if x < self.columns.0 || x >= self.columns.1 || y < self.rows.0 || y >= self.rows.1 {
+            return;
+        }
+        if let Some(&value) = self.grid.cells.get(y as usize * self.grid.geometry.width + x as usize) {
+            table.add(evidence, value);
+        }
+    }
+}
+
+/// The indices from 0 to `count` for which `start + index * step` lies within the bounds, and maybe one more at both
+/// ends: the first, and the one behind the last.
+fn range_within(start: f64, step: f64, (low, high): (f64, f64), count: usize) -> (usize, usize) {
+    if step.abs() < 1e-12 {
+        return if start >= low && start < high { (0, count) } else { (0, 0) };
+    }
+    let (one, other) = ((low - start) / step, (high - start) / step);
+    let (first, last) = (one.min(other).floor().max(0.0), (one.max(other).ceil() + 1.0).clamp(0.0, count as f64));
+    if first < last { (first as usize, last as usize) } else { (0, 0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layout::{Lattice, lay_out};
+    use super::*;
+    use crate::geometry::{Pose2, UNKNOWN, is_free, is_occupied, pose};
+    use proptest::prelude::*;
+
+    fn geometry(width: usize, height: usize, resolution: f64, origin: Pose2) -> GridGeometry {
+        GridGeometry { width, height, resolution, origin }
+    }
+
+    /// Fuses maps onto the lattice of the first.
+    fn fuse_all(maps: &[PlacedGrid<'_>]) -> (GridGeometry, Vec<i8>) {
+        let areas: Vec<KnownArea> = maps.iter().map(|map| KnownArea::of(&map.grid)).collect();
+        let maps: Vec<_> = maps.iter().copied().zip(&areas).collect();
+        let anchor = Point2::from(maps[0].0.transform_world_grid().translation.vector);
+        let resolution = maps.iter().map(|(map, _)| map.grid.geometry.resolution).fold(f64::INFINITY, f64::min);
+        let lattice = Lattice { anchor, resolution, max_extent: 100.0, max_cells: 1_000_000 };
+        let geometry = lay_out(&maps, &lattice).geometry.unwrap();
+        let mut cells = vec![0; geometry.cell_count()];
+        fuse(&maps, &geometry, &EvidenceTable::new(0.1192, 0.971), &mut cells);
+        (geometry, cells)
+    }
+
+    /// Cells of a made-up map; the corners are known, so that nothing is cropped.
+    fn cells(width: usize, height: usize) -> impl Strategy<Value = Vec<i8>> {
+        let cell = prop_oneof![Just(-1i8), Just(0), Just(100), 0i8..=100];
+        prop::collection::vec(cell, width * height).prop_map(|mut cells| {
+            let last = cells.len() - 1;
+            (cells[0], cells[last]) = (0, 100);
+            cells
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_reference_map_comes_out_as_it_went_in(cells in cells(13, 9), x in -99.0..99.0, y in -99.0..99.0) {
+            let source = geometry(13, 9, 0.05, pose(x, y, 0.0));
+            let grid = Grid::new(source, &cells).unwrap();
+            let (laid, fused) = fuse_all(&[PlacedGrid { grid, transform_world_map: Pose2::identity() }]);
+            prop_assert_eq!(laid, source);
+            prop_assert_eq!(fused, cells);
+        }
+
+        #[test]
+        fn a_map_fused_with_itself_keeps_free_and_occupied(cells in cells(13, 9), x in -9.0..9.0) {
+            let grid = Grid::new(geometry(13, 9, 0.05, pose(x, 1.0, 0.0)), &cells).unwrap();
+            let map = PlacedGrid { grid, transform_world_map: Pose2::identity() };
+            let (_, fused) = fuse_all(&[map, map]);
+            for (one, two) in cells.iter().zip(fused) {
+                prop_assert_eq!(*one == UNKNOWN, two == UNKNOWN);
+                prop_assert!(!is_free(*one) || is_free(two));
+                prop_assert!(!is_occupied(*one) || is_occupied(two));
+            }
+        }
+
+        #[test]
+        fn the_order_of_the_maps_does_not_matter(
+            first in cells(13, 9), second in cells(7, 8), third in cells(5, 4), x in -0.5..0.5, yaw in -4.0..4.0,
+        ) {
+            let map = |cells, geometry, transform_world_map| PlacedGrid {
+                grid: Grid::new(geometry, cells).unwrap(), transform_world_map,
+            };
+            let first = map(&first, geometry(13, 9, 0.05, Pose2::identity()), Pose2::identity());
+            let second = map(&second, geometry(7, 8, 0.07, pose(0.1, 0.2, 0.4)), pose(x, 0.1, yaw));
+            let third = map(&third, geometry(5, 4, 0.1, Pose2::identity()), pose(0.1, x, 2.0 * yaw));
+            let forward = fuse_all(&[first, second, third]);
+            prop_assert_eq!(&forward, &fuse_all(&[first, third, second]));
+        }
+
+        #[test]
+        fn a_turned_area_has_no_gaps(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
+            let cells = vec![0; 20 * 20];
+            let grid = Grid::new(geometry(20, 20, 0.05, pose(0.3, -0.2, 0.7)), &cells).unwrap();
+            let map = PlacedGrid { grid, transform_world_map: pose(x, y, yaw) };
+            let (laid, fused) = fuse_all(&[map]);
+            for row in fused.chunks(laid.width) {
+                let first = row.iter().position(|value| *value == 0).unwrap_or(0);
+                let behind = row.iter().rposition(|value| *value == 0).map_or(0, |last| last + 1);
+                prop_assert!(row.get(first..behind).unwrap_or_default().iter().all(|value| *value == 0));
+            }
+            let known = fused.iter().filter(|value| **value == 0).count();
+            prop_assert!((385..=415).contains(&known), "the area stays: {known} cells");
+        }
+    }
+
+    #[test]
+    fn a_coarse_map_is_resampled_to_the_finest_resolution() {
+        let (coarse, fine) = ([0, 100, -1, 50], [0; 4]);
+        let coarse = Grid::new(geometry(2, 2, 0.1, Pose2::identity()), &coarse).unwrap();
+        let fine = Grid::new(geometry(2, 2, 0.05, pose(-0.1, 0.0, 0.0)), &fine).unwrap();
+        let maps = [fine, coarse].map(|grid| PlacedGrid { grid, transform_world_map: Pose2::identity() });
+        let (laid, fused) = fuse_all(&maps);
+        assert_eq!((laid.width, laid.height, laid.resolution), (6, 4, 0.05));
+        #[rustfmt::skip]
+        assert_eq!(fused, [
+             0,  0,  0,  0, 100, 100,
+             0,  0,  0,  0, 100, 100,
+            -1, -1, -1, -1,  50,  50,
+            -1, -1, -1, -1,  50,  50,
+        ]);
+    }
+
+    #[test]
+    fn a_map_whose_origin_is_turned_lies_where_its_origin_says() {
+        let cells = [100, 0, 0, 0, 0, 0];
+        let turned = Grid::new(geometry(3, 2, 1.0, pose(0.0, 0.0, std::f64::consts::FRAC_PI_2)), &cells).unwrap();
+        let (laid, fused) = fuse_all(&[PlacedGrid { grid: turned, transform_world_map: Pose2::identity() }]);
+        assert_eq!((laid.width, laid.height), (2, 3));
+        assert!((laid.origin.translation.x + 2.0).abs() < 1e-12);
+        assert_eq!(fused, [0, 100, 0, 0, 0, 0]);
+    }
+}

@@ -1,0 +1,42 @@
+//! Grid fuser: the maps of all placed robots in, one map out (Tsardoulias et al., section 4.4).
+//!
+//! Every robot's map is carried into the world, which is the reference robot's map frame, and the maps are added in
+//! log-odds. Coverage fields, which are grids too, can be fused by a second stage of this kind.
+//!
+//! - [`known`]: where the known cells of a map lie, so that nothing else is walked.
+//! - [`layout`]: how large the fused grid is, and where its cells lie.
+//! - [`evidence`]: cell values as log-odds, and their sum.
+//! - [`inverse`]: every output cell looked up in the maps; the default.
+//! - [`forward`]: every map cell carried to the output and rounded, gaps closed by a conditional mean; the paper's way.
+
+pub mod evidence;
+pub mod forward;
+pub mod inverse;
+pub mod known;
+pub mod layout;
+mod parameters;
+mod stage;
+#[cfg(test)]
+mod tests;
+
+pub use known::KnownArea;
+pub use parameters::{GridFuserParameters, Warp};
+pub use stage::kind;
+
+use crate::geometry::{Grid, Pose2};
+
+/// A map and where it lies.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedGrid<'a> {
+    /// The map.
+    pub grid: Grid<'a>,
+    /// `T_world_map`: the pose of the map frame in the world.
+    pub transform_world_map: Pose2,
+}
+
+impl PlacedGrid<'_> {
+    /// `T_world_grid`: the pose of the grid's corner in the world.
+    pub fn transform_world_grid(&self) -> Pose2 {
+        self.transform_world_map * self.grid.geometry.origin
+    }
+}

@@ -1,0 +1,188 @@
+//! The grid fuser as a stage.
+
+use super::evidence::EvidenceTable;
+use super::layout::{Lattice, lay_out};
+use super::{GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
+use crate::geometry::{Grid, GridGeometry, Point2, wrap_angle};
+use gridweave_runtime::message::Message;
+use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
+use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
+use std::collections::BTreeMap;
+
+const MAP: usize = 0;
+const FUSED: usize = 0;
+/// The frame of the fused map.
+const WORLD: &str = "world";
+
+/// The kind `grid_fuser`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "grid_fuser",
+        "Fuses the maps of all placed robots in log-odds: unknown says nothing, evidence adds. The map is sent when the \
+         frames change by more than `min_move` or `min_turn`, when a robot that is placed has another map, and at the \
+         end if anything has changed since.",
+        vec![
+            InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, or their coverage fields"),
+            InputPort::one("frames", PortType::of::<RobotFrames>(), "where the maps lie"),
+        ],
+        vec![
+            OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the fused map, in the frame `world`")
+                .on_topic("/map"),
+        ],
+        |parameters: GridFuserParameters, _: &Context| Ok(GridFuser::new(parameters)),
+    )
+}
+
+struct GridFuser {
+    table: EvidenceTable,
+    parameters: GridFuserParameters,
+    maps: BTreeMap<String, StoredMap>,
+    frames: RobotFrames,
+    /// The frames that the fused map sent last was made with.
+    fused: Option<RobotFrames>,
+}
+
+/// A robot's latest map, where it came in: its bytes are not copied.
+struct StoredMap {
+    message: Message,
+    area: KnownArea,
+}
+
+impl Stage for GridFuser {
+    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let is_due = match port {
+            MAP => self.receive_map(message, output),
+            _ => self.receive_frames(message, output),
+        };
+        if is_due { self.fuse(output) } else { Ok(()) }
+    }
+
+    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+        let is_sent = self.fused.as_ref().is_some_and(|fused| {
+            (&fused.reference, self.placed(fused)) == (&self.frames.reference, self.placed(&self.frames))
+        });
+        if is_sent { Ok(()) } else { self.fuse(output) }
+    }
+}
+
+impl GridFuser {
+    fn new(parameters: GridFuserParameters) -> Self {
+        let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
+        Self { table, parameters, maps: BTreeMap::new(), frames: RobotFrames::default(), fused: None }
+    }
+
+    /// Keeps a robot's map. Whether it belongs in the fused one: a map of a robot that is not placed waits for its
+    /// frame, which mostly follows at the same log time.
+    fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
+        let robot = message.robot();
+        let area = message.decode::<OccupancyGrid<'_>>().map_err(|error| error.to_string()).and_then(|grid| {
+            Grid::from_message(&grid).map(|grid| KnownArea::of(&grid)).map_err(|error| error.to_string())
+        });
+        match area {
+            Ok(area) => {
+                self.maps.insert(robot.to_owned(), StoredMap { message: message.clone(), area });
+                self.frames.frames.iter().any(|frame| frame.robot == robot)
+            }
+            Err(error) => {
+                output.warn(format!("a map of {robot} was left out: {error}"));
+                false
+            }
+        }
+    }
+
+    /// Keeps the frames. Whether they differ from those of the fused map by more than the parameters allow.
+    fn receive_frames(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
+        match message.decode() {
+            Ok(frames) => self.frames = frames,
+            Err(error) => {
+                output.warn(format!("robot frames were left out: {error}"));
+                return false;
+            }
+        }
+        let is_near = |(one, next): (&RobotFrame, &RobotFrame)| {
+            one.robot == next.robot
+                && (one.x - next.x).hypot(one.y - next.y) <= self.parameters.min_move
+                && wrap_angle(one.yaw - next.yaw).abs() <= self.parameters.min_turn
+        };
+        let Some(fused) = &self.fused else { return true };
+        let (before, after) = (self.placed(fused), self.placed(&self.frames));
+        fused.reference != self.frames.reference
+            || before.len() != after.len()
+            || !before.into_iter().zip(after).all(is_near)
+    }
+
+    /// The frames of robots that have sent a map, the reference first and then by name.
+    fn placed<'a>(&self, frames: &'a RobotFrames) -> Vec<&'a RobotFrame> {
+        let mut placed: Vec<&RobotFrame> =
+            frames.frames.iter().filter(|frame| self.maps.contains_key(&frame.robot)).collect();
+        placed.sort_by_key(|frame| (frame.robot != frames.reference, frame.robot.as_str()));
+        placed
+    }
+
+    fn fuse(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+        self.fused = Some(self.frames.clone());
+        if !output.is_read(FUSED) {
+            return Ok(());
+        }
+        let mut stored = Vec::new();
+        for frame in self.placed(&self.frames) {
+            let Some(map) = self.maps.get(&frame.robot) else { continue };
+            let grid = map.message.decode::<OccupancyGrid<'_>>();
+            let grid = grid.map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
+            stored.push((frame, map, grid));
+        }
+        let mut maps = Vec::with_capacity(stored.len());
+        for (frame, map, grid) in &stored {
+            let grid = Grid::from_message(grid);
+            let grid = grid.map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
+            maps.push((PlacedGrid { grid, transform_world_map: frame.transform_reference_robot() }, &map.area));
+        }
+
+        let finest = maps.iter().map(|(map, _)| map.grid.geometry.resolution).min_by(f64::total_cmp);
+        let Some(resolution) = self.parameters.resolution.or(finest) else { return Ok(()) };
+        let lattice = Lattice {
+            anchor: anchor(&maps),
+            resolution,
+            max_extent: self.parameters.max_extent,
+            max_cells: self.parameters.max_cells,
+        };
+        let layout = lay_out(&maps, &lattice);
+        for ((frame, ..), _) in stored.iter().zip(&layout.takes_part).filter(|(_, takes_part)| !**takes_part) {
+            output.warn(format!(
+                "the map of {} is not in the fused one: where it lies is no finite number, or the fused map would be \
+                 larger than `max_extent` or `max_cells` allow",
+                frame.robot
+            ));
+        }
+        let mut takes_part = layout.takes_part.iter();
+        maps.retain(|_| takes_part.next().is_some_and(|takes_part| *takes_part));
+        let Some(geometry) = layout.geometry else { return Ok(()) };
+        let prefix = prefix(&geometry, Header::new(output.log_time(), WORLD));
+        output.send_grid(FUSED, "", &prefix, |cells| {
+            match self.parameters.warp {
+                Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, cells),
+                Warp::Forward => forward::fuse(&maps, &geometry, &self.table, cells),
+            }
+            Ok(())
+        })
+    }
+}
+
+/// The corner of the first map that holds anything: the reference robot's, if it does.
+fn anchor(maps: &[(PlacedGrid<'_>, &KnownArea)]) -> Point2 {
+    let corners = maps.iter().filter(|(_, area)| !area.is_empty()).map(|(map, _)| map.transform_world_grid());
+    let mut finite = corners.filter(|corner| corner.translation.vector.iter().all(|value| value.is_finite()));
+    finite.next().map_or(Point2::origin(), |corner| Point2::from(corner.translation.vector))
+}
+
+/// All of the fused map but its cells. The layout keeps the size within what the message can say.
+fn prefix(geometry: &GridGeometry, header: Header) -> GridPrefix {
+    let info = MapMetaData {
+        map_load_time: header.stamp,
+        resolution: geometry.resolution as f32,
+        width: geometry.width as u32,
+        height: geometry.height as u32,
+        origin: geometry.origin.into(),
+    };
+    GridPrefix { header, info }
+}
