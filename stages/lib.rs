@@ -4,11 +4,12 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod tag_filter;
 pub mod tag_localizer;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![tag_localizer::kind()]
+    vec![tag_filter::kind(), tag_localizer::kind()]
 }
