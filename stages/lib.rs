@@ -8,6 +8,8 @@ pub mod geometry;
 pub mod grid_fuser;
 pub mod icp_refiner;
 pub mod simulator;
+pub mod tag_filter;
+pub mod tag_localizer;
 
 use gridweave_runtime::stage::StageKind;
 
@@ -18,5 +20,7 @@ pub fn kinds() -> Vec<StageKind> {
         grid_fuser::kind(),
         icp_refiner::kind(),
         simulator::kind(),
+        tag_filter::kind(),
+        tag_localizer::kind(),
     ]
 }

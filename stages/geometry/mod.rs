@@ -4,6 +4,8 @@
 
 mod grid;
 mod pose;
+mod rigid_fit;
 
 pub use grid::{Cell, FREE_BELOW, Grid, GridError, GridGeometry, OCCUPIED_ABOVE, UNKNOWN, is_free, is_occupied};
 pub use pose::{Point2, Pose2, pose, turn_difference, wrap_angle};
+pub use rigid_fit::{PointPair, RigidFit, fit_rigid, point_jacobian};

@@ -1,0 +1,91 @@
+//! The tags that are certain in both maps.
+
+use gridweave_runtime::ros::{CommonTag, TagEstimate};
+use std::collections::BTreeMap;
+
+/// The tags with at least the given certainty in both maps, by falling common precision (the lesser of the two
+/// certainties) and then by id (section 4.1.3).
+///
+/// Estimates that hold a value that is no finite number, or have no id, do not count; of two estimates of one tag the
+/// first does.
+pub fn common_tags(tags_a: &[TagEstimate], tags_b: &[TagEstimate], certainty: f64) -> Vec<CommonTag> {
+    let certain = |tags: &'_ [TagEstimate]| {
+        let mut by_id: BTreeMap<String, TagEstimate> = BTreeMap::new();
+        for tag in tags.iter().filter(|tag| is_usable(tag) && tag.certainty >= certainty) {
+            by_id.entry(tag.tag_id.clone()).or_insert_with(|| tag.clone());
+        }
+        by_id
+    };
+    let in_b = certain(tags_b);
+    let pair = |(tag_id, a): (String, TagEstimate)| {
+        let b = in_b.get(&tag_id)?;
+        Some(CommonTag {
+            tag_id,
+            a: [a.x, a.y],
+            b: [b.x, b.y],
+            covariance_a: a.covariance,
+            covariance_b: b.covariance,
+            certainty_a: a.certainty,
+            certainty_b: b.certainty,
+        })
+    };
+    let mut common: Vec<CommonTag> = certain(tags_a).into_iter().filter_map(pair).collect();
+    // The sort is stable, and the tags come by id.
+    common.sort_by(|one, other| other.common_precision().total_cmp(&one.common_precision()));
+    common
+}
+
+/// Whether an estimate can be used.
+pub(super) fn is_usable(tag: &TagEstimate) -> bool {
+    let [xx, xy, yx, yy] = tag.covariance;
+    let finite = [tag.x, tag.y, tag.certainty, xx, xy, yx, yy].iter().all(|value| value.is_finite());
+    finite && xx >= 0.0 && yy >= 0.0 && !tag.tag_id.is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tag(tag_id: &str, certainty: f64) -> TagEstimate {
+        TagEstimate { tag_id: tag_id.into(), certainty, ..Default::default() }
+    }
+
+    #[test]
+    fn table_3_is_sorted_as_in_the_paper() {
+        let robot_1 = [tag("5", 0.82), tag("7", 0.99), tag("9", 0.91)];
+        let robot_2 = [tag("5", 0.92), tag("7", 0.76), tag("9", 0.92)];
+        let common = common_tags(&robot_1, &robot_2, 0.75);
+        let order: Vec<&str> = common.iter().map(|tag| tag.tag_id.as_str()).collect();
+        let precision: Vec<f64> = common.iter().map(CommonTag::common_precision).collect();
+        assert_eq!(order, ["9", "5", "7"]);
+        assert_eq!(precision, [0.91, 0.82, 0.76]);
+    }
+
+    #[test]
+    fn a_tag_must_be_certain_in_both_maps() {
+        let common = common_tags(&[tag("1", 0.75), tag("2", 0.9), tag("3", 0.9)], &[tag("1", 0.75), tag("2", 0.74)], 0.75);
+        assert_eq!(common.len(), 1);
+        assert_eq!(common[0].tag_id, "1");
+    }
+
+    #[test]
+    fn tags_of_equal_precision_come_by_id() {
+        let tags = ["c", "a", "b"].map(|id| tag(id, 0.9));
+        let order: Vec<String> = common_tags(&tags, &tags, 0.75).into_iter().map(|tag| tag.tag_id).collect();
+        assert_eq!(order, ["a", "b", "c"]);
+    }
+
+    #[test]
+    fn estimates_that_are_no_numbers_do_not_count() {
+        let good = tag("1", 0.9);
+        for bad in [
+            TagEstimate { x: f64::NAN, ..good.clone() },
+            TagEstimate { certainty: f64::NAN, ..good.clone() },
+            TagEstimate { covariance: [-1.0, 0.0, 0.0, 1.0], ..good.clone() },
+            TagEstimate { covariance: [f64::INFINITY, 0.0, 0.0, 1.0], ..good.clone() },
+            TagEstimate { tag_id: String::new(), ..good.clone() },
+        ] {
+            assert_eq!(common_tags(&[bad], std::slice::from_ref(&good), 0.75), vec![]);
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Whether the tags that two robots have in common suffice for a merge.
+
+use super::common::is_usable;
+use super::{Consensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
+use crate::geometry::RigidFit;
+use gridweave_runtime::ros::{CommonTag, TagEstimate};
+use std::collections::BTreeSet;
+
+/// Whether the tags that two robots have in common suffice for a merge, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// If accepted, the tags that agree; otherwise all that are certain in both maps. By falling common precision and
+    /// then by id.
+    pub tags: Vec<CommonTag>,
+    /// Whether they suffice.
+    pub accepted: bool,
+    /// Why they do not or, if they do, how well they agree and what was left out.
+    pub reason: String,
+    /// If accepted, the transform that they agree on.
+    pub fit: Option<RigidFit>,
+}
+
+/// The tags of one robot.
+#[derive(Clone, Copy, Debug)]
+pub struct RobotTags<'a> {
+    /// The robot's name.
+    pub robot: &'a str,
+    /// Its tags.
+    pub tags: &'a [TagEstimate],
+}
+
+/// Judges whether the tags that two robots have in common suffice for a merge.
+///
+/// Besides the paper's conditions on certainties, the tags that count must agree on one rigid transform; see the
+/// parameters for what makes an agreement strong enough.
+pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> Judgement {
+    let tags = common_tags(a.tags, b.tags, parameters.certainty);
+    let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| agreement(&tags, parameters));
+    match outcome {
+        Ok(consensus) => {
+            let reason = praise(&tags, &consensus);
+            let members = consensus.members.iter().filter_map(|&index| tags.get(index).cloned()).collect();
+            Judgement { tags: members, accepted: true, reason, fit: Some(consensus.fit) }
+        }
+        Err(reason) => Judgement { tags, accepted: false, reason, fit: None },
+    }
+}
+
+/// The paper's conditions: how many tags there are, and how certain they are.
+fn enough_certain(
+    a: RobotTags<'_>,
+    b: RobotTags<'_>,
+    tags: &[CommonTag],
+    parameters: &TagFilterParameters,
+) -> Result<(), String> {
+    let TagFilterParameters { certainty, best_certainty, min_tags, .. } = *parameters;
+    let ids = |tags: &[TagEstimate]| -> BTreeSet<String> {
+        tags.iter().filter(|tag| is_usable(tag)).map(|tag| tag.tag_id.clone()).collect()
+    };
+    let (in_a, in_b) = (ids(a.tags), ids(b.tags));
+    let shared = in_a.intersection(&in_b).count();
+    let (name_a, name_b) = (a.robot, b.robot);
+    if shared == 0 {
+        let (count_a, count_b) = (in_a.len(), in_b.len());
+        return Err(format!(
+            "{name_a} and {name_b} have no tag in common; {name_a} knows {}, {name_b} {count_b}",
+            counted(count_a)
+        ));
+    }
+    if tags.len() < min_tags {
+        return Err(format!(
+            "{name_a} and {name_b} have {} in common, of which {} a certainty of {certainty:.2} in both maps{}; {min_tags} \
+             are needed",
+            counted(shared),
+            if tags.len() == 1 { "1 has".to_owned() } else { format!("{} have", tags.len()) },
+            listed(tags.iter(), " (", ")"),
+        ));
+    }
+    match tags.first() {
+        Some(best) if best.common_precision() < best_certainty => Err(format!(
+            "{name_a} and {name_b} have {} in common, but none has a certainty of {best_certainty:.2} in both maps; the \
+             best is {} with {:.2}",
+            counted(tags.len()),
+            best.tag_id,
+            best.common_precision(),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The conditions on the places of the tags.
+fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Consensus, String> {
+    let TagFilterParameters { gate, map_stddev, min_tags, rival_distance, best_certainty, .. } = *parameters;
+    let pairs: Vec<TagPair> = tags.iter().map(|tag| TagPair::new(tag, map_stddev)).collect();
+    let search = find_consensus(&pairs, gate, rival_distance);
+    let count = tags.len();
+    let Some(best) = search.best.filter(|best| best.members.len() >= min_tags) else {
+        return Err(format!(
+            "of the {count} tags in common no {min_tags} lie to each other in one map as in the other; the tags of two \
+             places may bear the same ids"
+        ));
+    };
+    let agreeing = best.members.len();
+    let names = listed(best.members.iter().filter_map(|&index| tags.get(index)), " (", ")");
+    if agreeing as f64 <= parameters.min_agreement * count as f64 {
+        return Err(format!(
+            "only {agreeing} of the {count} tags in common agree on one transform{names}; the tags of two places may bear \
+             the same ids"
+        ));
+    }
+    let yaw_stddev = best.fit.yaw_stddev();
+    if yaw_stddev > parameters.max_yaw_stddev {
+        return Err(format!(
+            "the {agreeing} tags in common that agree{names} lie so near to each other that they leave the rotation \
+             uncertain by {:.1} degrees",
+            yaw_stddev.to_degrees()
+        ));
+    }
+    let chance = chance_of_agreement(&pairs, agreeing, gate);
+    if chance > parameters.max_chance {
+        return Err(format!(
+            "{agreeing} of the {count} tags in common agree on one transform{names}, but as many would agree by chance with \
+             a probability of up to {:.1} %",
+            100.0 * chance
+        ));
+    }
+    if let Some(rival) = &search.rival {
+        let size = rival.members.len();
+        if size >= min_tags && size as f64 > parameters.max_rival_share * agreeing as f64 {
+            return Err(format!(
+                "{agreeing} of the {count} tags in common agree on one transform{names}, but {size} on another one{}: it \
+                 cannot be told which is right",
+                listed(rival.members.iter().filter_map(|&index| tags.get(index)), " (", ")")
+            ));
+        }
+    }
+    let best_precision =
+        best.members.iter().filter_map(|&index| tags.get(index)).map(CommonTag::common_precision).fold(0.0, f64::max);
+    if best_precision < best_certainty {
+        return Err(format!(
+            "{agreeing} of the {count} tags in common agree on one transform{names}, but none of them has a certainty of \
+             {best_certainty:.2} in both maps; the best has {best_precision:.2}"
+        ));
+    }
+    Ok(best)
+}
+
+/// What speaks for a consensus, and which tags are not in it by how much.
+fn praise(tags: &[CommonTag], consensus: &Consensus) -> String {
+    let left_out: Vec<String> = tags
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| !consensus.members.contains(index))
+        .map(|(_, tag)| {
+            let off = (TagPair::new(tag, 0.0).residual(&consensus.fit)).norm();
+            format!("{} (off by {off:.2} m)", tag.tag_id)
+        })
+        .collect();
+    let (agreeing, count, rms) = (consensus.members.len(), tags.len(), consensus.fit.rms);
+    match left_out.is_empty() {
+        true => format!("all {count} tags in common agree within {rms:.3} m"),
+        false => format!("{agreeing} of {count} tags in common agree within {rms:.3} m; left out: {}", left_out.join(", ")),
+    }
+}
+
+fn counted(count: usize) -> String {
+    if count == 1 { "1 tag".to_owned() } else { format!("{count} tags") }
+}
+
+/// The ids of at most eight tags between `before` and `after`; nothing if there are none.
+fn listed<'a>(tags: impl Iterator<Item = &'a CommonTag>, before: &str, after: &str) -> String {
+    let ids: Vec<&str> = tags.map(|tag| tag.tag_id.as_str()).collect();
+    match ids.len() {
+        0 => String::new(),
+        1..=8 => format!("{before}{}{after}", ids.join(", ")),
+        _ => format!("{before}{}, ...{after}", ids[..8].join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, Pose2, pose};
+
+    const SHAPE: [(f64, f64); 6] = [(0.0, 0.0), (5.0, 1.0), (9.0, -2.0), (3.0, 7.0), (-4.0, 6.0), (-8.0, -1.0)];
+
+    fn tags(transform: &Pose2, places: &[(f64, f64)]) -> Vec<TagEstimate> {
+        let tag = |(index, &(x, y)): (usize, &(f64, f64))| {
+            let place = transform * Point2::new(x, y);
+            TagEstimate {
+                tag_id: format!("tag{index}"),
+                x: place.x,
+                y: place.y,
+                covariance: [4e-4, 0.0, 0.0, 4e-4],
+                certainty: 0.95,
+                readings: 50,
+            }
+        };
+        places.iter().enumerate().map(tag).collect()
+    }
+
+    fn judged(a: &[TagEstimate], b: &[TagEstimate]) -> Judgement {
+        let robot = |robot, tags| RobotTags { robot, tags };
+        judge(robot("robot1", a), robot("robot2", b), &TagFilterParameters::default())
+    }
+
+    fn refused(a: &[TagEstimate], b: &[TagEstimate], part: &str) {
+        let judgement = judged(a, b);
+        assert!(!judgement.accepted && judgement.fit.is_none(), "{judgement:?}");
+        assert!(judgement.reason.contains(part), "{}", judgement.reason);
+    }
+
+    #[test]
+    fn tags_that_agree_are_accepted() {
+        let judgement = judged(&tags(&pose(1.0, 2.0, 3.0), &SHAPE), &tags(&pose(-4.0, 0.0, 1.0), &SHAPE));
+        assert!(judgement.accepted);
+        assert_eq!(judgement.reason, "all 6 tags in common agree within 0.000 m");
+        let error = judgement.fit.unwrap().transform_a_b.inverse() * (pose(1.0, 2.0, 3.0) * pose(-4.0, 0.0, 1.0).inverse());
+        assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle().abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_moved_tag_is_left_out_by_name() {
+        let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
+        let mut b = tags(&pose(0.0, 0.0, 0.0), &SHAPE);
+        b[2].x += 1.46;
+        let judgement = judged(&a, &b);
+        assert!(judgement.accepted);
+        assert_eq!(judgement.reason, "5 of 6 tags in common agree within 0.000 m; left out: tag2 (off by 1.46 m)");
+        assert!(judgement.tags.iter().all(|tag| tag.tag_id != "tag2"));
+    }
+
+    #[test]
+    fn robots_without_a_common_tag_are_told_so() {
+        let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
+        let mut b = a[..1].to_vec();
+        b[0].tag_id = "other".into();
+        refused(&a, &b, "robot1 and robot2 have no tag in common; robot1 knows 6 tags, robot2 1");
+        refused(&a, &[], "robot1 knows 6 tags, robot2 0");
+    }
+
+    #[test]
+    fn too_few_certain_tags_are_refused() {
+        let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
+        let mut b = a.clone();
+        b[1..5].iter_mut().for_each(|tag| tag.certainty = 0.5);
+        refused(&a, &b, "have 6 tags in common, of which 2 have a certainty of 0.75 in both maps (tag0, tag5); 3 are needed");
+        let mut b = a.clone();
+        b.iter_mut().for_each(|tag| tag.certainty = 0.89);
+        refused(&a, &b, "none has a certainty of 0.90");
+    }
+
+    #[test]
+    fn the_most_certain_tag_must_be_among_those_that_agree() {
+        let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
+        let mut b = a.clone();
+        b[..5].iter_mut().for_each(|tag| tag.certainty = 0.8);
+        b[5].y += 3.0;
+        refused(&a, &b, "none of them has a certainty of 0.90");
+    }
+
+    #[test]
+    fn the_tags_of_two_buildings_with_the_same_ids_are_refused() {
+        let elsewhere = [(3.0, 1.0), (-6.0, 2.0), (0.5, -7.0), (8.0, 8.0), (-1.0, 4.0), (2.0, -3.0)];
+        refused(&tags(&pose(0.0, 0.0, 0.0), &SHAPE), &tags(&pose(0.0, 0.0, 0.0), &elsewhere), "the same ids");
+    }
+
+    #[test]
+    fn a_mirrored_map_is_refused() {
+        let mirrored = SHAPE.map(|(x, y)| (x, -y));
+        refused(&tags(&pose(0.0, 0.0, 0.0), &SHAPE), &tags(&pose(0.0, 0.0, 0.0), &mirrored), "the same ids");
+    }
+
+    #[test]
+    fn tags_near_one_place_are_refused() {
+        let cluster = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1), (0.1, 0.1), (0.05, 0.0)];
+        let tags = tags(&pose(0.0, 0.0, 0.0), &cluster);
+        refused(&tags, &tags, "lie so near to each other");
+        let one_place = self::tags(&pose(0.0, 0.0, 0.0), &[(1.0, 1.0); 4]);
+        refused(&one_place, &one_place, "");
+    }
+
+    #[test]
+    fn an_agreement_that_may_be_chance_is_refused() {
+        let close = [(0.0, 0.0), (1.4, 0.2), (0.3, 1.3)];
+        let tags = tags(&pose(0.0, 0.0, 0.0), &close);
+        refused(&tags, &tags, "by chance");
+    }
+
+    #[test]
+    fn two_transforms_with_as_many_tags_are_refused() {
+        // The first tag turns about nothing: it is on both.
+        let a = tags(&pose(0.0, 0.0, 0.0), &SHAPE[..5]);
+        let turned = pose(0.0, 0.0, 2.0);
+        let mut b = a.clone();
+        for tag in &mut b[3..] {
+            let place = turned * Point2::new(tag.x, tag.y);
+            (tag.x, tag.y) = (place.x, place.y);
+        }
+        refused(&a, &b, "cannot be told which is right");
+    }
+}

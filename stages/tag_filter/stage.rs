@@ -1,0 +1,175 @@
+//! The stage `tag_filter`.
+
+use super::{Judgement, RobotTags, TagFilterParameters, judge};
+use gridweave_runtime::message::Message;
+use gridweave_runtime::ros::{CommonTags, Header, TagEstimates};
+use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+const COMMON: usize = 0;
+
+/// The stage kind `tag_filter`.
+pub fn kind() -> StageKind {
+    StageKind::stage::<TagFilterParameters, TagFilterStage>(
+        "tag_filter",
+        "Finds the tags that two robots have in common (Tsardoulias et al., sections 4 and 4.1.3) and leaves out those \
+         that do not agree with the others on one rigid transform. Sends the tags of a pair of robots when they change, \
+         and says why they do not suffice for a merge if so.",
+        vec![InputPort::one("estimates", PortType::of::<TagEstimates>(), "all tags of one robot")],
+        vec![OutputPort::new("common", PortType::of::<CommonTags>(), "the common tags of one pair of robots")],
+        |parameters, _| Ok(TagFilterStage { parameters, robots: BTreeMap::new(), sent: BTreeMap::new() }),
+    )
+}
+
+struct TagFilterStage {
+    parameters: TagFilterParameters,
+    /// The last estimates of each robot.
+    robots: BTreeMap<String, TagEstimates>,
+    /// What was sent last for each pair.
+    sent: BTreeMap<(String, String), Judgement>,
+}
+
+impl Stage for TagFilterStage {
+    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let estimates: TagEstimates = match message.decode() {
+            Ok(estimates) => estimates,
+            Err(error) => {
+                output.warn(format!("tag estimates that cannot be read are left out: {error}"));
+                return Ok(());
+            }
+        };
+        // The robot's name in the message counts; a program that only fills the header is understood as well.
+        let robot = if estimates.robot.is_empty() { message.robot() } else { &estimates.robot }.to_owned();
+        if robot.is_empty() {
+            output.warn("tag estimates without a robot are left out");
+            return Ok(());
+        }
+        for _ in estimates.tags.iter().filter(|tag| !super::common::is_usable(tag)) {
+            output.warn("tag estimates without an id or with a value that is no finite number are left out");
+        }
+        self.robots.insert(robot.clone(), estimates);
+        let others: Vec<String> = self.robots.keys().filter(|other| **other != robot).cloned().collect();
+        for other in others {
+            let pair = if robot < other { (robot.clone(), other) } else { (other, robot.clone()) };
+            self.update(pair, output)?;
+        }
+        Ok(())
+    }
+
+    fn report(&self) -> Option<Value> {
+        let pair = |((a, b), judgement): (&(String, String), &Judgement)| {
+            json!({
+                "a": a,
+                "b": b,
+                "tags": judgement.tags.len(),
+                "accepted": judgement.accepted,
+                "reason": judgement.reason,
+            })
+        };
+        Some(json!({ "pairs": self.sent.iter().map(pair).collect::<Vec<_>>() }))
+    }
+}
+
+impl TagFilterStage {
+    /// Judges a pair and sends the result, unless it was sent before.
+    fn update(&mut self, pair: (String, String), output: &mut Output<'_>) -> Result<(), StageError> {
+        let (Some(a), Some(b)) = (self.robots.get(&pair.0), self.robots.get(&pair.1)) else { return Ok(()) };
+        let judgement = judge(
+            RobotTags { robot: &pair.0, tags: &a.tags },
+            RobotTags { robot: &pair.1, tags: &b.tags },
+            &self.parameters,
+        );
+        if self.sent.get(&pair) == Some(&judgement) {
+            return Ok(());
+        }
+        let message = CommonTags {
+            header: Header::new(output.log_time(), a.header.frame_id.clone()),
+            robot_a: pair.0.clone(),
+            robot_b: pair.1.clone(),
+            tags: judgement.tags.clone(),
+            accepted: judgement.accepted,
+            reason: judgement.reason.clone(),
+        };
+        output.send(COMMON, "", &message)?;
+        self.sent.insert(pair, judgement);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
+    use gridweave_runtime::ros::{TagEstimate, encode};
+    use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
+
+    struct Bench {
+        stage: Box<dyn Stage>,
+        outputs: CollectedOutputs,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            let kind = kind();
+            let Ok(Node::Stage(stage)) = kind.make(toml::Table::new(), &Context::default()) else { panic!("no stage") };
+            Self { stage, outputs: CollectedOutputs::new(&kind) }
+        }
+
+        fn send(&mut self, robot: &str, tags: &[TagEstimate]) -> Vec<CommonTags> {
+            let estimates = TagEstimates { robot: robot.into(), tags: tags.to_vec(), ..Default::default() };
+            let header = MessageHeader { robot: FixedText::new(robot).unwrap(), ..Default::default() };
+            let message = Message::from_vec(header, encode(&estimates).unwrap());
+            self.stage.receive(0, &message, &mut self.outputs.output(LogTime(1))).unwrap();
+            self.outputs.take(COMMON).iter().map(|message| message.decode().unwrap()).collect()
+        }
+    }
+
+    fn tags() -> Vec<TagEstimate> {
+        let places = [(0.0, 0.0), (5.0, 1.0), (9.0, -2.0), (3.0, 7.0)];
+        let tag = |(index, (x, y)): (usize, (f64, f64))| TagEstimate {
+            tag_id: format!("tag{index}"),
+            x,
+            y,
+            covariance: [4e-4, 0.0, 0.0, 4e-4],
+            certainty: 0.95,
+            readings: 50,
+        };
+        places.into_iter().enumerate().map(tag).collect()
+    }
+
+    #[test]
+    fn every_pair_is_sent_when_it_changes_and_only_then() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.send("robot2", &tags()).len(), 0);
+        let sent = bench.send("robot1", &tags());
+        assert_eq!((sent[0].robot_a.as_str(), sent[0].robot_b.as_str(), sent[0].accepted), ("robot1", "robot2", true));
+        assert_eq!(bench.send("robot1", &tags()), vec![], "nothing has changed");
+        let third = bench.send("robot3", &tags()[..2]);
+        let pairs: Vec<_> = third.iter().map(|pair| (pair.robot_a.as_str(), pair.robot_b.as_str())).collect();
+        assert_eq!(pairs, [("robot1", "robot3"), ("robot2", "robot3")]);
+        assert!(third.iter().all(|pair| !pair.accepted && pair.reason.contains("3 are needed")), "{third:?}");
+        assert_eq!(bench.send("robot2", &tags()[..3]).len(), 1, "the other pair is as it was");
+    }
+
+    #[test]
+    fn a_pair_without_a_common_tag_is_sent_as_refused() {
+        let mut bench = Bench::new();
+        bench.send("robot1", &tags());
+        let sent = bench.send("robot2", &[]);
+        assert_eq!((sent.len(), sent[0].accepted), (1, false));
+        assert_eq!(sent[0].reason, "robot1 and robot2 have no tag in common; robot1 knows 4 tags, robot2 0");
+    }
+
+    #[test]
+    fn estimates_that_cannot_be_used_are_counted_and_left_out() {
+        let mut bench = Bench::new();
+        let mut broken = tags();
+        broken[0].x = f64::NAN;
+        bench.send("robot1", &broken);
+        bench.send("", &tags());
+        let message = Message::from_vec(MessageHeader::default(), vec![1, 2]);
+        bench.stage.receive(0, &message, &mut bench.outputs.output(LogTime(1))).unwrap();
+        assert_eq!(bench.outputs.warnings().values().sum::<u64>(), 3, "{:?}", bench.outputs.warnings());
+    }
+}

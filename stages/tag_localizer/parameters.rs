@@ -1,0 +1,181 @@
+//! The parameters of the tag localizer.
+
+use gridweave_runtime::stage::{ParameterError, Parameters};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How the certainty of a tag is read from its grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Readout {
+    /// The largest share that a window holds, wherever it lies.
+    #[default]
+    Window,
+    /// The largest share of a block of a fixed raster (the paper). A tag on the border of two blocks gets half its
+    /// certainty.
+    Blocks,
+}
+
+/// Parameters of `tag_localizer`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TagLocalizerParameters {
+    /// Width and height of a tag's grid, metres; its centre is where the robot was at the first reading. The paper has
+    /// 6 m (300 px), which cuts off tags that are first heard at the full reach along an axis. At least twice `reach`.
+    pub grid_size: f64,
+    /// Width of a grid cell, metres. The paper has 0.02 m.
+    pub resolution: f64,
+    /// How the certainty is read from the grid: `window` or `blocks`.
+    pub readout: Readout,
+    /// Width of the window or block whose share of the probability is the certainty, metres; rounded to whole cells. The
+    /// paper has 0.06 m (3 px).
+    pub window: f64,
+    /// How far a tag can be heard, metres. Readings that say more are left out, and a tag is read out when it is out of
+    /// reach. The paper has 3 m.
+    pub reach: f64,
+    /// Least standard deviation of a reading, metres: used where a reading brings none, or a smaller one. The paper has
+    /// 0.05 m.
+    pub range_stddev: f64,
+    /// Standard deviation of the robot's position, metres. It is shared by all readings of one place, so many readings
+    /// of a robot that stands still do not make it certain. 0 is the paper's.
+    pub pose_stddev: f64,
+    /// The robot has changed its place when it is this far from where the last place began, metres. Readings of one place
+    /// are averaged. 0 takes every reading by itself, as the paper does.
+    pub min_travel: f64,
+    /// Share of readings that say nothing of where the tag is, such as echoes: every ring is mixed with this share of
+    /// an equal chance for every range up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can lead
+    /// astray.
+    pub outlier_share: f64,
+    /// Least standard deviation of a tag's position, metres: what the grid cannot know, such as the bends of the map.
+    pub position_stddev: f64,
+    /// A tag of which nothing was heard for so long is out of reach, seconds.
+    pub timeout: f64,
+    /// How old the last pose before a reading may be, seconds. Between two poses the position is interpolated.
+    pub max_pose_age: f64,
+    /// A tag with fewer readings is not reported.
+    pub min_readings: u32,
+}
+
+impl Default for TagLocalizerParameters {
+    fn default() -> Self {
+        Self {
+            grid_size: 7.0,
+            resolution: 0.02,
+            readout: Readout::Window,
+            window: 0.06,
+            reach: 3.0,
+            range_stddev: 0.05,
+            pose_stddev: 0.02,
+            min_travel: 0.05,
+            outlier_share: 0.02,
+            position_stddev: 0.01,
+            timeout: 2.0,
+            max_pose_age: 0.5,
+            min_readings: 5,
+        }
+    }
+}
+
+/// The most cells along a side: beyond, a grid costs more memory than it can be worth.
+const MOST_CELLS: f64 = 4000.0;
+
+impl TagLocalizerParameters {
+    /// Cells along a side of a tag's grid.
+    pub fn cells(&self) -> usize {
+        (self.grid_size / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
+    }
+
+    /// Cells along a side of the window.
+    pub fn window_cells(&self) -> usize {
+        (self.window / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
+    }
+}
+
+impl Parameters for TagLocalizerParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let mut errors = Vec::new();
+        let mut expect = |good: bool, field: &'static str, problem: &str| {
+            if !good {
+                errors.push(ParameterError::new(field, problem));
+            }
+        };
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let not_negative = |value: f64| value >= 0.0 && value.is_finite();
+        expect(positive(self.reach), "reach", "must be above 0 m");
+        expect(
+            self.grid_size.is_finite() && self.grid_size >= 2.0 * self.reach,
+            "grid_size",
+            "must be at least twice `reach`",
+        );
+        expect(positive(self.resolution), "resolution", "must be above 0 m");
+        expect(
+            self.grid_size / self.resolution <= MOST_CELLS,
+            "resolution",
+            "must not divide `grid_size` into more than 4000 cells",
+        );
+        expect(
+            self.window >= self.resolution && self.window <= self.grid_size,
+            "window",
+            "must lie between `resolution` and `grid_size`",
+        );
+        expect(positive(self.range_stddev), "range_stddev", "must be above 0 m");
+        expect(not_negative(self.pose_stddev), "pose_stddev", "must not be below 0 m");
+        expect(not_negative(self.min_travel), "min_travel", "must not be below 0 m");
+        expect((0.0..=0.5).contains(&self.outlier_share), "outlier_share", "must lie between 0 and 0.5");
+        expect(not_negative(self.position_stddev), "position_stddev", "must not be below 0 m");
+        expect(positive(self.timeout), "timeout", "must be above 0 s");
+        expect(not_negative(self.max_pose_age), "max_pose_age", "must not be below 0 s");
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        assert_eq!(TagLocalizerParameters::default().check(), vec![]);
+    }
+
+    #[test]
+    fn the_paper_has_300_cells_and_a_window_of_3() {
+        let paper = TagLocalizerParameters { grid_size: 6.0, ..Default::default() };
+        assert_eq!((paper.cells(), paper.window_cells()), (300, 3));
+        assert_eq!(paper.check(), vec![]);
+    }
+
+    #[test]
+    fn every_value_out_of_range_is_named() {
+        let wrong = TagLocalizerParameters {
+            grid_size: f64::NAN,
+            resolution: 0.0,
+            window: -1.0,
+            reach: f64::INFINITY,
+            range_stddev: 0.0,
+            pose_stddev: -0.1,
+            min_travel: f64::NAN,
+            outlier_share: 0.6,
+            position_stddev: -1.0,
+            timeout: 0.0,
+            max_pose_age: -1.0,
+            ..Default::default()
+        };
+        let fields: Vec<_> = wrong.check().into_iter().map(|error| error.field).collect();
+        for field in [
+            "grid_size",
+            "resolution",
+            "window",
+            "reach",
+            "range_stddev",
+            "pose_stddev",
+            "min_travel",
+            "outlier_share",
+            "position_stddev",
+            "timeout",
+            "max_pose_age",
+        ] {
+            assert!(fields.contains(&field), "{field}");
+        }
+    }
+}

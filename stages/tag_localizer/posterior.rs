@@ -1,0 +1,265 @@
+//! The probability of a tag's place on its grid.
+
+use super::RingProduct;
+use crate::geometry::Point2;
+
+/// Places whose log-likelihood lies this far below the best hold less than a millionth of the probability together.
+const NEGLIGIBLE: f64 = 20.0;
+/// The first nodes are 2^5 cells wide.
+const COARSEST: i32 = 5;
+/// The last ones are 2^-4 cells wide.
+const FINEST: i32 = -4;
+/// The probability is resolved when this many nodes hold it: then one is about a standard deviation wide.
+const RESOLVED: usize = 80;
+
+/// Where a tag's square grid lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridSize {
+    /// Its middle, metres, map frame.
+    pub centre: Point2,
+    /// Cells along a side.
+    pub cells: usize,
+    /// Width of a cell, metres.
+    pub resolution: f64,
+}
+
+/// A place with its share of the probability: a cell of the grid, or a part of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leaf {
+    /// Its middle, metres, map frame.
+    pub place: Point2,
+    /// Column of the cell it lies in.
+    pub column: usize,
+    /// Row of the cell it lies in.
+    pub row: usize,
+    /// Its share of the probability; all leaves together have 1.
+    pub mass: f64,
+}
+
+/// The probability of a tag's place. Cells that have next to none are left out.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    /// The grid.
+    pub grid: GridSize,
+    /// Width of the leaves, metres.
+    pub leaf_size: f64,
+    /// The places that share the probability.
+    pub leaves: Vec<Leaf>,
+}
+
+/// A square of the grid, 2^level cells wide.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    column: usize,
+    row: usize,
+}
+
+/// Nodes of one size.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    grid: GridSize,
+    level: i32,
+}
+
+impl Posterior {
+    /// The product of rings on the grid, normalised.
+    ///
+    /// It goes from squares of 32 x 32 cells to single cells by halves. A square is dropped when no place in it can come
+    /// within 20 nats of the best place seen, so no mode is lost. Where the probability is so narrow that single
+    /// cells do not resolve it, it goes on to parts of cells: otherwise the share of a mode would depend on where the
+    /// raster happens to lie. `None` if there is no ring.
+    pub fn new(product: &RingProduct, grid: GridSize) -> Option<Self> {
+        if product.is_empty() || grid.cells == 0 {
+            return None;
+        }
+        let mut level = Level { grid, level: COARSEST };
+        let mut nodes = level.all();
+        let mut best = f64::NEG_INFINITY;
+        loop {
+            for node in &nodes {
+                if let Some(centre) = level.centre_on_grid(*node)
+                    && let Some(value) = product.log_likelihood(&centre, best)
+                {
+                    best = value;
+                }
+            }
+            let radius = level.half_diagonal();
+            nodes.retain(|node| {
+                product.log_likelihood_within(&level.centre(*node), radius, best - NEGLIGIBLE).is_some()
+            });
+            if level.level <= 0 && (nodes.len() >= RESOLVED || level.level == FINEST) {
+                break;
+            }
+            (level, nodes) = level.halved(&nodes);
+        }
+        let leaves = nodes.iter().filter_map(|node| {
+            let place = level.centre(*node);
+            let value = product.log_likelihood(&place, best - NEGLIGIBLE)?;
+            let (column, row) = level.cell(*node);
+            Some(Leaf { place, column, row, mass: (value - best).exp() })
+        });
+        let mut leaves: Vec<Leaf> = leaves.collect();
+        let mass: f64 = leaves.iter().map(|leaf| leaf.mass).sum();
+        if !(mass > 0.0 && mass.is_finite()) {
+            return None;
+        }
+        leaves.iter_mut().for_each(|leaf| leaf.mass /= mass);
+        Some(Self { grid, leaf_size: level.size(), leaves })
+    }
+}
+
+impl Level {
+    /// All nodes of this level, row by row.
+    fn all(&self) -> Vec<Node> {
+        let count = self.grid.cells.div_ceil(1 << self.level.max(0));
+        (0..count).flat_map(|row| (0..count).map(move |column| Node { column, row })).collect()
+    }
+
+    /// Width of a node, metres.
+    fn size(&self) -> f64 {
+        self.grid.resolution * f64::from(self.level).exp2()
+    }
+
+    fn half_diagonal(&self) -> f64 {
+        self.size() * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    fn centre(&self, node: Node) -> Point2 {
+        let size = self.size();
+        let half_grid = 0.5 * self.grid.cells as f64 * self.grid.resolution;
+        let place = |index: usize, middle: f64| middle - half_grid + (index as f64 + 0.5) * size;
+        Point2::new(place(node.column, self.grid.centre.x), place(node.row, self.grid.centre.y))
+    }
+
+    /// The centre, unless it lies beyond the end of the grid, as it may in the last row and column.
+    fn centre_on_grid(&self, node: Node) -> Option<Point2> {
+        let limit = self.grid.cells as f64 * self.grid.resolution;
+        let on_grid = |index: usize| (index as f64 + 0.5) * self.size() < limit;
+        (on_grid(node.column) && on_grid(node.row)).then(|| self.centre(node))
+    }
+
+    /// The column and row of the cell that a node of at most a cell's size lies in.
+    fn cell(&self, node: Node) -> (usize, usize) {
+        let parts = (-self.level).max(0);
+        (node.column >> parts, node.row >> parts)
+    }
+
+    /// The next level, and the four quarters of each node as far as they begin on the grid.
+    fn halved(&self, nodes: &[Node]) -> (Self, Vec<Node>) {
+        let next = Self { grid: self.grid, level: self.level - 1 };
+        let limit = match next.level >= 0 {
+            true => self.grid.cells.div_ceil(1 << next.level),
+            false => self.grid.cells << -next.level,
+        };
+        let quarters = |node: &Node| {
+            let (column, row) = (2 * node.column, 2 * node.row);
+            [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)]
+        };
+        let on_grid = |(column, row): (usize, usize)| (column < limit && row < limit).then_some(Node { column, row });
+        (next, nodes.iter().flat_map(quarters).filter_map(on_grid).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Ring;
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    fn product(tag: Point2, positions: &[(f64, f64)], errors: &[f64], outlier_share: f64) -> RingProduct {
+        let rings = positions.iter().zip(errors.iter().cycle()).map(|(&(x, y), error)| {
+            let centre = Point2::new(x, y);
+            Ring { centre, radius: (tag - centre).norm() + error, variance: 0.05 * 0.05 }
+        });
+        RingProduct::new(rings.collect::<Vec<_>>().into_iter(), outlier_share, 3.0)
+    }
+
+    /// Every part of every cell of the grid, one by one.
+    fn plain(product: &RingProduct, grid: GridSize, leaf_size: f64) -> BTreeMap<(usize, usize), f64> {
+        let parts = (grid.resolution / leaf_size).round() as usize;
+        let corner = 0.5 * grid.cells as f64 * grid.resolution;
+        let mut values = Vec::new();
+        for row in 0..grid.cells * parts {
+            for column in 0..grid.cells * parts {
+                let x = grid.centre.x - corner + (column as f64 + 0.5) * leaf_size;
+                let y = grid.centre.y - corner + (row as f64 + 0.5) * leaf_size;
+                let value = product.log_likelihood(&Point2::new(x, y), f64::NEG_INFINITY).unwrap();
+                values.push(((column / parts, row / parts), value));
+            }
+        }
+        let best = values.iter().map(|(_, value)| *value).max_by(f64::total_cmp).unwrap();
+        let total: f64 = values.iter().map(|(_, value)| (value - best).exp()).sum();
+        let mut masses = BTreeMap::new();
+        for (cell, value) in values {
+            *masses.entry(cell).or_insert(0.0) += (value - best).exp() / total;
+        }
+        masses
+    }
+
+    fn assert_equals_plain(product: &RingProduct, grid: GridSize) -> Posterior {
+        let posterior = Posterior::new(product, grid).unwrap();
+        let mut masses = plain(product, grid, posterior.leaf_size);
+        for leaf in &posterior.leaves {
+            *masses.get_mut(&(leaf.column, leaf.row)).unwrap() -= leaf.mass;
+        }
+        let difference: f64 = masses.values().map(|difference| difference.abs()).sum();
+        assert!(difference < 1e-5, "{difference}");
+        posterior
+    }
+
+    const GRID: GridSize = GridSize { centre: Point2::new(0.4, -0.2), cells: 150, resolution: 0.04 };
+
+    #[test]
+    fn one_reading_is_a_whole_ring() {
+        let posterior = assert_equals_plain(&product(Point2::new(1.0, 1.0), &[(0.0, 0.0)], &[0.0], 0.0), GRID);
+        assert!(posterior.leaves.len() > 1000);
+    }
+
+    #[test]
+    fn with_outliers_one_reading_leaves_the_whole_grid() {
+        let posterior = assert_equals_plain(&product(Point2::new(1.0, 1.0), &[(0.0, 0.0)], &[0.0], 0.05), GRID);
+        assert_eq!(posterior.leaves.len(), 150 * 150);
+    }
+
+    #[test]
+    fn a_straight_drive_leaves_both_modes() {
+        let drive: Vec<_> = (0..60).map(|step| (-1.0 + 0.04 * f64::from(step), 0.0)).collect();
+        let posterior = assert_equals_plain(&product(Point2::new(0.5, 1.2), &drive, &[0.03, -0.02, -0.01], 0.02), GRID);
+        let above: f64 = posterior.leaves.iter().filter(|leaf| leaf.place.y > 0.0).map(|leaf| leaf.mass).sum();
+        assert!((above - 0.5).abs() < 1e-6, "{above}");
+    }
+
+    #[test]
+    fn a_spot_narrower_than_a_cell_is_resolved() {
+        let circle: Vec<_> = (0..900).map(|step| (0.4 + f64::from(step).cos(), -0.2 + f64::from(step).sin())).collect();
+        let tag = Point2::new(0.513, -0.291);
+        let posterior = assert_equals_plain(&product(tag, &circle, &[0.05, -0.05], 0.0), GRID);
+        assert!(posterior.leaf_size <= 0.005);
+        let mean = posterior.leaves.iter().fold(nalgebra::Vector2::zeros(), |sum, leaf| sum + leaf.place.coords * leaf.mass);
+        assert!((mean - tag.coords).norm() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn no_rings_give_none() {
+        assert!(Posterior::new(&RingProduct::new(std::iter::empty(), 0.0, 3.0), GRID).is_none());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn it_equals_the_whole_grid(
+            x in -2.0..2.0, y in -2.0..2.0,
+            positions in prop::collection::vec((-2.0..2.0, -2.0..2.0), 1..20),
+            errors in prop::collection::vec(-0.2..0.2, 1..5),
+            pure: bool, cells in 20usize..80,
+        ) {
+            let product = product(Point2::new(x, y), &positions, &errors, if pure { 0.0 } else { 0.02 });
+            let grid = GridSize { centre: Point2::new(0.1, 0.1), cells, resolution: 6.0 / cells as f64 };
+            let posterior = Posterior::new(&product, grid).unwrap();
+            // The parts of a cell that the plain evaluation goes through are few enough.
+            prop_assume!(grid.resolution / posterior.leaf_size * cells as f64 <= 200.0);
+            assert_equals_plain(&product, grid);
+        }
+    }
+}
