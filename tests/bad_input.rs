@@ -13,7 +13,7 @@ fn merge(folder: &TempDir) -> Ended {
 }
 
 /// A log that `build` fills, merged.
-fn merged(build: impl FnOnce(&mut LogBuilder)) -> Ended {
+fn merged(build: impl FnOnce(&mut LogBuilder) -> &mut LogBuilder) -> Ended {
     let folder = TempDir::new().unwrap();
     let mut log = LogBuilder::new(&folder.path().join("in.mcap"));
     build(&mut log);
@@ -67,7 +67,7 @@ fn a_log_without_maps() {
 
 #[test]
 fn a_log_without_messages() {
-    merged(|_| {}).assert(1, &["no map"]);
+    merged(|log| log).assert(1, &["no map"]);
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn a_log_without_tags() {
 
 #[test]
 fn a_log_with_one_robot() {
-    merged(|log| drop(log.map(0.0, "robot1", &TestMap::room()))).assert(0, &["only robot1", "nothing to merge"]);
+    merged(|log| log.map(0.0, "robot1", &TestMap::room())).assert(0, &["only robot1", "nothing to merge"]);
 }
 
 #[test]
@@ -98,8 +98,8 @@ fn maps_that_cannot_be() {
         ("origin", spoilt(&|map| map.info.origin.position.x = f64::NAN)),
     ];
     for (word, map) in cases {
-        merged(|log| drop(log.map(0.0, "robot1", &good).map(0.0, "robot2", &map))).assert(3, &["warning", word]);
-        let ended = merged(|log| drop(log.map(0.0, "robot1", &map)));
+        merged(|log| log.map(0.0, "robot1", &good).map(0.0, "robot2", &map)).assert(3, &["warning", word]);
+        let ended = merged(|log| log.map(0.0, "robot1", &map));
         assert!([0, 1].contains(&ended.status), "{ended:#?}");
         ended.assert(ended.status, &[word]);
     }
@@ -113,7 +113,7 @@ fn empty_maps() {
     (no_cells.info.width, no_cells.info.height) = (0, 0);
     no_cells.cells.clear();
     for map in [nothing, no_cells] {
-        let ended = merged(|log| drop(log.map(0.0, "robot1", &map).map(0.0, "robot2", &map)));
+        let ended = merged(|log| log.map(0.0, "robot1", &map).map(0.0, "robot2", &map));
         ended.assert(3, &["not merged: robot2"]);
     }
 }
@@ -129,7 +129,7 @@ fn readings_before_any_pose_and_readings_that_cannot_be() {
         }
         log.reading(0.3, "robot1", "", 1.0);
         log.pose(0.4, "robot1", f64::NAN, 1.0);
-        log.reading(0.4, "robot1", "a", 1.0);
+        log.reading(0.4, "robot1", "a", 1.0)
     });
     ended.assert(0, &["warning: tags:", "before"]);
 }
@@ -146,7 +146,7 @@ fn messages_that_are_cut_or_of_another_type() {
             "gridweave_msgs/msg/TagRange",
             b"\0\x01\0\0\xff\xff\xff\xff\xff\xff\xff\xff\xff",
         );
-        log.raw(0.2, "/robot1/tag_ranges", "std_msgs/msg/String", &[0, 1, 0, 0, 1, 0, 0, 0, 0]);
+        log.raw(0.2, "/robot1/tag_ranges", "std_msgs/msg/String", &[0, 1, 0, 0, 1, 0, 0, 0, 0])
     })
     .assert(0, &["warning"]);
 }
@@ -196,7 +196,7 @@ fn maps_with_a_turned_origin_and_of_another_resolution_are_used() {
     turned.info.origin.position = Point { x: 3.0, y: -2.0, z: 0.0 };
     turned.info.origin.orientation = Quaternion::from_yaw(0.7);
     turned.info.resolution = 0.1;
-    let ended = merged(|log| drop(log.map(0.0, "robot1", &turned)));
+    let ended = merged(|log| log.map(0.0, "robot1", &turned));
     ended.assert(0, &["only robot1"]);
 }
 

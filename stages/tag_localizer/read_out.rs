@@ -31,7 +31,8 @@ pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Optio
         Readout::Blocks => masses.best_block(window),
     };
     let in_mode = masses.mode_of(found.columns, found.rows);
-    let members = || posterior.leaves.iter().filter(|leaf| in_mode.get(masses.index(leaf.column, leaf.row)) == Some(&true));
+    let members =
+        || posterior.leaves.iter().filter(|leaf| in_mode.get(masses.index(leaf.column, leaf.row)) == Some(&true));
     let mass: f64 = members().map(|leaf| leaf.mass).sum();
     if !(mass > 0.0 && mass.is_finite()) {
         return None;

@@ -5,6 +5,7 @@
 //! that have nothing to do with each other (no truth file, or one without frames) to refuse is right, and every merged
 //! robot is wrong. The reference robot is not counted.
 
+use crate::args::EvaluateArgs;
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::de::DeserializeOwned;
@@ -13,6 +14,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::io::ErrorKind;
 use std::path::Path;
+
+/// Compares a summary with the truth, and prints how they differ.
+pub(crate) fn command(args: &EvaluateArgs) -> Result<crate::Outcome> {
+    let evaluation = evaluate(&args.summary, &args.truth)?;
+    match args.json {
+        true => println!("{}", serde_json::to_string_pretty(&evaluation)?),
+        false => print!("{}", evaluation.to_text()),
+    }
+    Ok(crate::Outcome::Done)
+}
 
 /// Metres. A robot is right below this error at the middle of its map.
 const RIGHT_METRES: f64 = 0.5;

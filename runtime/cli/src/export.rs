@@ -11,6 +11,7 @@ use gridweave_runtime::stage::{RobotTopics, match_robot};
 use nalgebra::{Isometry2, Vector2};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
@@ -43,7 +44,7 @@ impl<'a> Exports<'a> {
             map_file::save(path, merged).context("cannot write the merged map")?;
         }
         if let Some(path) = self.picture {
-            let mut layers: Vec<MapLayer<'_>> = summary
+            let layers: Vec<MapLayer<'_>> = summary
                 .frames()
                 .filter_map(|(robot, [x, y, yaw])| {
                     let topic = maps.keys().find(|topic| match_robot(&robots.map, topic) == Some(robot))?;
@@ -53,10 +54,7 @@ impl<'a> Exports<'a> {
             // A log without the input's messages holds the merged map only.
             let picture = match layers.is_empty() {
                 true => picture::render_map(&layer(merged, Isometry2::identity())),
-                false => {
-                    layers.shrink_to_fit();
-                    picture::render_overlay(&layers)
-                }
+                false => picture::render_overlay(&layers),
             };
             picture.and_then(|picture| picture.save_png(path)).context("cannot draw the merged map")?;
         }
@@ -71,9 +69,25 @@ fn layer(map: &GridMap, transform_world_map: Isometry2<f64>) -> MapLayer<'_> {
 /// The last grid on every topic of a log that holds grids.
 fn last_maps(log: &Path) -> Result<BTreeMap<String, GridMap>> {
     let mut reader = reader::open(&[log.to_owned()])?;
-    let mut maps = BTreeMap::new();
+    let files = Arc::clone(reader.files());
+    // For each channel, its topic if it carries grids.
+    let mut topics: BTreeMap<u16, Option<String>> = BTreeMap::new();
+    let mut last: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     while let Some(message) = reader.next_message() {
-        let _ = message;
+        let topic = topics.entry(message.channel).or_insert_with(|| {
+            let channel = files[message.file].channel(message.channel)?;
+            (channel.schema_name == OccupancyGrid::NAME).then_some(channel.topic)
+        });
+        if let Some(topic) = topic {
+            let bytes = last.entry(topic.clone()).or_default();
+            bytes.clear();
+            bytes.extend_from_slice(message.data);
+        }
     }
-    Ok(maps)
+    // A map that cannot be used was warned of when it was read for the merge.
+    let decoded = last.into_iter().filter_map(|(topic, bytes)| {
+        let grid: OccupancyGrid<'_> = decode(&bytes).ok()?;
+        Some((topic, GridMap::from_message(&grid)))
+    });
+    Ok(decoded.collect())
 }

@@ -1,4 +1,3 @@
-<<<<<<< HEAD
 //! The command `gridweave`: merges the maps of several robots.
 
 #![forbid(unsafe_code)]
@@ -76,9 +75,3 @@ fn start_log(verbose: bool) {
         .with_target(false)
         .init();
 }
-=======
-//! x
-#[allow(dead_code)]
-mod evaluate;
-fn main() {}
->>>>>>> fuse
