@@ -7,12 +7,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The reason of an alignment that the others show to be wrong.
 pub(super) fn contradicts(cycle: &OpenCycle) -> String {
-    format!("left out: it contradicts other alignments, which agree with each other ({})", gap(cycle))
+    format!("it contradicts other alignments, which agree with each other ({})", gap(cycle))
 }
 
 /// The reason of an alignment of which it cannot be told whether it is wrong.
 pub(super) fn disputed(cycle: &OpenCycle) -> String {
-    format!("left out: alignments contradict each other, and it cannot be told which is wrong ({})", gap(cycle))
+    format!("alignments contradict each other, and it cannot be told which is wrong ({})", gap(cycle))
 }
 
 fn gap(cycle: &OpenCycle) -> String {
@@ -39,7 +39,7 @@ pub(super) fn unmerged(
     let groups = tied_groups(&outside, alignments, left_out);
     let reason = |robot: &str| {
         if let Some(reason) = disputed.get(robot) {
-            return reason.strip_prefix("left out: ").unwrap_or(reason).to_owned();
+            return reason.clone();
         }
         let group = groups.iter().find(|group| group.contains(robot));
         let others: Vec<String> =
@@ -49,9 +49,7 @@ pub(super) fn unmerged(
             false => {
                 // What keeps the group apart may be known of another member only.
                 let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
-                let known = members.clone().find_map(|member| {
-                    disputed.get(member).map(|reason| reason.strip_prefix("left out: ").unwrap_or(reason).to_owned())
-                });
+                let known = members.clone().find_map(|member| disputed.get(member).cloned());
                 let refused = || members.clone().find_map(|member| refusal(member, frames, alignments, left_out));
                 let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
                 format!("it is tied to {} only, not to the reference: {why}", list(&others))

@@ -78,7 +78,7 @@ pub fn solve(
                 pairs.push(pair);
             }
             Err(reason) => {
-                left_out.insert(pair.clone(), reason);
+                left_out.insert(pair.clone(), format!("left out: {reason}"));
             }
         }
     }
@@ -97,7 +97,7 @@ pub fn solve(
                 reason
             }
         };
-        left_out.insert((*pair).clone(), reason);
+        left_out.insert((*pair).clone(), format!("left out: {reason}"));
     }
 
     let right: Vec<Edge> =

@@ -3,7 +3,8 @@
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
 use super::{KnownArea, PlacedGrid};
-use crate::geometry::{Grid, GridGeometry, Point2};
+use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 
 /// Writes the fused map of `maps` to `cells`, the rows of `geometry`, which lies along the world's axes.
@@ -11,18 +12,21 @@ use rayon::prelude::*;
 /// Every cell takes what each map says of the cell that its centre falls in. Rows are independent of each other and
 /// made in parallel.
 pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, cells: &mut [i8]) {
-    let width = geometry.width.max(1);
     let lookups: Vec<Lookup<'_>> = maps.iter().map(|(map, area)| Lookup::new(map, area, geometry)).collect();
-    cells.par_chunks_mut(width).enumerate().for_each_init(
-        || vec![Evidence::NONE; width],
-        |evidence, (row, cells)| {
-            evidence.fill(Evidence::NONE);
-            lookups.iter().for_each(|lookup| lookup.add_row(row, table, evidence));
-            for (cell, evidence) in cells.iter_mut().zip(evidence) {
-                *cell = table.value(*evidence);
+    cells.par_chunks_mut(geometry.width.max(1)).enumerate().for_each(|(row, cells)| {
+        let rows: Vec<LookupRow<'_>> = lookups.iter().map(|lookup| lookup.row(row, cells.len())).collect();
+        for (stretch, cells) in cells.chunks_mut(TILE).enumerate() {
+            let mut evidence = [Evidence::NONE; TILE];
+            let mut is_known = false;
+            for row in &rows {
+                is_known |= row.add_stretch(stretch * TILE, &mut evidence[..cells.len()], table);
             }
-        },
-    );
+            match is_known {
+                true => cells.iter_mut().zip(evidence).for_each(|(cell, evidence)| *cell = table.value(evidence)),
+                false => cells.fill(UNKNOWN),
+            }
+        }
+    });
 }
 
 /// How output cells are found in one map: its column and row are linear in the output's.
@@ -32,7 +36,7 @@ struct Lookup<'a> {
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
     /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
-    step: nalgebra::Vector2<f64>,
+    step: Vector2<f64>,
     /// The known columns and rows: the first, and the one behind the last.
     columns: (f64, f64),
     rows: (f64, f64),
@@ -48,44 +52,59 @@ impl<'a> Lookup<'a> {
             grid: map.grid,
             area,
             start: (transform_grid_output * Point2::new(half, half)) * scale,
-            step: transform_grid_output.rotation * nalgebra::Vector2::new(output.resolution, 0.0) * scale,
+            step: transform_grid_output.rotation * Vector2::new(output.resolution, 0.0) * scale,
             columns: (area.columns.0 as f64, area.columns.1 as f64),
             rows: (first_row as f64, behind_rows as f64),
         }
     }
 
-    /// Adds what the map says of the cells of one output row.
-    fn add_row(&self, row: usize, table: &EvidenceTable, evidence: &mut [Evidence]) {
+    /// The part of an output row of `count` cells that falls on the known part of the map.
+    fn row(&self, row: usize, count: usize) -> LookupRow<'_> {
         let row = row as f64;
-        let (column, line) = (self.start.x - row * self.step.y, self.start.y + row * self.step.x);
-        let (from, to) = range_within(column, self.step.x, self.columns, evidence.len());
-        let (from_line, to_line) = range_within(line, self.step.y, self.rows, evidence.len());
-        let (from, to) = (from.max(from_line), to.min(to_line));
-        let Some(evidence) = evidence.get_mut(from..to) else { return };
-        // A stretch of so many cells stays within a tile's length of its middle, up to two map cells a step.
-        let can_skip = self.step.norm() <= 2.0;
-        for (stretch, evidence) in evidence.chunks_mut(TILE).enumerate() {
-            let from = from + stretch * TILE;
-            let place = |index: f64| (column + index * self.step.x, line + index * self.step.y);
-            let (x, y) = place(from as f64 + evidence.len() as f64 / 2.0);
-            if can_skip && !self.area.is_near(x, y) {
-                continue;
-            }
-            for (index, evidence) in (from..).zip(evidence) {
-                let (x, y) = place(index as f64);
-                self.add_cell(x, y, table, evidence);
-            }
-        }
+        let start = Point2::new(self.start.x - row * self.step.y, self.start.y + row * self.step.x);
+        let by_column = range_within(start.x, self.step.x, self.columns, count);
+        let by_row = range_within(start.y, self.step.y, self.rows, count);
+        LookupRow { lookup: self, start, from: by_column.0.max(by_row.0), to: by_column.1.min(by_row.1) }
     }
 
-    fn add_cell(&self, x: f64, y: f64, table: &EvidenceTable, evidence: &mut Evidence) {
-        // Rounding can put the ends of a range outside.
-        if x < self.columns.0 || x >= self.columns.1 || y < self.rows.0 || y >= self.rows.1 {
-            return;
+    fn value(&self, place: &Point2) -> i8 {
+        // Rounding can put the ends of a row's range outside.
+        if place.x < self.columns.0 || place.x >= self.columns.1 || place.y < self.rows.0 || place.y >= self.rows.1 {
+            return UNKNOWN;
         }
-        if let Some(&value) = self.grid.cells.get(y as usize * self.grid.geometry.width + x as usize) {
-            table.add(evidence, value);
+        let index = place.y as usize * self.grid.geometry.width + place.x as usize;
+        self.grid.cells.get(index).copied().unwrap_or(UNKNOWN)
+    }
+}
+
+/// One output row on one map.
+struct LookupRow<'a> {
+    lookup: &'a Lookup<'a>,
+    /// Where the centre of the row's first cell falls.
+    start: Point2,
+    /// The cells of the row that may fall on the known part of the map: the first, and the one behind the last.
+    from: usize,
+    to: usize,
+}
+
+impl LookupRow<'_> {
+    /// Adds what the map says of the output cells from `first` on, at most [`TILE`] of them. Whether it may know any.
+    fn add_stretch(&self, first: usize, evidence: &mut [Evidence], table: &EvidenceTable) -> bool {
+        let (from, to) = (self.from.max(first), self.to.min(first + evidence.len()));
+        if from >= to {
+            return false;
         }
+        let lookup = self.lookup;
+        let place = |index: f64| self.start + lookup.step * index;
+        let middle = place((from + to) as f64 / 2.0);
+        // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
+        if lookup.step.norm() <= 2.0 && !lookup.area.is_near(middle.x, middle.y) {
+            return false;
+        }
+        for (index, evidence) in (from..to).zip(&mut evidence[from - first..]) {
+            table.add(evidence, lookup.value(&place(index as f64)));
+        }
+        true
     }
 }
 
@@ -104,7 +123,7 @@ fn range_within(start: f64, step: f64, (low, high): (f64, f64), count: usize) ->
 mod tests {
     use super::super::layout::{Lattice, lay_out};
     use super::*;
-    use crate::geometry::{Pose2, UNKNOWN, is_free, is_occupied, pose};
+    use crate::geometry::{Pose2, is_free, is_occupied, pose};
     use proptest::prelude::*;
 
     fn geometry(width: usize, height: usize, resolution: f64, origin: Pose2) -> GridGeometry {
