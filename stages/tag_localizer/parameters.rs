@@ -66,7 +66,7 @@ impl Default for TagLocalizerParameters {
             reach: 3.0,
             range_stddev: 0.05,
             pose_stddev: 0.02,
-            min_travel: 0.05,
+            min_travel: 0.1,
             outlier_share: 0.02,
             position_stddev: 0.01,
             timeout: 2.0,

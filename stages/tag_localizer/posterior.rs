@@ -7,10 +7,11 @@ use crate::geometry::Point2;
 const NEGLIGIBLE: f64 = 20.0;
 /// The first nodes are 2^5 cells wide.
 const COARSEST: i32 = 5;
-/// The last ones are 2^-4 cells wide.
+/// A cell is split into parts of 2^-4 of its width at the most.
 const FINEST: i32 = -4;
-/// The probability is resolved when this many nodes hold it: then one is about a standard deviation wide.
-const RESOLVED: usize = 80;
+/// The probability is resolved when this many places hold it: then one is about 1.5 standard deviations wide, and
+/// sums over them are right to a thousandth.
+const RESOLVED: usize = 64;
 
 /// Where a tag's square grid lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +33,7 @@ pub struct Leaf {
     pub column: usize,
     /// Row of the cell it lies in.
     pub row: usize,
-    /// Its share of the probability; all leaves together have 1.
+    /// Its share of the probability; all leaves of a posterior together have 1.
     pub mass: f64,
 }
 
@@ -83,28 +84,35 @@ impl Posterior {
                     best = value;
                 }
             }
-            let radius = level.half_diagonal();
-            nodes.retain(|node| {
-                product.log_likelihood_within(&level.centre(*node), radius, best - NEGLIGIBLE).is_some()
-            });
-            if level.level <= 0 && (nodes.len() >= RESOLVED || level.level == FINEST) {
+            level.drop_negligible(&mut nodes, product, best);
+            if level.level == 0 {
                 break;
             }
             (level, nodes) = level.halved(&nodes);
         }
-        let leaves = nodes.iter().filter_map(|node| {
-            let place = level.centre(*node);
-            let value = product.log_likelihood(&place, best - NEGLIGIBLE)?;
-            let (column, row) = level.cell(*node);
-            Some(Leaf { place, column, row, mass: (value - best).exp() })
-        });
-        let mut leaves: Vec<Leaf> = leaves.collect();
-        let mass: f64 = leaves.iter().map(|leaf| leaf.mass).sum();
-        if !(mass > 0.0 && mass.is_finite()) {
-            return None;
+        loop {
+            while nodes.len() < RESOLVED && level.level > FINEST {
+                (level, nodes) = level.halved(&nodes);
+            }
+            let leaves = level.leaves(product, &nodes, best);
+            // A spot that is very narrow lies in few of the parts.
+            if leaves.len() >= RESOLVED / 4 || level.level == FINEST {
+                return Self::normalised(grid, level.size(), leaves);
+            }
+            best = leaves.iter().map(|leaf| leaf.mass).fold(best, f64::max);
+            level.drop_negligible(&mut nodes, product, best);
+            (level, nodes) = level.halved(&nodes);
         }
-        leaves.iter_mut().for_each(|leaf| leaf.mass /= mass);
-        Some(Self { grid, leaf_size: level.size(), leaves })
+    }
+
+    /// Turns the log-likelihoods that the leaves carry into shares.
+    fn normalised(grid: GridSize, leaf_size: f64, mut leaves: Vec<Leaf>) -> Option<Self> {
+        let best = leaves.iter().map(|leaf| leaf.mass).fold(f64::NEG_INFINITY, f64::max);
+        leaves.retain(|leaf| leaf.mass >= best - NEGLIGIBLE);
+        leaves.iter_mut().for_each(|leaf| leaf.mass = (leaf.mass - best).exp());
+        let total: f64 = leaves.iter().map(|leaf| leaf.mass).sum();
+        leaves.iter_mut().for_each(|leaf| leaf.mass /= total);
+        (total > 0.0 && total.is_finite()).then_some(Self { grid, leaf_size, leaves })
     }
 }
 
@@ -120,8 +128,22 @@ impl Level {
         self.grid.resolution * f64::from(self.level).exp2()
     }
 
-    fn half_diagonal(&self) -> f64 {
-        self.size() * std::f64::consts::FRAC_1_SQRT_2
+    /// Drops the nodes in which no place comes near the best.
+    fn drop_negligible(&self, nodes: &mut Vec<Node>, product: &RingProduct, best: f64) {
+        let half_diagonal = self.size() * std::f64::consts::FRAC_1_SQRT_2;
+        let bound = |node: &Node| product.log_likelihood_within(&self.centre(*node), half_diagonal, best - NEGLIGIBLE);
+        nodes.retain(|node| bound(node).is_some());
+    }
+
+    /// The nodes near the best as leaves, which carry their log-likelihood.
+    fn leaves(&self, product: &RingProduct, nodes: &[Node], best: f64) -> Vec<Leaf> {
+        let leaf = |node: &Node| {
+            let place = self.centre(*node);
+            let mass = product.log_likelihood(&place, best - NEGLIGIBLE)?;
+            let (column, row) = self.cell(*node);
+            Some(Leaf { place, column, row, mass })
+        };
+        nodes.iter().filter_map(leaf).collect()
     }
 
     fn centre(&self, node: Node) -> Point2 {

@@ -3,11 +3,11 @@
 use crate::geometry::Point2;
 use std::f64::consts::TAU;
 
-/// How many factors are multiplied before their logarithm is taken: fewer than underflow.
-const FACTORS: usize = 8;
-/// The least factor: the smallest double is about `LEAST_FACTOR` to the power of `FACTORS`.
+/// So many factors are evaluated together, and multiplied before their logarithm is taken: fewer than underflow.
+const LANES: usize = 8;
+/// The least factor: the smallest double is about `LEAST_FACTOR` to the power of `LANES`.
 const LEAST_FACTOR: f64 = 1e-37;
-/// `exp` of less than this is nothing beside the share of outliers.
+/// `exp` of less than this is nothing beside a share of outliers.
 const NOTHING: f64 = -50.0;
 
 /// "The tag lies about `radius` from `centre`."
@@ -21,43 +21,64 @@ pub struct Ring {
     pub variance: f64,
 }
 
-/// A ring, ready to be evaluated.
+/// Some rings, ready to be evaluated together. Lanes that are left over hold factors of 1.
 #[derive(Clone, Copy, Debug)]
-struct Factor {
-    x: f64,
-    y: f64,
-    radius: f64,
+struct Block {
+    x: [f64; LANES],
+    y: [f64; LANES],
+    radius: [f64; LANES],
     /// `-1 / (2 variance)`
-    scale: f64,
+    scale: [f64; LANES],
+    inlier_share: [f64; LANES],
     /// The chance of an outlier, relative to the height of the ring.
-    floor: f64,
+    floor: [f64; LANES],
+    /// The product far away from all rings.
+    all_outliers: f64,
 }
 
 /// The product of rings `f_t(x) = exp(-(|x - P| - D)^2 / (2 sigma^2))`, each mixed with a share of outliers.
 #[derive(Clone, Debug)]
 pub struct RingProduct {
-    factors: Vec<Factor>,
-    inlier_share: f64,
+    blocks: Vec<Block>,
+    pure: bool,
 }
 
 impl RingProduct {
     /// The product of `rings`. `outlier_share` of the readings have any range up to `reach` with the same probability;
     /// 0 is the pure product.
     pub fn new(rings: impl Iterator<Item = Ring>, outlier_share: f64, reach: f64) -> Self {
-        let factor = |ring: Ring| Factor {
-            x: ring.centre.x,
-            y: ring.centre.y,
-            radius: ring.radius,
-            scale: -0.5 / ring.variance,
-            // The density 1 / reach over that of the ring's middle, 1 / (sigma sqrt(2 pi)).
-            floor: outlier_share * ((ring.variance * TAU).sqrt() / reach).clamp(0.0, 1.0),
+        let rings: Vec<Ring> = rings.collect();
+        let ones = Block {
+            x: [0.0; LANES],
+            y: [0.0; LANES],
+            radius: [0.0; LANES],
+            scale: [0.0; LANES],
+            inlier_share: [1.0; LANES],
+            floor: [0.0; LANES],
+            all_outliers: 1.0,
         };
-        Self { factors: rings.map(factor).collect(), inlier_share: 1.0 - outlier_share }
+        // Neighbours in the list are neighbours on the drive and say much the same. Dealing them out to different
+        // blocks lets the first blocks tell already that a place is out of the question.
+        let mut blocks = vec![ones; rings.len().div_ceil(LANES)];
+        let count = blocks.len().max(1);
+        for (index, ring) in rings.iter().enumerate() {
+            let (block, lane) = (index % count, index / count);
+            let Some(block) = blocks.get_mut(block) else { continue };
+            block.x[lane] = ring.centre.x;
+            block.y[lane] = ring.centre.y;
+            block.radius[lane] = ring.radius;
+            block.scale[lane] = -0.5 / ring.variance;
+            block.inlier_share[lane] = 1.0 - outlier_share;
+            // The density 1 / reach over that of the ring's middle, 1 / (sigma sqrt(2 pi)).
+            block.floor[lane] = outlier_share * ((ring.variance * TAU).sqrt() / reach).clamp(0.0, 1.0);
+            block.all_outliers *= block.floor[lane].max(LEAST_FACTOR);
+        }
+        Self { blocks, pure: 1.0 - outlier_share == 1.0 }
     }
 
     /// Whether there are no rings.
     pub fn is_empty(&self) -> bool {
-        self.factors.is_empty()
+        self.blocks.is_empty()
     }
 
     /// The logarithm of the product at a place, not normalised; at most 0. `None` as soon as it is known to be below
@@ -69,44 +90,66 @@ impl RingProduct {
     /// An upper bound of the logarithm of the product over all places within `radius` of `place`: a distance changes by
     /// no more than the place is moved. `None` as soon as it is known to be below `least`.
     pub fn log_likelihood_within(&self, place: &Point2, radius: f64, least: f64) -> Option<f64> {
-        // Neighbours in the list are neighbours on the drive and say much the same: taking them with a stride tells
-        // early that a place is out of the question.
-        let stride = self.factors.len().div_ceil(FACTORS).max(1);
         let mut sum = 0.0;
-        for start in 0..stride {
-            let factors = self.factors.get(start..).unwrap_or_default().iter().step_by(stride);
-            sum += match self.inlier_share < 1.0 {
-                true => self.log_of_mixtures(factors, place, radius),
-                false => factors.map(|factor| factor.exponent(place, radius)).sum(),
+        for block in &self.blocks {
+            let exponents = block.exponents(place, radius);
+            sum += match self.pure {
+                true => exponents.iter().sum(),
+                false => block.mixture(&exponents).ln(),
             };
             if sum < least {
                 return None;
             }
         }
-        // A sum that is no number is a place that cannot be.
-        (sum >= least).then_some(sum)
-    }
-
-    fn log_of_mixtures<'a>(&self, factors: impl Iterator<Item = &'a Factor>, place: &Point2, radius: f64) -> f64 {
-        let product: f64 = factors
-            .map(|factor| {
-                let exponent = factor.exponent(place, radius);
-                let ring = if exponent > NOTHING { self.inlier_share * exponent.exp() } else { 0.0 };
-                (ring + factor.floor).max(LEAST_FACTOR)
-            })
-            .product();
-        product.ln()
+        Some(sum)
     }
 }
 
-impl Factor {
+impl Block {
     /// `-(|x - P| - D)^2 / (2 sigma^2)`, or its largest value within `radius` of x.
     #[inline]
-    fn exponent(&self, place: &Point2, radius: f64) -> f64 {
-        let (x, y) = (place.x - self.x, place.y - self.y);
-        let error = (((x * x + y * y).sqrt() - self.radius).abs() - radius).max(0.0);
-        error * error * self.scale
+    fn exponents(&self, place: &Point2, radius: f64) -> [f64; LANES] {
+        std::array::from_fn(|lane| {
+            let (x, y) = (place.x - self.x[lane], place.y - self.y[lane]);
+            let error = (((x * x + y * y).sqrt() - self.radius[lane]).abs() - radius).max(0.0);
+            error * error * self.scale[lane]
+        })
     }
+
+    /// The product of the rings with their share of outliers.
+    #[inline]
+    fn mixture(&self, exponents: &[f64; LANES]) -> f64 {
+        if exponents.iter().all(|exponent| *exponent < NOTHING) {
+            return self.all_outliers;
+        }
+        let factors: [f64; LANES] = std::array::from_fn(|lane| {
+            (self.inlier_share[lane] * exp(exponents[lane]) + self.floor[lane]).max(LEAST_FACTOR)
+        });
+        factors.iter().product()
+    }
+}
+
+/// `exp` of a value that is at most 0, to 10 digits; below -700 it is that of -700.
+///
+/// It has no branches, so the compiler does several at once, and it gives the same bits on every machine.
+#[inline]
+fn exp(value: f64) -> f64 {
+    /// Adding it leaves no bits for a fraction: 1.5 * 2^52.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    let value = value.max(-700.0);
+    // value = n ln 2 + rest, with |rest| at most ln 2 / 2.
+    let rounded = value * std::f64::consts::LOG2_E + ROUND;
+    let n = rounded - ROUND;
+    let rest = value - n * LN_2_HIGH - n * LN_2_LOW;
+    // The series of exp, from the last term on.
+    let mut power = 1.0;
+    for divisor in [9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0] {
+        power = 1.0 + power * rest * (1.0 / divisor);
+    }
+    // The last bits of `rounded` are n: moved to the exponent of a double they make 2^n.
+    power * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1f64.to_bits()))
 }
 
 #[cfg(test)]
@@ -156,6 +199,16 @@ mod tests {
             let value = product.log_likelihood(&Point2::new(3.0, 0.0), f64::NEG_INFINITY).unwrap();
             assert!(value.is_finite() && value < -1000.0, "{value}");
         }
+    }
+
+    #[test]
+    fn the_exponential_is_exact() {
+        assert_eq!(exp(0.0), 1.0);
+        for step in 0..7000 {
+            let value = -0.1 * f64::from(step);
+            assert!((exp(value) / value.exp() - 1.0).abs() < 1e-10, "{value}");
+        }
+        assert!(exp(f64::NEG_INFINITY) < 1e-300);
     }
 
     proptest! {
