@@ -4,10 +4,11 @@
 #![forbid(unsafe_code)]
 
 pub mod geometry;
+pub mod line_extractor;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![]
+    vec![line_extractor::kind()]
 }
