@@ -5,10 +5,11 @@
 
 pub mod geometry;
 pub mod line_extractor;
+pub mod quadrant_classifier;
 
 use gridweave_runtime::stage::StageKind;
 
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![line_extractor::kind()]
+    vec![line_extractor::kind(), quadrant_classifier::kind()]
 }
