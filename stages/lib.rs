@@ -7,6 +7,8 @@ pub mod frame_solver;
 pub mod geometry;
 pub mod grid_fuser;
 pub mod icp_refiner;
+pub mod line_extractor;
+pub mod quadrant_classifier;
 pub mod simulator;
 pub mod tag_filter;
 pub mod tag_localizer;
@@ -19,6 +21,8 @@ pub fn kinds() -> Vec<StageKind> {
         frame_solver::kind(),
         grid_fuser::kind(),
         icp_refiner::kind(),
+        line_extractor::kind(),
+        quadrant_classifier::kind(),
         simulator::kind(),
         tag_filter::kind(),
         tag_localizer::kind(),

@@ -1,0 +1,108 @@
+//! From an occupancy grid to its straight walls: section 4.1.1 of Tsardoulias et al.
+
+use super::line::{Line, Stretch};
+use super::merge::merge_walls;
+use super::parameters::{Fit, LineExtractorParameters};
+use super::point_index::PointIndex;
+use super::ransac::find_walls;
+use super::reliability::reliability;
+use super::scale::Scale;
+use super::wall::{Wall, fit_stretch};
+use crate::geometry::{Grid, Point2};
+use gridweave_runtime::ros::Segment;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// How often a segment is fitted to all cells near it.
+const FINAL_FITS: usize = 3;
+/// The last fits leave out cells farther from the line than this many standard deviations: what stands at a wall.
+const OUTLIER_DEVIATIONS: f64 = 2.5;
+
+/// The straight walls of a grid, the best supported first, in metres of the map frame.
+///
+/// The same grid, parameters and seed give the same walls.
+pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, seed: u64) -> Vec<Segment> {
+    let scale = Scale::new(parameters, grid.geometry.resolution);
+    let index_of =
+        |points: &[Point2]| PointIndex::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let cells: Vec<Point2> =
+        grid.occupied().map(|cell| Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5)).collect();
+
+    let index = index_of(&sub_sample(&cells, parameters.max_points, &mut random));
+    let walls = find_walls(&index, parameters, &scale, &mut random);
+    let walls = merge_walls(index.points(), walls, parameters, &scale);
+
+    let all = if index.points().len() == cells.len() { index } else { index_of(&cells) };
+    let mut segments: Vec<Segment> = walls
+        .iter()
+        .filter_map(|wall| final_fit(&all, wall, parameters.fit, &scale))
+        .filter(|(stretch, _)| stretch.length() >= scale.min_length)
+        .map(|(stretch, inliers)| {
+            let reliability = reliability(grid, &stretch, scale.reach);
+            segment(grid, &stretch, reliability, inliers)
+        })
+        .filter(|segment| segment.reliability >= parameters.min_reliability)
+        .filter(|segment| [segment.x1, segment.y1, segment.x2, segment.y2].iter().all(|value| value.is_finite()))
+        .collect();
+    segments.sort_by_key(|segment| std::cmp::Reverse(segment.inliers));
+    segments
+}
+
+/// `count` of the points, drawn at random, or all if there are no more.
+fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Point2> {
+    let mut sample = points.to_vec();
+    if count < sample.len() {
+        for place in 0..count {
+            let other = random.random_range(place..sample.len());
+            sample.swap(place, other);
+        }
+        sample.truncate(count);
+    }
+    sample
+}
+
+/// Fits a wall to all cells near it. Gives the stretch and the number of cells.
+fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
+    let mut stretch = wall.stretch;
+    let mut reach = scale.reach;
+    let mut near = Vec::new();
+    for _ in 0..FINAL_FITS {
+        near.clear();
+        let Stretch { line, start, end } = stretch;
+        // Where walls meet, cells of the other wall lie on one side of this one and would turn it.
+        let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
+        let inside = |id: usize| (start + margin..=end - margin).contains(&line.along(&index.points()[id]));
+        index.near_line(&line, &line.at((start + end) / 2.0), reach, f64::INFINITY, inside, &mut near);
+        let cells = near.iter().map(|&id| index.points()[id]);
+        let Some(fitted) = fit_stretch(fit, &line, cells.clone()) else { break };
+        // The cells at the ends took no part in the fit, but they belong to the wall.
+        let [first, last] = stretch.ends();
+        stretch = Stretch::between_farthest(fitted.line, cells.clone().chain([first, last]))?;
+        if fit == Fit::Ends {
+            break;
+        }
+        let squares: f64 = cells.map(|cell| fitted.line.distance(&cell).powi(2)).sum();
+        reach =
+            (OUTLIER_DEVIATIONS * (squares / near.len() as f64).sqrt()).clamp(1.0_f64.min(scale.reach), scale.reach);
+    }
+    near.clear();
+    let Stretch { line, start, end } = stretch;
+    let inside = |id: usize| (start..=end).contains(&line.along(&index.points()[id]));
+    index.near_line(&line, &line.at((start + end) / 2.0), scale.reach, f64::INFINITY, inside, &mut near);
+    (!near.is_empty()).then_some((stretch, near.len()))
+}
+
+fn segment(grid: &Grid<'_>, stretch: &Stretch, reliability: f64, inliers: usize) -> Segment {
+    let line: &Line = &stretch.line;
+    let in_map = |along: f64| grid.geometry.origin * Point2::from(line.at(along).coords * grid.geometry.resolution);
+    let (first, last) = (in_map(stretch.start), in_map(stretch.end));
+    Segment {
+        x1: first.x,
+        y1: first.y,
+        x2: last.x,
+        y2: last.y,
+        reliability,
+        inliers: u32::try_from(inliers).unwrap_or(u32::MAX),
+    }
+}

@@ -1,0 +1,169 @@
+//! The parameters of the line extractor.
+
+use gridweave_runtime::stage::{ParameterError, Parameters};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How the two points are drawn that make a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// The second near the first, so that both are likely to lie on the same wall.
+    #[default]
+    Local,
+    /// Both anywhere (the paper).
+    Uniform,
+}
+
+/// When a line counts as a wall.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scoring {
+    /// When a stretch of it without a gap holds `min_points` points and is `min_length` long. Only these points are
+    /// taken out.
+    #[default]
+    Points,
+    /// When it holds `min_share` of all points, all of which are taken out (the paper).
+    Percentage,
+}
+
+/// How the final line of a segment is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Fit {
+    /// Total least squares over all occupied cells of the segment.
+    #[default]
+    LeastSquares,
+    /// The line through the two farthest members (the paper).
+    Ends,
+}
+
+/// The parameters of `line_extractor`. The paper's cell (px) is 0.02 m.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LineExtractorParameters {
+    /// How the two points are drawn that make a line: `local` (the second near the first) or `uniform` (the paper).
+    pub sampling: Sampling,
+    /// How far apart the two points of `local` sampling may be, metres.
+    pub sampling_radius: f64,
+    /// When a line counts as a wall: `points` or `percentage` (the paper).
+    pub scoring: Scoring,
+    /// How the final line of a segment is found: `least_squares` or `ends` (the paper).
+    pub fit: Fit,
+    /// Of more occupied cells than these a random part is searched for lines (the set P); the lines found are then
+    /// fitted to all cells.
+    pub max_points: usize,
+    /// Cells nearer to a line than this are its members (D_line), metres; never less than three quarters of a cell,
+    /// which a straight wall of single cells takes up. Paper: 2 px.
+    pub inlier_distance: f64,
+    /// Points that a wall must hold under `points` scoring.
+    pub min_points: usize,
+    /// Share of all points that a line must hold under `percentage` scoring (T_perc), 0 to 1. Paper: 0.15.
+    pub min_share: f64,
+    /// The search ends when less than this share of the points is left (T_final), 0 to 1. Paper: 0.5.
+    pub stop_share: f64,
+    /// Lines drawn to choose the best of, each time. Paper: 1, the first that suffices is taken.
+    pub candidates: usize,
+    /// The search ends after this many choices in a row that gave no wall (`points` scoring).
+    pub patience: usize,
+    /// Lines drawn in all, at most. Under `percentage` scoring the best line so far is kept when they are spent.
+    pub max_iterations: usize,
+    /// A line is broken where neighbouring members are farther apart than this (D_s), metres. Paper: 30 px.
+    pub max_gap: f64,
+    /// Segments whose directions differ by less than this may be merged (T_theta), radians. The paper gives no value.
+    pub merge_angle: f64,
+    /// Segments whose nearest ends are nearer than this may be merged (T_j), metres; they are if one line then has
+    /// both within `inlier_distance`. 0 merges none. The paper gives no value.
+    pub merge_distance: f64,
+    /// Shorter segments are dropped (T_len), metres. Paper: 30 px.
+    pub min_length: f64,
+    /// Segments whose mean occupancy is below this are dropped, 0 to 1. Paper: 0.6.
+    pub min_reliability: f64,
+}
+
+impl Default for LineExtractorParameters {
+    fn default() -> Self {
+        Self {
+            sampling: Sampling::Local,
+            sampling_radius: 0.5,
+            scoring: Scoring::Points,
+            fit: Fit::LeastSquares,
+            max_points: 15_000,
+            inlier_distance: 0.08,
+            min_points: 12,
+            min_share: 0.15,
+            stop_share: 0.05,
+            candidates: 8,
+            patience: 40,
+            max_iterations: 20_000,
+            max_gap: 0.6,
+            merge_angle: 0.05,
+            merge_distance: 0.3,
+            min_length: 0.6,
+            min_reliability: 0.6,
+        }
+    }
+}
+
+impl Parameters for LineExtractorParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let mut errors = Vec::new();
+        let mut require = |good: bool, field: &'static str, problem: &str| {
+            if !good {
+                errors.push(ParameterError::new(field, problem));
+            }
+        };
+        for (field, value) in [
+            ("sampling_radius", self.sampling_radius),
+            ("inlier_distance", self.inlier_distance),
+            ("max_gap", self.max_gap),
+            ("min_length", self.min_length),
+        ] {
+            require(value.is_finite() && value > 0.0, field, "must be a number above 0 m");
+        }
+        for (field, value) in
+            [("min_share", self.min_share), ("stop_share", self.stop_share), ("min_reliability", self.min_reliability)]
+        {
+            require((0.0..=1.0).contains(&value), field, "must be from 0 to 1");
+        }
+        require((0.0..=0.5).contains(&self.merge_angle), "merge_angle", "must be from 0 to 0.5 rad");
+        let merge_distance = self.merge_distance.is_finite() && self.merge_distance >= 0.0;
+        require(merge_distance, "merge_distance", "must be a number of 0 m or more");
+        require(self.min_points >= 2, "min_points", "must be 2 or more");
+        require(self.max_points >= 2, "max_points", "must be 2 or more");
+        require(self.candidates >= 1, "candidates", "must be 1 or more");
+        require(self.patience >= 1, "patience", "must be 1 or more");
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        assert_eq!(LineExtractorParameters::default().check(), []);
+    }
+
+    #[test]
+    fn every_value_out_of_range_is_reported() {
+        let parameters = LineExtractorParameters {
+            sampling_radius: f64::NAN,
+            max_points: 1,
+            inlier_distance: 0.0,
+            min_points: 0,
+            min_share: 1.5,
+            stop_share: -0.1,
+            candidates: 0,
+            patience: 0,
+            max_gap: -1.0,
+            merge_angle: 2.0,
+            merge_distance: f64::INFINITY,
+            min_length: 0.0,
+            min_reliability: f64::NAN,
+            ..Default::default()
+        };
+        assert_eq!(parameters.check().len(), 13);
+    }
+}

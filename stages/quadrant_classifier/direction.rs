@@ -1,0 +1,237 @@
+//! The direction of a map's walls.
+
+use super::grouping::{bisector, group_directions};
+use super::parameters::{Mean, QuadrantClassifierParameters};
+use super::walls::{WallDirection, wall_directions};
+use crate::geometry::turn_difference;
+use gridweave_runtime::ros::Segment;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+/// How often walls are weighted anew by their distance from the mean.
+const REWEIGHTINGS: usize = 10;
+
+/// The direction that the walls of a map share.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Direction {
+    /// Radians, in `(-pi / 4, pi / 4]`, known up to quarter turns.
+    pub angle: f64,
+    /// Standard deviation of the angle, radians.
+    pub deviation: f64,
+    /// Directions of the two groups of walls, radians.
+    pub groups: [f64; 2],
+    /// Share of the wall length that follows the direction or stands across it, 0 to 1.
+    pub agreement: f64,
+    /// Whether there are walls enough that agree.
+    pub valid: bool,
+}
+
+/// The direction of the walls of a map. Without walls it is not valid, and zero.
+pub fn map_direction(segments: &[Segment], parameters: &QuadrantClassifierParameters) -> Direction {
+    let walls = wall_directions(segments, parameters.weighting);
+    let Some((angle, members)) = (match parameters.mean {
+        Mean::Circular => mean_round_mode(&walls, parameters.tolerance),
+        Mean::Groups => mean_of_groups(&walls),
+    }) else {
+        return Direction::default();
+    };
+    let Some(groups) = group_directions(&members) else { return Direction::default() };
+
+    let length: f64 = walls.iter().map(|wall| wall.length).sum();
+    let agreeing: f64 = walls
+        .iter()
+        .filter(|wall| turn_difference(wall.angle, angle, FRAC_PI_2).abs() <= parameters.tolerance)
+        .map(|wall| wall.length)
+        .sum();
+    let agreement = agreeing / length;
+    Direction {
+        angle: turn_difference(angle, 0.0, FRAC_PI_2),
+        deviation: deviation(&members, angle, parameters),
+        groups,
+        agreement,
+        valid: agreement >= parameters.min_agreement && agreeing >= parameters.min_wall_length,
+    }
+}
+
+/// The weighted circular mean of the walls near the mode, and these walls with the weights they had in it.
+///
+/// Walls are weighted by Tukey's biweight of their distance from the mean, so that a furnishing at an angle has no say
+/// and none falls in or out at a border.
+fn mean_round_mode(walls: &[WallDirection], tolerance: f64) -> Option<(f64, Vec<WallDirection>)> {
+    let mut mean = mode(walls, tolerance)?;
+    let mut members = Vec::new();
+    for _ in 0..REWEIGHTINGS {
+        members = weighted_near(walls, mean, 2.0 * tolerance);
+        let (sine, cosine) = members.iter().fold((0.0, 0.0), |(sine, cosine), wall| {
+            let angle = 4.0 * turn_difference(wall.angle, mean, FRAC_PI_2);
+            (sine + wall.weight * angle.sin(), cosine + wall.weight * angle.cos())
+        });
+        mean += sine.atan2(cosine) / 4.0;
+    }
+    (!members.is_empty()).then_some((mean, members))
+}
+
+/// The walls within `limit` of a direction, up to quarter turns, with their weights reduced by the biweight.
+fn weighted_near(walls: &[WallDirection], direction: f64, limit: f64) -> Vec<WallDirection> {
+    walls
+        .iter()
+        .filter_map(|wall| {
+            let distance = turn_difference(wall.angle, direction, FRAC_PI_2) / limit;
+            let weight = wall.weight * (1.0 - distance * distance).powi(2);
+            (distance.abs() < 1.0 && weight > 0.0).then_some(WallDirection { weight, ..*wall })
+        })
+        .collect()
+}
+
+/// The middle of the window of twice `tolerance` that holds most weight, among angles up to quarter turns.
+fn mode(walls: &[WallDirection], tolerance: f64) -> Option<f64> {
+    let mut folded: Vec<(f64, f64)> =
+        walls.iter().map(|wall| (wall.angle.rem_euclid(FRAC_PI_2), wall.weight)).collect();
+    folded.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let count = folded.len();
+    folded.extend_from_within(..);
+    folded[count..].iter_mut().for_each(|(angle, _)| *angle += FRAC_PI_2);
+
+    let (mut end, mut weight, mut moment) = (0, 0.0, 0.0);
+    let mut best: Option<(f64, f64)> = None;
+    for start in 0..count {
+        while end < start + count && folded[end].0 <= folded[start].0 + 2.0 * tolerance {
+            weight += folded[end].1;
+            moment += folded[end].0 * folded[end].1;
+            end += 1;
+        }
+        if weight > 0.0 && best.is_none_or(|(most, _)| weight > most) {
+            best = Some((weight, moment / weight));
+        }
+        weight -= folded[start].1;
+        moment -= folded[start].0 * folded[start].1;
+    }
+    best.map(|(_, angle)| angle)
+}
+
+/// The paper's direction, turned from between the groups to the walls.
+fn mean_of_groups(walls: &[WallDirection]) -> Option<(f64, Vec<WallDirection>)> {
+    let groups = group_directions(walls)?;
+    Some((bisector(groups) - FRAC_PI_4, walls.to_vec()))
+}
+
+/// The standard deviation of the weighted mean of the walls' directions: from how they scatter, from how well one
+/// wall's direction can be known, and from what all walls of a map may share.
+fn deviation(walls: &[WallDirection], mean: f64, parameters: &QuadrantClassifierParameters) -> f64 {
+    let weight: f64 = walls.iter().map(|wall| wall.weight).sum();
+    let variance: f64 = walls
+        .iter()
+        .map(|wall| {
+            let scatter = turn_difference(wall.angle, mean, FRAC_PI_2);
+            // No direction is worse known than one that is anywhere in the quadrant.
+            let own = (parameters.end_deviation / wall.length).min(FRAC_PI_4);
+            (wall.weight / weight).powi(2) * (scatter.powi(2) + own.powi(2))
+        })
+        .sum();
+    (variance + parameters.min_deviation.powi(2)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    fn wall(degrees: f64, length: f64) -> Segment {
+        let angle = degrees.to_radians();
+        let (x2, y2) = (1.0 + length * angle.cos(), 2.0 + length * angle.sin());
+        Segment { x1: 1.0, y1: 2.0, x2, y2, reliability: 0.9, inliers: 10 }
+    }
+
+    fn modes() -> [QuadrantClassifierParameters; 4] {
+        let default = QuadrantClassifierParameters::default();
+        [
+            default.clone(),
+            QuadrantClassifierParameters { mean: Mean::Groups, ..default.clone() },
+            QuadrantClassifierParameters { weighting: super::super::Weighting::Equation4, ..default.clone() },
+            QuadrantClassifierParameters {
+                mean: Mean::Groups,
+                weighting: super::super::Weighting::Equation4,
+                ..default
+            },
+        ]
+    }
+
+    fn error(direction: &Direction, degrees: f64) -> f64 {
+        turn_difference(direction.angle, degrees.to_radians(), FRAC_PI_2).to_degrees().abs()
+    }
+
+    #[test]
+    fn every_mode_finds_the_direction_of_a_room_at_any_angle() {
+        for degrees in 0..180 {
+            let degrees = f64::from(degrees);
+            let room =
+                [wall(degrees, 5.0), wall(degrees + 90.0, 4.0), wall(degrees + 180.0, 5.0), wall(degrees - 90.0, 4.0)];
+            for parameters in modes() {
+                let direction = map_direction(&room, &parameters);
+                assert!(error(&direction, degrees) < 1e-9, "{degrees} {direction:?}");
+                assert!(direction.valid && (direction.agreement - 1.0).abs() < 1e-12);
+                assert!(direction.angle > -FRAC_PI_4 && direction.angle <= FRAC_PI_4);
+            }
+        }
+    }
+
+    #[test]
+    fn walls_at_an_angle_do_not_turn_the_circular_mean() {
+        let mut walls: Vec<Segment> = (0..12).map(|i| wall(12.0 + 90.0 * f64::from(i), 4.0)).collect();
+        walls.extend([wall(40.0, 15.0), wall(35.0, 6.0)]);
+        let direction = map_direction(&walls, &QuadrantClassifierParameters::default());
+        assert!(error(&direction, 12.0) < 1e-6);
+        assert!((direction.agreement - 48.0 / 69.0).abs() < 1e-9);
+        let groups = map_direction(&walls, &modes()[1]);
+        assert!(error(&groups, 12.0) > 1.0, "the paper's mean takes all walls");
+    }
+
+    #[test]
+    fn a_round_hall_and_no_walls_have_no_direction() {
+        let hall: Vec<Segment> = (0..60).map(|i| wall(6.0 * f64::from(i), 1.0)).collect();
+        for parameters in modes() {
+            assert!(!map_direction(&hall, &parameters).valid);
+            assert_eq!(map_direction(&[], &parameters), Direction::default());
+            let broken = [Segment { x1: f64::NAN, ..wall(3.0, 1.0) }, wall(3.0, 0.0)];
+            assert_eq!(map_direction(&broken, &parameters), Direction::default());
+            assert!(!map_direction(&[wall(3.0, 1.5)], &parameters).valid, "one short wall does not tell");
+        }
+    }
+
+    #[test]
+    fn one_wall_alone_is_known_as_well_as_its_ends() {
+        let direction = map_direction(&[wall(3.0, 10.0)], &QuadrantClassifierParameters::default());
+        assert!(direction.deviation > 0.0019 && direction.deviation < 0.01);
+    }
+
+    proptest! {
+        #[test]
+        fn turning_the_map_turns_the_direction(
+            turn in -PI..PI, noise in prop::collection::vec(-2.0..2.0f64, 8..40),
+        ) {
+            let walls = |turn: f64| -> Vec<Segment> {
+                let walls = noise.iter().enumerate();
+                walls.map(|(i, noise)| wall(turn.to_degrees() + 90.0 * (i % 4) as f64 + noise, 1.0 + i as f64)).collect()
+            };
+            let parameters = QuadrantClassifierParameters::default();
+            let (still, turned) = (map_direction(&walls(0.0), &parameters), map_direction(&walls(turn), &parameters));
+            prop_assert!(turn_difference(turned.angle, still.angle + turn, FRAC_PI_2).abs() < 1e-6);
+            prop_assert!((turned.deviation - still.deviation).abs() < 1e-6);
+        }
+
+        #[test]
+        fn the_direction_is_always_a_number(
+            segments in prop::collection::vec(prop::array::uniform5(prop::num::f64::ANY), 0..20),
+        ) {
+            let segments: Vec<Segment> = segments
+                .iter()
+                .map(|v| Segment { x1: v[0], y1: v[1], x2: v[2], y2: v[3], reliability: v[4], inliers: 1 })
+                .collect();
+            for parameters in modes() {
+                let direction = map_direction(&segments, &parameters);
+                let values = [direction.angle, direction.deviation, direction.agreement, direction.groups[0], direction.groups[1]];
+                prop_assert!(values.iter().all(|value| value.is_finite()), "{:?}", direction);
+            }
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! How two maps lie to each other, from their directions and their common tags: sections 4.1.3 and 4.2.
+
+use super::direction::Direction;
+use super::parameters::{QuadrantClassifierParameters, RotationFrom};
+use super::quadrant::quadrant;
+use super::tag_rotation::{TagPair, TagRotation, tag_rotation};
+use super::translation::{residual, translate};
+use crate::geometry::{Pose2, turn_difference, wrap_angle};
+use gridweave_runtime::ros::CommonTag;
+use nalgebra::Matrix3;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// A first guess of an alignment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstGuess {
+    /// `T_a_b`.
+    pub transform_a_b: Pose2,
+    /// Covariance of (x, y, yaw), metres and radians.
+    pub covariance: Matrix3<f64>,
+    /// The least common precision of the tags, 0 to 1.
+    pub score: f64,
+    /// `tags+directions` or `tags`.
+    pub method: &'static str,
+    /// What the guess rests on.
+    pub reason: String,
+}
+
+/// Why common tags give no alignment.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GuessError {
+    /// There are too few tags, or they lie in one place.
+    #[error("{0} common tags do not tell the rotation: it takes two or more in different places")]
+    NoRotation(usize),
+    /// The rotation is known too badly.
+    #[error(
+        "the {count} common tags lie too near each other: they tell the rotation to {degrees:.0} degrees only, which \
+         does not tell the quarter turn"
+    )]
+    WeakRotation {
+        /// Tags there are.
+        count: usize,
+        /// Standard deviation of the rotation, degrees.
+        degrees: f64,
+    },
+    /// The tags do not fit each other.
+    #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
+    Residual {
+        /// Tags there are.
+        count: usize,
+        /// Root mean square of the distances, metres.
+        residual: f64,
+    },
+}
+
+/// How map b lies to map a: rotation from the directions of the two maps and the quarter turn that the tags tell, or
+/// from the tags alone; then the translation from the tags.
+///
+/// The tags are sorted by falling common precision. Directions that are missing, not valid, or that contradict the tags
+/// are left out, and the reason says so.
+pub fn first_guess(
+    tags: &[CommonTag],
+    direction_a: Option<&Direction>,
+    direction_b: Option<&Direction>,
+    parameters: &QuadrantClassifierParameters,
+) -> Result<FirstGuess, GuessError> {
+    let pairs: Vec<TagPair> = tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect();
+    let count = pairs.len();
+    let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
+    if by_tags.deviation > parameters.max_tag_rotation_deviation {
+        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
+    }
+    let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
+        Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps"),
+        Err(reason) => (by_tags, "tags", reason),
+    };
+    let transform = translate(&pairs, &rotation, parameters.translation).ok_or(GuessError::NoRotation(count))?;
+    let residual = residual(&pairs, &transform.transform_a_b);
+    if !(residual <= parameters.max_residual) {
+        return Err(GuessError::Residual { count, residual });
+    }
+    let precisions = tags.iter().map(CommonTag::common_precision).filter(|precision| precision.is_finite());
+    Ok(FirstGuess {
+        transform_a_b: transform.transform_a_b,
+        covariance: transform.covariance,
+        score: precisions.fold(1.0, f64::min).max(0.0),
+        method,
+        reason: format!("{count} common tags; {rotation_reason}"),
+    })
+}
+
+/// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
+fn by_directions(
+    by_tags: &TagRotation,
+    a: Option<&Direction>,
+    b: Option<&Direction>,
+    parameters: &QuadrantClassifierParameters,
+) -> Result<TagRotation, &'static str> {
+    if parameters.rotation == RotationFrom::Tags {
+        return Err("rotation from the tags");
+    }
+    let (Some(a), Some(b)) = (a, b) else {
+        return Err("rotation from the tags, for a map has not come yet");
+    };
+    if !(a.valid && b.valid) {
+        return Err("rotation from the tags, for the walls of a map have no common direction");
+    }
+    let d_theta = a.angle - b.angle;
+    let angle = wrap_angle(d_theta + f64::from(quadrant(by_tags.angle, d_theta)) * FRAC_PI_2);
+    let deviation = a.deviation.hypot(b.deviation);
+    let limit = 3.0 * deviation.hypot(by_tags.deviation) + parameters.contradiction_angle;
+    match turn_difference(by_tags.angle, angle, TAU).abs() <= limit {
+        true => Ok(TagRotation { angle, deviation }),
+        false => Err("rotation from the tags, which the directions of the maps contradict"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, pose};
+    use crate::quadrant_classifier::{TagRotationFrom, TranslationFrom};
+    use proptest::prelude::*;
+
+    fn tags(transform_a_b: &Pose2) -> Vec<CommonTag> {
+        let tag = |(x, y, certainty): (f64, f64, f64)| {
+            let a = transform_a_b * Point2::new(x, y);
+            let covariance = [0.0004, 0.0, 0.0, 0.0004];
+            CommonTag {
+                tag_id: format!("tag at {x}"),
+                a: [a.x, a.y],
+                b: [x, y],
+                covariance_a: covariance,
+                covariance_b: covariance,
+                certainty_a: certainty,
+                certainty_b: 0.95,
+            }
+        };
+        [(2.0, 1.0, 0.91), (9.0, 5.0, 0.82), (4.0, 8.0, 0.76)].map(tag).to_vec()
+    }
+
+    fn direction(angle: f64) -> Direction {
+        Direction { angle, deviation: 0.002, groups: [angle, angle + FRAC_PI_2], agreement: 0.9, valid: true }
+    }
+
+    proptest! {
+        #[test]
+        fn any_transform_is_recovered_in_every_mode(
+            x in -50.0..50.0, y in -50.0..50.0, yaw in -4.0..4.0, direction_b in -1.0..1.0, turns in 0..4i32,
+        ) {
+            let truth = pose(x, y, yaw);
+            let a = direction(direction_b + yaw + f64::from(turns) * FRAC_PI_2);
+            for rotation in [RotationFrom::Directions, RotationFrom::Tags] {
+                for tag_rotation in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
+                    for translation in [TranslationFrom::AllTags, TranslationFrom::BestTag, TranslationFrom::Triplet] {
+                        let parameters =
+                            QuadrantClassifierParameters { rotation, tag_rotation, translation, ..Default::default() };
+                        let guess = first_guess(&tags(&truth), Some(&a), Some(&direction(direction_b)), &parameters);
+                        let error = guess.unwrap().transform_a_b * truth.inverse();
+                        prop_assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-8);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn whatever_comes_in_only_numbers_come_out(
+            values in prop::collection::vec(prop::array::uniform10(prop::num::f64::ANY), 0..6),
+        ) {
+            let tags: Vec<CommonTag> = values
+                .iter()
+                .map(|v| CommonTag {
+                    tag_id: String::new(),
+                    a: [v[0], v[1]],
+                    b: [v[2], v[3]],
+                    covariance_a: [v[4], v[5], v[5], v[6]],
+                    covariance_b: [v[7], v[8], v[8], v[9]],
+                    certainty_a: v[0],
+                    certainty_b: v[9],
+                })
+                .collect();
+            let parameters = QuadrantClassifierParameters { max_residual: 1e12, ..Default::default() };
+            if let Ok(guess) = first_guess(&tags, Some(&direction(0.1)), Some(&direction(0.2)), &parameters) {
+                prop_assert!(guess.covariance.iter().all(|value| value.is_finite()));
+                prop_assert!(guess.transform_a_b.translation.vector.iter().all(|value| value.is_finite()));
+                prop_assert!((0.0..=1.0).contains(&guess.score));
+            }
+        }
+    }
+
+    fn guess(tags: &[CommonTag], a: Option<&Direction>, b: Option<&Direction>) -> Result<FirstGuess, GuessError> {
+        first_guess(tags, a, b, &QuadrantClassifierParameters::default())
+    }
+
+    #[test]
+    fn good_directions_make_the_rotation_better_than_noisy_tags() {
+        let mut tags = tags(&pose(3.0, 4.0, 2.0));
+        tags[2].a[0] += 0.06;
+        let found = guess(&tags, Some(&direction(2.0 - FRAC_PI_2)), Some(&direction(0.0))).unwrap();
+        assert_eq!(found.method, "tags+directions");
+        assert!((found.transform_a_b.rotation.angle() - 2.0).abs() < 1e-9);
+        assert_eq!(found.score, 0.76);
+    }
+
+    #[test]
+    fn directions_that_are_missing_or_bad_leave_the_rotation_to_the_tags() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let good = direction(0.0);
+        let invalid = Direction { valid: false, ..direction(0.4) };
+        let contradicting = direction(0.2);
+        for a in [None, Some(&invalid), Some(&contradicting)] {
+            let found = guess(&tags, a, Some(&good)).unwrap();
+            assert_eq!(found.method, "tags");
+            assert!(found.reason.contains("from the tags"), "{}", found.reason);
+            assert!((found.transform_a_b.rotation.angle() - 2.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn tags_that_do_not_tell_the_quarter_turn_or_do_not_fit_are_refused() {
+        let all = tags(&pose(3.0, 4.0, 2.0));
+        assert_eq!(guess(&[], None, None), Err(GuessError::NoRotation(0)));
+        assert_eq!(guess(&all[..1], None, None), Err(GuessError::NoRotation(1)));
+        let mut near = all.clone();
+        for (index, tag) in near.iter_mut().enumerate() {
+            tag.a = [0.05 * index as f64, 0.0];
+            tag.b = tag.a;
+        }
+        assert!(matches!(guess(&near, None, None), Err(GuessError::WeakRotation { count: 3, .. })));
+        let mut wrong = all;
+        wrong[1].a[0] += 5.0;
+        assert!(matches!(guess(&wrong, None, None), Err(GuessError::Residual { count: 3, .. })));
+    }
+}

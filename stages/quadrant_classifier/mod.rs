@@ -1,0 +1,24 @@
+//! The direction of a map's walls, and from it and common tags a first guess of how two maps lie to each other.
+//!
+//! After Tsardoulias et al., sections 4.1.2 to 4.2. Walls stand at right angles, so the directions of two maps give
+//! their rotation up to quarter turns, and more precisely than tags do; the tags tell the quarter turn and the
+//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags.
+//!
+//! Not for buildings without right angles: there every rotation comes from the tags.
+
+mod direction;
+mod first_guess;
+mod grouping;
+mod parameters;
+mod quadrant;
+mod stage;
+mod tag_rotation;
+mod translation;
+mod walls;
+
+pub use direction::{Direction, map_direction};
+pub use first_guess::{FirstGuess, GuessError, first_guess};
+pub use grouping::{Group, classify};
+pub use parameters::{Mean, QuadrantClassifierParameters, RotationFrom, TagRotationFrom, TranslationFrom, Weighting};
+pub use quadrant::quadrant;
+pub use stage::kind;

@@ -1,0 +1,197 @@
+//! The parameters of the quadrant classifier.
+
+use gridweave_runtime::stage::{ParameterError, Parameters};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// How the directions of many walls become one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mean {
+    /// The weighted mean of four times the angle, round its mode: walls far from it count little or nothing.
+    #[default]
+    Circular,
+    /// The mean of the two groups' weighted means (the paper).
+    Groups,
+}
+
+/// How much a wall counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Weighting {
+    /// By length x reliability.
+    #[default]
+    Length,
+    /// By length x (1 - reliability), as equation 4 is printed. The paper calls a reliability near 1 ideal, so this is
+    /// likely to be a slip; a wall of reliability 1 counts nothing.
+    #[serde(rename = "equation_4")]
+    Equation4,
+}
+
+/// Where the rotation between two maps comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationFrom {
+    /// The directions of the maps, with the quarter turn from the tags (the paper's methods 2 and 3).
+    #[default]
+    Directions,
+    /// The tags alone (the paper's method 1).
+    Tags,
+}
+
+/// How the tags tell a rotation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TagRotationFrom {
+    /// The weighted least squares fit of all common tags.
+    #[default]
+    LeastSquares,
+    /// The direction from the middle of the two best tags to the third: equations 5 and 6 (the paper).
+    Triplet,
+}
+
+/// Which tags give the translation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TranslationFrom {
+    /// All common tags, weighted with the inverse of their covariances.
+    #[default]
+    AllTags,
+    /// The best tag alone: equation 8 (the paper's methods 2 and 3).
+    BestTag,
+    /// The centroid of the three best tags (the paper's method 1).
+    Triplet,
+}
+
+/// The parameters of `quadrant_classifier`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct QuadrantClassifierParameters {
+    /// How the directions of many walls become one: `circular` or `groups` (the paper).
+    pub mean: Mean,
+    /// How much a wall counts: `length` (length x reliability) or `equation_4` (as printed in the paper).
+    pub weighting: Weighting,
+    /// Where the rotation between two maps comes from: `directions` or `tags` (the paper's method 1). Maps without a
+    /// direction, or whose directions contradict the tags, are turned by the tags in any case.
+    pub rotation: RotationFrom,
+    /// How the tags tell a rotation: `least_squares` or `triplet` (the paper).
+    pub tag_rotation: TagRotationFrom,
+    /// Which tags give the translation: `all_tags`, `best_tag` (the paper) or `triplet` (the paper's method 1).
+    pub translation: TranslationFrom,
+    /// A wall within this angle of the map's direction, or of its perpendicular, agrees with it, radians.
+    pub tolerance: f64,
+    /// A map has a direction if at least this share of its wall length agrees with it, 0 to 1. Walls of all directions
+    /// alike give tolerance / 45 degrees, 0.11 by default.
+    pub min_agreement: f64,
+    /// A map has a direction if at least this length of walls agrees with it, metres.
+    pub min_wall_length: f64,
+    /// How far the end of a wall may lie off the wall, metres, one standard deviation: about half a cell. It bounds how
+    /// well one wall tells a direction.
+    pub end_deviation: f64,
+    /// Standard deviation of a map's direction that no number of walls removes, radians: maps bend, and corners are not
+    /// square.
+    pub min_deviation: f64,
+    /// Standard deviation of a tag's position in one map, metres, which is added to what its estimate claims.
+    pub tag_deviation: f64,
+    /// Tags that tell the rotation no better than this standard deviation, radians, cannot tell the quarter turn: the
+    /// maps are not aligned.
+    pub max_tag_rotation_deviation: f64,
+    /// Directions contradict the tags when the two rotations differ by more than three joint standard deviations and
+    /// this angle, radians.
+    pub contradiction_angle: f64,
+    /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
+    pub max_residual: f64,
+    /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
+    pub resend_distance: f64,
+    /// A pair's alignment is sent again when it has turned by more than this, radians, or one of its maps has changed.
+    pub resend_angle: f64,
+}
+
+impl Default for QuadrantClassifierParameters {
+    fn default() -> Self {
+        Self {
+            mean: Mean::Circular,
+            weighting: Weighting::Length,
+            rotation: RotationFrom::Directions,
+            tag_rotation: TagRotationFrom::LeastSquares,
+            translation: TranslationFrom::AllTags,
+            tolerance: 5_f64.to_radians(),
+            min_agreement: 0.35,
+            min_wall_length: 2.0,
+            end_deviation: 0.02,
+            min_deviation: 0.002,
+            tag_deviation: 0.03,
+            max_tag_rotation_deviation: 0.2,
+            contradiction_angle: 0.01,
+            max_residual: 0.5,
+            resend_distance: 0.001,
+            resend_angle: 0.0001,
+        }
+    }
+}
+
+impl Parameters for QuadrantClassifierParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let mut errors = Vec::new();
+        let mut require = |good: bool, field: &'static str, problem: &str| {
+            if !good {
+                errors.push(ParameterError::new(field, problem));
+            }
+        };
+        let above_zero = |value: f64| value.is_finite() && value > 0.0;
+        let not_below_zero = |value: f64| value.is_finite() && value >= 0.0;
+        require(self.tolerance > 0.0 && self.tolerance <= 0.5, "tolerance", "must be above 0 and at most 0.5 rad");
+        require((0.0..=1.0).contains(&self.min_agreement), "min_agreement", "must be from 0 to 1");
+        for (field, value) in [("end_deviation", self.end_deviation), ("tag_deviation", self.tag_deviation)] {
+            require(above_zero(value), field, "must be a number above 0 m");
+        }
+        require(above_zero(self.max_residual), "max_residual", "must be a number above 0 m");
+        for (field, value) in [("min_wall_length", self.min_wall_length), ("resend_distance", self.resend_distance)] {
+            require(not_below_zero(value), field, "must be a number of 0 m or more");
+        }
+        for (field, value) in [
+            ("min_deviation", self.min_deviation),
+            ("contradiction_angle", self.contradiction_angle),
+            ("resend_angle", self.resend_angle),
+        ] {
+            require(not_below_zero(value), field, "must be a number of 0 rad or more");
+        }
+        let deviation = self.max_tag_rotation_deviation;
+        // Three deviations and the contradiction angle must stay below an eighth turn, where quadrants meet.
+        require(
+            deviation > 0.0 && deviation <= 0.25,
+            "max_tag_rotation_deviation",
+            "must be above 0 and at most 0.25 rad",
+        );
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        assert_eq!(QuadrantClassifierParameters::default().check(), []);
+    }
+
+    #[test]
+    fn every_value_out_of_range_is_reported() {
+        let parameters = QuadrantClassifierParameters {
+            tolerance: 0.0,
+            min_agreement: 1.1,
+            min_wall_length: -1.0,
+            end_deviation: 0.0,
+            min_deviation: f64::NAN,
+            tag_deviation: f64::INFINITY,
+            max_tag_rotation_deviation: 1.0,
+            contradiction_angle: -0.1,
+            max_residual: 0.0,
+            resend_distance: -0.1,
+            resend_angle: f64::NAN,
+            ..Default::default()
+        };
+        assert_eq!(parameters.check().len(), 11);
+    }
+}
