@@ -131,9 +131,8 @@ mod tests {
     }
 
     fn points() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
-        let far_apart = |points: &Vec<(f64, f64, f64)>| {
-            points.iter().any(|p| (p.0 - points[0].0).hypot(p.1 - points[0].1) > 0.5)
-        };
+        let far_apart =
+            |points: &Vec<(f64, f64, f64)>| points.iter().any(|p| (p.0 - points[0].0).hypot(p.1 - points[0].1) > 0.5);
         prop::collection::vec((-50.0..50.0, -50.0..50.0, 0.1..10.0), 2..20).prop_filter("in one place", far_apart)
     }
 
@@ -194,7 +193,8 @@ mod tests {
 
     #[test]
     fn points_that_do_not_tell_the_rotation_give_none() {
-        let pair = |ax: f64, bx: f64, weight: f64| PointPair { a: Point2::new(ax, 7.0), b: Point2::new(bx, 7.0), weight };
+        let pair =
+            |ax: f64, bx: f64, weight: f64| PointPair { a: Point2::new(ax, 7.0), b: Point2::new(bx, 7.0), weight };
         assert_eq!(fit_rigid(&[]), None);
         assert_eq!(fit_rigid(&[pair(1.0, 2.0, 1.0)]), None);
         assert_eq!(fit_rigid(&[pair(1.0, 2.0, 1.0); 5]), None);

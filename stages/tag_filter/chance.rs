@@ -24,10 +24,8 @@ pub fn chance_of_agreement(pairs: &[TagPair], agreeing: usize, gate: f64) -> f64
     // A gate is an area of pi reach^2 in the disc, and twice `reach * sqrt(2)` among distances up to the disc's width.
     let in_gate = (PI * reach * reach / (PI * radius * radius)).min(1.0);
     let same_length = (2.0 * std::f64::consts::SQRT_2 * reach / (2.0 * radius)).min(1.0);
-    let logarithm = ln_choose(count, agreeing)
-        + ln_choose(agreeing, 2)
-        + same_length.ln()
-        + (agreeing - 2) as f64 * in_gate.ln();
+    let logarithm =
+        ln_choose(count, agreeing) + ln_choose(agreeing, 2) + same_length.ln() + (agreeing - 2) as f64 * in_gate.ln();
     logarithm.exp().min(1.0)
 }
 

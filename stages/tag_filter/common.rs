@@ -63,7 +63,8 @@ mod tests {
 
     #[test]
     fn a_tag_must_be_certain_in_both_maps() {
-        let common = common_tags(&[tag("1", 0.75), tag("2", 0.9), tag("3", 0.9)], &[tag("1", 0.75), tag("2", 0.74)], 0.75);
+        let common =
+            common_tags(&[tag("1", 0.75), tag("2", 0.9), tag("3", 0.9)], &[tag("1", 0.75), tag("2", 0.74)], 0.75);
         assert_eq!(common.len(), 1);
         assert_eq!(common[0].tag_id, "1");
     }

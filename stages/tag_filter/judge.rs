@@ -159,7 +159,9 @@ fn praise(tags: &[CommonTag], consensus: &Consensus) -> String {
     let (agreeing, count, rms) = (consensus.members.len(), tags.len(), consensus.fit.rms);
     match left_out.is_empty() {
         true => format!("all {count} tags in common agree within {rms:.3} m"),
-        false => format!("{agreeing} of {count} tags in common agree within {rms:.3} m; left out: {}", left_out.join(", ")),
+        false => {
+            format!("{agreeing} of {count} tags in common agree within {rms:.3} m; left out: {}", left_out.join(", "))
+        }
     }
 }
 
@@ -215,7 +217,8 @@ mod tests {
         let judgement = judged(&tags(&pose(1.0, 2.0, 3.0), &SHAPE), &tags(&pose(-4.0, 0.0, 1.0), &SHAPE));
         assert!(judgement.accepted);
         assert_eq!(judgement.reason, "all 6 tags in common agree within 0.000 m");
-        let error = judgement.fit.unwrap().transform_a_b.inverse() * (pose(1.0, 2.0, 3.0) * pose(-4.0, 0.0, 1.0).inverse());
+        let error =
+            judgement.fit.unwrap().transform_a_b.inverse() * (pose(1.0, 2.0, 3.0) * pose(-4.0, 0.0, 1.0).inverse());
         assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle().abs() < 1e-9);
     }
 
@@ -244,7 +247,11 @@ mod tests {
         let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
         let mut b = a.clone();
         b[1..5].iter_mut().for_each(|tag| tag.certainty = 0.5);
-        refused(&a, &b, "have 6 tags in common, of which 2 have a certainty of 0.75 in both maps (tag0, tag5); 3 are needed");
+        refused(
+            &a,
+            &b,
+            "have 6 tags in common, of which 2 have a certainty of 0.75 in both maps (tag0, tag5); 3 are needed",
+        );
         let mut b = a.clone();
         b.iter_mut().for_each(|tag| tag.certainty = 0.89);
         refused(&a, &b, "none has a certainty of 0.90");

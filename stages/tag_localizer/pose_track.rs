@@ -29,7 +29,8 @@ impl PoseTrack {
             return false;
         }
         self.poses.push_back((time, pose));
-        while self.poses.front().is_some_and(|(first, _)| time.seconds_since(*first) > HISTORY) && self.poses.len() > 2 {
+        while self.poses.front().is_some_and(|(first, _)| time.seconds_since(*first) > HISTORY) && self.poses.len() > 2
+        {
             self.poses.pop_front();
         }
         true

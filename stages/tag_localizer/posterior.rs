@@ -258,7 +258,8 @@ mod tests {
         let tag = Point2::new(0.513, -0.291);
         let posterior = assert_equals_plain(&product(tag, &circle, &[0.05, -0.05], 0.0), GRID);
         assert!(posterior.leaf_size <= 0.005);
-        let mean = posterior.leaves.iter().fold(nalgebra::Vector2::zeros(), |sum, leaf| sum + leaf.place.coords * leaf.mass);
+        let mean =
+            posterior.leaves.iter().fold(nalgebra::Vector2::zeros(), |sum, leaf| sum + leaf.place.coords * leaf.mass);
         assert!((mean - tag.coords).norm() < 1e-3, "{mean}");
     }
 

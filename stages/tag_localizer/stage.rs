@@ -20,7 +20,11 @@ pub fn kind() -> StageKind {
             InputPort::one("pose", PortType::of::<PoseStamped>(), "poses of the robots in their maps"),
             InputPort::one("tags", PortType::of::<TagRange>(), "range readings of tags"),
         ],
-        vec![OutputPort::new("estimates", PortType::of::<TagEstimates>(), "all tags of one robot, the most certain first")],
+        vec![OutputPort::new(
+            "estimates",
+            PortType::of::<TagEstimates>(),
+            "all tags of one robot, the most certain first",
+        )],
         |parameters, _| Ok(TagLocalizerStage { parameters, robots: BTreeMap::new() }),
     )
 }
