@@ -31,6 +31,9 @@ pub struct TagFilterParameters {
     pub max_rival_share: f64,
     /// Two transforms are different when they put a tag so far apart, metres.
     pub rival_distance: f64,
+    /// While the same tags agree, they are sent again only when one has moved by more than this, metres; what is left is sent
+    /// at the end. 0 sends every change. Each change sent makes later stages align the maps anew.
+    pub min_change: f64,
 }
 
 impl Default for TagFilterParameters {
@@ -46,6 +49,7 @@ impl Default for TagFilterParameters {
             max_yaw_stddev: 0.05,
             max_rival_share: 0.7,
             rival_distance: 0.5,
+            min_change: 0.02,
         }
     }
 }
@@ -74,6 +78,7 @@ impl Parameters for TagFilterParameters {
         expect(positive(self.max_yaw_stddev), "max_yaw_stddev", "must be above 0 rad");
         expect(share(self.max_rival_share), "max_rival_share", "must lie between 0 and 1");
         expect(positive(self.rival_distance), "rival_distance", "must be above 0 m");
+        expect(self.min_change >= 0.0 && self.min_change.is_finite(), "min_change", "must not be below 0 m");
         errors
     }
 }
@@ -100,7 +105,8 @@ mod tests {
             max_yaw_stddev: f64::INFINITY,
             max_rival_share: 2.0,
             rival_distance: -1.0,
+            min_change: f64::NAN,
         };
-        assert_eq!(wrong.check().len(), 10);
+        assert_eq!(wrong.check().len(), 11);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Judgement, RobotTags, TagFilterParameters, judge};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{CommonTags, Header, TagEstimates};
+use gridweave_runtime::ros::{CommonTag, CommonTags, Header, TagEstimates};
 use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -52,9 +52,14 @@ impl Stage for TagFilterStage {
         let others: Vec<String> = self.robots.keys().filter(|other| **other != robot).cloned().collect();
         for other in others {
             let pair = if robot < other { (robot.clone(), other) } else { (other, robot.clone()) };
-            self.update(pair, output)?;
+            self.update(pair, self.parameters.min_change, output)?;
         }
         Ok(())
+    }
+
+    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+        let pairs: Vec<_> = self.sent.keys().cloned().collect();
+        pairs.into_iter().try_for_each(|pair| self.update(pair, 0.0, output))
     }
 
     fn report(&self) -> Option<Value> {
@@ -72,15 +77,16 @@ impl Stage for TagFilterStage {
 }
 
 impl TagFilterStage {
-    /// Judges a pair and sends the result, unless it was sent before.
-    fn update(&mut self, pair: (String, String), output: &mut Output<'_>) -> Result<(), StageError> {
+    /// Judges a pair and sends the result, unless it was sent before and no tag has moved by more than `min_change`
+    /// metres since.
+    fn update(&mut self, pair: (String, String), min_change: f64, output: &mut Output<'_>) -> Result<(), StageError> {
         let (Some(a), Some(b)) = (self.robots.get(&pair.0), self.robots.get(&pair.1)) else { return Ok(()) };
         let judgement = judge(
             RobotTags { robot: &pair.0, tags: &a.tags },
             RobotTags { robot: &pair.1, tags: &b.tags },
             &self.parameters,
         );
-        if self.sent.get(&pair) == Some(&judgement) {
+        if self.sent.get(&pair).is_some_and(|sent| says_the_same(sent, &judgement, min_change)) {
             return Ok(());
         }
         let message = CommonTags {
@@ -95,6 +101,17 @@ impl TagFilterStage {
         self.sent.insert(pair, judgement);
         Ok(())
     }
+}
+
+/// Whether two judgements are equal or, if both are accepted, name the same tags within `min_change` metres.
+fn says_the_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bool {
+    let near = |one: &[f64; 2], other: &[f64; 2]| (one[0] - other[0]).hypot(one[1] - other[1]) <= min_change;
+    let same_tags = sent.tags.len() == judgement.tags.len()
+        && sent.tags.iter().all(|one| {
+            let same = |other: &&CommonTag| other.tag_id == one.tag_id;
+            judgement.tags.iter().find(same).is_some_and(|other| near(&one.a, &other.a) && near(&one.b, &other.b))
+        });
+    sent == judgement || min_change > 0.0 && sent.accepted && judgement.accepted && same_tags
 }
 
 #[cfg(test)]
@@ -150,6 +167,24 @@ mod tests {
         assert_eq!(pairs, [("robot1", "robot3"), ("robot2", "robot3")]);
         assert!(third.iter().all(|pair| !pair.accepted && pair.reason.contains("3 are needed")), "{third:?}");
         assert_eq!(bench.send("robot2", &tags()[..3]).len(), 1, "the other pair is as it was");
+    }
+
+    #[test]
+    fn a_small_change_is_sent_at_the_end() {
+        let mut bench = Bench::new();
+        bench.send("robot1", &tags());
+        bench.send("robot2", &tags());
+        let mut moved = tags();
+        moved[0].x += 0.01;
+        assert_eq!(bench.send("robot2", &moved), vec![]);
+        moved[1].x += 0.03;
+        assert_eq!(bench.send("robot2", &moved).len(), 1);
+        moved[0].x += 0.01;
+        assert_eq!(bench.send("robot2", &moved), vec![]);
+        for count in [1, 0] {
+            bench.stage.finish(&mut bench.outputs.output(LogTime(2))).unwrap();
+            assert_eq!(bench.outputs.take(COMMON).len(), count);
+        }
     }
 
     #[test]

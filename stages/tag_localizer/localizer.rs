@@ -16,8 +16,10 @@ pub struct TagLocalizer {
     parameters: TagLocalizerParameters,
     track: PoseTrack,
     tags: BTreeMap<String, Tag>,
-    /// Readings that are later than the last pose.
-    pending: Vec<RangeReading>,
+    /// Readings that are later than the last pose, by time and then as they came.
+    pending: BTreeMap<(LogTime, u64), RangeReading>,
+    /// How many readings have waited.
+    waited: u64,
 }
 
 /// A reading as it comes: when, which tag, how far.
@@ -72,7 +74,7 @@ impl fmt::Display for ReadingProblem {
 impl TagLocalizer {
     /// A robot that has heard nothing yet.
     pub fn new(parameters: TagLocalizerParameters) -> Self {
-        Self { parameters, track: PoseTrack::default(), tags: BTreeMap::new(), pending: Vec::new() }
+        Self { parameters, track: PoseTrack::default(), tags: BTreeMap::new(), pending: BTreeMap::new(), waited: 0 }
     }
 
     /// Adds a pose, and the readings that waited for it. `false`, and it is left out, if it is older than the last one.
@@ -80,10 +82,8 @@ impl TagLocalizer {
         if !self.track.add(time, pose) {
             return false;
         }
-        let (ready, later) = std::mem::take(&mut self.pending).into_iter().partition(|reading| reading.time <= time);
-        self.pending = later;
-        let ready: Vec<RangeReading> = ready;
-        for reading in ready {
+        while let Some(entry) = self.pending.first_entry().filter(|entry| entry.key().0 <= time) {
+            let reading = entry.remove();
             self.place(reading).unwrap_or_else(&mut problem);
         }
         true
@@ -108,7 +108,8 @@ impl TagLocalizer {
         match self.track.latest_time().is_some_and(|latest| time <= latest) {
             true => self.place(reading),
             false => {
-                self.pending.push(reading);
+                self.pending.insert((time, self.waited), reading);
+                self.waited += 1;
                 Ok(())
             }
         }
@@ -116,7 +117,7 @@ impl TagLocalizer {
 
     /// Puts the readings that still wait for a pose where the robot was last seen.
     pub fn place_pending(&mut self, mut problem: impl FnMut(ReadingProblem)) {
-        for reading in std::mem::take(&mut self.pending) {
+        for reading in std::mem::take(&mut self.pending).into_values() {
             self.place(reading).unwrap_or_else(&mut problem);
         }
     }
@@ -188,5 +189,113 @@ impl Tag {
             mode.covariance[(axis, axis)] += position_stddev * position_stddev;
         }
         Some(mode)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, Normal};
+
+    const TAG: Point2 = Point2::new(1.2, 1.1);
+
+    fn at(seconds: f64) -> LogTime {
+        LogTime(1_000_000_000).plus_seconds(seconds)
+    }
+
+    /// Drives along the path and reads the tag ten times a second with noise; a share of readings is any range.
+    fn locate(parameters: TagLocalizerParameters, outliers: f64, path: impl Iterator<Item = (f64, f64)>) -> TagMode {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let noise = Normal::new(0.0, 0.05).unwrap();
+        let mut localizer = TagLocalizer::new(parameters);
+        for (step, (x, y)) in path.enumerate() {
+            let time = at(0.1 * step as f64);
+            assert!(localizer.add_pose(time, pose(x, y, 0.0), |problem| panic!("{problem}")));
+            let range = match random.random::<f64>() < outliers {
+                true => 0.1 + 2.8 * random.random::<f64>(),
+                false => (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random),
+            };
+            localizer.add_reading(time, "tag", range, 0.05).unwrap();
+        }
+        assert!(localizer.read_out_all());
+        *localizer.modes().next().unwrap().1
+    }
+
+    /// Two metres along one side of the tag, then two along another.
+    fn corner() -> impl Iterator<Item = (f64, f64)> {
+        (0..190).map(|step| 0.021 * f64::from(step)).map(|way| if way < 2.0 { (way, 0.0) } else { (2.0, way - 2.0) })
+    }
+
+    #[test]
+    fn readings_with_noise_give_the_place_within_its_covariance() {
+        let mode = locate(TagLocalizerParameters::default(), 0.0, corner());
+        let error = mode.position - TAG;
+        let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
+        assert!(mode.certainty > 0.9 && squared < 9.0, "{mode:?} {squared}");
+    }
+
+    #[test]
+    fn a_fifth_of_outliers_does_not_lead_astray() {
+        let mode = locate(TagLocalizerParameters::default(), 0.2, corner());
+        assert!((mode.position - TAG).norm() < 0.05 && mode.certainty > 0.75, "{mode:?}");
+    }
+
+    #[test]
+    fn a_straight_drive_leaves_a_certainty_of_about_one_half() {
+        let mode = locate(TagLocalizerParameters::default(), 0.0, (0..100).map(|step| (0.02 * f64::from(step), 0.0)));
+        assert!(mode.certainty > 0.3 && mode.certainty < 0.6, "{mode:?}");
+        assert!((mode.mass - 0.5).abs() < 0.05, "{mode:?}");
+    }
+
+    #[test]
+    fn a_robot_that_stands_still_is_not_certain_however_long_it_stands() {
+        let mode = locate(TagLocalizerParameters::default(), 0.0, (0..3000).map(|_| (0.0, 0.0)));
+        assert!(mode.certainty < 0.05, "{mode:?}");
+    }
+
+    #[test]
+    fn far_from_the_origin_nothing_is_lost() {
+        let near = locate(TagLocalizerParameters::default(), 0.0, corner());
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let noise = Normal::new(0.0, 0.05).unwrap();
+        for (step, (x, y)) in corner().enumerate() {
+            let time = at(0.1 * step as f64);
+            localizer.add_pose(time, pose(x + 5e5, y - 4e6, 0.0), |problem| panic!("{problem}"));
+            let _outlier: f64 = random.random();
+            let range = (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random);
+            localizer.add_reading(time, "tag", range, 0.05).unwrap();
+        }
+        localizer.read_out_all();
+        let far = *localizer.modes().next().unwrap().1;
+        assert!((far.position.coords - near.position.coords - nalgebra::Vector2::new(5e5, -4e6)).norm() < 1e-4);
+        assert!((far.covariance - near.covariance).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_reading_between_two_poses_waits_for_the_second() {
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
+        let ignore = |_| ();
+        localizer.add_pose(at(0.0), pose(0.0, 0.0, 0.0), ignore);
+        localizer.add_reading(at(0.25), "tag", 1.0, 0.05).unwrap();
+        assert!(!localizer.read_out_all(), "it has no place yet");
+        localizer.add_pose(at(0.5), pose(1.0, 0.0, 0.0), ignore);
+        assert_eq!(localizer.tags["tag"].first_position, Point2::new(0.5, 0.0));
+        assert!(localizer.read_out_all());
+    }
+
+    #[test]
+    fn a_standard_deviation_that_is_no_number_is_replaced() {
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
+        localizer.add_pose(at(0.0), pose(0.0, 0.0, 0.0), |_| ());
+        for stddev in [f64::NAN, -1.0, 0.0, f64::INFINITY, 1e300] {
+            localizer.add_reading(at(0.0), "tag", 1.0, stddev).unwrap();
+        }
+        assert!(localizer.read_out_all());
+        let mode = localizer.modes().next().unwrap().1;
+        assert!(mode.position.coords.iter().chain(mode.covariance.iter()).all(|value| value.is_finite()), "{mode:?}");
     }
 }

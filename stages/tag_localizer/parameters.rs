@@ -68,7 +68,7 @@ impl Default for TagLocalizerParameters {
             pose_stddev: 0.02,
             min_travel: 0.1,
             outlier_share: 0.02,
-            position_stddev: 0.01,
+            position_stddev: 0.02,
             timeout: 2.0,
             max_pose_age: 0.5,
             min_readings: 5,
