@@ -26,6 +26,7 @@ mod tests {
             v if v > 45.0 && v < 135.0 => 1,
             v if v > 135.0 && v < 225.0 => 2,
             v if v > 225.0 && v < 315.0 => 3,
+            v if v < 0.0 => equation_7(v + 360.0),
             v => equation_7(v - 360.0),
         }
     }
