@@ -70,6 +70,9 @@ pub fn first_guess(
         return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
     }
     let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
+        Ok(rotation) if parameters.rotation == RotationFrom::Both => {
+            (mean_rotation(&by_tags, &rotation), "tags+directions", "rotation from the tags and both maps' directions")
+        }
         Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps"),
         Err(reason) => (by_tags, "tags", reason),
     };
@@ -114,6 +117,14 @@ fn by_directions(
     }
 }
 
+/// The mean of two rotations, weighted with the inverse of their variances.
+fn mean_rotation(a: &TagRotation, b: &TagRotation) -> TagRotation {
+    let (variance_a, variance_b) = (a.deviation * a.deviation, b.deviation * b.deviation);
+    let share_b = variance_a / (variance_a + variance_b);
+    let angle = wrap_angle(a.angle + share_b * turn_difference(b.angle, a.angle, TAU));
+    TagRotation { angle, deviation: share_b.sqrt() * b.deviation }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,7 +160,7 @@ mod tests {
         ) {
             let truth = pose(x, y, yaw);
             let a = direction(direction_b + yaw + f64::from(turns) * FRAC_PI_2);
-            for rotation in [RotationFrom::Directions, RotationFrom::Tags] {
+            for rotation in [RotationFrom::Directions, RotationFrom::Tags, RotationFrom::Both] {
                 for tag_rotation in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
                     for translation in [TranslationFrom::AllTags, TranslationFrom::BestTag, TranslationFrom::Triplet] {
                         let parameters =
