@@ -26,17 +26,18 @@ struct LineExtractor {
 
 impl Stage for LineExtractor {
     fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let left_out = |error: &dyn std::fmt::Display| format!("a map of {} was left out: {error}", message.robot());
         let map: OccupancyGrid<'_> = match message.decode() {
             Ok(map) => map,
             Err(error) => {
-                output.warn(format!("a map of {} was left out: {error}", message.robot()));
+                output.warn(left_out(&error));
                 return Ok(());
             }
         };
         let grid = match Grid::from_message(&map) {
             Ok(grid) => grid,
             Err(error) => {
-                output.warn(format!("a map of {} was left out: {error}", message.robot()));
+                output.warn(left_out(&error));
                 return Ok(());
             }
         };

@@ -160,7 +160,7 @@ impl Parameters for QuadrantClassifierParameters {
             require(not_below_zero(value), field, "must be a number of 0 rad or more");
         }
         let deviation = self.max_tag_rotation_deviation;
-        // Three deviations and the contradiction angle must stay below an eighth turn, where quadrants meet.
+        // Three deviations must stay below an eighth turn, where quadrants meet.
         require(
             deviation > 0.0 && deviation <= 0.25,
             "max_tag_rotation_deviation",
