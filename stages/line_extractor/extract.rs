@@ -106,3 +106,94 @@ fn segment(grid: &Grid<'_>, stretch: &Stretch, reliability: f64, inliers: usize)
         inliers: u32::try_from(inliers).unwrap_or(u32::MAX),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{GridGeometry, pose, turn_difference};
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    const GEOMETRY: (usize, usize, f64) = (240, 240, 0.05);
+
+    /// A room of 8 m by 5 m with walls of single cells, turned by `angle`, in a grid with an origin of its own.
+    fn room(angle: f64) -> (GridGeometry, Vec<i8>) {
+        let (width, height, resolution) = GEOMETRY;
+        let geometry = GridGeometry { width, height, resolution, origin: pose(-3.0, 7.0, 0.4) };
+        let mut cells = vec![0; width * height];
+        let corners = [[-4.0, -2.5], [4.0, -2.5], [4.0, 2.5], [-4.0, 2.5]].map(Point2::from);
+        let transform = geometry.origin * pose(6.0, 6.0, angle - 0.4);
+        for (index, from) in corners.iter().enumerate() {
+            let to = corners[(index + 1) % 4];
+            for step in 0..1000 {
+                let point = transform * Point2::from(from.coords.lerp(&to.coords, f64::from(step) / 1000.0));
+                let cell = geometry.cell(&point).unwrap();
+                cells[geometry.index(cell)] = 100;
+            }
+        }
+        (geometry, cells)
+    }
+
+    fn length(segment: &Segment) -> f64 {
+        (segment.x2 - segment.x1).hypot(segment.y2 - segment.y1)
+    }
+
+    #[test]
+    fn the_four_walls_of_a_room_are_found_at_any_angle() {
+        for degrees in (0..180).step_by(7) {
+            let angle = f64::from(degrees).to_radians();
+            let (geometry, cells) = room(angle);
+            let grid = Grid::new(geometry, &cells).unwrap();
+            let segments = extract_segments(&grid, &LineExtractorParameters::default(), 5);
+            assert_eq!(segments.len(), 4, "{degrees} {segments:?}");
+            let lengths: Vec<f64> = segments.iter().map(length).collect();
+            for (length, expected) in lengths.iter().zip([8.0, 8.0, 5.0, 5.0]) {
+                assert!((length - expected).abs() < 0.35, "{degrees} {lengths:?}");
+            }
+            for segment in &segments {
+                let direction = (segment.y2 - segment.y1).atan2(segment.x2 - segment.x1);
+                assert!(turn_difference(direction, angle, FRAC_PI_2).abs() < 0.005, "{degrees} {segment:?}");
+                assert!(segment.reliability > 0.95);
+            }
+            let long = (segments[0].y2 - segments[0].y1).atan2(segments[0].x2 - segments[0].x1);
+            assert!(turn_difference(long, angle, PI).abs() < 0.005);
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_segments_and_a_sub_sample_the_same_walls() {
+        let (geometry, cells) = room(0.3);
+        let grid = Grid::new(geometry, &cells).unwrap();
+        let all = LineExtractorParameters::default();
+        assert_eq!(extract_segments(&grid, &all, 9), extract_segments(&grid, &all, 9));
+        let some = LineExtractorParameters { max_points: 300, ..all.clone() };
+        let (all, some) = (extract_segments(&grid, &all, 9), extract_segments(&grid, &some, 9));
+        assert_eq!(some.len(), 4);
+        assert!((length(&all[0]) - length(&some[0])).abs() < 0.3);
+        assert!(some[0].inliers > 140, "they are fitted to all cells");
+    }
+
+    #[test]
+    fn grids_without_walls_have_none() {
+        let parameters = LineExtractorParameters::default();
+        for value in [-1, 0, 50, i8::MIN] {
+            for (width, height) in [(0, 0), (1, 1), (50, 40)] {
+                let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
+                let cells = vec![value; width * height];
+                assert_eq!(extract_segments(&Grid::new(geometry, &cells).unwrap(), &parameters, 1), []);
+            }
+        }
+    }
+
+    #[test]
+    fn odd_grids_do_no_harm() {
+        let parameters = LineExtractorParameters::default();
+        for resolution in [1e-9, 0.05, 5.0, 1e300] {
+            for x in [0.0, 1e300, f64::MAX] {
+                let geometry = GridGeometry { width: 60, height: 40, resolution, origin: pose(x, 0.0, 0.7) };
+                let cells = vec![100; 2400];
+                let segments = extract_segments(&Grid::new(geometry, &cells).unwrap(), &parameters, 1);
+                assert!(segments.iter().all(|s| [s.x1, s.y1, s.x2, s.y2, s.reliability].iter().all(|v| v.is_finite())));
+            }
+        }
+    }
+}

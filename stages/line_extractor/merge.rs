@@ -15,23 +15,27 @@ pub(super) fn merge_walls(
     parameters: &LineExtractorParameters,
     scale: &Scale,
 ) -> Vec<Wall> {
-    let mut first = 0;
-    while first < walls.len() {
-        let merged = (first + 1..walls.len()).find_map(|second| {
-            let wall = merge(points, &walls[first], &walls[second], parameters, scale)?;
-            Some((second, wall))
-        });
-        match merged {
-            Some((second, wall)) => {
-                walls[first] = wall;
-                walls.remove(second);
-                // The longer wall may have come near an earlier one.
-                first = 0;
+    loop {
+        let before = walls.len();
+        let mut first = 0;
+        while first < walls.len() {
+            let merged = (first + 1..walls.len()).find_map(|second| {
+                let wall = merge(points, &walls[first], &walls[second], parameters, scale)?;
+                Some((second, wall))
+            });
+            match merged {
+                Some((second, wall)) => {
+                    walls[first] = wall;
+                    walls.remove(second);
+                }
+                None => first += 1,
             }
-            None => first += 1,
+        }
+        // A wall that has grown may have come near one before it.
+        if walls.len() == before {
+            return walls;
         }
     }
-    walls
 }
 
 fn merge(points: &[Point2], a: &Wall, b: &Wall, parameters: &LineExtractorParameters, scale: &Scale) -> Option<Wall> {

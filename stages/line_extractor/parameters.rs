@@ -132,6 +132,7 @@ impl Parameters for LineExtractorParameters {
         require(self.min_points >= 2, "min_points", "must be 2 or more");
         require(self.max_points >= 2, "max_points", "must be 2 or more");
         require(self.candidates >= 1, "candidates", "must be 1 or more");
+        require(self.max_iterations >= 1, "max_iterations", "must be 1 or more");
         require(self.patience >= 1, "patience", "must be 1 or more");
         errors
     }
@@ -157,6 +158,7 @@ mod tests {
             stop_share: -0.1,
             candidates: 0,
             patience: 0,
+            max_iterations: 0,
             max_gap: -1.0,
             merge_angle: 2.0,
             merge_distance: f64::INFINITY,
@@ -164,6 +166,6 @@ mod tests {
             min_reliability: f64::NAN,
             ..Default::default()
         };
-        assert_eq!(parameters.check().len(), 13);
+        assert_eq!(parameters.check().len(), 14);
     }
 }

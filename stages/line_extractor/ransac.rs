@@ -4,7 +4,7 @@ use super::line::Line;
 use super::parameters::{LineExtractorParameters, Sampling, Scoring};
 use super::point_index::PointIndex;
 use super::scale::Scale;
-use super::wall::{Wall, break_down};
+use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
 
 /// How often a line is fitted to its members, and these are counted again.
@@ -159,7 +159,7 @@ impl Search<'_> {
             let points = self.index.points();
             let Some(&from) = candidate.members.first() else { break };
             let Candidate { line, members } = &candidate;
-            let fitted = super::wall::fit_stretch(self.parameters.fit, line, members.iter().map(|&id| points[id]));
+            let fitted = fit_stretch(self.parameters.fit, line, members.iter().map(|&id| points[id]));
             let Some(fitted) = fitted else { break };
             let members = self.members(pool, &fitted.line, from);
             candidate = Candidate { line: fitted.line, members };

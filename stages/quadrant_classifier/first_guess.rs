@@ -8,7 +8,7 @@ use super::translation::{residual, translate};
 use crate::geometry::{Pose2, turn_difference, wrap_angle};
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix3;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A first guess of an alignment.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,12 +70,15 @@ pub fn first_guess(
         return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
     }
     let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
+        Ok(rotation) if parameters.rotation == RotationFrom::Both => {
+            (mean_rotation(&by_tags, &rotation), "tags+directions", "rotation from the tags and both maps' directions")
+        }
         Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps"),
         Err(reason) => (by_tags, "tags", reason),
     };
     let transform = translate(&pairs, &rotation, parameters.translation).ok_or(GuessError::NoRotation(count))?;
     let residual = residual(&pairs, &transform.transform_a_b);
-    if !(residual <= parameters.max_residual) {
+    if residual.is_nan() || residual > parameters.max_residual {
         return Err(GuessError::Residual { count, residual });
     }
     let precisions = tags.iter().map(CommonTag::common_precision).filter(|precision| precision.is_finite());
@@ -87,6 +90,9 @@ pub fn first_guess(
         reason: format!("{count} common tags; {rotation_reason}"),
     })
 }
+
+/// Near 45 degrees from the directions' rotation the quarter turn is a toss of a coin, however uncertain the tags are.
+const MAX_CONTRADICTION: f64 = PI / 6.0;
 
 /// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
 fn by_directions(
@@ -108,10 +114,19 @@ fn by_directions(
     let angle = wrap_angle(d_theta + f64::from(quadrant(by_tags.angle, d_theta)) * FRAC_PI_2);
     let deviation = a.deviation.hypot(b.deviation);
     let limit = 3.0 * deviation.hypot(by_tags.deviation) + parameters.contradiction_angle;
+    let limit = limit.min(MAX_CONTRADICTION);
     match turn_difference(by_tags.angle, angle, TAU).abs() <= limit {
         true => Ok(TagRotation { angle, deviation }),
         false => Err("rotation from the tags, which the directions of the maps contradict"),
     }
+}
+
+/// The mean of two rotations, weighted with the inverse of their variances.
+fn mean_rotation(a: &TagRotation, b: &TagRotation) -> TagRotation {
+    let (variance_a, variance_b) = (a.deviation * a.deviation, b.deviation * b.deviation);
+    let share_b = variance_a / (variance_a + variance_b);
+    let angle = wrap_angle(a.angle + share_b * turn_difference(b.angle, a.angle, TAU));
+    TagRotation { angle, deviation: share_b.sqrt() * b.deviation }
 }
 
 #[cfg(test)]
@@ -149,7 +164,7 @@ mod tests {
         ) {
             let truth = pose(x, y, yaw);
             let a = direction(direction_b + yaw + f64::from(turns) * FRAC_PI_2);
-            for rotation in [RotationFrom::Directions, RotationFrom::Tags] {
+            for rotation in [RotationFrom::Directions, RotationFrom::Tags, RotationFrom::Both] {
                 for tag_rotation in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
                     for translation in [TranslationFrom::AllTags, TranslationFrom::BestTag, TranslationFrom::Triplet] {
                         let parameters =
@@ -199,6 +214,27 @@ mod tests {
         assert_eq!(found.method, "tags+directions");
         assert!((found.transform_a_b.rotation.angle() - 2.0).abs() < 1e-9);
         assert_eq!(found.score, 0.76);
+    }
+
+    #[test]
+    fn the_rotation_from_both_lies_between_and_is_known_better_than_from_either() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let rotation = |rotation: RotationFrom| {
+            let parameters = QuadrantClassifierParameters { rotation, ..Default::default() };
+            let a = Direction { deviation: 0.005, ..direction(2.01) };
+            let guess = first_guess(&tags, Some(&a), Some(&direction(0.0)), &parameters).unwrap();
+            (guess.transform_a_b.rotation.angle(), guess.covariance[(2, 2)])
+        };
+        let [directions, tags, both] = [RotationFrom::Directions, RotationFrom::Tags, RotationFrom::Both].map(rotation);
+        assert!(both.0 > tags.0 && both.0 < directions.0);
+        assert!(both.1 < tags.1.min(directions.1));
+    }
+
+    #[test]
+    fn near_the_border_of_two_quadrants_the_directions_are_left_out() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let vague = Direction { deviation: 0.5, ..direction(2.0 - 0.7) };
+        assert_eq!(guess(&tags, Some(&vague), Some(&direction(0.0))).unwrap().method, "tags");
     }
 
     #[test]

@@ -37,6 +37,8 @@ pub enum RotationFrom {
     Directions,
     /// The tags alone (the paper's method 1).
     Tags,
+    /// The mean of the two, weighted with the inverse of their variances.
+    Both,
 }
 
 /// How the tags tell a rotation.
@@ -71,14 +73,15 @@ pub struct QuadrantClassifierParameters {
     pub mean: Mean,
     /// How much a wall counts: `length` (length x reliability) or `equation_4` (as printed in the paper).
     pub weighting: Weighting,
-    /// Where the rotation between two maps comes from: `directions` or `tags` (the paper's method 1). Maps without a
-    /// direction, or whose directions contradict the tags, are turned by the tags in any case.
+    /// Where the rotation between two maps comes from: `directions`, `tags` (the paper's method 1) or `both`. Maps
+    /// without a direction, or whose directions contradict the tags, are turned by the tags in any case.
     pub rotation: RotationFrom,
     /// How the tags tell a rotation: `least_squares` or `triplet` (the paper).
     pub tag_rotation: TagRotationFrom,
     /// Which tags give the translation: `all_tags`, `best_tag` (the paper) or `triplet` (the paper's method 1).
     pub translation: TranslationFrom,
-    /// A wall within this angle of the map's direction, or of its perpendicular, agrees with it, radians.
+    /// A wall within this angle of the map's direction, or of its perpendicular, agrees with it, radians. Others have no
+    /// say in the `circular` mean.
     pub tolerance: f64,
     /// A map has a direction if at least this share of its wall length agrees with it, 0 to 1. Walls of all directions
     /// alike give tolerance / 45 degrees, 0.11 by default.
@@ -119,7 +122,7 @@ impl Default for QuadrantClassifierParameters {
             min_agreement: 0.35,
             min_wall_length: 2.0,
             end_deviation: 0.02,
-            min_deviation: 0.002,
+            min_deviation: 0.004,
             tag_deviation: 0.03,
             max_tag_rotation_deviation: 0.2,
             contradiction_angle: 0.01,
@@ -157,7 +160,7 @@ impl Parameters for QuadrantClassifierParameters {
             require(not_below_zero(value), field, "must be a number of 0 rad or more");
         }
         let deviation = self.max_tag_rotation_deviation;
-        // Three deviations and the contradiction angle must stay below an eighth turn, where quadrants meet.
+        // Three deviations must stay below an eighth turn, where quadrants meet.
         require(
             deviation > 0.0 && deviation <= 0.25,
             "max_tag_rotation_deviation",

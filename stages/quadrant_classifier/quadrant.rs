@@ -21,13 +21,11 @@ mod tests {
 
     /// Equation 7, with quadrants of 90 degrees.
     fn equation_7(theta_hat_degrees: f64) -> u8 {
-        match theta_hat_degrees {
-            v if v > -45.0 && v < 45.0 => 0,
-            v if v > 45.0 && v < 135.0 => 1,
-            v if v > 135.0 && v < 225.0 => 2,
-            v if v > 225.0 && v < 315.0 => 3,
-            v if v < 0.0 => equation_7(v + 360.0),
-            v => equation_7(v - 360.0),
+        match (theta_hat_degrees + 45.0).rem_euclid(360.0) - 45.0 {
+            v if v < 45.0 => 0,
+            v if v < 135.0 => 1,
+            v if v < 225.0 => 2,
+            _ => 3,
         }
     }
 

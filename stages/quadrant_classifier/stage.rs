@@ -167,3 +167,121 @@ impl QuadrantClassifier {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, Pose2, pose};
+    use gridweave_runtime::message::{LogTime, MessageHeader};
+    use gridweave_runtime::ros::{CommonTag, Segment, encode};
+    use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
+
+    const COMMON: usize = 1;
+
+    struct Run {
+        stage: Box<dyn Stage>,
+        outputs: CollectedOutputs,
+    }
+
+    impl Run {
+        fn new() -> Self {
+            let kind = kind();
+            let Node::Stage(stage) = kind.make(Default::default(), &Context::default()).unwrap() else {
+                panic!("a stage")
+            };
+            Self { stage, outputs: CollectedOutputs::new(&kind) }
+        }
+
+        /// Hands the stage a message and gives the alignments that it sends.
+        fn receive(&mut self, port: usize, message: &impl serde::Serialize) -> Vec<Alignment> {
+            let message = Message::from_vec(MessageHeader::default(), encode(message).unwrap());
+            self.stage.receive(port, &message, &mut self.outputs.output(LogTime(7))).unwrap();
+            self.outputs.take(ALIGNMENT).iter().map(|message| message.decode().unwrap()).collect()
+        }
+    }
+
+    /// A room whose walls stand at `angle`.
+    fn segments(robot: &str, angle: f64) -> Segments {
+        let wall = |(x1, y1, x2, y2): (f64, f64, f64, f64)| {
+            let turn = pose(0.0, 0.0, angle);
+            let (a, b) = (turn * Point2::new(x1, y1), turn * Point2::new(x2, y2));
+            Segment { x1: a.x, y1: a.y, x2: b.x, y2: b.y, reliability: 1.0, inliers: 50 }
+        };
+        let room = [(0.0, 0.0, 8.0, 0.0), (8.0, 0.0, 8.0, 5.0), (8.0, 5.0, 0.0, 5.0), (0.0, 5.0, 0.0, 0.0)];
+        let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
+        Segments { header, robot: robot.into(), segments: room.map(wall).to_vec() }
+    }
+
+    fn common(transform_a_b: &Pose2) -> CommonTags {
+        let tag = |(x, y): (f64, f64)| {
+            let a = transform_a_b * Point2::new(x, y);
+            let covariance = [0.001, 0.0, 0.0, 0.001];
+            CommonTag {
+                a: [a.x, a.y],
+                b: [x, y],
+                covariance_a: covariance,
+                covariance_b: covariance,
+                certainty_a: 0.95,
+                certainty_b: 0.9,
+                ..Default::default()
+            }
+        };
+        let tags = [(1.0, 0.0), (8.0, 2.0), (3.0, 5.0)].map(tag).to_vec();
+        let (robot_a, robot_b) = ("robot1".into(), "robot2".into());
+        CommonTags { robot_a, robot_b, tags, accepted: true, ..Default::default() }
+    }
+
+    #[test]
+    fn maps_and_common_tags_give_an_alignment_which_every_new_map_sends_again() {
+        let mut run = Run::new();
+        let truth = pose(4.0, -2.0, 2.5);
+        assert!(run.receive(SEGMENTS, &segments("robot1", 2.5)).is_empty());
+        let directions = run.outputs.take(DIRECTION);
+        let direction: MapDirection = directions[0].decode().unwrap();
+        assert!(direction.valid && turn_difference(direction.direction, 2.5, TAU / 4.0).abs() < 1e-9);
+
+        let first = run.receive(COMMON, &common(&truth));
+        assert_eq!(first.len(), 1);
+        assert_eq!(first[0].method, "tags");
+        assert!(run.receive(COMMON, &common(&truth)).is_empty(), "nothing has changed");
+
+        let second = run.receive(SEGMENTS, &segments("robot2", 0.0));
+        assert_eq!(second.len(), 1);
+        assert_eq!((second[0].method.as_str(), second[0].accepted), ("tags+directions", true));
+        assert_eq!((second[0].a.as_str(), second[0].b.as_str()), ("robot1", "robot2"));
+        assert_eq!(second[0].header.frame_id, "robot1/map");
+        assert_eq!(second[0].score, 0.9);
+        let error = second[0].transform_a_b() * truth.inverse();
+        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-9);
+        assert!(second[0].covariance.iter().all(|value| value.is_finite()) && second[0].covariance[8] > 0.0);
+
+        assert_eq!(run.receive(SEGMENTS, &segments("robot2", 0.0)), second, "the refiner works on the map");
+        assert!(run.receive(SEGMENTS, &segments("robot3", 0.0)).is_empty(), "it is in no pair");
+        assert_eq!(run.receive(COMMON, &common(&pose(4.0, -1.9, 2.5))).len(), 1);
+        assert_eq!(run.stage.report().unwrap()["directions"]["robot2"]["valid"], true);
+    }
+
+    #[test]
+    fn refused_tags_are_passed_on_with_their_reason() {
+        let mut run = Run::new();
+        let refused = CommonTags { accepted: false, reason: "two tags only".into(), ..common(&pose(0.0, 0.0, 0.0)) };
+        let sent = run.receive(COMMON, &refused);
+        assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "two tags only"));
+        assert!(run.receive(COMMON, &refused).is_empty());
+        let together = CommonTags { tags: vec![refused.tags[0].clone(); 3], accepted: true, ..refused };
+        let sent = run.receive(COMMON, &together);
+        assert!(!sent[0].accepted && sent[0].reason.contains("do not tell the rotation"), "{}", sent[0].reason);
+    }
+
+    #[test]
+    fn what_cannot_be_read_and_a_robot_paired_with_itself_are_left_out_with_a_warning() {
+        let mut run = Run::new();
+        let broken = Message::from_vec(MessageHeader::default(), vec![0, 1]);
+        for port in [SEGMENTS, COMMON] {
+            run.stage.receive(port, &broken, &mut run.outputs.output(LogTime(1))).unwrap();
+        }
+        let own = CommonTags { robot_b: "robot1".into(), ..common(&pose(0.0, 0.0, 0.0)) };
+        assert!(run.receive(COMMON, &own).is_empty());
+        assert_eq!(run.outputs.warnings().len(), 3);
+    }
+}
