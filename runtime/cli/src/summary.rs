@@ -99,10 +99,10 @@ impl Summary {
     fn write_frames(&self, out: &mut String, reference: &str) -> std::fmt::Result {
         let merged = self.frames().count();
         let all = merged + self.object("unmerged").count();
-        if all == 1 {
-            writeln!(out, "only {reference} has a map: there is nothing to merge it with")?;
-        } else {
-            writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?;
+        match (merged, all) {
+            (_, 1) => writeln!(out, "only {reference} has a map: there is nothing to merge it with")?,
+            (1, _) => writeln!(out, "none of the other {} robots could be merged with {reference}", all - 1)?,
+            _ => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
         }
         let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
         for (robot, [x, y, yaw]) in self.frames() {
