@@ -1,14 +1,8 @@
 //! Occupancy grids: where their cells lie, and what they say.
 
 use super::{Point2, Pose2};
+use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
-
-/// The value of a cell that nobody has seen.
-pub const UNKNOWN: i8 = -1;
-/// A known cell with a value above this is occupied: 65 %, as in nav2's map server.
-pub const OCCUPIED_ABOVE: i8 = 64;
-/// A known cell with a value below this is free: 25 %, as in nav2's map server.
-pub const FREE_BELOW: i8 = 25;
 
 /// A cell's place in a grid: column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -145,16 +139,6 @@ impl From<&MapMetaData> for GridGeometry {
             origin: info.origin.planar(),
         }
     }
-}
-
-/// Whether a cell's value stands for an obstacle.
-pub fn is_occupied(value: i8) -> bool {
-    value > OCCUPIED_ABOVE
-}
-
-/// Whether a cell's value stands for free space.
-pub fn is_free(value: i8) -> bool {
-    (0..FREE_BELOW).contains(&value)
 }
 
 /// The double with the shortest decimal that rounds to the given single.

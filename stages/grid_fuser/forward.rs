@@ -4,7 +4,7 @@
 
 use super::evidence::{Evidence, EvidenceTable};
 use super::{KnownArea, PlacedGrid};
-use crate::geometry::{Cell, GridGeometry, UNKNOWN, is_occupied};
+use crate::geometry::{Cell, GridGeometry, UNKNOWN, is_known, is_occupied};
 use rayon::prelude::*;
 
 /// How many of its eight neighbours must be known for an unknown cell to be a gap. The border of a straight or
@@ -27,7 +27,7 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
 pub fn carry(map: &PlacedGrid<'_>, geometry: &GridGeometry) -> Vec<i8> {
     let mut carried = vec![UNKNOWN; geometry.cell_count()];
     let width = map.grid.geometry.width.max(1);
-    for (index, &value) in map.grid.cells.iter().enumerate().filter(|(_, value)| (0..=100).contains(*value)) {
+    for (index, &value) in map.grid.cells.iter().enumerate().filter(|(_, value)| is_known(**value)) {
         let cell = Cell { column: index % width, row: index / width };
         let centre = map.transform_world_map * map.grid.geometry.centre(cell);
         let Some(place) = geometry.cell(&centre).and_then(|cell| carried.get_mut(geometry.index(cell))) else {

@@ -1,6 +1,6 @@
 //! Where the known cells of a grid lie.
 
-use crate::geometry::{Grid, Point2};
+use crate::geometry::{Grid, Point2, is_known};
 
 /// Cells along the side of a tile.
 pub const TILE: usize = 32;
@@ -29,7 +29,7 @@ impl KnownArea {
         let (tile_columns, tile_rows) = (grid.geometry.width.div_ceil(TILE), grid.geometry.height.div_ceil(TILE));
         let near = vec![false; tile_columns * tile_rows];
         let mut area = Self { rows: Vec::new(), columns: (0, 0), near, tile_columns };
-        let is_known = |value: &i8| (0..=100).contains(value);
+        let is_known = |value: &i8| is_known(*value);
         for (row, cells) in grid.cells.chunks_exact(grid.geometry.width.max(1)).enumerate() {
             let Some(first) = cells.iter().position(is_known) else { continue };
             let behind = cells.iter().rposition(is_known).map_or(cells.len(), |last| last + 1);

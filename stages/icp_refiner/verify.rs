@@ -1,7 +1,7 @@
 //! How well two maps agree where both know something.
 
 use super::{IcpParameters, WallMap};
-use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_free};
+use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_free, is_known};
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
 /// cells.
@@ -64,7 +64,7 @@ pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, paramete
     let (mut known, mut free) = (0usize, 0usize);
     for sample in &b.walls.samples {
         let value = value_at(&a.grid, &(transform_a_b * sample.point));
-        known += usize::from(value >= 0);
+        known += usize::from(is_known(value));
         free += usize::from(sample.free && is_free(value));
     }
     Agreement {
@@ -88,7 +88,7 @@ fn walls_on(map: &MapView<'_>, other: &WallMap, transform_map_other: &Pose2, tol
         let point = transform_map_other * point;
         // The cell is cheaper to look at than the walls, and most walls of one map are unknown to the other.
         let value = value_at(&map.grid, &point);
-        if value < 0 {
+        if !is_known(value) {
             continue;
         }
         if map.walls.walls.nearest(&point, tolerance).is_some() {

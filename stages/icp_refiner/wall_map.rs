@@ -1,7 +1,7 @@
 //! What registration and verification need of one map, made once for each map.
 
 use super::PointIndex;
-use crate::geometry::{Cell, Grid, Point2, is_free, is_occupied};
+use crate::geometry::{Cell, Grid, Point2, is_free, is_known, is_occupied};
 use nalgebra::Vector2;
 
 /// Distance between the samples of known space, metres.
@@ -57,7 +57,7 @@ impl WallMap {
 fn borders_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
     let rows = cell.row.saturating_sub(1)..=cell.row + 1;
     rows.flat_map(|row| (cell.column.saturating_sub(1)..=cell.column + 1).map(move |column| Cell { column, row }))
-        .any(|cell| matches!(grid.value(cell), value if value >= 0 && !is_occupied(value)))
+        .any(|cell| matches!(grid.value(cell), value if is_known(value) && !is_occupied(value)))
 }
 
 /// A point on the line through a cell's neighbours, and that line's normal, in cells.
@@ -131,7 +131,7 @@ fn known_samples(grid: &Grid<'_>) -> (Vec<KnownSample>, f64) {
         for column in (stride / 2..width).step_by(stride) {
             let cell = Cell { column, row };
             let value = grid.value(cell);
-            if value >= 0 {
+            if is_known(value) {
                 samples.push(KnownSample { point: grid.geometry.centre(cell), free: is_free(value) });
             }
         }

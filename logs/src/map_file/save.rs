@@ -1,6 +1,7 @@
 //! Writing a map.
 
 use super::{GridMap, MapFileError};
+use gridweave_runtime::ros::cell::{is_free, is_occupied};
 use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 use std::fs;
@@ -10,9 +11,6 @@ use std::path::{Path, PathBuf};
 const OCCUPIED_SHADE: u8 = 0;
 const FREE_SHADE: u8 = 254;
 const UNKNOWN_SHADE: u8 = 205;
-/// The least value of an occupied cell, and the first that is no longer free.
-const OCCUPIED_FROM: i8 = 65;
-const FREE_TO: i8 = 25;
 /// The thresholds that read those shades back. The shade of unknown has the occupancy 50 / 255 = 0.19608, so that the
 /// usual 0.25 would turn unknown cells into free ones.
 const OCCUPIED_THRESHOLD: f64 = 0.65;
@@ -69,8 +67,8 @@ fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'
 
 fn shade(cell: i8) -> u8 {
     match cell {
-        0..FREE_TO => FREE_SHADE,
-        OCCUPIED_FROM..=100 => OCCUPIED_SHADE,
+        _ if is_free(cell) => FREE_SHADE,
+        _ if is_occupied(cell) => OCCUPIED_SHADE,
         _ => UNKNOWN_SHADE,
     }
 }

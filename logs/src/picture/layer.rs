@@ -2,12 +2,8 @@
 
 use super::view::View;
 use gridweave_runtime::ros::MapMetaData;
+use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 use nalgebra::{Isometry2, Point2, Vector2};
-
-/// Known cells from this value on are walls.
-const WALL_FROM: i8 = 65;
-/// Known cells up to this value are free; those between are drawn as unknown.
-const FREE_TO: i8 = 25;
 
 /// A map, and where it lies.
 #[derive(Clone, Copy, Debug)]
@@ -59,8 +55,8 @@ impl<'a> PlacedLayer<'a> {
     pub(super) fn outline(&self) -> impl Iterator<Item = Point2<f64>> + '_ {
         let rows = self.cells.chunks_exact(self.width.max(1)).enumerate();
         rows.flat_map(move |(row, cells)| {
-            let first = cells.iter().position(|&cell| cell >= 0);
-            let last = cells.iter().rposition(|&cell| cell >= 0);
+            let first = cells.iter().position(|&cell| is_known(cell));
+            let last = cells.iter().rposition(|&cell| is_known(cell));
             first.zip(last).into_iter().flat_map(move |(first, last)| {
                 let corners = [(first, row), (first, row + 1), (last + 1, row), (last + 1, row + 1)];
                 corners.map(|(column, row)| {
@@ -82,14 +78,12 @@ impl<'a> PlacedLayer<'a> {
         let across: Vector2<f64> = to_grid(u + step, v) - first;
         let down: Vector2<f64> = to_grid(u, v + step) - first;
 
-        let (mut walls, mut free) = (0, 0);
+        let (mut walls, mut free) = (0u32, 0u32);
         for i in 0..samples {
             for j in 0..samples {
-                match self.cell(first + across * i as f64 + down * j as f64) {
-                    WALL_FROM..=i8::MAX => walls += 1,
-                    0..FREE_TO => free += 1,
-                    _ => {}
-                }
+                let cell = self.cell(first + across * i as f64 + down * j as f64);
+                walls += u32::from(is_occupied(cell));
+                free += u32::from(is_free(cell));
             }
         }
         let count = (samples * samples) as f64;
@@ -101,9 +95,9 @@ impl<'a> PlacedLayer<'a> {
     /// The cell at a place in units of cells; unknown outside of the map.
     fn cell(&self, place: Point2<f64>) -> i8 {
         if !(place.x >= 0.0 && place.y >= 0.0 && place.x < self.width as f64) {
-            return -1;
+            return UNKNOWN;
         }
         let index = (place.y as usize).checked_mul(self.width).and_then(|row| row.checked_add(place.x as usize));
-        index.and_then(|index| self.cells.get(index)).copied().unwrap_or(-1)
+        index.and_then(|index| self.cells.get(index)).copied().unwrap_or(UNKNOWN)
     }
 }

@@ -3,6 +3,7 @@
 //! The types mirror the `.msg` files field by field. Units are SI, angles radians, and a frame is named in the header.
 //! [`OccupancyGrid`] borrows its cells; the others are small and own their parts.
 
+pub mod cell;
 mod codec;
 mod geometry;
 mod gridweave;
