@@ -4,6 +4,7 @@
 pub mod info;
 pub mod map_file;
 pub mod picture;
+mod qos;
 pub mod reader;
 pub mod schemas;
 pub mod sink;

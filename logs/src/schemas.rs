@@ -1,5 +1,7 @@
 //! The definitions of the ROS 2 types that Gridweave writes, from the `.msg` files in `logs/msg`.
 
+use std::borrow::Cow;
+
 /// Stands between a definition and the next of the types that it uses.
 const SEPARATOR: &str = "================================================================================";
 
@@ -52,6 +54,14 @@ pub fn schema_text(name: &str) -> Option<String> {
     let mut used = vec![name.as_str()];
     append_used_types(definition(&name)?, &mut used, &mut text);
     Some(text)
+}
+
+/// The name of a type with its `/msg/`, which some old logs leave out.
+pub fn full_type_name(name: &str) -> Cow<'_, str> {
+    match name.split_once('/') {
+        Some((package, message)) if !message.contains('/') => Cow::Owned(format!("{package}/msg/{message}")),
+        _ => Cow::Borrowed(name),
+    }
 }
 
 /// The full names (`package/msg/Type`) of all types that [`schema_text`] knows, by name.

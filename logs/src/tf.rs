@@ -6,9 +6,6 @@ use gridweave_runtime::stage::{TfFrames, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The name of the type of tf messages.
-pub(crate) const TF_TYPE: &str = "tf2_msgs/msg/TFMessage";
-
 /// Whether tf messages come on `topic`, and the prefix of the frames in them: `/tf` and `/tf_static` have frames with
 /// their full names, `/robot1/tf` and `/robot1/tf_static` frames that lack the `robot1/` before them.
 pub fn tf_topic(topic: &str) -> Option<&str> {

@@ -1,7 +1,6 @@
 //! What is in a log: topics, robots, and what is wrong with it.
 
 mod robots;
-mod text;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,8 @@
 //! What a log holds of each robot.
 
 use super::LogInfo;
-use crate::source::{Classified, Role, classify, full_type_name};
+use crate::schemas::full_type_name;
+use crate::source::{Classified, Role, classify};
 use crate::tf::TfPoses;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
@@ -84,12 +85,7 @@ impl RobotSurvey {
             Role::Tags => {
                 info.readings += 1;
                 match decode::<TagRangeStart>(data) {
-                    Ok(reading) => match info.tags.get_mut(&reading.tag_id) {
-                        Some(count) => *count += 1,
-                        None => {
-                            info.tags.insert(reading.tag_id, 1);
-                        }
-                    },
+                    Ok(reading) => *info.tags.entry(reading.tag_id).or_default() += 1,
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
                 }
             }

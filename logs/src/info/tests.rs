@@ -37,10 +37,6 @@ fn topics_robots_and_times_are_told() {
     assert_eq!(robot.topics.len(), 3);
     assert_eq!(info.files[0].compression, ["zstd"]);
     assert_eq!(info.problems, [""; 0]);
-    let text = info.to_text();
-    for part in ["10 messages over 4.0 s", "/robot1/tag_ranges", "gridweave_msgs/msg/TagRange", "Readings", "zstd"] {
-        assert!(text.contains(part), "{part} is not in\n{text}");
-    }
     assert!(serde_json::to_string(&info).unwrap().contains("\"type\":\"nav_msgs/msg/OccupancyGrid\""));
 }
 
@@ -66,5 +62,4 @@ fn what_stands_in_the_way_of_a_merge_is_told() {
     }
     let empty = inspect_bytes(&TestLog::new(layouts()[0].clone()).finish());
     assert_eq!(empty.problems, ["there are no messages"]);
-    assert!(empty.to_text().contains("0 messages"));
 }

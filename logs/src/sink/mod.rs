@@ -10,7 +10,6 @@
 
 mod error;
 mod log_writer;
-mod qos;
 mod routing;
 mod stage;
 

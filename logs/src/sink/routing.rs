@@ -1,7 +1,7 @@
 //! Which channel of the log a message is written on.
 
-use super::qos;
-use crate::schemas::schema_text;
+use crate::qos;
+use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{RosMessage, TFMessage};
 use gridweave_runtime::stage::{Context, match_robot};
@@ -54,8 +54,7 @@ fn fits(template: &str, topic: &str) -> bool {
 }
 
 fn is_tf(channel: &Channel) -> bool {
-    let name = channel.schema_name.as_str();
-    channel.message_encoding == "cdr" && (name == TFMessage::NAME || name == "tf2_msgs/TFMessage")
+    channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME
 }
 
 /// The channel of a result. Its schema is empty if the type is none that Gridweave has a definition of.

@@ -1,5 +1,6 @@
 //! The part of a log that is read, and the latched messages before it.
 
+use crate::qos;
 use crate::reader::LogMessage;
 use gridweave_runtime::message::{Channel, LogTime};
 use std::collections::BTreeMap;
@@ -34,12 +35,9 @@ pub(crate) enum Latch {
 impl Latch {
     /// How `channel` latches. Maps always do, whatever their publisher offered.
     pub(crate) fn of(channel: &Channel, is_map: bool) -> Self {
-        let offered = channel.metadata.get("offered_qos_profiles").map_or("", String::as_str);
-        // ROS 2 writes the durability as a number up to Iron, and as a word since.
-        let is_transient_local = |line: &str| matches!(line.trim(), "durability: 1" | "durability: transient_local");
         if channel.topic.ends_with("/tf_static") {
             Self::All
-        } else if is_map || offered.lines().any(is_transient_local) {
+        } else if is_map || qos::is_transient_local(&channel.metadata) {
             Self::Last
         } else {
             Self::No

@@ -10,7 +10,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use route::{Classified, Role, classify, full_type_name};
+pub(crate) use route::{Classified, Role, classify};
 pub use stage::McapSource;
 
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, TagRange};

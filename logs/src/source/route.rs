@@ -1,10 +1,10 @@
 //! What a channel carries, by its topic and its type.
 
-use crate::tf::{TF_TYPE, tf_topic};
+use crate::schemas::full_type_name;
+use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
-use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TagRange};
+use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TFMessage, TagRange};
 use gridweave_runtime::stage::{RobotTopics, match_robot};
-use std::borrow::Cow;
 
 /// What a channel carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub(crate) fn classify<'a>(robots: &RobotTopics, channel: &'a Channel) -> Classi
     let type_name = full_type_name(&channel.schema_name);
     let is_cdr = channel.message_encoding == "cdr";
     if robots.tf.is_some()
-        && type_name == TF_TYPE
+        && type_name == TFMessage::NAME
         && is_cdr
         && let Some(robot) = tf_topic(topic)
     {
@@ -98,12 +98,4 @@ fn role_of_pose(type_name: &str) -> Option<Role> {
 
 fn role_of_tags(type_name: &str) -> Option<Role> {
     (type_name == TagRange::NAME).then_some(Role::Tags)
-}
-
-/// The name with its `/msg/`, which some old logs leave out.
-pub(crate) fn full_type_name(name: &str) -> Cow<'_, str> {
-    match name.split_once('/') {
-        Some((package, message)) if !message.contains('/') => Cow::Owned(format!("{package}/msg/{message}")),
-        _ => Cow::Borrowed(name),
-    }
 }

@@ -6,6 +6,7 @@ use super::pose::to_pose_stamped;
 use super::route::{PoseSource, Role, classify};
 use super::{MAP, OTHER, POSE, TAGS};
 use crate::reader::{Damage, LogFile, LogMessage};
+use crate::schemas::full_type_name;
 use crate::tf::TfPoses;
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
@@ -213,8 +214,7 @@ impl Router {
     pub(crate) fn warn_of_missing(&self, output: &mut Output<'_>) {
         let routed = |role: Role| self.routes.iter().any(|route| route.role == role && route.messages > 0);
         if output.is_read(MAP) && !routed(Role::Map) {
-            let is_map =
-                |route: &&Route| super::route::full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
+            let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
             let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
             let others =
                 if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };

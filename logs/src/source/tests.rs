@@ -1,4 +1,5 @@
 use super::*;
+use crate::schemas::full_type_name;
 use crate::test_log::{Folder, TestLog, layouts};
 use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{

@@ -6,12 +6,12 @@
 //! robot is wrong. The reference robot is not counted.
 
 use crate::args::EvaluateArgs;
+use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -204,31 +204,20 @@ impl Evaluation {
     /// A table for people: a line for every robot, and the counts.
     pub(crate) fn to_text(&self) -> String {
         let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
-        let rows: Vec<[String; 5]> =
-            std::iter::once(["robot", "outcome", "error (m)", "error (deg)", ""].map(str::to_owned))
-                .chain(self.robots.iter().map(|robot| {
-                    [
-                        robot.robot.clone(),
-                        robot.outcome.words().to_owned(),
-                        number(robot.error_m),
-                        number(robot.error_deg),
-                        robot.reason.clone().unwrap_or_default(),
-                    ]
-                }))
-                .collect();
-        let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let [w0, w1, w2, w3] = [width(0), width(1), width(2), width(3)];
-        let mut text = String::new();
-        for [robot, outcome, metres, degrees, reason] in &rows {
-            let line = format!("{robot:w0$}  {outcome:w1$}  {metres:>w2$}  {degrees:>w3$}  {reason}");
-            // Writing to a string does not fail.
-            let _ = writeln!(text, "{}", line.trim_end());
+        let mut table = Table::new(["robot", "outcome", "error m", "error deg", ""]);
+        for robot in &self.robots {
+            table.row([
+                robot.robot.clone(),
+                robot.outcome.words().to_owned(),
+                number(robot.error_m),
+                number(robot.error_deg),
+                robot.reason.clone().unwrap_or_default(),
+            ]);
         }
         let unrelated = if self.related { "" } else { "; the truth has no frames: the robots are taken as unrelated" };
         let reference = self.reference.as_deref().unwrap_or("none");
         let Self { right, wrong, refused, .. } = self;
-        let _ = writeln!(text, "right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})");
-        text
+        format!("{table}right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})\n")
     }
 }
 
@@ -383,9 +372,9 @@ mod tests {
         });
         let text = run(&summary, Some(&truth())).unwrap().to_text();
         let expected = "\
-robot   outcome  error (m)  error (deg)
-robot2  right        0.000        0.000
-robot3  refused          -            -  no tags in common
+  robot   outcome  error m  error deg
+  robot2  right      0.000      0.000
+  robot3  refused        -          -  no tags in common
 right 1, wrong 0, refused 1 (reference robot1)
 ";
         assert_eq!(text, expected);

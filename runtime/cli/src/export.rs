@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use gridweave_logs::map_file::{self, GridMap};
 use gridweave_logs::picture::{self, MapLayer};
 use gridweave_logs::reader;
+use gridweave_logs::schemas::full_type_name;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
 use gridweave_runtime::stage::{RobotTopics, match_robot};
 use nalgebra::{Isometry2, Vector2};
@@ -76,7 +77,7 @@ fn last_maps(log: &Path) -> Result<BTreeMap<String, GridMap>> {
     while let Some(message) = reader.next_message() {
         let topic = topics.entry(message.channel).or_insert_with(|| {
             let channel = files[message.file].channel(message.channel)?;
-            (channel.schema_name == OccupancyGrid::NAME).then_some(channel.topic)
+            (full_type_name(&channel.schema_name) == OccupancyGrid::NAME).then_some(channel.topic)
         });
         if let Some(topic) = topic {
             let bytes = last.entry(topic.clone()).or_default();

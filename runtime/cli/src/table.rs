@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 
-/// Lines up columns: the first to the left, the others to the right where they are numbers. A last column of text goes
-/// to the left.
+/// Lines up columns: those of numbers, with their units or without, to the right, all others to the left.
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,
 }
@@ -44,8 +43,11 @@ impl std::fmt::Display for Table {
     }
 }
 
+/// Whether a cell is empty, a dash, or a number with at most a unit behind it.
 fn is_numeric(text: &str) -> bool {
-    text.chars().all(|c| c.is_ascii_digit() || "+-.,% ".contains(c))
+    let mut words = text.split_whitespace();
+    let is_number = |word: &str| word.chars().all(|c| c.is_ascii_digit() || "+-.,%".contains(c));
+    words.next().is_none_or(is_number) && words.count() <= 1
 }
 
 #[cfg(test)]
@@ -58,5 +60,15 @@ mod tests {
         table.row(["robot1".into(), "0.1".into(), "a".into()]);
         table.row(["r".into(), "-10.1".into(), "bcd".into()]);
         assert_eq!(table.to_string(), "  robot       x  why\n  robot1    0.1  a\n  r       -10.1  bcd\n");
+    }
+
+    #[test]
+    fn a_number_may_have_a_unit_and_a_sentence_may_begin_with_a_number() {
+        for number in ["", "-", "3", "-0.5", "12 %", "1.2 kB"] {
+            assert!(is_numeric(number), "{number}");
+        }
+        for text in ["robot1", "3 tags agree", "x"] {
+            assert!(!is_numeric(text), "{text}");
+        }
     }
 }

@@ -31,9 +31,16 @@ const LATCHED: &str = "\
 
 /// The metadata of the channel of a result. Maps, static transforms and the poses of the robots' maps are latched; of
 /// the others nothing is said, and a player takes its default.
-pub(super) fn metadata(topic: &str, ros_type: &str) -> BTreeMap<String, String> {
+pub(crate) fn metadata(topic: &str, ros_type: &str) -> BTreeMap<String, String> {
     let latched = [OccupancyGrid::NAME, RobotFrames::NAME].contains(&ros_type) || topic.ends_with("/tf_static");
     BTreeMap::from([(KEY.to_owned(), if latched { LATCHED.to_owned() } else { String::new() })])
+}
+
+/// Whether the metadata of a channel says that its last message is kept for those who come later.
+pub(crate) fn is_transient_local(metadata: &BTreeMap<String, String>) -> bool {
+    let offered = metadata.get(KEY).map_or("", String::as_str);
+    // ROS 2 writes the durability as a number up to Iron, and as a word since.
+    offered.lines().any(|line| matches!(line.trim(), "durability: 1" | "durability: transient_local"))
 }
 
 #[cfg(test)]
@@ -48,6 +55,8 @@ mod tests {
         assert_eq!(of("/tf_static", "tf2_msgs/msg/TFMessage"), LATCHED);
         assert_eq!(of("/tf", "tf2_msgs/msg/TFMessage"), "");
         assert_eq!(of("/robot1/lines/segments", "gridweave_msgs/msg/Segments"), "");
+        assert!(is_transient_local(&metadata("/map", "nav_msgs/msg/OccupancyGrid")));
+        assert!(!is_transient_local(&metadata("/tf", "tf2_msgs/msg/TFMessage")));
     }
 
     #[test]
