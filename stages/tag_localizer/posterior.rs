@@ -2,6 +2,7 @@
 
 use super::RingProduct;
 use crate::geometry::Point2;
+use nalgebra::Vector2;
 
 /// Places whose log-likelihood lies this far below the best hold less than a millionth of the probability together.
 const NEGLIGIBLE: f64 = 20.0;
@@ -75,7 +76,7 @@ impl Posterior {
         }
         let mut level = Level { grid, level: COARSEST };
         let mut nodes = level.all();
-        let mut best = f64::NEG_INFINITY;
+        let mut best = level.climb(product, &nodes)?;
         loop {
             for node in &nodes {
                 if let Some(centre) = level.centre_on_grid(*node)
@@ -90,16 +91,19 @@ impl Posterior {
             }
             (level, nodes) = level.halved(&nodes);
         }
+        // The summit may be sharper than a cell; of the leaves, only the best of their middles counts.
+        best = f64::NEG_INFINITY;
         loop {
             while nodes.len() < RESOLVED && level.level > FINEST {
                 (level, nodes) = level.halved(&nodes);
             }
-            let leaves = level.leaves(product, &nodes, best);
+            let mut leaves = level.leaves(product, &nodes, best);
+            best = leaves.iter().map(|leaf| leaf.mass).fold(best, f64::max);
+            leaves.retain(|leaf| leaf.mass >= best - NEGLIGIBLE);
             // A spot that is very narrow lies in few of the parts.
             if leaves.len() >= RESOLVED / 4 || level.level == FINEST {
                 return Self::normalised(grid, level.size(), leaves);
             }
-            best = leaves.iter().map(|leaf| leaf.mass).fold(best, f64::max);
             level.drop_negligible(&mut nodes, product, best);
             (level, nodes) = level.halved(&nodes);
         }
@@ -108,7 +112,6 @@ impl Posterior {
     /// Turns the log-likelihoods that the leaves carry into shares.
     fn normalised(grid: GridSize, leaf_size: f64, mut leaves: Vec<Leaf>) -> Option<Self> {
         let best = leaves.iter().map(|leaf| leaf.mass).fold(f64::NEG_INFINITY, f64::max);
-        leaves.retain(|leaf| leaf.mass >= best - NEGLIGIBLE);
         leaves.iter_mut().for_each(|leaf| leaf.mass = (leaf.mass - best).exp());
         let total: f64 = leaves.iter().map(|leaf| leaf.mass).sum();
         leaves.iter_mut().for_each(|leaf| leaf.mass /= total);
@@ -126,6 +129,30 @@ impl Level {
     /// Width of a node, metres.
     fn size(&self) -> f64 {
         self.grid.resolution * f64::from(self.level).exp2()
+    }
+
+    /// The log-likelihood at a summit near the best of the nodes' centres, found by steps along the axes that are
+    /// halved where none leads up. The better the best that is known, the more can be dropped while nodes are large.
+    /// `None` if no centre lies on the grid.
+    fn climb(&self, product: &RingProduct, nodes: &[Node]) -> Option<f64> {
+        let value_at = |place: &Point2| product.log_likelihood(place, f64::NEG_INFINITY);
+        let centres = nodes.iter().filter_map(|node| self.centre_on_grid(*node));
+        let values = centres.filter_map(|centre| Some((value_at(&centre)?, centre)));
+        let (mut best, mut place) = values.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let half_grid = 0.5 * self.grid.cells as f64 * self.grid.resolution;
+        let mut step = 0.5 * self.size();
+        while step > 0.25 * self.grid.resolution {
+            let around = [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)]
+                .map(|(x, y)| place + Vector2::new(x, y))
+                .into_iter()
+                .filter(|next| (next - self.grid.centre).amax() <= half_grid);
+            let next = around.filter_map(|next| Some((value_at(&next)?, next))).max_by(|a, b| a.0.total_cmp(&b.0));
+            match next {
+                Some((value, next)) if value > best => (best, place) = (value, next),
+                _ => step /= 2.0,
+            }
+        }
+        Some(best)
     }
 
     /// Drops the nodes in which no place comes near the best.
