@@ -3,7 +3,7 @@
 use super::graph::Edge;
 use super::uncertain::{UncertainPose, across, error_vector};
 use crate::geometry::{Pose2, pose, wrap_angle};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, U3, Vector3};
 
 /// The most Gauss-Newton steps.
 const STEPS: usize = 30;
@@ -60,8 +60,7 @@ pub fn optimize(poses: &[Option<UncertainPose>], edges: &[Edge], root: usize) ->
             return None;
         }
         if largest <= CONVERGED {
-            let covariance = normal_equations.inverse();
-            return Some(assemble(&estimate, &unknown, &covariance));
+            return assemble(&estimate, &unknown, &normal_equations.unpack());
         }
     }
     None
@@ -82,19 +81,30 @@ fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matr
     (error, by_a, by_b)
 }
 
+/// The poses with their covariances: of the inverse of the normal equations `L L^T` only the blocks on the diagonal are
+/// needed, which are the products of three columns of `L^-1` with each other. `None` if `L` has no inverse.
 fn assemble(
     estimate: &[Option<Pose2>],
     unknown: &[Option<usize>],
-    covariance: &DMatrix<f64>,
-) -> Vec<Option<UncertainPose>> {
-    let one = |(pose, place): (&Option<Pose2>, &Option<usize>)| {
-        let covariance = match place {
-            Some(place) => covariance.fixed_view::<3, 3>(*place, *place).into_owned(),
+    lower: &DMatrix<f64>,
+) -> Option<Vec<Option<UncertainPose>>> {
+    let mut poses = Vec::with_capacity(estimate.len());
+    for (pose, place) in estimate.iter().zip(unknown) {
+        let covariance = match *place {
+            Some(place) => {
+                // The columns are zero above `place`.
+                let count = lower.nrows() - place;
+                let mut columns = OMatrix::<f64, Dyn, U3>::identity(count);
+                if !lower.view((place, place), (count, count)).solve_lower_triangular_mut(&mut columns) {
+                    return None;
+                }
+                columns.tr_mul(&columns)
+            }
             None => Matrix3::zeros(),
         };
-        pose.map(|pose| UncertainPose { pose, covariance })
-    };
-    estimate.iter().zip(unknown).map(one).collect()
+        poses.push(pose.map(|pose| UncertainPose { pose, covariance }));
+    }
+    Some(poses)
 }
 
 #[cfg(test)]
