@@ -85,11 +85,13 @@ fn supervise<S: Service>(
                 if first_error.is_some() {
                     // A stage that was not listening yet when the stop was sent gets it again.
                     wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
-                } else if observer.should_stop() {
-                    stop(&mut first_error, RunError { stage: pipeline.name.clone(), failure: Failure::Interrupted });
                 }
             }
             Err(RecvTimeoutError::Disconnected) => break,
+        }
+        // After every event, as a fast source tells of its progress without a pause.
+        if first_error.is_none() && observer.should_stop() {
+            stop(&mut first_error, RunError { stage: pipeline.name.clone(), failure: Failure::Interrupted });
         }
     }
     match first_error {
