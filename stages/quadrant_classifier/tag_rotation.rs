@@ -1,9 +1,9 @@
 //! The rotation between two maps that their common tags tell.
 
 use super::parameters::TagRotationFrom;
-use crate::geometry::{Point2, wrap_angle};
+use crate::geometry::{Point2, PointPair, fit_rigid, wrap_angle};
 use gridweave_runtime::ros::CommonTag;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 
 /// A tag in both maps, its values checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,22 +73,9 @@ pub(super) fn tag_rotation(tags: &[TagPair], from: TagRotationFrom) -> Option<Ta
 
 /// The rotation that makes the weighted sum of squared distances least.
 fn least_squares(tags: &[TagPair]) -> Option<TagRotation> {
-    let weight: f64 = tags.iter().map(|tag| 1.0 / tag.variance()).sum();
-    let centre = |place: fn(&TagPair) -> Point2| {
-        let sum = tags.iter().fold(Vector2::zeros(), |sum, tag| sum + place(tag).coords / tag.variance());
-        Point2::from(sum / weight)
-    };
-    let (centre_a, centre_b) = (centre(|tag| tag.a), centre(|tag| tag.b));
-    let (mut cosine, mut sine, mut spread) = (0.0, 0.0, 0.0);
-    for tag in tags {
-        let (a, b) = (tag.a - centre_a, tag.b - centre_b);
-        cosine += a.dot(&b) / tag.variance();
-        sine += b.perp(&a) / tag.variance();
-        spread += b.norm_squared() / tag.variance();
-    }
-    let strength = cosine.hypot(sine);
-    (tags.len() >= 2 && strength > 1e-9 && spread > 1e-9)
-        .then(|| TagRotation { angle: sine.atan2(cosine), deviation: spread.sqrt().recip() })
+    let pair = |tag: &TagPair| PointPair { a: tag.a, b: tag.b, weight: 1.0 / tag.variance() };
+    let fit = fit_rigid(&tags.iter().map(pair).collect::<Vec<_>>())?;
+    Some(TagRotation { angle: fit.transform_a_b.rotation.angle(), deviation: fit.yaw_stddev() })
 }
 
 /// `theta_hat` of equations 5 and 6: the direction from the middle of tags 1 and 2 to tag 3, in map a less in map b.

@@ -371,8 +371,7 @@ mod tests {
             "unmerged": {"robot3": "no tags in common"},
         });
         let text = run(&summary, Some(&truth())).unwrap().to_text();
-        let expected = "\
-  robot   outcome  error m  error deg
+        let expected = "  robot   outcome  error m  error deg
   robot2  right      0.000      0.000
   robot3  refused        -          -  no tags in common
 right 1, wrong 0, refused 1 (reference robot1)
