@@ -1,8 +1,8 @@
 //! Weighted least squares over the pose graph.
 
 use super::graph::Edge;
-use super::uncertain::{UncertainPose, across, error_vector};
-use crate::geometry::{Pose2, pose, wrap_angle};
+use super::uncertain::{UncertainPose, error_vector};
+use crate::geometry::{Pose2, pose, quarter_turn, wrap_angle};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, U3, Vector3};
 
 /// The most Gauss-Newton steps.
@@ -73,7 +73,7 @@ fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matr
     error.z = wrap_angle(error.z);
     let back = pose_a.rotation.inverse();
     let turn = back.to_rotation_matrix().into_inner();
-    let lever = -(back * across(&(pose_b.translation.vector - pose_a.translation.vector)));
+    let lever = -(back * quarter_turn(&(pose_b.translation.vector - pose_a.translation.vector)));
     let mut by_b = Matrix3::identity();
     by_b.fixed_view_mut::<2, 2>(0, 0).copy_from(&turn);
     let mut by_a = -by_b;

@@ -4,6 +4,7 @@ use super::consistency::{Verdict, judge};
 use super::graph::{Cycle, Edge, Forest};
 use super::reasons;
 use super::{FrameSolverParameters, UncertainPose, optimize, uncertain::error_vector};
+use crate::geometry::row_by_row;
 use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,11 +46,6 @@ pub fn by_name(mut alignment: Alignment) -> Option<(Pair, Alignment)> {
         alignment.covariance = row_by_row(&transform_b_a.covariance);
     }
     Some(((alignment.a.clone(), alignment.b.clone()), alignment))
-}
-
-/// A covariance as messages carry it.
-pub fn row_by_row(covariance: &Matrix3<f64>) -> [f64; 9] {
-    std::array::from_fn(|index| covariance[(index / 3, index % 3)])
 }
 
 /// Solves for the frames of all `robots` in the frame of `reference`, which must be one of them.

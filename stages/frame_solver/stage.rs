@@ -1,8 +1,8 @@
 //! The frame solver as a stage.
 
-use super::solve::{Alignments, Solution, by_name, row_by_row, solve};
+use super::solve::{Alignments, Solution, by_name, solve};
 use super::{FrameSolverParameters, UncertainPose};
-use crate::geometry::wrap_angle;
+use crate::geometry::row_by_row;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{
     Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TransformStamped, UnmergedRobot,
@@ -14,8 +14,6 @@ use std::collections::{BTreeMap, BTreeSet};
 const MAP: usize = 0;
 const FRAMES: usize = 0;
 const TF: usize = 1;
-/// The name of the frame that all robots' maps are placed in.
-const WORLD: &str = "world";
 
 /// The kind `frame_solver`.
 pub fn kind() -> StageKind {
@@ -196,7 +194,7 @@ impl FrameSolver {
             self.solution.frames.iter().map(|(robot, pose)| self.frame(robot, pose)).collect();
         let unmerged = self.solution.unmerged.iter();
         let unmerged = unmerged.map(|(robot, reason)| UnmergedRobot { robot: robot.clone(), reason: reason.clone() });
-        let header = Header::new(output.log_time(), WORLD);
+        let header = Header::new(output.log_time(), RobotFrames::WORLD);
         let message = RobotFrames { header: header.clone(), reference, frames, unmerged: unmerged.collect() };
         if self.sent.as_ref().is_some_and(|sent| match last {
             true => RobotFrames { header: sent.header.clone(), ..message.clone() } == *sent,
@@ -225,11 +223,9 @@ impl FrameSolver {
     }
 
     fn is_nearly(&self, sent: &RobotFrames, message: &RobotFrames) -> bool {
+        let FrameSolverParameters { min_move, min_turn, .. } = self.parameters;
         let near = |(one, next): (&RobotFrame, &RobotFrame)| {
-            one.robot == next.robot
-                && one.frame_id == next.frame_id
-                && (one.x - next.x).hypot(one.y - next.y) <= self.parameters.min_move
-                && wrap_angle(one.yaw - next.yaw).abs() <= self.parameters.min_turn
+            one.frame_id == next.frame_id && one.is_near(next, min_move, min_turn)
         };
         sent.reference == message.reference
             && sent.unmerged == message.unmerged

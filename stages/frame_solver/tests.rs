@@ -308,7 +308,7 @@ proptest! {
                 }.inverse();
                 std::mem::swap(&mut alignment.a, &mut alignment.b);
                 alignment.set_transform_a_b(&transform_b_a.pose);
-                alignment.covariance = super::solve::row_by_row(&transform_b_a.covariance);
+                alignment.covariance = crate::geometry::row_by_row(&transform_b_a.covariance);
             }
             alignment
         };

@@ -1,6 +1,6 @@
 //! Rigid transforms with a covariance.
 
-use crate::geometry::{Pose2, wrap_angle};
+use crate::geometry::{Pose2, quarter_turn, wrap_angle};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 /// A rigid transform and the covariance of its (x, y, yaw), metres and radians.
@@ -23,7 +23,7 @@ impl UncertainPose {
     pub fn inverse(&self) -> Self {
         let back = self.pose.rotation.inverse();
         // The turn moves the origin by the derivative of -R(-yaw) t.
-        let lever = back * across(&self.pose.translation.vector);
+        let lever = back * quarter_turn(&self.pose.translation.vector);
         let jacobian = jacobian(&-back.to_rotation_matrix().into_inner(), &lever, -1.0);
         Self { pose: self.pose.inverse(), covariance: jacobian * self.covariance * jacobian.transpose() }
     }
@@ -31,7 +31,7 @@ impl UncertainPose {
     /// `T_a_c` of this `T_a_b` and `T_b_c`, whose errors are taken as independent; covariance to first order.
     #[must_use]
     pub fn then(&self, transform_b_c: &Self) -> Self {
-        let lever = across(&(self.pose.rotation * transform_b_c.pose.translation.vector));
+        let lever = quarter_turn(&(self.pose.rotation * transform_b_c.pose.translation.vector));
         let by_self = jacobian(&Matrix2::identity(), &lever, 1.0);
         let turn = self.pose.rotation.to_rotation_matrix().into_inner();
         let by_next = jacobian(&turn, &Vector2::zeros(), 1.0);
@@ -79,11 +79,6 @@ impl UncertainPose {
 /// (x, y, yaw) of a transform, the yaw in `(-pi, pi]`.
 pub fn error_vector(pose: &Pose2) -> Vector3<f64> {
     Vector3::new(pose.translation.x, pose.translation.y, wrap_angle(pose.rotation.angle()))
-}
-
-/// A vector turned by a quarter turn: how a point moves under a small turn about the origin.
-pub(crate) fn across(vector: &Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(-vector.y, vector.x)
 }
 
 fn jacobian(turn: &Matrix2<f64>, lever: &Vector2<f64>, yaw: f64) -> Matrix3<f64> {

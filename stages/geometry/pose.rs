@@ -1,6 +1,6 @@
 //! Poses in the plane.
 
-use nalgebra::{Isometry2, Vector2};
+use nalgebra::{Isometry2, Matrix3, Vector2};
 use std::f64::consts::{PI, TAU};
 
 /// A pose in the plane, or the rigid transform that it stands for: metres and radians.
@@ -12,6 +12,16 @@ pub type Point2 = nalgebra::Point2<f64>;
 /// The pose at (x, y) metres, turned by `yaw` radians.
 pub fn pose(x: f64, y: f64, yaw: f64) -> Pose2 {
     Isometry2::new(Vector2::new(x, y), yaw)
+}
+
+/// A vector turned left by a quarter turn: how a point moves under a small turn about the origin.
+pub fn quarter_turn(vector: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-vector.y, vector.x)
+}
+
+/// A covariance of (x, y, yaw) as messages carry it.
+pub fn row_by_row(covariance: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|index| covariance[(index / 3, index % 3)])
 }
 
 /// The same angle in `(-pi, pi]`.

@@ -3,7 +3,7 @@
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
-use crate::geometry::{Grid, GridGeometry, Point2, wrap_angle};
+use crate::geometry::{Grid, GridGeometry, Point2};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
@@ -11,8 +11,6 @@ use std::collections::BTreeMap;
 
 const MAP: usize = 0;
 const FUSED: usize = 0;
-/// The frame of the fused map.
-const WORLD: &str = "world";
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {
@@ -99,11 +97,8 @@ impl GridFuser {
                 return false;
             }
         }
-        let is_near = |(one, next): (&RobotFrame, &RobotFrame)| {
-            one.robot == next.robot
-                && (one.x - next.x).hypot(one.y - next.y) <= self.parameters.min_move
-                && wrap_angle(one.yaw - next.yaw).abs() <= self.parameters.min_turn
-        };
+        let GridFuserParameters { min_move, min_turn, .. } = self.parameters;
+        let is_near = |(one, next): (&RobotFrame, &RobotFrame)| one.is_near(next, min_move, min_turn);
         let Some(fused) = &self.fused else { return true };
         let (before, after) = (self.placed(fused), self.placed(&self.frames));
         fused.reference != self.frames.reference
@@ -157,7 +152,7 @@ impl GridFuser {
         let mut takes_part = layout.takes_part.iter();
         maps.retain(|_| takes_part.next().is_some_and(|takes_part| *takes_part));
         let Some(geometry) = layout.geometry else { return Ok(()) };
-        let prefix = prefix(&geometry, Header::new(output.log_time(), WORLD));
+        let prefix = prefix(&geometry, Header::new(output.log_time(), RobotFrames::WORLD));
         output.send_grid(FUSED, "", &prefix, |cells| {
             match self.parameters.warp {
                 Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, cells),

@@ -3,7 +3,7 @@
 use super::first_guess::LocalFrame;
 use super::normal_equations::{Measurement, NormalEquations};
 use super::{FirstGuess, IcpParameters, Metric, WallMap, Weighting};
-use crate::geometry::Pose2;
+use crate::geometry::{Pose2, quarter_turn};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -136,7 +136,7 @@ impl<'a> Iteration<'a> {
             let normal = a.normals[partner.index];
             let arm = point.coords - origin;
             // Turns about the origin of b; moved to the middle of all pairs once that is known.
-            let turned = perpendicular(&arm);
+            let turned = quarter_turn(&arm);
             match metric {
                 Metric::PointToLine => {
                     if normal.dot(&(transform_a_b.rotation * normal_b)).abs() < LEAST_NORMAL_AGREEMENT {
@@ -162,17 +162,12 @@ impl<'a> Iteration<'a> {
         let count = f64::max(inliers as f64, 1.0);
         let mean = sum / count;
         let scale = (squares / count - mean.norm_squared()).max(0.0).sqrt().max(LEAST_SCALE);
-        let turned = perpendicular(&mean);
+        let turned = quarter_turn(&mean);
         for Measurement { derivative, .. } in &mut self.measurements {
             derivative.z = (derivative.z - derivative.xy().dot(&turned)) / scale;
         }
         (LocalFrame { centre: (origin + mean).into(), scale }, inliers)
     }
-}
-
-/// The vector turned left by a quarter.
-fn perpendicular(vector: &Vector2<f64>) -> Vector2<f64> {
-    Vector2::new(-vector.y, vector.x)
 }
 
 impl Weighting {

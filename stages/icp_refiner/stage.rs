@@ -1,7 +1,7 @@
 //! The stage: keeps each robot's map with its walls, and refines each pair's first guess when one of the three changes.
 
 use super::{FirstGuess, IcpParameters, MapView, Refinement, WallMap, refine};
-use crate::geometry::{Grid, GridError, wrap_angle};
+use crate::geometry::{Grid, GridError, row_by_row, wrap_angle};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Output, Stage, StageError};
@@ -58,7 +58,7 @@ impl IcpRefiner {
     fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
         let robot = message.robot();
         if let Err(problem) = check_map(message) {
-            output.warn(format!("maps of `{robot}` that cannot be used: {problem}"));
+            output.warn(format!("a map of {robot} was left out: {problem}"));
             return Ok(());
         }
         let number = self.maps.get(robot).map_or(0, |map| map.number + 1);
@@ -69,10 +69,15 @@ impl IcpRefiner {
     }
 
     fn receive_alignment(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let first_guess: Alignment =
-            message.decode().map_err(|error| StageError::new("read a first guess of an alignment", error))?;
+        let first_guess: Alignment = match message.decode() {
+            Ok(first_guess) => first_guess,
+            Err(error) => {
+                output.warn(format!("a first guess was left out: {error}"));
+                return Ok(());
+            }
+        };
         if !(first_guess.x.is_finite() && first_guess.y.is_finite() && first_guess.yaw.is_finite()) {
-            output.warn("first guesses that hold a value that is no finite number");
+            output.warn("a first guess was left out: it holds a value that is no finite number");
             return Ok(());
         }
         let key = (first_guess.a.clone(), first_guess.b.clone());
@@ -171,13 +176,11 @@ impl Refined {
     /// The message that tells of it.
     fn alignment(&self, first_guess: &Alignment, output: &Output<'_>) -> Alignment {
         let Refinement { registration, agreement, refusal } = &self.refinement;
-        let mut covariance = [0.0; 9];
-        covariance.copy_from_slice(registration.covariance.transpose().as_slice());
         let mut alignment = Alignment {
             header: Header::new(output.log_time(), first_guess.header.frame_id.clone()),
             a: first_guess.a.clone(),
             b: first_guess.b.clone(),
-            covariance,
+            covariance: row_by_row(&registration.covariance),
             score: agreement.wall_agreement(),
             method: format!("{}+icp", first_guess.method),
             accepted: refusal.is_none(),

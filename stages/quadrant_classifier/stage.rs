@@ -1,7 +1,7 @@
 //! The stage `quadrant_classifier`.
 
 use super::{Direction, QuadrantClassifierParameters, first_guess, map_direction};
-use crate::geometry::turn_difference;
+use crate::geometry::{row_by_row, turn_difference};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, CommonTags, Header, MapDirection, Segments};
 use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
@@ -140,8 +140,7 @@ impl QuadrantClassifier {
         match first_guess(&common.tags, direction(a).as_ref(), direction(b).as_ref(), &self.parameters) {
             Ok(guess) => {
                 alignment.set_transform_a_b(&guess.transform_a_b);
-                // A symmetric matrix reads the same by rows as by columns.
-                alignment.covariance.copy_from_slice(guess.covariance.as_slice());
+                alignment.covariance = row_by_row(&guess.covariance);
                 alignment.score = guess.score;
                 alignment.method = guess.method.into();
                 alignment.reason = guess.reason;

@@ -2,7 +2,7 @@
 
 use super::parameters::TranslationFrom;
 use super::tag_rotation::{TagPair, TagRotation};
-use crate::geometry::Pose2;
+use crate::geometry::{Pose2, quarter_turn};
 use nalgebra::{Isometry2, Matrix2, Matrix3, Rotation2, Vector2};
 
 /// A transform and its covariance.
@@ -39,12 +39,11 @@ pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: Translat
         }
     };
 
-    let quarter = Matrix2::new(0.0, -1.0, 1.0, 0.0);
     let (mut translation, mut by_rotation, mut spread) = (Vector2::zeros(), Vector2::zeros(), Matrix2::zeros());
     for (tag, weight) in used.iter().zip(&weights) {
         let turned = turn * tag.b.coords;
         translation += weight * (tag.a.coords - turned);
-        by_rotation -= weight * quarter * turned;
+        by_rotation -= weight * quarter_turn(&turned);
         spread += weight * covariance(tag) * weight.transpose();
     }
     let variance = rotation.deviation * rotation.deviation;

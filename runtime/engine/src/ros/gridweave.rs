@@ -198,6 +198,13 @@ pub struct RobotFrame {
 }
 
 impl RobotFrame {
+    /// Whether this is a frame of the same robot that has moved by `distance` metres and turned by `angle` radians at
+    /// most.
+    pub fn is_near(&self, other: &Self, distance: f64, angle: f64) -> bool {
+        let change = self.transform_reference_robot().rotation.angle_to(&other.transform_reference_robot().rotation);
+        self.robot == other.robot && (self.x - other.x).hypot(self.y - other.y) <= distance && change.abs() <= angle
+    }
+
     /// The transform that takes a point in this robot's map to the reference robot's.
     pub fn transform_reference_robot(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
@@ -224,6 +231,11 @@ pub struct RobotFrames {
     pub frames: Vec<RobotFrame>,
     /// The robots that are not, by name.
     pub unmerged: Vec<UnmergedRobot>,
+}
+
+impl RobotFrames {
+    /// The name of the frame that all maps are placed in: the reference robot's map frame.
+    pub const WORLD: &'static str = "world";
 }
 
 macro_rules! named {
