@@ -1,8 +1,9 @@
 //! Occupancy grids: where their cells lie, and what they say.
 
 use super::{Point2, Pose2};
+use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
-use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
+use gridweave_runtime::ros::{DecodeError, Header, MapMetaData, OccupancyGrid};
 
 /// A cell's place in a grid: column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -79,6 +80,24 @@ pub enum GridError {
     Origin,
 }
 
+/// Why a message holds no map that can be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MapError {
+    /// It is no occupancy grid.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// It is one that cannot be.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+}
+
+/// The header and the grid of a message that holds a map.
+pub fn read_map(message: &Message) -> Result<(Header, Grid<'_>), MapError> {
+    let map: OccupancyGrid<'_> = message.decode()?;
+    let grid = Grid::from_message(&map)?;
+    Ok((map.header, grid))
+}
+
 /// An occupancy grid, its cells borrowed.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
@@ -105,7 +124,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The grid of a message.
-    pub fn from_message(message: &'a OccupancyGrid<'a>) -> Result<Self, GridError> {
+    pub fn from_message(message: &OccupancyGrid<'a>) -> Result<Self, GridError> {
         Self::new(GridGeometry::from(&message.info), message.cells())
     }
 

@@ -6,7 +6,7 @@ mod grid;
 mod pose;
 mod rigid_fit;
 
-pub use grid::{Cell, Grid, GridError, GridGeometry};
+pub use grid::{Cell, Grid, GridError, GridGeometry, MapError, read_map};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};
 pub use rigid_fit::{PointPair, RigidFit, fit_rigid, point_jacobian};

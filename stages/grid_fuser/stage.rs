@@ -3,7 +3,7 @@
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
-use crate::geometry::{Grid, GridGeometry, Point2};
+use crate::geometry::{GridGeometry, Point2, read_map};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
@@ -73,11 +73,9 @@ impl GridFuser {
     /// frame, which mostly follows at the same log time.
     fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
         let robot = message.robot();
-        let area = message.decode::<OccupancyGrid<'_>>().map_err(|error| error.to_string()).and_then(|grid| {
-            Grid::from_message(&grid).map(|grid| KnownArea::of(&grid)).map_err(|error| error.to_string())
-        });
-        match area {
-            Ok(area) => {
+        match read_map(message) {
+            Ok((_, grid)) => {
+                let area = KnownArea::of(&grid);
                 self.maps.insert(robot.to_owned(), StoredMap { message: message.clone(), area });
                 self.frames.frames.iter().any(|frame| frame.robot == robot)
             }
@@ -119,17 +117,12 @@ impl GridFuser {
         if !output.is_read(FUSED) {
             return Ok(());
         }
-        let mut stored = Vec::new();
-        for frame in self.placed(&self.frames) {
+        let placed = self.placed(&self.frames);
+        let mut maps = Vec::with_capacity(placed.len());
+        for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let grid = map.message.decode::<OccupancyGrid<'_>>();
-            let grid = grid.map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
-            stored.push((frame, map, grid));
-        }
-        let mut maps = Vec::with_capacity(stored.len());
-        for (frame, map, grid) in &stored {
-            let grid = Grid::from_message(grid);
-            let grid = grid.map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
+            let (_, grid) = read_map(&map.message)
+                .map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
             maps.push((PlacedGrid { grid, transform_world_map: frame.transform_reference_robot() }, &map.area));
         }
 
@@ -142,7 +135,7 @@ impl GridFuser {
             max_cells: self.parameters.max_cells,
         };
         let layout = lay_out(&maps, &lattice);
-        for ((frame, ..), _) in stored.iter().zip(&layout.takes_part).filter(|(_, takes_part)| !**takes_part) {
+        for (frame, _) in placed.iter().zip(&layout.takes_part).filter(|(_, takes_part)| !**takes_part) {
             output.warn(format!(
                 "the map of {} is not in the fused one: where it lies is no finite number, or the fused map would be \
                  larger than `max_extent` or `max_cells` allow",

@@ -1,9 +1,9 @@
 //! The stage: keeps each robot's map with its walls, and refines each pair's first guess when one of the three changes.
 
 use super::{FirstGuess, IcpParameters, MapView, Refinement, WallMap, refine};
-use crate::geometry::{Grid, GridError, row_by_row, wrap_angle};
+use crate::geometry::{read_map, row_by_row, wrap_angle};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
+use gridweave_runtime::ros::{Alignment, Header};
 use gridweave_runtime::stage::{Output, Stage, StageError};
 use nalgebra::Matrix3;
 use std::cell::OnceCell;
@@ -57,7 +57,7 @@ impl IcpRefiner {
 
     fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
         let robot = message.robot();
-        if let Err(problem) = check_map(message) {
+        if let Err(problem) = read_map(message) {
             output.warn(format!("a map of {robot} was left out: {problem}"));
             return Ok(());
         }
@@ -192,21 +192,6 @@ impl Refined {
     }
 }
 
-/// Why a message is no map.
-#[derive(Debug, thiserror::Error)]
-enum MapError {
-    #[error(transparent)]
-    Decode(#[from] gridweave_runtime::ros::DecodeError),
-    #[error(transparent)]
-    Grid(#[from] GridError),
-}
-
-fn check_map(message: &Message) -> Result<(), MapError> {
-    let map: OccupancyGrid<'_> = message.decode()?;
-    Grid::from_message(&map)?;
-    Ok(())
-}
-
 fn refine_pair(
     a: &RobotMap,
     b: &RobotMap,
@@ -214,10 +199,8 @@ fn refine_pair(
     parameters: &IcpParameters,
 ) -> Result<Refinement, StageError> {
     let doing = || format!("refine the alignment of `{}` and `{}`", first_guess.a, first_guess.b);
-    let map_a: OccupancyGrid<'_> = a.message.decode().map_err(|error| StageError::new(doing(), error))?;
-    let map_b: OccupancyGrid<'_> = b.message.decode().map_err(|error| StageError::new(doing(), error))?;
-    let grid_a = Grid::from_message(&map_a).map_err(|error| StageError::new(doing(), error))?;
-    let grid_b = Grid::from_message(&map_b).map_err(|error| StageError::new(doing(), error))?;
+    let (_, grid_a) = read_map(&a.message).map_err(|error| StageError::new(doing(), error))?;
+    let (_, grid_b) = read_map(&b.message).map_err(|error| StageError::new(doing(), error))?;
     let walls_a = a.walls.get_or_init(|| WallMap::new(&grid_a, parameters.normal_radius));
     let walls_b = b.walls.get_or_init(|| WallMap::new(&grid_b, parameters.normal_radius));
     let covariance = Matrix3::from_row_slice(&first_guess.covariance);

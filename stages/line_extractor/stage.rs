@@ -1,7 +1,7 @@
 //! The stage `line_extractor`.
 
 use super::{LineExtractorParameters, extract_segments};
-use crate::geometry::Grid;
+use crate::geometry::read_map;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{OccupancyGrid, Segments};
 use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
@@ -26,25 +26,17 @@ struct LineExtractor {
 
 impl Stage for LineExtractor {
     fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let left_out = |error: &dyn std::fmt::Display| format!("a map of {} was left out: {error}", message.robot());
-        let map: OccupancyGrid<'_> = match message.decode() {
+        let (header, grid) = match read_map(message) {
             Ok(map) => map,
             Err(error) => {
-                output.warn(left_out(&error));
-                return Ok(());
-            }
-        };
-        let grid = match Grid::from_message(&map) {
-            Ok(grid) => grid,
-            Err(error) => {
-                output.warn(left_out(&error));
+                output.warn(format!("a map of {} was left out: {error}", message.robot()));
                 return Ok(());
             }
         };
         // Every map is searched with the same seed: the same map gives the same walls whatever came before it.
         let segments = extract_segments(&grid, &self.parameters, self.seed);
         let robot = message.robot().to_owned();
-        output.send(SEGMENTS, message.robot(), &Segments { header: map.header.clone(), robot, segments })
+        output.send(SEGMENTS, message.robot(), &Segments { header, robot, segments })
     }
 }
 

@@ -30,9 +30,9 @@ pub struct OccupancyGrid<'a> {
     pub data: &'a [u8],
 }
 
-impl OccupancyGrid<'_> {
-    /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied.
-    pub fn cells(&self) -> &[i8] {
+impl<'a> OccupancyGrid<'a> {
+    /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied; see [`cell`](super::cell).
+    pub fn cells(&self) -> &'a [i8] {
         bytemuck::cast_slice(self.data)
     }
 }
