@@ -150,7 +150,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
 
     fn drive_stage(&mut self) -> Result<(), Failure> {
         loop {
-            self.wake.take_data()?;
+            self.wake.look_at_inputs()?;
             self.receive()?;
             let mut handled = 0;
             while let Some(wire) = self.runner.handle_next(&mut self.queues)? {
