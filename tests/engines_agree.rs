@@ -1,5 +1,7 @@
 //! The same log, pipeline and seed give the same output, byte for byte, on every engine and any number of cores.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
 mod support;
 
 use std::path::{Path, PathBuf};

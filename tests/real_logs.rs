@@ -3,6 +3,8 @@
 //! The logs and their truth lie in the folder that `GRIDWEAVE_LOGS` names: `NAME.mcap`, and `NAME.truth.json` where
 //! the robots' maps can be merged.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
 mod support;
 
 use serde_json::Value;

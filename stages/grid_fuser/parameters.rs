@@ -2,10 +2,10 @@
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// How cells get from a robot's map to the fused one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Warp {
     /// Every cell of the fused map takes the value of the cell that its centre falls in: no gaps and no blur.

@@ -2,10 +2,10 @@
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// What registration measures between two points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
     /// The distance of a point from the line of the wall nearest to it. Finds a place between the cells, and lets
@@ -17,7 +17,7 @@ pub enum Metric {
 }
 
 /// How much a point counts that lies far from its partner.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
     /// Every pair counts the same: the paper's.

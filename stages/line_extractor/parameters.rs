@@ -2,10 +2,10 @@
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// How the two points are drawn that make a line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// The second near the first, so that both are likely to lie on the same wall.
@@ -16,7 +16,7 @@ pub enum Sampling {
 }
 
 /// When a line counts as a wall.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scoring {
     /// When a stretch of it without a gap holds `min_points` points and is `min_length` long. Only these points are
@@ -28,7 +28,7 @@ pub enum Scoring {
 }
 
 /// How the final line of a segment is found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
     /// Total least squares over all occupied cells of the segment.

@@ -2,10 +2,10 @@
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// How the directions of many walls become one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mean {
     /// The weighted mean of four times the angle, round its mode: walls far from it count little or nothing.
@@ -16,7 +16,7 @@ pub enum Mean {
 }
 
 /// How much a wall counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
     /// By length x reliability.
@@ -29,7 +29,7 @@ pub enum Weighting {
 }
 
 /// Where the rotation between two maps comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RotationFrom {
     /// The directions of the maps, with the quarter turn from the tags (the paper's methods 2 and 3).
@@ -42,7 +42,7 @@ pub enum RotationFrom {
 }
 
 /// How the tags tell a rotation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagRotationFrom {
     /// The weighted least squares fit of all common tags.
@@ -53,7 +53,7 @@ pub enum TagRotationFrom {
 }
 
 /// Which tags give the translation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TranslationFrom {
     /// All common tags, weighted with the inverse of their covariances.

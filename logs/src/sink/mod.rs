@@ -18,11 +18,11 @@ pub use log_writer::{LogOptions, LogWriter, Outcome};
 
 use gridweave_runtime::stage::{InputPort, ParameterError, Parameters, PortType, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// How the chunks of a log are compressed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Compression {
     /// Zstandard at its fastest level: the smallest logs.

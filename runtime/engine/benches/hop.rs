@@ -6,6 +6,9 @@
 //! The reference is bare iceoryx2 in the same run: the same payload, a listener, two threads. A hop that copied would
 //! grow with the size; one that does not costs the same for 64 B and 16 MiB.
 
+// A bench that cannot go on has nothing better to do than to stop.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
 use gridweave_runtime::engine::{EngineKind, run};
 use gridweave_runtime::message::{LogTime, Message};
 use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};

@@ -2,18 +2,39 @@
 
 use crate::link::shared::LinkError;
 use crate::stage::StageError;
+use std::fmt;
 
 /// A run has failed: which stage, and why.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("stage `{stage}` {failure}")]
 pub struct RunError {
-    /// The stage that failed first.
-    pub stage: String,
+    /// The stage that failed first; none if the run as a whole did.
+    pub stage: Option<String>,
     /// Why.
     pub failure: Failure,
 }
 
-/// Why a stage has failed.
+impl RunError {
+    /// A stage has failed.
+    pub fn of_stage(stage: &str, failure: impl Into<Failure>) -> Self {
+        Self { stage: Some(stage.to_owned()), failure: failure.into() }
+    }
+
+    /// The run as a whole has failed.
+    pub fn of_run(failure: impl Into<Failure>) -> Self {
+        Self { stage: None, failure: failure.into() }
+    }
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.stage {
+            Some(stage) => write!(f, "stage `{stage}` {}", self.failure),
+            None => write!(f, "the run {}", self.failure),
+        }
+    }
+}
+
+/// Why a stage, or a run, has failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
     /// It says so itself.

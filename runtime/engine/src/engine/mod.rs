@@ -3,9 +3,11 @@
 //! Every engine gives each stage the same inputs in the same order, so every engine gives the same result.
 
 mod error;
+mod plan;
 mod report;
 mod runner;
 mod single;
+mod stage_thread;
 mod threads;
 
 pub use error::{Failure, RunError};

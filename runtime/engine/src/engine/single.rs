@@ -36,7 +36,7 @@ pub(super) fn run(pipeline: &Pipeline, observer: &dyn Observer) -> Result<RunRep
     let mut report = RunReport::default();
     for (stage, spec) in stages.into_iter().zip(&pipeline.stages) {
         let stage = stage.runner.into_report(Default::default());
-        report.stages.push(stage.map_err(|failure| RunError { stage: spec.name.clone(), failure })?);
+        report.stages.push(stage.map_err(|failure| RunError::of_stage(&spec.name, failure))?);
     }
     Ok(report)
 }
@@ -59,7 +59,7 @@ fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
             Some(Box::new(link.clone()) as Box<dyn OutputSink>)
         });
         let runner =
-            Runner::new(pipeline, index, outputs).map_err(|failure| RunError { stage: spec.name.clone(), failure })?;
+            Runner::new(pipeline, index, outputs).map_err(|failure| RunError::of_stage(&spec.name, failure))?;
         let own = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         stages.push(SingleStage { runner, inbox: inboxes[index].clone(), queues: own, links, done: false });
     }
@@ -67,14 +67,14 @@ fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
 }
 
 fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observer) -> Result<(), RunError> {
-    let failed = |stage: usize| move |failure| RunError { stage: pipeline.stages[stage].name.clone(), failure };
+    let failed = |stage: usize| move |failure: Failure| RunError::of_stage(&pipeline.stages[stage].name, failure);
     while let Some(source) = furthest_behind(stages) {
         stages[source].let_source_send().map_err(failed(source))?;
         if let Some(share) = stages[source].runner.progress() {
             observer.progress(&pipeline.stages[source].name, share, stages[source].reached());
         }
         if observer.should_stop() {
-            return Err(failed(source)(Failure::Interrupted));
+            return Err(RunError::of_run(Failure::Interrupted));
         }
         for (index, stage) in stages.iter_mut().enumerate() {
             stage.handle_all().map_err(failed(index))?;

@@ -14,10 +14,9 @@
 pub mod direct;
 mod input_queue;
 mod order;
+mod sequence;
 pub mod shared;
 
 pub use input_queue::InputQueue;
 pub use order::{latest, lower_bound, next_input};
 pub(crate) use sequence::Sequence;
-
-mod sequence;

@@ -1,4 +1,67 @@
 //! What a stage is, what it is told, and what it may do.
+//!
+//! A stage of one's own is a struct, its parameters, and a kind that tells both to the pipeline:
+//!
+//! ```
+//! use gridweave_runtime::message::Message;
+//! use gridweave_runtime::ros::{OccupancyGrid, PoseStamped};
+//! use gridweave_runtime::stage::{
+//!     Context, InputPort, Output, OutputPort, ParameterError, Parameters, PortType, Stage, StageError, StageKind,
+//! };
+//! use schemars::JsonSchema;
+//! use serde::Deserialize;
+//!
+//! /// The doc comments are what `gridweave kinds` shows.
+//! #[derive(Deserialize, JsonSchema)]
+//! #[serde(default, deny_unknown_fields)]
+//! struct CornerParameters {
+//!     /// Maps with fewer cells are left out.
+//!     min_cells: u32,
+//! }
+//!
+//! impl Default for CornerParameters {
+//!     fn default() -> Self {
+//!         Self { min_cells: 1 }
+//!     }
+//! }
+//!
+//! impl Parameters for CornerParameters {
+//!     fn check(&self) -> Vec<ParameterError> {
+//!         let wrong = self.min_cells == 0;
+//!         wrong.then(|| ParameterError::new("min_cells", "must be above 0")).into_iter().collect()
+//!     }
+//! }
+//!
+//! /// Sends the pose of each map's corner.
+//! struct Corner {
+//!     parameters: CornerParameters,
+//! }
+//!
+//! impl Stage for Corner {
+//!     fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+//!         let Ok(map) = message.decode::<OccupancyGrid<'_>>() else {
+//!             output.warn("messages that are no map");
+//!             return Ok(());
+//!         };
+//!         if map.cells().len() < self.parameters.min_cells as usize {
+//!             return Ok(());
+//!         }
+//!         let corner = PoseStamped { pose: map.info.origin, header: map.header };
+//!         output.send(0, message.robot(), &corner)
+//!     }
+//! }
+//!
+//! fn kind() -> StageKind {
+//!     StageKind::stage(
+//!         "map_corner",
+//!         "Sends the pose of each map's corner.",
+//!         vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the maps")],
+//!         vec![OutputPort::new("corner", PortType::of::<PoseStamped>(), "the corners")],
+//!         |parameters: CornerParameters, _context: &Context| Ok(Corner { parameters }),
+//!     )
+//! }
+//! # assert_eq!(kind().outputs[0].name, "corner");
+//! ```
 
 mod collected;
 mod context;

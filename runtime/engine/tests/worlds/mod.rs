@@ -1,5 +1,5 @@
 //! Small stages, and a way to wire them, for tests of the engines.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};
@@ -92,12 +92,12 @@ impl Source for Counter {
             return Err(StageError::new("count", "on purpose"));
         }
         let time = p.start + p.step * if p.backwards { p.count - number } else { number };
-        let size = if p.large_every > 0 && number % p.large_every == 0 { p.large_size } else { p.size };
+        let size = if p.large_every > 0 && number.is_multiple_of(p.large_every) { p.large_size } else { p.size };
         let bytes: Vec<u8> = (0..size).map(|place| (number as usize * 31 + place) as u8).collect();
         let header = MessageHeader { log_time: LogTime(time), publish_time: number, ..Default::default() };
         output.set_log_time(LogTime(time));
         output.send_encoded(0, header, &bytes)?;
-        if p.both && number % 3 == 0 {
+        if p.both && number.is_multiple_of(3) {
             output.send_encoded(1, header, &bytes)?;
         }
         Ok(true)
@@ -127,7 +127,7 @@ impl Stage for Relay {
             return Err(StageError::new("relay", "on purpose"));
         }
         assert!(!(self.seen == 20 && self.parameters.panic), "on purpose");
-        if self.parameters.keep_every > 0 && self.seen % self.parameters.keep_every == 0 {
+        if self.parameters.keep_every > 0 && self.seen.is_multiple_of(self.parameters.keep_every) {
             let mut bytes = message.bytes().to_vec();
             bytes.push(port as u8 + message.wire() as u8);
             output.send_encoded(0, *message.header(), &bytes)?;

@@ -30,8 +30,11 @@ impl RunNames {
     /// The iceoryx2 node of one thread or process of the run.
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
-        let mut config = Config::global_config().clone();
+        let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;
+        // The prefix is this run's own: there are no nodes of others to look for.
+        config.global.node.cleanup_dead_nodes_on_creation = false;
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
         if let Some(root) = &self.root {
             let root = Path::new(root.as_bytes()).map_err(|e| doing()(&e))?;
             config.global.set_root_path(&root);

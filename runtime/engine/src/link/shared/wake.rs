@@ -52,6 +52,7 @@ pub struct Wake<S: Service> {
     events: WakeEvents,
     credits: RefCell<Vec<u64>>,
     acknowledged: RefCell<Vec<bool>>,
+    /// Whether an input may have something that has not been looked at.
     data: Cell<bool>,
     stopped: Cell<bool>,
 }
@@ -103,10 +104,11 @@ impl<S: Service> Wake<S> {
         self.check()
     }
 
-    /// Whether an input may have something that was not there at the last call.
-    pub(crate) fn take_data(&self) -> Result<bool, LinkError> {
+    /// Called before the inputs are looked at: what comes in from here on will end the next sleep.
+    pub(crate) fn look_at_inputs(&self) -> Result<(), LinkError> {
         self.poll()?;
-        Ok(self.data.replace(false))
+        self.data.set(false);
+        Ok(())
     }
 
     /// Sleeps until something happens, unless an input may have something already.

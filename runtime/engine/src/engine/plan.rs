@@ -1,0 +1,54 @@
+//! How the links of a pipeline are numbered.
+
+use super::runner::readers;
+use crate::link::shared::{LinkError, RunNames, Waker};
+use crate::pipeline::Pipeline;
+use iceoryx2::node::Node;
+use iceoryx2::service::Service;
+use std::collections::BTreeMap;
+
+/// Who reads what, and how many peers each stage has: what both ends of a link must agree on.
+pub(super) struct Plan {
+    readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
+    /// For each stage, the number of its readers over all ports.
+    pub(super) stage_readers: Vec<usize>,
+    /// For each stage, how many may wake it: its readers, those it reads, and the run.
+    pub(super) peers: Vec<usize>,
+}
+
+impl Plan {
+    pub(super) fn new(pipeline: &Pipeline) -> Self {
+        let readers = readers(pipeline);
+        let mut stage_readers = vec![0; pipeline.stages.len()];
+        for (&(stage, _), list) in &readers {
+            stage_readers[stage] += list.len();
+        }
+        let peers = pipeline.stages.iter().zip(&stage_readers).map(|(spec, readers)| spec.inputs.len() + readers + 1);
+        Self { peers: peers.collect(), readers, stage_readers }
+    }
+
+    pub(super) fn waker<S: Service>(
+        &self,
+        node: &Node<S>,
+        names: &RunNames,
+        pipeline: &Pipeline,
+        stage: usize,
+    ) -> Result<Waker<S>, LinkError> {
+        Waker::new(node, names, &pipeline.stages[stage].name, self.stage_readers[stage], self.peers[stage])
+    }
+
+    pub(super) fn readers(&self, stage: usize, port: usize) -> &[(usize, usize)] {
+        self.readers.get(&(stage, port)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The number of one reader among all readers of a stage: counted port by port.
+    pub(super) fn reader_number(&self, stage: usize, port: usize, reader: (usize, usize)) -> usize {
+        let before: usize = (0..port).map(|port| self.readers(stage, port).len()).sum();
+        before + self.readers(stage, port).iter().position(|other| *other == reader).unwrap_or_default()
+    }
+
+    pub(super) fn port_depth(&self, pipeline: &Pipeline, stage: usize, port: usize) -> usize {
+        let depths = self.readers(stage, port).iter().map(|(reader, _)| pipeline.stages[*reader].depth);
+        depths.max().unwrap_or(1)
+    }
+}
