@@ -1,6 +1,6 @@
 //! Test worlds: buildings, robots that drive and map them, and the truth that a merge is measured against.
 //!
-//! [`simulate`] makes all of it from [`Parameters`] and a seed, in the order of the files here: a [`FloorPlan`] with
+//! [`simulate`] makes all of it from [`SimulatorParameters`] and a seed, in the order of the files here: a [`FloorPlan`] with
 //! rooms, doors and furniture; a route and a drive for every robot; lidar scans of the true world; poses with the drift
 //! that a SLAM system leaves; a growing occupancy grid per robot, in a map frame of its own; and range readings of radio
 //! tags on the walls. The same parameters and seed give the same simulation, bit by bit, on any number of threads:
@@ -32,7 +32,7 @@ mod world;
 pub use drive::TICK_SECONDS;
 pub use floor_plan::{Door, FloorPlan, Room};
 pub use mapper::SnapshotMap;
-pub use parameters::Parameters;
+pub use parameters::SimulatorParameters;
 pub use robot::RobotLog;
 pub use shape::{Rectangle, Solid};
 pub use stage::kind;

@@ -3,7 +3,7 @@
 use super::floor_plan::BuildingSize;
 use super::lidar::Lidar;
 use super::tags::TagReader;
-use gridweave_runtime::stage::{ParameterError, Parameters as StageParameters};
+use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -14,7 +14,7 @@ const MOST_CELLS: f64 = 6e7;
 /// What is simulated.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct Parameters {
+pub struct SimulatorParameters {
     /// How many robots there are, 1 to 64. They are called `robot1`, `robot2`, ...
     pub robots: u32,
     /// Size of the building along its corridors, metres, 10 to 300. In a building of the default size three robots
@@ -69,7 +69,7 @@ pub struct Parameters {
     pub reflections: f64,
 }
 
-impl Default for Parameters {
+impl Default for SimulatorParameters {
     fn default() -> Self {
         Self {
             robots: 3,
@@ -100,7 +100,7 @@ impl Default for Parameters {
     }
 }
 
-impl Parameters {
+impl SimulatorParameters {
     pub(super) fn building(&self) -> BuildingSize {
         let Self { width, height, room_width, corridor_width, clutter, .. } = *self;
         BuildingSize { width, height, room_width, corridor_width, clutter }
@@ -135,7 +135,7 @@ impl Parameters {
     }
 }
 
-impl StageParameters for Parameters {
+impl Parameters for SimulatorParameters {
     fn check(&self) -> Vec<ParameterError> {
         let ranges = [
             ("robots", f64::from(self.robots), 1.0, 64.0),
@@ -193,15 +193,15 @@ impl StageParameters for Parameters {
 mod tests {
     use super::*;
 
-    fn wrong(change: impl FnOnce(&mut Parameters)) -> Vec<&'static str> {
-        let mut parameters = Parameters::default();
+    fn wrong(change: impl FnOnce(&mut SimulatorParameters)) -> Vec<&'static str> {
+        let mut parameters = SimulatorParameters::default();
         change(&mut parameters);
         parameters.check().into_iter().map(|error| error.field).collect()
     }
 
     #[test]
     fn the_defaults_are_in_range() {
-        assert!(Parameters::default().check().is_empty());
+        assert!(SimulatorParameters::default().check().is_empty());
     }
 
     #[test]
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn a_map_that_would_fill_the_memory_is_refused() {
-        let huge = |p: &mut Parameters| (p.width, p.height, p.resolution) = (300.0, 300.0, vec![0.01]);
+        let huge = |p: &mut SimulatorParameters| (p.width, p.height, p.resolution) = (300.0, 300.0, vec![0.01]);
         assert_eq!(wrong(huge), ["resolution"]);
     }
 }

@@ -3,7 +3,7 @@
 use super::drive::{DriveLimits, drive};
 use super::mapper::{Mapper, SnapshotMap};
 use super::odometry::{Drift, estimate_poses};
-use super::parameters::Parameters;
+use super::parameters::SimulatorParameters;
 use super::route::plan_route;
 use super::shape::{Rectangle, between};
 use super::tags::TagReading;
@@ -38,7 +38,7 @@ pub(super) fn simulate_robot(
     world: &World,
     robot: usize,
     rooms: Range<usize>,
-    parameters: &Parameters,
+    parameters: &SimulatorParameters,
 ) -> Result<RobotLog, SimulationError> {
     let name = format!("robot{}", robot + 1);
     let route = plan_route(&world.plan, &world.space, rooms, &mut world.random(Stream::Route(robot)));
@@ -66,7 +66,7 @@ pub(super) fn simulate_robot(
 }
 
 /// A map frame near the start of the drive, turned at random: `T_building_map`.
-fn map_frame(start: &Pose2, world: &World, robot: usize, parameters: &Parameters) -> Pose2 {
+fn map_frame(start: &Pose2, world: &World, robot: usize, parameters: &SimulatorParameters) -> Pose2 {
     let mut random = world.random(Stream::MapFrame(robot));
     let mut offset = || between(&mut random, -parameters.map_offset, parameters.map_offset);
     let (x, y) = (start.translation.x + offset(), start.translation.y + offset());
@@ -78,7 +78,7 @@ fn map_building(
     robot: usize,
     true_poses: &[Pose2],
     poses: &[Pose2],
-    parameters: &Parameters,
+    parameters: &SimulatorParameters,
 ) -> Vec<(usize, SnapshotMap)> {
     let lidar = parameters.lidar();
     let mut random = world.random(Stream::Lidar(robot));
@@ -101,7 +101,12 @@ fn map_building(
     maps
 }
 
-fn read_tags(world: &World, robot: usize, true_poses: &[Pose2], parameters: &Parameters) -> Vec<(usize, TagReading)> {
+fn read_tags(
+    world: &World,
+    robot: usize,
+    true_poses: &[Pose2],
+    parameters: &SimulatorParameters,
+) -> Vec<(usize, TagReading)> {
     let reader = parameters.tag_reader();
     let mut random = world.random(Stream::Tags(robot));
     let mut readings = Vec::new();

@@ -1,7 +1,7 @@
 //! The source `simulator`: a simulation as the messages of a log.
 
 use super::drive::TICK_SECONDS;
-use super::parameters::Parameters;
+use super::parameters::SimulatorParameters;
 use super::robot::RobotLog;
 use super::world::{Simulation, simulate};
 use crate::geometry::Pose2;
@@ -43,7 +43,7 @@ pub fn kind() -> StageKind {
 
 /// The world is made when the first message is asked for.
 struct Simulator {
-    parameters: Parameters,
+    parameters: SimulatorParameters,
     seed: u64,
     playback: Option<Playback>,
 }
@@ -101,7 +101,7 @@ impl Source for Simulator {
 }
 
 impl Playback {
-    fn new(parameters: &Parameters, seed: u64) -> Result<Self, StageError> {
+    fn new(parameters: &SimulatorParameters, seed: u64) -> Result<Self, StageError> {
         let simulation = simulate(parameters, seed).map_err(|error| StageError::new("simulate a world", error))?;
         let mut events = Vec::new();
         for (robot, log) in simulation.robots.iter().enumerate() {
@@ -143,7 +143,7 @@ fn send_reading(
     simulation: &Simulation,
     log: &RobotLog,
     index: usize,
-    parameters: &Parameters,
+    parameters: &SimulatorParameters,
 ) -> Result<(), StageError> {
     let Some((_, reading)) = log.readings.get(index) else { return Ok(()) };
     let Some(tag) = simulation.tags.get(reading.tag) else { return Ok(()) };

@@ -2,7 +2,7 @@
 
 use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
-use super::parameters::Parameters;
+use super::parameters::SimulatorParameters;
 use super::ray_caster::RayCaster;
 use super::robot::{RobotLog, simulate_robot};
 use super::route::share_rooms;
@@ -69,7 +69,7 @@ pub(super) enum Stream {
 }
 
 impl World {
-    fn new(parameters: &Parameters, seed: u64) -> Self {
+    fn new(parameters: &SimulatorParameters, seed: u64) -> Self {
         let plan = FloorPlan::random(&parameters.building(), &mut random(seed, Stream::Building));
         let entrance = plan.corridors.first().map_or(plan.bounds.centre(), |corridor| corridor.centre());
         let space = FreeSpace::new(&plan.bounds, &plan.solids, &entrance);
@@ -104,7 +104,7 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
 ///
 /// # Errors
 /// A parameter is out of its range, or the robots have no way to go or see nothing.
-pub fn simulate(parameters: &Parameters, seed: u64) -> Result<Simulation, SimulationError> {
+pub fn simulate(parameters: &SimulatorParameters, seed: u64) -> Result<Simulation, SimulationError> {
     if let Some(error) = parameters.check().into_iter().next() {
         return Err(error.into());
     }
@@ -146,8 +146,8 @@ mod tests {
     use crate::geometry::{Cell, Grid, Pose2, is_occupied};
 
     /// A small building with two robots, exact poses and an exact lidar.
-    fn small() -> Parameters {
-        Parameters {
+    fn small() -> SimulatorParameters {
+        SimulatorParameters {
             robots: 2,
             width: 12.0,
             height: 10.0,
@@ -156,7 +156,7 @@ mod tests {
             drift: 0.0,
             lidar_noise: 0.0,
             tags: 12,
-            ..Parameters::default()
+            ..SimulatorParameters::default()
         }
     }
 
@@ -169,7 +169,7 @@ mod tests {
     fn a_seed_gives_the_same_world_on_any_number_of_threads_and_another_seed_another() {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| simulate(&Parameters { drift: 0.005, lidar_noise: 0.02, ..small() }, 4).unwrap())
+            pool.install(|| simulate(&SimulatorParameters { drift: 0.005, lidar_noise: 0.02, ..small() }, 4).unwrap())
         };
         let one = on(1);
         assert!(one == on(3));
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn maps_grow_and_have_the_resolutions_asked_for() {
-        let parameters = Parameters { resolution: vec![0.05, 0.1], snapshots: 4, ..small() };
+        let parameters = SimulatorParameters { resolution: vec![0.05, 0.1], snapshots: 4, ..small() };
         let simulation = simulate(&parameters, 1).unwrap();
         for (robot, resolution) in simulation.robots.iter().zip([0.05, 0.1]) {
             assert_eq!(robot.maps.len(), 4);
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn robots_stay_clear_of_everything_and_see_all_their_rooms() {
-        let simulation = simulate(&Parameters { clutter: 0.3, ..small() }, 3).unwrap();
+        let simulation = simulate(&SimulatorParameters { clutter: 0.3, ..small() }, 3).unwrap();
         let visited = |area: &crate::simulator::Rectangle| {
             let robots = simulation.robots.iter().flat_map(|robot| &robot.true_poses);
             robots.into_iter().any(|pose| area.contains(&Point2::from(pose.translation.vector)))
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn one_robot_no_tags_and_an_empty_building_are_worlds_too() {
-        let bare = Parameters { robots: 1, tags: 0, clutter: 0.0, map_yaw: 0.0, map_offset: 0.0, ..small() };
+        let bare = SimulatorParameters { robots: 1, tags: 0, clutter: 0.0, map_yaw: 0.0, map_offset: 0.0, ..small() };
         assert!(bare.check().is_empty());
         let simulation = simulate(&bare, 1).unwrap();
         assert_eq!((simulation.robots.len(), simulation.tags.len()), (1, 0));
@@ -267,13 +267,13 @@ mod tests {
 
     #[test]
     fn a_parameter_out_of_range_is_an_error() {
-        let error = simulate(&Parameters { width: f64::NAN, ..small() }, 1).unwrap_err();
+        let error = simulate(&SimulatorParameters { width: f64::NAN, ..small() }, 1).unwrap_err();
         assert!(matches!(error, SimulationError::Parameter(ParameterError { field: "width", .. })));
     }
 
     #[test]
     fn a_lidar_that_meets_nothing_is_an_error_that_says_what_to_change() {
-        let blind = Parameters { beams: 1, lidar_range: 0.5, duration: 1.0, dropped_beams: 0.99, ..small() };
+        let blind = SimulatorParameters { beams: 1, lidar_range: 0.5, duration: 1.0, dropped_beams: 0.99, ..small() };
         let error = simulate(&blind, 1).unwrap_err();
         assert!(error.to_string().contains("lidar_range"), "{error}");
     }
