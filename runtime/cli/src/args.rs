@@ -126,6 +126,8 @@ pub(crate) enum GraphFormat {
     Mermaid,
     /// A Graphviz graph.
     Dot,
+    /// A pipeline file in which nothing is left to defaults.
+    Toml,
 }
 
 #[derive(Debug, Args)]

@@ -57,6 +57,7 @@ pub(crate) fn graph(args: &GraphArgs) -> Result<Outcome> {
             GraphFormat::Text => pipeline.to_text(),
             GraphFormat::Mermaid => pipeline.to_mermaid(),
             GraphFormat::Dot => pipeline.to_dot(),
+            GraphFormat::Toml => pipeline.to_toml(),
         }
     );
     Ok(Outcome::Done)

@@ -48,10 +48,10 @@ impl Runner {
     }
 
     /// How much of its work a source has done.
-    pub(super) fn progress(&self) -> Option<f64> {
+    pub(super) fn progress(&self) -> Result<Option<f64>, Failure> {
         match &self.node {
-            Node::Source(source) => source.progress(),
-            Node::Stage(_) => None,
+            Node::Source(source) => guarded(|| Ok(source.progress())),
+            Node::Stage(_) => Ok(None),
         }
     }
 
@@ -107,6 +107,10 @@ impl Runner {
         self.report.result = guarded(|| match &self.node {
             Node::Stage(stage) => Ok(stage.report()),
             Node::Source(source) => Ok(source.report()),
+        })?;
+        guarded(|| {
+            drop(self.node);
+            Ok(())
         })?;
         self.report.messages_out = self.outputs.iter().map(Sent::messages).sum();
         self.report.busy = self.report.busy.saturating_sub(waited);

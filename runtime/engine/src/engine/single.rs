@@ -70,7 +70,7 @@ fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observe
     let failed = |stage: usize| move |failure: Failure| RunError::of_stage(&pipeline.stages[stage].name, failure);
     while let Some(source) = furthest_behind(stages) {
         stages[source].let_source_send().map_err(failed(source))?;
-        if let Some(share) = stages[source].runner.progress() {
+        if let Some(share) = stages[source].runner.progress().map_err(failed(source))? {
             observer.progress(&pipeline.stages[source].name, share, stages[source].reached());
         }
         if observer.should_stop() {

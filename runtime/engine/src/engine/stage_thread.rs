@@ -138,7 +138,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 self.wake.poll()?;
                 let reached = self.outputs.borrow().reached();
                 self.outputs.borrow_mut().flush(reached)?;
-                if let Some(share) = self.runner.progress() {
+                if let Some(share) = self.runner.progress()? {
                     tell(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
                 }
             }
@@ -159,6 +159,8 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 }
                 handled += 1;
                 if handled % self.flush_interval == 0 {
+                    // Looks for a stop, too: a stage whose input never dries up would not see it otherwise.
+                    self.wake.poll()?;
                     self.receive()?;
                     self.flush()?;
                 }

@@ -17,8 +17,6 @@ impl MessageFlags {
     pub const END: Self = Self(4);
     /// The bytes are a [`Channel`](super::Channel): the next messages with the same `channel` were logged there.
     pub const CHANNEL: Self = Self(8);
-    /// The run has failed. The bytes are the reason, in UTF-8.
-    pub const ABORT: Self = Self(16);
 
     /// Whether all bits of `other` are set.
     pub fn contains(self, other: Self) -> bool {
