@@ -125,7 +125,11 @@ impl McapSink {
         };
         let (log_time, publish_time) = (header.log_time.0, header.publish_time);
         let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
-        log.write(&record, message.bytes()).map_err(failure)?;
+        if let Err(error) = log.write(&record, message.bytes()) {
+            // Nothing more can be written, not even that the log is not complete.
+            self.log = None;
+            return Err(failure(error));
+        }
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }

@@ -5,12 +5,22 @@ use crate::stage::StageError;
 
 /// A run has failed: which stage, and why.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("stage `{stage}` {failure}")]
+#[error("{}", self.text())]
 pub struct RunError {
     /// The stage that failed first.
     pub stage: String,
     /// Why.
     pub failure: Failure,
+}
+
+impl RunError {
+    fn text(&self) -> String {
+        match &self.failure {
+            // No stage has done anything wrong.
+            Failure::Interrupted => "the run was interrupted".to_owned(),
+            failure => format!("stage `{}` {failure}", self.stage),
+        }
+    }
 }
 
 /// Why a stage has failed.
