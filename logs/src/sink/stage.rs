@@ -182,7 +182,10 @@ impl Stage for McapSink {
     }
 
     fn abort(&mut self, reason: &str) {
-        if let Err(error) = self.end(Outcome::Incomplete(reason)) {
+        // A run that has not begun leaves the log of an earlier one alone.
+        if self.log.is_some()
+            && let Err(error) = self.end(Outcome::Incomplete(reason))
+        {
             tracing::warn!("{error}");
         }
     }
