@@ -125,11 +125,7 @@ impl McapSink {
         };
         let (log_time, publish_time) = (header.log_time.0, header.publish_time);
         let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
-        if let Err(error) = log.write(&record, message.bytes()) {
-            // Nothing more can be written, not even that the log is not complete.
-            self.log = None;
-            return Err(failure(error));
-        }
+        log.write(&record, message.bytes()).map_err(failure)?;
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }
@@ -174,7 +170,12 @@ impl Stage for McapSink {
                 }
             },
         };
-        self.write(lane, message)
+        let written = self.write(lane, message);
+        if written.is_err() {
+            // Nothing more can be written, not even that the log is not complete.
+            self.log = None;
+        }
+        written
     }
 
     fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {

@@ -74,6 +74,10 @@ fn supervise<S: Service>(
         wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
     };
     loop {
+        // Asked with every event: a source that makes good progress leaves no time without any.
+        if first_error.is_none() && observer.should_stop() {
+            stop(&mut first_error, RunError { stage: pipeline.name.clone(), failure: Failure::Interrupted });
+        }
         match events.recv_timeout(STOP_INTERVAL) {
             Ok(Event::Progress { stage, share, log_time }) => observer.progress(&name(stage), share, log_time),
             Ok(Event::Ended { stage, result: Ok(report) }) => reports[stage] = report,
@@ -85,8 +89,6 @@ fn supervise<S: Service>(
                 if first_error.is_some() {
                     // A stage that was not listening yet when the stop was sent gets it again.
                     wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
-                } else if observer.should_stop() {
-                    stop(&mut first_error, RunError { stage: pipeline.name.clone(), failure: Failure::Interrupted });
                 }
             }
             Err(RecvTimeoutError::Disconnected) => break,
