@@ -49,7 +49,7 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
     let folder = TempDir::new().unwrap();
     let mut messages = 200_000;
     long_log(&folder.path().join("in.mcap"), messages);
-    for (engine, signal) in [("threads", "INT"), ("threads-ipc", "TERM")] {
+    for (engine, signal) in [("single", "INT"), ("threads", "INT"), ("threads-ipc", "TERM")] {
         let mut ended = interrupt(folder.path(), engine, signal);
         // A run that came to its end before the signal came to it shows nothing.
         while ended.status == 0 && messages < 10_000_000 {
