@@ -2,7 +2,6 @@
 
 use super::UncertainPose;
 use super::solve::{Alignments, OpenCycle, Pair};
-use gridweave_runtime::ros::Alignment;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The reason of an alignment that the others show to be wrong.
@@ -37,6 +36,7 @@ pub(super) fn unmerged(
     let outside: BTreeSet<&str> =
         robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
     let groups = tied_groups(&outside, alignments, left_out);
+    let refusals = Refusals::new(&outside, alignments, left_out);
     let reason = |robot: &str| {
         if let Some(reason) = disputed.get(robot) {
             return reason.clone();
@@ -45,12 +45,12 @@ pub(super) fn unmerged(
         let others: Vec<String> =
             group.into_iter().flatten().filter(|other| **other != robot).map(|&other| other.to_owned()).collect();
         match others.is_empty() {
-            true => no_tie(robot, frames, alignments, left_out),
+            true => no_tie(robot, frames, &refusals),
             false => {
                 // What keeps the group apart may be known of another member only.
                 let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
                 let known = members.clone().find_map(|member| disputed.get(member).cloned());
-                let refused = || members.clone().find_map(|member| refusal(member, frames, alignments, left_out));
+                let refused = || members.clone().find_map(|member| refusals.telling(member, frames));
                 let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
                 format!("it is tied to {} only, not to the reference: {why}", list(&others))
             }
@@ -81,59 +81,58 @@ fn tied_groups<'a>(
     groups
 }
 
-fn no_tie(
-    robot: &str,
-    frames: &BTreeMap<String, UncertainPose>,
-    alignments: &Alignments,
-    left_out: &BTreeMap<Pair, String>,
-) -> String {
-    refusal(robot, frames, alignments, left_out).unwrap_or_else(|| {
+fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &Refusals<'_>) -> String {
+    refusals.telling(robot, frames).unwrap_or_else(|| {
         format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that others know")
     })
 }
 
-/// The most telling of a robot's refused alignments: towards merged robots if there are any, and of these the one that
-/// came nearest to being accepted. `None` if none was tried.
-fn refusal(
-    robot: &str,
-    frames: &BTreeMap<String, UncertainPose>,
-    alignments: &Alignments,
-    left_out: &BTreeMap<Pair, String>,
-) -> Option<String> {
-    struct Refusal<'a> {
-        other: &'a str,
-        alignment: &'a Alignment,
-        reason: &'a str,
-    }
-    let mut refusals: Vec<Refusal<'_>> = alignments
-        .iter()
-        .filter_map(|(pair, alignment)| {
-            let other = match robot {
-                _ if robot == pair.0 => pair.1.as_str(),
-                _ if robot == pair.1 => pair.0.as_str(),
-                _ => return None,
-            };
+/// An alignment that was not used, as one of its robots sees it.
+#[derive(Clone, Copy)]
+struct Refusal<'a> {
+    other: &'a str,
+    score: f64,
+    reason: &'a str,
+}
+
+/// For every robot outside, its alignments that were not used. Gathered once: there are as many as pairs of robots.
+struct Refusals<'a>(BTreeMap<&'a str, Vec<Refusal<'a>>>);
+
+impl<'a> Refusals<'a> {
+    fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<Pair, String>) -> Self {
+        let mut by_robot: BTreeMap<&str, Vec<Refusal<'_>>> = outside.iter().map(|robot| (*robot, Vec::new())).collect();
+        for (pair, alignment) in alignments {
             let reason = match alignment.accepted {
-                true => left_out.get(pair)?,
-                false => &alignment.reason,
+                true => left_out.get(pair),
+                false => Some(&alignment.reason),
             };
-            Some(Refusal { other, alignment, reason })
-        })
-        .collect();
-    if refusals.iter().any(|refusal| frames.contains_key(refusal.other)) {
-        refusals.retain(|refusal| frames.contains_key(refusal.other));
+            let Some(reason) = reason else { continue };
+            for (robot, other) in [(&pair.0, &pair.1), (&pair.1, &pair.0)] {
+                if let Some(refusals) = by_robot.get_mut(robot.as_str()) {
+                    refusals.push(Refusal { other, score: alignment.score, reason });
+                }
+            }
+        }
+        Self(by_robot)
     }
-    refusals.sort_by(|one, next| {
-        next.alignment.score.total_cmp(&one.alignment.score).then_with(|| one.other.cmp(next.other))
-    });
-    let telling = refusals.first()?;
-    let same: Vec<String> = refusals
-        .iter()
-        .filter(|refusal| refusal.reason == telling.reason)
-        .map(|refusal| refusal.other.to_owned())
-        .collect();
-    let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
-    Some(format!("no alignment with {}: {reason}", list(&same)))
+
+    /// The most telling of a robot's: towards merged robots if there are any, and of these the one that came nearest to
+    /// being accepted. `None` if none was tried.
+    fn telling(&self, robot: &str, frames: &BTreeMap<String, UncertainPose>) -> Option<String> {
+        let mut refusals = self.0.get(robot)?.clone();
+        if refusals.iter().any(|refusal| frames.contains_key(refusal.other)) {
+            refusals.retain(|refusal| frames.contains_key(refusal.other));
+        }
+        refusals.sort_by(|one, next| next.score.total_cmp(&one.score).then_with(|| one.other.cmp(next.other)));
+        let telling = refusals.first()?;
+        let same: Vec<String> = refusals
+            .iter()
+            .filter(|refusal| refusal.reason == telling.reason)
+            .map(|refusal| refusal.other.to_owned())
+            .collect();
+        let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
+        Some(format!("no alignment with {}: {reason}", list(&same)))
+    }
 }
 
 /// "a", "a and b", "a, b and c".

@@ -9,6 +9,9 @@ use std::fmt;
 
 /// A range that exceeds the reach by less than this many standard deviations is noise.
 const REACH_TOLERANCE: f64 = 4.0;
+/// A tag that was read so lately is not out of reach, seconds: where poses jump to and fro, all tags would else be read
+/// out at every jump, which takes far longer than the drive.
+const LEAST_ABSENCE: f64 = 1.0;
 
 /// Localizes all tags of one robot as its poses and readings come in.
 #[derive(Clone, Debug)]
@@ -150,7 +153,8 @@ impl TagLocalizer {
         self.read_out_if(|&(last_time, last_position, last_range)| {
             // By the triangle inequality the tag is at least this far away.
             let distance = (position - last_position).norm() - last_range;
-            time.seconds_since(last_time) > timeout || distance > reach
+            let age = time.seconds_since(last_time);
+            age > timeout || (distance > reach && age > LEAST_ABSENCE)
         })
     }
 

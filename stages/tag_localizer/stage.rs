@@ -273,7 +273,22 @@ mod tests {
         bench.drive(&[("tag", 0.3, 2.0)], 0.0);
         bench.pose(20.0, 4.0, 0.0);
         assert_eq!(bench.take().len(), 0, "3 m from the last place, where the tag was 2 m away");
-        bench.pose(20.1, 9.0, 0.0);
+        bench.pose(20.5, 9.0, 0.0);
+        assert_eq!(bench.take().len(), 0, "it was read a moment ago");
+        bench.pose(21.0, 9.0, 0.0);
+        assert_eq!(bench.take().len(), 1);
+    }
+
+    #[test]
+    fn poses_that_jump_to_and_fro_do_not_have_the_tags_read_out_at_every_jump() {
+        let mut bench = Bench::new("");
+        for step in 0..100 {
+            let seconds = 0.1 * f64::from(step);
+            bench.pose(seconds, if step % 2 == 0 { 0.0 } else { 1000.0 }, 0.0);
+            bench.reading(seconds, "tag", 1.0);
+        }
+        assert_eq!(bench.take().len(), 0);
+        bench.finish();
         assert_eq!(bench.take().len(), 1);
     }
 

@@ -10,7 +10,8 @@ use nalgebra::{Isometry2, Vector2};
 use serde::Serialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// How a command ended.
@@ -47,6 +48,20 @@ pub fn gridweave(folder: &Path, args: &[&str]) -> Ended {
 /// The same, with environment variables.
 #[track_caller]
 pub fn gridweave_with(folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Ended {
+    start(folder, args, variables).wait()
+}
+
+/// A command that runs.
+pub struct Running {
+    child: Child,
+    command: String,
+    stdout: JoinHandle<String>,
+    stderr: JoinHandle<String>,
+}
+
+/// Starts `gridweave` in `folder`.
+#[track_caller]
+pub fn start(folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Running {
     let mut child = Command::new(env!("CARGO_BIN_EXE_gridweave"))
         .args(args)
         .envs(variables.iter().copied())
@@ -65,18 +80,32 @@ pub fn gridweave_with(folder: &Path, args: &[&str], variables: &[(&str, &str)]) 
     };
     let stdout = read(Box::new(child.stdout.take().unwrap()));
     let stderr = read(Box::new(child.stderr.take().unwrap()));
-    let start = Instant::now();
-    let status = loop {
-        match child.try_wait().unwrap() {
-            Some(status) => break status,
-            None if start.elapsed() > Duration::from_secs(240) => {
-                child.kill().unwrap();
-                panic!("gridweave {args:?} hangs");
+    Running { child, command: format!("gridweave {args:?}"), stdout, stderr }
+}
+
+impl Running {
+    /// The number of its process.
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits for its end. A command that hangs is killed and fails the test.
+    #[track_caller]
+    pub fn wait(mut self) -> Ended {
+        let start = Instant::now();
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None if start.elapsed() > Duration::from_secs(240) => {
+                    self.child.kill().unwrap();
+                    panic!("{} hangs", self.command);
+                }
+                None => std::thread::sleep(Duration::from_millis(5)),
             }
-            None => std::thread::sleep(Duration::from_millis(5)),
-        }
-    };
-    Ended { status: status.code().unwrap_or(-1), stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() }
+        };
+        let (stdout, stderr) = (self.stdout.join().unwrap(), self.stderr.join().unwrap());
+        Ended { status: status.code().unwrap_or(-1), stdout, stderr }
+    }
 }
 
 /// Writes a log message by message.

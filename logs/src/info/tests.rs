@@ -1,4 +1,5 @@
 use super::*;
+use crate::sink::{LogOptions, LogWriter, Outcome};
 use crate::test_log::{Folder, TestLog, layouts};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TagRange};
 
@@ -62,4 +63,20 @@ fn what_stands_in_the_way_of_a_merge_is_told() {
     }
     let empty = inspect_bytes(&TestLog::new(layouts()[0].clone()).finish());
     assert_eq!(empty.problems, ["there are no messages"]);
+}
+
+#[test]
+fn a_log_whose_run_ended_early_says_so() {
+    let folder = Folder::new();
+    let path = folder.write("a.mcap", b"");
+    for (outcome, expected) in [
+        (Outcome::Incomplete("it was late"), Some("ended early, and the log with it: it was late")),
+        (Outcome::Complete, None),
+    ] {
+        let log = LogWriter::create(&path, LogOptions::default()).unwrap();
+        log.finish(outcome).unwrap();
+        let info = inspect(std::slice::from_ref(&path), &RobotTopics::default()).unwrap();
+        let said = info.problems.iter().any(|problem| problem.contains(expected.unwrap_or("ended early")));
+        assert_eq!(said, expected.is_some(), "{:?}", info.problems);
+    }
 }

@@ -15,6 +15,12 @@ pub enum Damage {
         /// Where the last record that is whole ends.
         position: usize,
     },
+    /// The log is whole, but says that the run which wrote it ended early.
+    #[error("the run that wrote the log ended early, and the log with it: {reason}")]
+    Incomplete {
+        /// Why.
+        reason: String,
+    },
     /// Bytes between two records mean nothing.
     #[error("{length} bytes from byte {position} on are not readable")]
     Unreadable {

@@ -36,7 +36,8 @@ impl LogFile {
             return Err(ReadError::NotMcap { path, looks_like, cure });
         }
         let layout = Layout::of(&map);
-        match layout.damage.first() {
+        let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
+        match loss {
             Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
             _ => Ok(Self { path, map, layout }),
         }

@@ -4,6 +4,7 @@ use super::block::{Block, Records};
 use super::chunk::Chunk;
 use super::damage::{ChunkFault, Damage};
 use super::definitions::Definitions;
+use super::outcome;
 use super::record::{Fields, MessageRecord, Record, record_at};
 use super::summary::Summary;
 use mcap::MAGIC;
@@ -129,6 +130,7 @@ impl Walk {
                 }
             }
             op::MESSAGE_INDEX => index.read(record.body),
+            op::METADATA => self.layout.damage.extend(outcome::damage_of(record)),
             _ => {}
         }
         true

@@ -29,6 +29,7 @@ mod file;
 mod guess;
 mod layout;
 mod merge;
+mod outcome;
 mod paths;
 mod record;
 mod summary;

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 const MESSAGE_OVERHEAD: u64 = 31;
 
 /// The name of the metadata record that says how the run ended.
-const OUTCOME_RECORD: &str = "gridweave";
+pub(crate) const OUTCOME_RECORD: &str = "gridweave";
 
 /// How a log is written.
 #[derive(Clone, Copy, Debug)]

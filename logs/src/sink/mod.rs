@@ -14,6 +14,7 @@ mod routing;
 mod stage;
 
 pub use error::LogWriteError;
+pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
 
 use gridweave_runtime::stage::{InputPort, ParameterError, Parameters, PortType, StageKind};

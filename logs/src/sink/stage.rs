@@ -170,7 +170,12 @@ impl Stage for McapSink {
                 }
             },
         };
-        self.write(lane, message)
+        let written = self.write(lane, message);
+        if written.is_err() {
+            // Nothing more can be written, not even that the log is not complete.
+            self.log = None;
+        }
+        written
     }
 
     fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
@@ -178,7 +183,10 @@ impl Stage for McapSink {
     }
 
     fn abort(&mut self, reason: &str) {
-        if let Err(error) = self.end(Outcome::Incomplete(reason)) {
+        // A run that has not begun leaves the log of an earlier one alone.
+        if self.log.is_some()
+            && let Err(error) = self.end(Outcome::Incomplete(reason))
+        {
             tracing::warn!("{error}");
         }
     }

@@ -25,6 +25,7 @@ pub(crate) fn stop_on_interrupt() -> &'static AtomicBool {
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
+            eprintln!("interrupted: the output is being closed; a second signal ends the program at once");
         });
         if let Err(error) = handler {
             tracing::warn!("an interrupt will not close the output: {error}");

@@ -48,7 +48,8 @@ fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
     let readers = readers(pipeline);
     let mut stages = Vec::with_capacity(inboxes.len());
     for (index, spec) in pipeline.stages.iter().enumerate() {
-        let mut links = vec![DirectLink::default(); spec.kind.outputs.len()];
+        // Clones of a link are one link.
+        let mut links: Vec<DirectLink> = spec.kind.outputs.iter().map(|_| DirectLink::default()).collect();
         for (port, link) in links.iter_mut().enumerate() {
             for &(reader, wire) in readers.get(&(index, port)).into_iter().flatten() {
                 link.add_reader(Rc::clone(&inboxes[reader][wire]), wire);
