@@ -1,5 +1,6 @@
 //! A run that is interrupted ends soon, fails, and leaves a log that can be read and says that it is not complete.
 #![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod support;
 

@@ -1,5 +1,7 @@
 //! A tag that one robot sees in a wrong place, as a reflection or a move of the tag makes it, does not spoil a merge.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 mod support;
 
 use gridweave_runtime::ros::{CommonTags, PoseStamped, RosMessage, TagRange, decode, encode};
