@@ -61,8 +61,8 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
         ended.assert(1, &["the run was interrupted"]);
 
         let output = fs::read(folder.path().join("out.mcap")).unwrap();
-        let messages: Vec<mcap::Message<'_>> = mcap::MessageStream::new(&output).unwrap().map(Result::unwrap).collect();
-        let written = messages.len();
+        let read: Vec<mcap::Message<'_>> = mcap::MessageStream::new(&output).unwrap().map(Result::unwrap).collect();
+        let written = read.len();
         assert!((1..messages as usize).contains(&written), "{engine}: {written}");
         let summary = mcap::Summary::read(&output).unwrap().unwrap();
         assert_eq!(summary.stats.unwrap().message_count, written as u64);
