@@ -2,7 +2,7 @@
 //!
 //! A robot counts as **right** if its map lies within 0.5 m and 1 degree of the truth, the distance taken at the middle
 //! of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. In a log of robots
-//! that have nothing to do with each other (no truth file, or one without frames) to refuse is right, and every merged
+//! that have nothing to do with each other (the truth has no frames) to refuse is right, and every merged
 //! robot is wrong. The reference robot is not counted.
 
 use crate::args::EvaluateArgs;
@@ -12,7 +12,6 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// Compares a summary with the truth, and prints how they differ.
@@ -87,9 +86,9 @@ struct Summary {
     unmerged: BTreeMap<String, String>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Deserialize)]
 struct Truth {
-    #[serde(default)]
+    /// None if the robots have nothing to do with each other.
     frames: BTreeMap<String, Frame>,
     /// The middle of each robot's last map, in its map frame.
     #[serde(default)]
@@ -109,28 +108,21 @@ impl Frame {
     }
 }
 
-/// Measures the summary that `gridweave run --summary` wrote against a truth file. Where there is no truth file, the
+/// Measures the summary that `gridweave run --summary` wrote against a truth file. Where the truth has no frames, the
 /// robots are taken as unrelated. A robot for which the truth gives no middle is measured at its map's origin.
 ///
 /// # Errors
 /// A file cannot be read or is not what it should be; or the truth knows robots, but not the summary's reference.
 pub(crate) fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
-    let run: Summary = match read(summary, "the summary of a run")? {
-        Some(run) => run,
-        None => bail!("cannot read the summary {}: there is no such file", summary.display()),
-    };
-    let truth_file: Truth = read(truth, "a truth file")?.unwrap_or_default();
+    let run: Summary = read(summary, "the summary of a run")?;
+    let truth_file: Truth = read(truth, "a truth file")?;
     measure(&run, &truth_file).with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
 }
 
-/// A JSON file. `None` if there is none.
-fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<Option<T>> {
-    let text = match std::fs::read(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error).with_context(|| format!("cannot read {what}: {}", path.display())),
-    };
-    serde_json::from_slice(&text).map(Some).with_context(|| format!("{} is not {what}", path.display()))
+/// A JSON file.
+fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
+    let text = std::fs::read(path).with_context(|| format!("cannot read {what}: {}", path.display()))?;
+    serde_json::from_slice(&text).with_context(|| format!("{} is not {what}", path.display()))
 }
 
 fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
@@ -226,13 +218,11 @@ mod tests {
     use super::*;
     use serde_json::{Value, json};
 
-    fn run(summary: &Value, truth: Option<&Value>) -> Result<Evaluation> {
+    fn run(summary: &Value, truth: &Value) -> Result<Evaluation> {
         let folder = tempfile::tempdir().unwrap();
         let (summary_path, truth_path) = (folder.path().join("summary.json"), folder.path().join("truth.json"));
         std::fs::write(&summary_path, summary.to_string()).unwrap();
-        if let Some(truth) = truth {
-            std::fs::write(&truth_path, truth.to_string()).unwrap();
-        }
+        std::fs::write(&truth_path, truth.to_string()).unwrap();
         evaluate(&summary_path, &truth_path)
     }
 
@@ -259,7 +249,7 @@ mod tests {
             "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.01), "robot3": frame(-4.0, 2.3, -2.0)},
             "unmerged": {}, "alignments": [], "stages": {},
         });
-        let evaluation = run(&summary, Some(&truth())).unwrap();
+        let evaluation = run(&summary, &truth()).unwrap();
         assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Right), ("robot3", Outcome::Right)]);
         let robot2 = &evaluation.robots[0];
         assert!((robot2.error_m.unwrap() - 0.2).abs() < 1e-3, "0.01 rad over 20 m");
@@ -276,7 +266,7 @@ mod tests {
                 "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": wrong},
                 "unmerged": {"robot3": "no tags in common"},
             });
-            let evaluation = run(&summary, Some(&truth())).unwrap();
+            let evaluation = run(&summary, &truth()).unwrap();
             assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Wrong), ("robot3", Outcome::Refused)]);
             assert_eq!(evaluation.robots[1].reason.as_deref(), Some("no tags in common"));
             assert_eq!((evaluation.right, evaluation.wrong, evaluation.refused), (0, 1, 1));
@@ -294,7 +284,7 @@ mod tests {
                 "robot1": seen(robot2.inverse()), "robot2": frame(0.0, 0.0, 0.0), "robot3": seen(robot2.inverse() * robot3),
             },
         });
-        let evaluation = run(&summary, Some(&truth())).unwrap();
+        let evaluation = run(&summary, &truth()).unwrap();
         assert_eq!(outcomes(&evaluation), [("robot1", Outcome::Right), ("robot3", Outcome::Right)]);
         assert!(evaluation.robots.iter().all(|robot| robot.error_m.unwrap() < 1e-9));
     }
@@ -307,12 +297,11 @@ mod tests {
         let merged = json!({
             "reference": "robot1", "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(1.0, 0.0, 0.0)},
         });
-        for truth in [None, Some(json!({})), Some(json!({"frames": {}}))] {
-            let evaluation = run(&refused, truth.as_ref()).unwrap();
-            assert_eq!(outcomes(&evaluation), [("robot2", Outcome::RightlyRefused)]);
-            assert!(!evaluation.related);
-            assert_eq!(outcomes(&run(&merged, truth.as_ref()).unwrap()), [("robot2", Outcome::Wrong)]);
-        }
+        let truth = json!({"frames": {}});
+        let evaluation = run(&refused, &truth).unwrap();
+        assert_eq!(outcomes(&evaluation), [("robot2", Outcome::RightlyRefused)]);
+        assert!(!evaluation.related);
+        assert_eq!(outcomes(&run(&merged, &truth).unwrap()), [("robot2", Outcome::Wrong)]);
     }
 
     #[test]
@@ -322,7 +311,7 @@ mod tests {
             "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot7": frame(1.0, 0.0, 0.0)},
             "unmerged": {"robot8": "no tags"},
         });
-        let evaluation = run(&summary, Some(&truth())).unwrap();
+        let evaluation = run(&summary, &truth()).unwrap();
         let expected = [
             ("robot2", Outcome::Refused),
             ("robot3", Outcome::Refused),
@@ -336,7 +325,7 @@ mod tests {
     #[test]
     fn a_reference_that_the_truth_does_not_know_is_an_error() {
         let summary = json!({"reference": "robot9", "frames": {"robot9": frame(0.0, 0.0, 0.0)}});
-        let error = format!("{:#}", run(&summary, Some(&truth())).unwrap_err());
+        let error = format!("{:#}", run(&summary, &truth()).unwrap_err());
         assert!(error.contains("`robot9` is not in the truth, which has robot1, robot2, robot3"), "{error}");
     }
 
@@ -358,9 +347,11 @@ mod tests {
         std::fs::write(&bad, r#"{"frames": 3}"#).unwrap();
         let error = format!("{:#}", evaluate(&good, &bad).unwrap_err());
         assert!(error.contains("bad.json is not a truth file"), "{error}");
-        let error = format!("{:#}", evaluate(&folder.path().join("none.json"), &good).unwrap_err());
-        assert!(error.contains("there is no such file"), "{error}");
-        assert_eq!(evaluate(&good, &folder.path().join("none.json")).unwrap().robots, []);
+        let none = folder.path().join("none.json");
+        for (summary, truth) in [(&none, &good), (&good, &none)] {
+            let error = format!("{:#}", evaluate(summary, truth).unwrap_err());
+            assert!(error.contains("none.json"), "{error}");
+        }
     }
 
     #[test]
@@ -370,7 +361,7 @@ mod tests {
             "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.0)},
             "unmerged": {"robot3": "no tags in common"},
         });
-        let text = run(&summary, Some(&truth())).unwrap().to_text();
+        let text = run(&summary, &truth()).unwrap().to_text();
         let expected = "  robot   outcome  error m  error deg
   robot2  right      0.000      0.000
   robot3  refused        -          -  no tags in common
