@@ -103,3 +103,62 @@ pub(crate) fn unpack(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::{LogTime, MessageFlags};
+
+    /// The messages of a sample: their log times and bytes.
+    fn unpacked(header: &SampleHeader, payload: &[u8]) -> Result<Vec<(u64, Vec<u8>)>, LinkError> {
+        let mut messages = Vec::new();
+        unpack(header, Rc::new(payload.to_vec()), "a.b", |message| {
+            messages.push((message.header().log_time.0, message.bytes().to_vec()));
+        })?;
+        Ok(messages)
+    }
+
+    fn batch(messages: &[&[u8]]) -> Batch {
+        let mut batch = Batch::default();
+        for (time, bytes) in messages.iter().enumerate() {
+            let header = MessageHeader {
+                log_time: LogTime(time as u64),
+                length: bytes.len() as u64,
+                flags: MessageFlags::DATA,
+                ..Default::default()
+            };
+            batch.push(&header, bytes);
+        }
+        batch
+    }
+
+    #[test]
+    fn the_messages_of_a_batch_come_out_as_they_went_in() {
+        for messages in [&[&b"one"[..]][..], &[b"", b"1", b"12345678", b"123456789"]] {
+            let batch = batch(messages);
+            let (header, payload) = batch.sample();
+            let expected: Vec<_> = messages.iter().enumerate().map(|(t, bytes)| (t as u64, bytes.to_vec())).collect();
+            assert_eq!(unpacked(&header, payload).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn a_sample_that_is_cut_or_lies_about_its_lengths_is_an_error() {
+        let batch = batch(&[b"123456789", b"12"]);
+        let (header, payload) = batch.sample();
+        for end in 0..payload.len() - 8 {
+            assert!(unpacked(&header, &payload[..end]).is_err(), "{end}");
+        }
+        let mut lie = payload.to_vec();
+        lie[24..32].fill(0xff);
+        assert!(unpacked(&header, &lie).is_err());
+    }
+
+    #[test]
+    fn a_sample_of_another_version_is_refused() {
+        let batch = batch(&[b"1"]);
+        let (header, payload) = batch.sample();
+        let error = unpacked(&SampleHeader { version: 2, ..header }, payload).unwrap_err().to_string();
+        assert!(error.contains("version 2"), "{error}");
+    }
+}
