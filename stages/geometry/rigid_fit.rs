@@ -13,7 +13,7 @@ pub struct PointPair {
     /// The point in frame b, metres.
     pub b: Point2,
     /// How much the pair counts: the inverse of the variance of `a - T_a_b * b` along one axis, 1 / square metres. Where
-    /// variances are not known, any positive number; then see [`RigidFit::scaled_covariance`].
+    /// variances are not known, any positive number; the fit's covariance then means nothing.
     pub weight: f64,
 }
 
@@ -26,17 +26,9 @@ pub struct RigidFit {
     pub covariance: Matrix3<f64>,
     /// Weighted root mean square of the distances that remain, metres.
     pub rms: f64,
-    /// Weighted sum of the squared distances over the degrees of freedom that are left, 2 n - 3: near 1 if the weights
-    /// are inverse variances and right.
-    pub variance_factor: f64,
 }
 
 impl RigidFit {
-    /// The covariance with its size taken from the distances that remain: for weights that say only how pairs compare.
-    pub fn scaled_covariance(&self) -> Matrix3<f64> {
-        self.covariance * self.variance_factor
-    }
-
     /// The covariance of `T_a_b * b` that comes from the transform alone, square metres.
     pub fn point_covariance(&self, b: &Point2) -> Matrix2<f64> {
         let jacobian = point_jacobian(&self.transform_a_b, b);
@@ -100,12 +92,7 @@ pub fn fit_rigid(pairs: &[PointPair]) -> Option<RigidFit> {
     let covariance = to_origin * about_centre * to_origin.transpose();
 
     let squares: f64 = usable().map(|pair| pair.weight * (pair.a - transform_a_b * pair.b).norm_squared()).sum();
-    let fit = RigidFit {
-        transform_a_b,
-        covariance,
-        rms: (squares / weight).sqrt(),
-        variance_factor: squares / (2 * count - 3) as f64,
-    };
+    let fit = RigidFit { transform_a_b, covariance, rms: (squares / weight).sqrt() };
     let finite = translation.iter().chain(covariance.iter()).all(|value| value.is_finite());
     finite.then_some(fit)
 }
