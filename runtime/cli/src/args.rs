@@ -1,5 +1,6 @@
 //! What the command line may say.
 
+use crate::experiment::ExperimentArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gridweave_runtime::engine::EngineKind;
 use std::path::PathBuf;
@@ -37,6 +38,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Simulate three robots, merge their maps, and compare with the truth.
     Demo(DemoArgs),
+    /// Repeat the experiments of the papers, and measure how far the stages hold.
+    Experiment(ExperimentArgs),
 }
 
 /// The command line asks for something that cannot be.

@@ -7,17 +7,18 @@ use crate::run::Job;
 use crate::simulate;
 use anyhow::{Context, Result};
 use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
 use std::path::Path;
 
 /// Simulates, merges, evaluates, and leaves all files in one folder.
-pub(crate) fn demo(args: &DemoArgs) -> Result<Outcome> {
+pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Outcome> {
     let folder = &args.out;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let (log, truth) = (folder.join("robots.mcap"), folder.join("robots.truth.json"));
     println!("simulating three robots in one building ...");
     let mut overrides = Overrides::default();
     overrides.seed = Some(args.seed);
-    if simulate::write_log(&log, &truth, overrides)?.is_none() {
+    if simulate::write_log(&log, &truth, overrides, registry)?.is_none() {
         return Ok(Outcome::BadUse);
     }
 
@@ -31,7 +32,8 @@ pub(crate) fn demo(args: &DemoArgs) -> Result<Outcome> {
     };
     let merged = folder.join("merged.mcap");
     let inputs = [log];
-    let job = Job { pipeline: Path::new("tag_merge"), inputs: &inputs, output: Some(&merged), options: &options };
+    let job =
+        Job { pipeline: Path::new("tag_merge"), inputs: &inputs, output: Some(&merged), options: &options, registry };
     let Some(summary) = job.run()? else { return Ok(Outcome::BadUse) };
     print!("{}", summary.to_text());
 

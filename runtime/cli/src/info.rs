@@ -7,14 +7,15 @@ use crate::table::Table;
 use anyhow::Result;
 use gridweave_logs::info::{self, LogInfo, TopicInfo};
 use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
 use gridweave_runtime::stage::RobotTopics;
 use std::fmt::Write;
 
 /// Shows what is in logs.
-pub(crate) fn info(args: &InfoArgs) -> Result<Outcome> {
+pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Outcome> {
     let robots = match &args.pipeline {
         None => RobotTopics::default(),
-        Some(path) => match pipelines::load(path, &Overrides::default())? {
+        Some(path) => match pipelines::load(path, &Overrides::default(), registry)? {
             Some(pipeline) => pipeline.robots,
             None => return Ok(Outcome::BadUse),
         },

@@ -14,18 +14,12 @@ const SHIPPED: [(&str, &str); 2] = [
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),
 ];
 
-/// All stage kinds of this program.
-pub(crate) fn registry() -> Registry {
-    Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()))
-}
-
 /// Loads a pipeline file or a shipped pipeline. `None` if it is wrong: then all its errors have been shown.
-pub(crate) fn load(pipeline: &Path, overrides: &Overrides) -> Result<Option<Pipeline>> {
-    let registry = registry();
+pub(crate) fn load(pipeline: &Path, overrides: &Overrides, registry: &Registry) -> Result<Option<Pipeline>> {
     let shipped = SHIPPED.iter().find(|(name, _)| Path::new(name) == pipeline && !pipeline.exists());
     let loaded = match shipped {
-        Some((name, text)) => Pipeline::parse(&format!("pipelines/{name}.toml"), text, &registry, overrides),
-        None => Pipeline::load(pipeline, &registry, overrides),
+        Some((name, text)) => Pipeline::parse(&format!("pipelines/{name}.toml"), text, registry, overrides),
+        None => Pipeline::load(pipeline, registry, overrides),
     };
     match loaded {
         Ok(pipeline) => Ok(Some(pipeline)),
@@ -37,10 +31,10 @@ pub(crate) fn load(pipeline: &Path, overrides: &Overrides) -> Result<Option<Pipe
 }
 
 /// Checks pipeline files.
-pub(crate) fn check(args: &CheckArgs) -> Result<Outcome> {
+pub(crate) fn check(args: &CheckArgs, registry: &Registry) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     for path in &args.pipelines {
-        match load(path, &Overrides::default())? {
+        match load(path, &Overrides::default(), registry)? {
             Some(pipeline) => println!("{}: {} stages, no errors", path.display(), pipeline.stages.len()),
             None => outcome = Outcome::BadUse,
         }
@@ -49,8 +43,8 @@ pub(crate) fn check(args: &CheckArgs) -> Result<Outcome> {
 }
 
 /// Shows a pipeline.
-pub(crate) fn graph(args: &GraphArgs) -> Result<Outcome> {
-    let Some(pipeline) = load(&args.pipeline, &Overrides::default())? else { return Ok(Outcome::BadUse) };
+pub(crate) fn graph(args: &GraphArgs, registry: &Registry) -> Result<Outcome> {
+    let Some(pipeline) = load(&args.pipeline, &Overrides::default(), registry)? else { return Ok(Outcome::BadUse) };
     print!(
         "{}",
         match args.format {
@@ -64,13 +58,12 @@ pub(crate) fn graph(args: &GraphArgs) -> Result<Outcome> {
 }
 
 /// Lists the stage kinds.
-pub(crate) fn kinds(args: &KindsArgs) -> Result<Outcome> {
+pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Outcome> {
     let registry = match &args.kind {
-        None => registry(),
+        None => registry.clone(),
         Some(name) => {
-            let all = registry();
-            let kind = all.get(name).cloned().ok_or_else(|| {
-                let names: Vec<&str> = all.kinds().map(|kind| kind.name).collect();
+            let kind = registry.get(name).cloned().ok_or_else(|| {
+                let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
                 BadUse(format!("there is no stage kind `{name}`; the kinds are {}", names.join(", ")))
             })?;
             Registry::new([kind])

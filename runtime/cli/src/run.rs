@@ -9,6 +9,7 @@ use crate::summary::Summary;
 use anyhow::{Context, Result};
 use gridweave_runtime::engine;
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
+use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 
 /// One run of a pipeline, put together from what the command line says.
@@ -20,17 +21,24 @@ pub(crate) struct Job<'a> {
     /// What the only sink writes; if none, what the pipeline says.
     pub(crate) output: Option<&'a Path>,
     pub(crate) options: &'a RunOptions,
+    /// The stage kinds that the pipeline may name.
+    pub(crate) registry: &'a Registry,
 }
 
 /// Runs a pipeline file.
-pub(crate) fn run(args: &RunArgs) -> Result<Outcome> {
-    let job =
-        Job { pipeline: &args.pipeline, inputs: &args.input, output: args.output.as_deref(), options: &args.options };
+pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Outcome> {
+    let job = Job {
+        pipeline: &args.pipeline,
+        inputs: &args.input,
+        output: args.output.as_deref(),
+        options: &args.options,
+        registry,
+    };
     job.run_and_print()
 }
 
 /// Merges logs by the shipped pipeline for them.
-pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
+pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Outcome> {
     if let Some(map) = args.inputs.iter().find(|path| path.extension().is_some_and(|end| end == "yaml" || end == "yml"))
     {
         let text = format!("{} is a map file: merge takes logs (MCAP files or rosbag2 folders)", map.display());
@@ -41,6 +49,7 @@ pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
         inputs: &args.inputs,
         output: Some(&args.output),
         options: &args.options,
+        registry,
     };
     job.run_and_print()
 }
@@ -61,7 +70,9 @@ impl Job<'_> {
     /// Runs the pipeline and writes all that was asked for. `None` if the pipeline is wrong, which has been said then.
     pub(crate) fn run(&self) -> Result<Option<Summary>> {
         let exports = Exports::new(self.options, self.output)?;
-        let Some(pipeline) = pipelines::load(self.pipeline, &self.overrides()?)? else { return Ok(None) };
+        let Some(pipeline) = pipelines::load(self.pipeline, &self.overrides()?, self.registry)? else {
+            return Ok(None);
+        };
         refuse_to_overwrite_inputs(&pipeline)?;
         let progress = Progress::new(progress::stop_on_interrupt());
         let report = engine::run(&pipeline, self.options.engine, &progress);

@@ -7,10 +7,11 @@ use crate::progress::{self, Progress};
 use anyhow::{Context, Result};
 use gridweave_runtime::engine::{self, EngineKind, RunReport};
 use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 
 /// Simulates robots, and writes a log and its truth.
-pub(crate) fn simulate(args: &SimulateArgs) -> Result<Outcome> {
+pub(crate) fn simulate(args: &SimulateArgs, registry: &Registry) -> Result<Outcome> {
     let mut overrides = Overrides::default();
     overrides.seed = Some(args.seed);
     if let Some(robots) = args.robots {
@@ -20,17 +21,22 @@ pub(crate) fn simulate(args: &SimulateArgs) -> Result<Outcome> {
         overrides.set(&format!("simulator.{setting}")).map_err(|error| BadUse(error.to_string()))?;
     }
     let truth = args.truth.clone().unwrap_or_else(|| beside(&args.output));
-    let Some(report) = write_log(&args.output, &truth, overrides)? else { return Ok(Outcome::BadUse) };
+    let Some(report) = write_log(&args.output, &truth, overrides, registry)? else { return Ok(Outcome::BadUse) };
     let messages: u64 = report.stages.iter().map(|stage| stage.messages_in).sum();
     println!("wrote {messages} messages to {} and the truth to {}", args.output.display(), truth.display());
     Ok(Outcome::Done)
 }
 
 /// Writes a simulated log and its truth. `None` if the settings are wrong, which has been said then.
-pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides) -> Result<Option<RunReport>> {
+pub(crate) fn write_log(
+    log: &Path,
+    truth: &Path,
+    mut overrides: Overrides,
+    registry: &Registry,
+) -> Result<Option<RunReport>> {
     let path = log.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", log.display())))?;
     overrides.set_for_kind("mcap_sink", "file", path);
-    let Some(pipeline) = pipelines::load(Path::new("simulate"), &overrides)? else { return Ok(None) };
+    let Some(pipeline) = pipelines::load(Path::new("simulate"), &overrides, registry)? else { return Ok(None) };
     let progress = Progress::new(progress::stop_on_interrupt());
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();

@@ -19,6 +19,28 @@ impl Table {
     }
 }
 
+impl Table {
+    /// The table in Markdown.
+    pub(crate) fn to_markdown(&self) -> String {
+        let line = |row: &Vec<String>| {
+            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let rule = |row: &Vec<String>| format!("|{}\n", " --- |".repeat(row.len()));
+        let (heads, rows) = self.rows.split_at(1);
+        heads.iter().map(|row| line(row) + &rule(row)).chain(rows.iter().map(line)).collect()
+    }
+
+    /// The table as comma-separated values (RFC 4180).
+    pub(crate) fn to_csv(&self) -> String {
+        let quoted = |cell: &String| match cell.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", cell.replace('"', "\"\"")),
+            false => cell.clone(),
+        };
+        self.rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
+    }
+}
+
 impl std::fmt::Display for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
@@ -60,6 +82,14 @@ mod tests {
         table.row(["robot1".into(), "0.1".into(), "a".into()]);
         table.row(["r".into(), "-10.1".into(), "bcd".into()]);
         assert_eq!(table.to_string(), "  robot       x  why\n  robot1    0.1  a\n  r       -10.1  bcd\n");
+    }
+
+    #[test]
+    fn markdown_and_csv_hold_the_same_cells() {
+        let mut table = Table::new(["robot", "why"]);
+        table.row(["r1".into(), "a|b, \"c\"".into()]);
+        assert_eq!(table.to_markdown(), "| robot | why |\n| --- | --- |\n| r1 | a\\|b, \"c\" |\n");
+        assert_eq!(table.to_csv(), "robot,why\nr1,\"a|b, \"\"c\"\"\"\n");
     }
 
     #[test]

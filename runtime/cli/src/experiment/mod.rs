@@ -1,0 +1,55 @@
+//! `gridweave experiment`: the papers' experiments repeated, and how far the stages hold.
+//!
+//! Each experiment is a file here. It prints its tables and writes them as CSV, and its curves as SVG, to a folder.
+//! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
+
+mod direction;
+mod localization;
+mod methods;
+mod noise;
+mod plot;
+mod results;
+mod statistics;
+mod trial;
+
+use crate::Outcome;
+use anyhow::Result;
+use clap::{Args, Subcommand};
+use gridweave_runtime::stage::Registry;
+use results::Results;
+use std::path::PathBuf;
+
+/// What `gridweave experiment` is told.
+#[derive(Debug, Args)]
+pub(crate) struct ExperimentArgs {
+    /// The folder for the tables (CSV) and the curves (SVG).
+    #[arg(long, global = true, default_value = "experiments", value_name = "FOLDER")]
+    out: PathBuf,
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Debug, Subcommand)]
+enum Experiment {
+    /// How exactly the direction of a map's walls is found (Tsardoulias et al., section 5.1).
+    Direction(direction::DirectionArgs),
+    /// Merging by tags, by tags and directions, and by both and ICP (Tsardoulias et al., section 5.2).
+    Methods(methods::MethodsArgs),
+    /// How certain a tag's place is, and how wrong, after how many readings (Tsardoulias et al., figure 4).
+    Localization(localization::LocalizationArgs),
+    /// How often a merge succeeds as tags, odometry and overlap get worse.
+    Noise(noise::NoiseArgs),
+}
+
+/// Does one experiment.
+pub(crate) fn experiment(args: &ExperimentArgs, registry: &Registry) -> Result<Outcome> {
+    let mut results = Results::new(&args.out)?;
+    match &args.experiment {
+        Experiment::Direction(args) => direction::run(args, &mut results),
+        Experiment::Methods(args) => methods::run(args, registry, &mut results),
+        Experiment::Localization(args) => localization::run(args, &mut results),
+        Experiment::Noise(args) => noise::run(args, registry, &mut results),
+    }?;
+    results.say_where();
+    Ok(Outcome::Done)
+}
