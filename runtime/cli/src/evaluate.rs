@@ -181,7 +181,8 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
 }
 
 impl Outcome {
-    fn words(self) -> &'static str {
+    /// For people.
+    pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Right => "right",
             Self::Wrong => "wrong",

@@ -49,7 +49,7 @@ enum Outcome {
 /// given one counts. The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be
 /// merged.
 pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
-    let registry = Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()).chain(kinds));
+    let registry = registry(kinds);
     let cli = Cli::parse();
     start_log(cli.verbose);
     match dispatch(cli.command, &registry) {
@@ -62,6 +62,11 @@ pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
             ExitCode::from(if bad_use { 2 } else { 1 })
         }
     }
+}
+
+/// The stage kinds of Gridweave and the given ones.
+fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
+    Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()).chain(kinds))
 }
 
 fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
