@@ -37,6 +37,17 @@ fn a_mistake_in_stage_toml_is_shown_with_the_right_name() {
 }
 
 #[test]
+fn a_folder_without_cases_is_bad_use() {
+    let cases = Cases::new();
+    cases.folder("tag_filter");
+    cases.golden(&["--partial"]).assert(2, &["there is no case in cases", "KIND/CASE with stage.toml"]);
+    cases.stage("tag_filter", TAGS);
+    cases.golden(&["--partial"]).assert(2, &["cases/tag_filter/stage.toml lies among the cases of a kind"]);
+    fs::remove_dir_all(cases.0.path().join("cases")).unwrap();
+    cases.golden(&[]).assert(2, &["there is no folder cases", "--cases FOLDER"]);
+}
+
+#[test]
 fn an_input_that_cannot_be_used_fails_its_case() {
     let cases = Cases::four_tags(TAGS);
     let input = cases.folder("tag_filter/four_tags").join("input.mcap");
