@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
+#[path = "support/golden.rs"]
+mod golden_cases;
 mod support;
 
+use golden_cases::{Cases, TAGS, change, estimates};
 use std::fs;
-use support::golden::{Cases, TAGS, change, estimates};
 
 #[test]
 fn a_mistake_in_stage_toml_is_shown_with_the_right_name() {

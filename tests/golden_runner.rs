@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
+#[path = "support/golden.rs"]
+mod golden_cases;
 mod support;
 
+use golden_cases::{Cases, SOURCE, TAGS, estimates};
 use std::fs;
-use support::golden::{Cases, SOURCE, TAGS, estimates};
 use support::{LogBuilder, gridweave};
 use tempfile::TempDir;
 

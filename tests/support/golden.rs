@@ -1,6 +1,7 @@
 //! Folders of golden cases to run `gridweave golden` on.
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
-use super::{Ended, LogBuilder, TestMap, gridweave};
+use crate::support::{Ended, LogBuilder, TestMap, gridweave};
 use gridweave_runtime::ros::{TagEstimate, TagEstimates};
 use std::fs;
 use std::path::{Path, PathBuf};

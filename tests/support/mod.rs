@@ -1,8 +1,6 @@
 //! Running the command, and logs to run it on.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
-pub mod golden;
-
 use gridweave_logs::schemas::schema_text;
 use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::message::{Channel, LogTime};
