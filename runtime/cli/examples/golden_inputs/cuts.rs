@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 /// The input of one case.
 #[derive(Clone, Copy)]
-pub struct Cut {
+pub(crate) struct Cut {
     /// The stage kind, a folder of `tests/golden`.
-    pub kind: &'static str,
+    pub(crate) kind: &'static str,
     /// The case, a folder in it.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// The topics that are kept; `{robot}` is any robot.
     topics: &'static [&'static str],
     /// Messages up to so many seconds after the first are kept.
@@ -21,7 +21,7 @@ pub struct Cut {
 }
 
 /// All cuts.
-pub const CUTS: [Cut; 7] = [
+pub(crate) const CUTS: [Cut; 7] = [
     Cut { kind: "line_extractor", name: "simulated", topics: &["/{robot}/map"], seconds: f64::INFINITY },
     Cut { kind: "tag_localizer", name: "simulated", topics: &["/robot1/pose", "/robot1/tag_ranges"], seconds: 30.0 },
     Cut { kind: "tag_filter", name: "simulated", topics: &["/{robot}/tags/estimates"], seconds: f64::INFINITY },
@@ -52,13 +52,13 @@ const WORLD: [&str; 8] =
 const SEED: u64 = 4;
 
 /// A merge of a simulated log, with all that its stages have sent.
-pub struct Merge {
+pub(crate) struct Merge {
     log: PathBuf,
 }
 
 impl Merge {
     /// Simulates and merges, with files in `folder`.
-    pub fn new(folder: &Path) -> Self {
+    pub(crate) fn new(folder: &Path) -> Self {
         let (simulated, merged) = (folder.join("simulated.mcap"), folder.join("merged.mcap"));
         let mut world = Overrides::default();
         world.seed = Some(SEED);
@@ -75,7 +75,7 @@ impl Merge {
     }
 
     /// Writes what a cut keeps to a file.
-    pub fn write(&self, cut: &Cut, path: &Path) {
+    pub(crate) fn write(&self, cut: &Cut, path: &Path) {
         let mut log = LogBuilder::new(path);
         let kept = |topic: &str| cut.topics.iter().any(|kept| *kept == topic || match_robot(kept, topic).is_some());
         let messages = messages(&self.log);

@@ -43,6 +43,18 @@ impl FloorPlan {
         Self::new(&[[x2, y1, x2, y2], [x2, y2, x1, y2], [x1, y2, x1, y1], [x1, y1, x2, y1]])
     }
 
+    /// A room with a corner cut out, so that no two walls are of one length: 8, 5, 4.5, 3.5, 3 and 2 m.
+    pub(super) fn angular_room() -> Self {
+        Self::new(&[
+            [0.5, 0.5, 8.5, 0.5],
+            [8.5, 0.5, 8.5, 5.5],
+            [8.5, 5.5, 5.0, 5.5],
+            [5.0, 5.5, 5.0, 3.5],
+            [5.0, 3.5, 0.5, 3.5],
+            [0.5, 3.5, 0.5, 0.5],
+        ])
+    }
+
     /// An office of 14 x 10 m: rooms of several sizes on both sides of a corridor, their doors, and a slanted wall.
     pub(super) fn office() -> Self {
         let mut plan = Self::room([0.0, 0.0], [14.0, 10.0]);

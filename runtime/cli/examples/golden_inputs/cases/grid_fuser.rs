@@ -6,6 +6,7 @@ use super::log_builder::{LogBuilder, TestMap, header};
 use gridweave_runtime::ros::{RobotFrame, RobotFrames, UnmergedRobot};
 use gridweave_stages::geometry::{Pose2, pose};
 use nalgebra::{Isometry2, Translation2};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 pub(super) fn cases() -> Vec<Case> {
     let case = |name, write| Case::new("grid_fuser", name, write);
@@ -16,9 +17,9 @@ pub(super) fn cases() -> Vec<Case> {
         case("conditional_mean_inverse", conditional_mean),
         case("evidence", evidence),
         case("turned_origin", |log| {
-            let turned = grid(3, &[100, 0, 0, 0, 0, 50]).at(2.0, 0.0, std::f64::consts::FRAC_PI_2);
+            let turned = grid(3, &[100, 0, 0, 0, 0, 50]).at(2.0, 0.0, FRAC_PI_2);
             log.map(1.0, "robot1", &turned);
-            log.map(2.0, "robot2", &grid(2, &[20, 30]).at(0.0, 0.0, std::f64::consts::PI));
+            log.map(2.0, "robot2", &grid(2, &[20, 30]).at(0.0, 0.0, PI));
             place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(5.0, 2.0, 0.0))]);
         }),
         case("two_resolutions", |log| {
@@ -38,15 +39,13 @@ pub(super) fn cases() -> Vec<Case> {
             place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(0.5, 0.0, 0.0))]);
             log.map(4.0, "robot2", &grid(2, &[0, 100]));
         }),
-        case("one_point", |log| {
-            log.map(1.0, "robot1", &grid(3, &[-1, -1, -1, -1, 100, -1]));
-            place(log, 2.0, &[("robot1", pose(0.0, 0.0, 0.3))]);
-        }),
+        case("one_point", |log| one_point(log, FRAC_PI_2)),
+        case("one_point_forward", |log| one_point(log, 0.3)),
         case("all_occupied", |log| {
             for (seconds, robot) in [(1.0, "robot1"), (2.0, "robot2")] {
                 log.map(seconds, robot, &TestMap::filled(6, 5, 1.0, 100));
             }
-            place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(6.0, 1.0, std::f64::consts::FRAC_PI_4))]);
+            place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(6.0, 1.0, FRAC_PI_4))]);
         }),
         case("when_it_is_sent", when_it_is_sent),
         case("absurd_frames", |log| {
@@ -121,6 +120,12 @@ fn conditional_mean(log: &mut LogBuilder) {
     ];
     log.map(1.0, "robot1", &grid(9, &cells));
     place(log, 2.0, &[("robot1", Pose2::identity())]);
+}
+
+/// A free cell, and a map of which one cell is known, turned by an angle.
+fn one_point(log: &mut LogBuilder, angle: f64) {
+    log.map(1.0, "robot1", &grid(1, &[0])).map(2.0, "robot2", &grid(3, &[-1, -1, -1, -1, 100, -1]));
+    place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(2.0, 1.0, angle))]);
 }
 
 /// One row for each of two maps: free, occupied, undecided and unknown against each other.

@@ -11,7 +11,7 @@ const CELL: f32 = 0.05;
 pub(super) fn cases() -> Vec<Case> {
     let case = |name, write| Case::new("line_extractor", name, write);
     vec![
-        case("room", |log| draw(log, &FloorPlan::room([0.5, 0.5], [8.5, 5.5]), [9.0, 6.0])),
+        case("room", |log| draw(log, &FloorPlan::angular_room(), [9.0, 6.0])),
         case("paper", |log| {
             let view = View::of([0.0, 0.0], [5.0, 4.0], 0.02);
             log.map(
@@ -21,8 +21,8 @@ pub(super) fn cases() -> Vec<Case> {
             );
         }),
         case("walls_at_45_degrees", |log| {
-            let plan = FloorPlan::room([-3.0, -2.0], [3.0, 2.0]).turned(FRAC_PI_4);
-            log.map(1.0, "robot1", &plan.draw(&View::of([-4.0, -4.0], [4.0, 4.0], CELL)));
+            let plan = FloorPlan::angular_room().turned(FRAC_PI_4);
+            log.map(1.0, "robot1", &plan.draw(&View::of([-4.5, -0.5], [6.5, 10.5], CELL)));
         }),
         case("one_direction", |log| {
             draw(log, &FloorPlan::new(&[[0.0, 1.0, 8.0, 1.0], [0.0, 3.0, 8.0, 3.0]]), [8.0, 4.0]);
@@ -32,15 +32,13 @@ pub(super) fn cases() -> Vec<Case> {
                 [[0.5, 1.0, 3.0, 1.0], [3.9, 1.0, 7.5, 1.0], [0.5, 3.0, 3.0, 3.0], [3.3, 3.0, 7.0, 3.0]];
             draw(log, &FloorPlan::new(&door_and_crack), [8.0, 4.0]);
         }),
-        case("collinear_pieces", |log| {
-            let pieces = [[0.5, 1.0, 3.0, 1.0], [3.3, 1.0, 5.0, 1.0], [5.3, 1.6, 7.5, 1.6]];
-            draw(log, &FloorPlan::new(&pieces), [8.0, 2.5]);
-        }),
+        case("collinear_pieces", collinear_pieces),
+        case("collinear_pieces_apart", collinear_pieces),
         case("short_and_faint", short_and_faint),
         case("turned_origin", |log| {
             let view = View::of([0.0, 0.0], [9.0, 6.0], CELL);
             let (transform_building_map, grid_yaw) = (pose(2.0, -3.0, 0.4), 0.7);
-            let plan = FloorPlan::room([0.5, 0.5], [8.5, 5.5]);
+            let plan = FloorPlan::angular_room();
             log.map(1.0, "robot1", &plan.draw(&View { transform_building_map, grid_yaw, ..view }));
         }),
         case("empty_map", |log| {
@@ -63,6 +61,12 @@ pub(super) fn cases() -> Vec<Case> {
 /// What a robot sees of the building from its origin to a corner, metres.
 fn draw(log: &mut LogBuilder, plan: &FloorPlan, corner: [f64; 2]) {
     log.map(1.0, "robot1", &plan.draw(&View::of([0.0, 0.0], corner, CELL)));
+}
+
+/// Two pieces on one line, and a third aside.
+fn collinear_pieces(log: &mut LogBuilder) {
+    let pieces = [[0.5, 1.0, 3.0, 1.0], [3.3, 1.0, 5.0, 1.0], [5.3, 1.6, 7.5, 1.6]];
+    draw(log, &FloorPlan::new(&pieces), [8.0, 2.5]);
 }
 
 /// A wall of 2 m, one of 0.5 m, and one of 2 m of which every third cell is occupied.

@@ -3,7 +3,7 @@
 //! Topics are those of the pipeline `tag_merge`, so that a case is fed by the same patterns as a cut of a log.
 
 #[path = "../../../../../tests/support/log_builder.rs"]
-pub mod log_builder;
+pub(crate) mod log_builder;
 
 mod drawing;
 mod frame_solver;
@@ -21,11 +21,11 @@ use std::path::Path;
 
 /// A case with an input.
 #[derive(Clone, Copy)]
-pub struct Case {
+pub(crate) struct Case {
     /// The stage kind, a folder of `tests/golden`.
-    pub kind: &'static str,
+    pub(crate) kind: &'static str,
     /// The case, a folder in it.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     write: fn(&mut LogBuilder),
 }
 
@@ -35,7 +35,7 @@ impl Case {
     }
 
     /// Writes the input to a file.
-    pub fn write(&self, path: &Path) {
+    pub(crate) fn write(&self, path: &Path) {
         let mut log = LogBuilder::new(path);
         (self.write)(&mut log);
         log.finish();
@@ -43,7 +43,7 @@ impl Case {
 }
 
 /// All cases whose inputs are made up.
-pub fn made_up() -> Vec<Case> {
+pub(crate) fn made_up() -> Vec<Case> {
     [
         frame_solver::cases(),
         grid_fuser::cases(),
@@ -59,21 +59,21 @@ pub fn made_up() -> Vec<Case> {
 
 /// A message as a log holds it.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Logged {
+pub(crate) struct Logged {
     /// Its topic.
-    pub topic: String,
+    pub(crate) topic: String,
     /// Its ROS 2 type.
-    pub type_name: String,
+    pub(crate) type_name: String,
     /// Nanoseconds.
-    pub log_time: u64,
+    pub(crate) log_time: u64,
     /// Its number in the log.
-    pub sequence: u32,
+    pub(crate) sequence: u32,
     /// Its bytes.
-    pub data: Vec<u8>,
+    pub(crate) data: Vec<u8>,
 }
 
 /// All messages of a log, in the order of the file.
-pub fn messages(path: &Path) -> Vec<Logged> {
+pub(crate) fn messages(path: &Path) -> Vec<Logged> {
     let bytes = fs::read(path).unwrap_or_else(|error| panic!("cannot read {}: {error}", path.display()));
     let read = |message: mcap::Message<'_>| Logged {
         topic: message.channel.topic.clone(),
