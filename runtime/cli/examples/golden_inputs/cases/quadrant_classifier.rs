@@ -124,11 +124,13 @@ fn tables_1_and_2(log: &mut LogBuilder) {
     let by_length = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
     let walls: Vec<Segment> = degrees.iter().zip(by_length).map(|(&angle, length)| wall(angle, length, 1.0)).collect();
     send(log, 2.0, "weighted", &walls);
+    refused(log, 3.0, "equal", "weighted");
 }
 
 /// Walls whose reliabilities make the printed weights.
 fn equation_4(log: &mut LogBuilder) {
     send(log, 1.0, "robot1", &[wall(4.0, 5.0, 0.9), wall(1.0, 10.0, 0.8), wall(95.0, 4.0, 0.5), wall(89.0, 8.0, 1.0)]);
+    refused(log, 2.0, "robot1", "robot2");
 }
 
 /// Many walls that agree, and two at odd angles.
@@ -136,6 +138,7 @@ fn furniture(log: &mut LogBuilder) {
     let mut walls: Vec<Segment> = (0..12).map(|index| wall(12.0 + 90.0 * f64::from(index), 4.0, 0.9)).collect();
     walls.extend([wall(40.0, 15.0, 0.9), wall(35.0, 6.0, 0.9)]);
     send(log, 1.0, "robot1", &walls);
+    refused(log, 2.0, "robot1", "robot2");
 }
 
 /// Three tags that tell a rotation of `theta_hat`: the best two lie at one end, the third 4 m away.
@@ -201,14 +204,19 @@ fn angles_at_the_wrap(log: &mut LogBuilder) {
 
 fn no_common_tag(log: &mut LogBuilder) {
     maps(log, 10.0);
+    refused(log, 3.0, "robot1", "robot2");
+}
+
+/// A pair of robots that the tag filter has refused.
+fn refused(log: &mut LogBuilder, seconds: f64, a: &str, b: &str) {
     let refused = CommonTags {
-        header: header(3.0, "robot1/map"),
-        robot_a: "robot1".into(),
-        robot_b: "robot2".into(),
-        reason: "robot1 and robot2 have no tag in common; robot1 knows 4 tags, robot2 0".into(),
+        header: header(seconds, format!("{a}/map")),
+        robot_a: a.into(),
+        robot_b: b.into(),
+        reason: format!("{a} and {b} have no tag in common; {a} knows 4 tags, {b} 0"),
         ..Default::default()
     };
-    log.message(3.0, "/common_tags/common", &refused);
+    log.message(seconds, "/common_tags/common", &refused);
 }
 
 /// Two maps and the tags that they have in common.
