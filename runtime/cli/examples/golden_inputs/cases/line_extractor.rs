@@ -54,6 +54,13 @@ pub(super) fn cases() -> Vec<Case> {
         case("all_occupied", |log| {
             log.map(1.0, "robot1", &TestMap::filled(60, 40, CELL, 100));
         }),
+        case("solid_block", |log| {
+            let mut map = TestMap::filled(60, 50, CELL, 0);
+            for row in 10..30 {
+                map.cells[row * 60 + 10..row * 60 + 50].fill(100);
+            }
+            log.map(1.0, "robot1", &map);
+        }),
         case("no_maps", no_maps),
     ]
 }
