@@ -1,6 +1,7 @@
 //! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, what a log holds, maps of
 //! nav2's map server, and pictures of maps.
 
+pub mod dynamic;
 pub mod info;
 pub mod map_file;
 pub mod picture;

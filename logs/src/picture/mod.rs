@@ -6,11 +6,13 @@
 
 mod colour;
 mod decoration;
+mod difference;
 mod error;
 mod layer;
 mod view;
 
 pub use colour::robot_colour;
+pub use difference::render_difference;
 pub use error::PictureError;
 pub use layer::MapLayer;
 

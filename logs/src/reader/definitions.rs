@@ -63,6 +63,11 @@ impl Definitions {
         self.channels.len()
     }
 
+    /// The numbers of all channels, in order.
+    pub(crate) fn channel_numbers(&self) -> impl Iterator<Item = u16> + '_ {
+        self.channels.keys().copied()
+    }
+
     /// Whether every channel is known together with its schema.
     pub(crate) fn schemas_complete(&self) -> bool {
         self.channels.values().all(|channel| channel.schema == 0 || self.schemas.contains_key(&channel.schema))

@@ -7,7 +7,7 @@ use super::layout::Layout;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
 use memmap2::Mmap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -56,6 +56,17 @@ impl LogFile {
     /// The channel with the given number in this file.
     pub fn channel(&self, id: u16) -> Option<Channel> {
         self.layout.definitions.channel(id)
+    }
+
+    /// All channels that the file describes, with their numbers in it; some may have no messages.
+    pub fn channels(&self) -> impl Iterator<Item = (u16, Channel)> + '_ {
+        let definitions = &self.layout.definitions;
+        definitions.channel_numbers().filter_map(|id| Some((id, definitions.channel(id)?)))
+    }
+
+    /// The entries of the file's metadata record of the given name.
+    pub fn metadata(&self, name: &str) -> Option<&BTreeMap<String, String>> {
+        self.layout.metadata.get(name)
     }
 
     /// What was found wrong when the file was opened. Bad chunks may show only when they are read.

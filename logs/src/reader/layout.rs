@@ -10,7 +10,7 @@ use super::summary::Summary;
 use mcap::MAGIC;
 use mcap::records::op;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Records without a chunk are read in runs of about this many bytes.
 const RUN_LENGTH: usize = 1 << 20;
@@ -22,6 +22,8 @@ pub(crate) struct Layout {
     pub(crate) blocks: Vec<Block>,
     pub(crate) definitions: Definitions,
     pub(crate) damage: Vec<Damage>,
+    /// The entries of the metadata records, by name; of two with one name the last.
+    pub(crate) metadata: BTreeMap<String, BTreeMap<String, String>>,
     /// How many chunks there are, the bad ones among them.
     pub(crate) chunks: usize,
     /// The compressions of the chunks; empty text for none.
@@ -130,7 +132,12 @@ impl Walk {
                 }
             }
             op::MESSAGE_INDEX => index.read(record.body),
-            op::METADATA => self.layout.damage.extend(outcome::damage_of(record)),
+            op::METADATA => {
+                if let Some((name, metadata)) = outcome::read_metadata(record) {
+                    self.layout.damage.extend(outcome::damage_of(&name, &metadata));
+                    self.layout.metadata.insert(name, metadata);
+                }
+            }
             _ => {}
         }
         true

@@ -106,6 +106,13 @@ impl LogWriter {
         Ok(())
     }
 
+    /// Writes a metadata record.
+    pub fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), LogWriteError> {
+        self.close_chunk()?;
+        let record = Metadata { name: name.to_owned(), metadata };
+        self.writer.write_metadata(&record).map_err(|error| LogWriteError::from_mcap(&self.path, error))
+    }
+
     /// Ends the log and says in it how the run ended.
     pub fn finish(mut self, outcome: Outcome<'_>) -> Result<(), LogWriteError> {
         let mut metadata = BTreeMap::from([("complete".to_owned(), (outcome == Outcome::Complete).to_string())]);

@@ -16,6 +16,7 @@ mod stage;
 pub use error::LogWriteError;
 pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
+pub use routing::result_channel;
 
 use gridweave_runtime::stage::{InputPort, ParameterError, Parameters, PortType, StageKind};
 use schemars::JsonSchema;

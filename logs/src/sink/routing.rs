@@ -58,7 +58,7 @@ fn is_tf(channel: &Channel) -> bool {
 }
 
 /// The channel of a result. Its schema is empty if the type is none that Gridweave has a definition of.
-pub(super) fn result_channel(topic: &str, ros_type: &str) -> Channel {
+pub fn result_channel(topic: &str, ros_type: &str) -> Channel {
     Channel {
         topic: topic.to_owned(),
         message_encoding: "cdr".to_owned(),

@@ -1,6 +1,7 @@
 //! What the command line may say.
 
 use crate::experiment::ExperimentArgs;
+use crate::golden::GoldenArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gridweave_runtime::engine::EngineKind;
 use std::path::PathBuf;
@@ -38,6 +39,8 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Simulate three robots, merge their maps, and compare with the truth.
     Demo(DemoArgs),
+    /// Run every stage alone on stored input, and compare what it sends with what is expected.
+    Golden(GoldenArgs),
     /// Repeat the experiments of the papers, and measure how far the stages hold.
     Experiment(ExperimentArgs),
 }

@@ -19,6 +19,7 @@ mod demo;
 mod evaluate;
 mod experiment;
 mod export;
+mod golden;
 mod info;
 mod pipelines;
 mod progress;
@@ -41,6 +42,8 @@ enum Outcome {
     Done,
     /// It was used wrongly; what is wrong has been said.
     BadUse,
+    /// Something is not as it should be; what that is has been said.
+    Failed,
     /// It is done, but some robots could not be merged.
     NotAllMerged,
 }
@@ -54,6 +57,7 @@ pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
     start_log(cli.verbose);
     match dispatch(cli.command, &registry) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Failed) => ExitCode::from(1),
         Ok(Outcome::BadUse) => ExitCode::from(2),
         Ok(Outcome::NotAllMerged) => ExitCode::from(3),
         Err(error) => {
@@ -75,6 +79,7 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
         Command::Evaluate(args) => evaluate::command(&args),
         Command::Simulate(args) => simulate::simulate(&args, registry),
         Command::Demo(args) => demo::demo(&args, registry),
+        Command::Golden(args) => golden::golden(&args, registry),
         Command::Experiment(args) => experiment::experiment(&args, registry),
     }
 }

@@ -43,6 +43,7 @@ mod parameter_schema;
 mod parameters;
 mod reference;
 mod settings;
+mod single_stage;
 mod stage_section;
 #[cfg(test)]
 mod test_kinds;
@@ -55,9 +56,11 @@ mod write;
 
 pub use diagnostic::PipelineErrors;
 pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
+pub use nearest::{quoted_list, suggest};
 pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
+pub use single_stage::SingleStage;
 
 use crate::stage::{Context, RobotTopics, StageKind};
 

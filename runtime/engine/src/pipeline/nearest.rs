@@ -19,13 +19,13 @@ pub(super) fn did_you_mean<'a>(wrong: &str, names: impl IntoIterator<Item = &'a 
 }
 
 /// "did you mean `...`?", or else what there is to choose from.
-pub(super) fn suggest(wrong: &str, names: &[&str], what: &str) -> Option<String> {
+pub fn suggest(wrong: &str, names: &[&str], what: &str) -> Option<String> {
     let list = || (!names.is_empty()).then(|| format!("{what}: {}", quoted_list(names)));
     did_you_mean(wrong, names.iter().copied()).or_else(list)
 }
 
 /// "`a`, `b`, `c`", cut after the first few.
-pub(super) fn quoted_list<S: AsRef<str>>(names: &[S]) -> String {
+pub fn quoted_list<S: AsRef<str>>(names: &[S]) -> String {
     const MOST: usize = 12;
     let mut list: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", name.as_ref())).collect();
     if names.len() > MOST {

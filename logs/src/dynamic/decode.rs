@@ -1,0 +1,162 @@
+//! From bytes to a value.
+
+use super::definition::{Count, Primitive};
+use super::reader::CdrReader;
+use super::schema::{Element, Field, MessageType, Schema};
+use super::value::{Array, Scalar, Value};
+
+/// So many bytes may follow the last field: encoders round the length up.
+const PADDING: usize = 3;
+
+/// Why a message cannot be decoded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// The bytes do not begin as CDR does.
+    #[error("the message does not begin with a CDR encapsulation")]
+    Encapsulation,
+    /// A field does not fit the schema.
+    #[error("the message does not fit its schema: {fault} at `{path}`")]
+    Field {
+        /// Which field, such as `tags[3].tag_id`.
+        path: String,
+        /// What is wrong with it.
+        fault: DecodeFault,
+    },
+    /// The message is longer than its fields.
+    #[error("the message does not fit its schema: {0} bytes are left behind its last field")]
+    Rest(usize),
+}
+
+/// What is wrong with a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeFault {
+    /// The bytes end within it.
+    #[error("it ends")]
+    End,
+    /// It claims more elements than the rest of the message has room for.
+    #[error("there is no room for the {0} elements that it claims")]
+    Count(usize),
+    /// A truth value is neither 0 nor 1.
+    #[error("a truth value is {0}")]
+    Boolean(u8),
+    /// A text is not UTF-8.
+    #[error("the text is not UTF-8")]
+    Text,
+    /// `wstring`: how it is encoded differs between the versions of ROS 2.
+    #[error("there is a wide text (wstring), which cannot be read")]
+    WideText,
+}
+
+/// A fault, and the path to it from the inside out.
+struct Fault {
+    path: Vec<String>,
+    fault: DecodeFault,
+}
+
+impl From<DecodeFault> for Fault {
+    fn from(fault: DecodeFault) -> Self {
+        Self { path: Vec::new(), fault }
+    }
+}
+
+impl Fault {
+    fn within(mut self, part: String) -> Self {
+        self.path.push(part);
+        self
+    }
+
+    fn path(&self) -> String {
+        let parts: Vec<&str> = self.path.iter().rev().map(String::as_str).collect();
+        parts.join(".").replace(".[", "[")
+    }
+}
+
+impl Schema {
+    /// Decodes a message. Texts and arrays of bytes are borrowed from it, the names of fields from the schema.
+    pub fn decode<'a>(&'a self, bytes: &'a [u8]) -> Result<Value<'a>, DecodeError> {
+        let mut reader = CdrReader::new(bytes).ok_or(DecodeError::Encapsulation)?;
+        let Some(root) = self.root() else { return Ok(Value::Message(Vec::new())) };
+        let value = self
+            .message(root, &mut reader)
+            .map_err(|fault| DecodeError::Field { path: fault.path(), fault: fault.fault })?;
+        match reader.left() {
+            0..=PADDING => Ok(value),
+            rest => Err(DecodeError::Rest(rest)),
+        }
+    }
+
+    fn message<'a>(&'a self, of: &'a MessageType, reader: &mut CdrReader<'a>) -> Result<Value<'a>, Fault> {
+        if of.fields.is_empty() {
+            reader.bytes(1)?;
+        }
+        let field = |field: &'a Field| match self.field(field, reader) {
+            Ok(value) => Ok((field.name.as_str(), value)),
+            Err(fault) => Err(fault.within(field.name.clone())),
+        };
+        Ok(Value::Message(of.fields.iter().map(field).collect::<Result<_, _>>()?))
+    }
+
+    fn field<'a>(&'a self, field: &'a Field, reader: &mut CdrReader<'a>) -> Result<Value<'a>, Fault> {
+        let count = match field.count {
+            Count::One => return self.one(field.of, reader),
+            Count::Fixed(count) => count,
+            Count::Any => reader.number::<4, u32>()? as usize,
+        };
+        // Checked first, so that a damaged count allocates nothing.
+        match self.least_size(field.of).checked_mul(count) {
+            Some(size) if size <= reader.left() => self.array(field.of, count, reader).map(Value::Array),
+            _ => Err(DecodeFault::Count(count).into()),
+        }
+    }
+
+    fn one<'a>(&'a self, of: Element, reader: &mut CdrReader<'a>) -> Result<Value<'a>, Fault> {
+        let primitive = match of {
+            Element::Primitive(primitive) => primitive,
+            Element::Message(index) => return self.message(&self.types[index], reader),
+        };
+        Ok(Value::Scalar(match primitive {
+            Primitive::Bool => Scalar::Bool(reader.boolean()?),
+            Primitive::I8 => Scalar::Int(reader.number::<1, i8>()?.into()),
+            Primitive::U8 => Scalar::Uint(reader.number::<1, u8>()?.into()),
+            Primitive::I16 => Scalar::Int(reader.number::<2, i16>()?.into()),
+            Primitive::U16 => Scalar::Uint(reader.number::<2, u16>()?.into()),
+            Primitive::I32 => Scalar::Int(reader.number::<4, i32>()?.into()),
+            Primitive::U32 => Scalar::Uint(reader.number::<4, u32>()?.into()),
+            Primitive::I64 => Scalar::Int(reader.number::<8, i64>()?),
+            Primitive::U64 => Scalar::Uint(reader.number::<8, u64>()?),
+            Primitive::F32 => Scalar::F32(reader.number::<4, f32>()?),
+            Primitive::F64 => Scalar::F64(reader.number::<8, f64>()?),
+            Primitive::Text => Scalar::Text(reader.text()?),
+            Primitive::WideText => return Err(DecodeFault::WideText.into()),
+        }))
+    }
+
+    fn array<'a>(&'a self, of: Element, count: usize, reader: &mut CdrReader<'a>) -> Result<Array<'a>, Fault> {
+        let primitive = match of {
+            Element::Primitive(primitive) => primitive,
+            Element::Message(index) => {
+                let of = &self.types[index];
+                let element = |at| self.message(of, reader).map_err(|fault| fault.within(format!("[{at}]")));
+                return Ok(Array::Messages((0..count).map(element).collect::<Result<_, _>>()?));
+            }
+        };
+        Ok(match primitive {
+            Primitive::Bool => Array::Bool((0..count).map(|_| reader.boolean()).collect::<Result<_, _>>()?),
+            Primitive::I8 => Array::I8(bytemuck::cast_slice(reader.bytes(count)?)),
+            Primitive::U8 => Array::U8(reader.bytes(count)?),
+            Primitive::I16 => Array::I16(reader.numbers(count)?),
+            Primitive::U16 => Array::U16(reader.numbers(count)?),
+            Primitive::I32 => Array::I32(reader.numbers(count)?),
+            Primitive::U32 => Array::U32(reader.numbers(count)?),
+            Primitive::I64 => Array::I64(reader.numbers(count)?),
+            Primitive::U64 => Array::U64(reader.numbers(count)?),
+            Primitive::F32 => Array::F32(reader.numbers(count)?),
+            Primitive::F64 => Array::F64(reader.numbers(count)?),
+            Primitive::Text => {
+                let element = |at| reader.text().map_err(|fault| Fault::from(fault).within(format!("[{at}]")));
+                Array::Text((0..count).map(element).collect::<Result<_, _>>()?)
+            }
+            Primitive::WideText => return Err(DecodeFault::WideText.into()),
+        })
+    }
+}

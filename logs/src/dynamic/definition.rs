@@ -1,0 +1,148 @@
+//! One `.msg` definition: its fields, line by line.
+
+/// The types that are no messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Primitive {
+    Bool,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+    Text,
+    WideText,
+}
+
+impl Primitive {
+    /// The type of this name. `byte` and `char` are whole numbers from 0 to 255 in ROS 2.
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "bool" => Self::Bool,
+            "int8" => Self::I8,
+            "uint8" | "byte" | "char" => Self::U8,
+            "int16" => Self::I16,
+            "uint16" => Self::U16,
+            "int32" => Self::I32,
+            "uint32" => Self::U32,
+            "int64" => Self::I64,
+            "uint64" => Self::U64,
+            "float32" => Self::F32,
+            "float64" => Self::F64,
+            "string" => Self::Text,
+            "wstring" => Self::WideText,
+            _ => return None,
+        })
+    }
+
+    /// The fewest bytes that a value takes.
+    pub(super) fn least_size(self) -> usize {
+        match self {
+            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 | Self::Text | Self::WideText => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// How many values a field holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Count {
+    /// One.
+    One,
+    /// Always so many.
+    Fixed(usize),
+    /// Any number; the message says how many.
+    Any,
+}
+
+/// The type of a field, or of its elements, as the definition names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum TypeName {
+    Primitive(Primitive),
+    /// `package/Type`, or `Type` for one of the same package.
+    Message(String),
+}
+
+/// A line of a definition that is a field.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct FieldLine {
+    pub(super) name: String,
+    pub(super) of: TypeName,
+    pub(super) count: Count,
+}
+
+/// The fields of a definition; constants and defaults are not part of a message. An error is the line that is wrong.
+pub(super) fn fields(text: &str) -> Result<Vec<FieldLine>, String> {
+    let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
+    lines.filter(|line| !line.is_empty()).filter_map(|line| field(line).transpose()).collect()
+}
+
+/// The field of a line; `None` for a constant.
+fn field(line: &str) -> Result<Option<FieldLine>, String> {
+    let wrong = || line.to_owned();
+    let (type_text, rest) = line.split_once(char::is_whitespace).ok_or_else(wrong)?;
+    let rest = rest.trim_start();
+    let end = rest.find(|c: char| c.is_whitespace() || c == '=').unwrap_or(rest.len());
+    let (name, rest) = rest.split_at(end);
+    if rest.trim_start().starts_with('=') {
+        return Ok(None);
+    }
+    if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+        return Err(wrong());
+    }
+    let (element, count) = match type_text.split_once('[') {
+        None => (type_text, Count::One),
+        Some((element, bounds)) => match bounds.strip_suffix(']').ok_or_else(wrong)? {
+            "" => (element, Count::Any),
+            bound if bound.starts_with("<=") => (element, Count::Any),
+            number => (element, Count::Fixed(number.parse().map_err(|_| wrong())?)),
+        },
+    };
+    // A bound on the length of a text changes nothing in its encoding.
+    let element = element.split("<=").next().unwrap_or(element);
+    let of = match Primitive::named(element) {
+        Some(primitive) => TypeName::Primitive(primitive),
+        None if element.is_empty() => return Err(wrong()),
+        None => TypeName::Message(element.to_owned()),
+    };
+    Ok(Some(FieldLine { name: name.to_owned(), of, count }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(text: &str) -> FieldLine {
+        fields(text).unwrap().remove(0)
+    }
+
+    #[test]
+    fn types_and_counts_are_told_apart() {
+        let field = |name: &str, of, count| FieldLine { name: name.into(), of, count };
+        let primitive = TypeName::Primitive;
+        assert_eq!(line("int8[] data  # cells"), field("data", primitive(Primitive::I8), Count::Any));
+        assert_eq!(line("float64[36] c"), field("c", primitive(Primitive::F64), Count::Fixed(36)));
+        assert_eq!(line("string<=10[<=5] names"), field("names", primitive(Primitive::Text), Count::Any));
+        assert_eq!(line("a/B[2] b"), field("b", TypeName::Message("a/B".into()), Count::Fixed(2)));
+        assert_eq!(line("int32 x 5"), field("x", primitive(Primitive::I32), Count::One));
+        assert_eq!(line("string s \"a=b\""), field("s", primitive(Primitive::Text), Count::One));
+    }
+
+    #[test]
+    fn constants_are_no_fields() {
+        assert_eq!(fields("int32 A=1\nint32 B = 2\nstring C=\"x y\"\n\n# nothing").unwrap(), []);
+    }
+
+    #[test]
+    fn a_line_that_is_no_field_is_named() {
+        for wrong in ["int32", "int32[ x", "int32[x] y", "[] x", "int32 a.b"] {
+            assert_eq!(fields(wrong), Err(wrong.to_owned()));
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! CDR by hand: numbers and texts, aligned as the encoding wants it.
+
+use super::decode::DecodeFault;
+
+/// Reads the fields of a message one after the other.
+pub(super) struct CdrReader<'a> {
+    /// What follows the encapsulation; alignment counts from here.
+    body: &'a [u8],
+    at: usize,
+    big_endian: bool,
+}
+
+/// A number of fixed size.
+pub(super) trait Number<const N: usize>: Sized {
+    fn from_le(bytes: [u8; N]) -> Self;
+    fn from_be(bytes: [u8; N]) -> Self;
+}
+
+macro_rules! numbers {
+    ($($of:ty: $size:literal),*) => {$(
+        impl Number<$size> for $of {
+            fn from_le(bytes: [u8; $size]) -> Self {
+                Self::from_le_bytes(bytes)
+            }
+
+            fn from_be(bytes: [u8; $size]) -> Self {
+                Self::from_be_bytes(bytes)
+            }
+        }
+    )*};
+}
+
+numbers!(i8: 1, u8: 1, i16: 2, u16: 2, i32: 4, u32: 4, i64: 8, u64: 8, f32: 4, f64: 8);
+
+impl<'a> CdrReader<'a> {
+    /// Reads what follows the encapsulation, which says the byte order. `None` if it is none of plain CDR.
+    pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
+        let (encapsulation, body) = bytes.split_at_checked(4)?;
+        let big_endian = match encapsulation {
+            [0, 0, ..] => true,
+            [0, 1, ..] => false,
+            _ => return None,
+        };
+        Some(Self { body, at: 0, big_endian })
+    }
+
+    /// How many bytes are left.
+    pub(super) fn left(&self) -> usize {
+        self.body.len().saturating_sub(self.at)
+    }
+
+    fn align(&mut self, size: usize) {
+        self.at = self.at.next_multiple_of(size);
+    }
+
+    /// The next bytes, as they are.
+    pub(super) fn bytes(&mut self, count: usize) -> Result<&'a [u8], DecodeFault> {
+        let end = self.at.checked_add(count).ok_or(DecodeFault::End)?;
+        let bytes = self.body.get(self.at..end).ok_or(DecodeFault::End)?;
+        self.at = end;
+        Ok(bytes)
+    }
+
+    /// The next number.
+    pub(super) fn number<const N: usize, T: Number<N>>(&mut self) -> Result<T, DecodeFault> {
+        self.align(N);
+        let bytes = self.bytes(N)?.try_into().map_err(|_| DecodeFault::End)?;
+        Ok(if self.big_endian { T::from_be(bytes) } else { T::from_le(bytes) })
+    }
+
+    /// The next `count` numbers.
+    pub(super) fn numbers<const N: usize, T: Number<N>>(&mut self, count: usize) -> Result<Vec<T>, DecodeFault> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        self.align(N);
+        let bytes = self.bytes(count.checked_mul(N).ok_or(DecodeFault::End)?)?;
+        let (numbers, _) = bytes.as_chunks::<N>();
+        let order = if self.big_endian { T::from_be } else { T::from_le };
+        Ok(numbers.iter().map(|bytes| order(*bytes)).collect())
+    }
+
+    /// The next truth value.
+    pub(super) fn boolean(&mut self) -> Result<bool, DecodeFault> {
+        match self.number::<1, u8>()? {
+            0 => Ok(false),
+            1 => Ok(true),
+            other => Err(DecodeFault::Boolean(other)),
+        }
+    }
+
+    /// The next text: its length with the zero byte behind it, and its bytes.
+    pub(super) fn text(&mut self) -> Result<&'a str, DecodeFault> {
+        let length = self.number::<4, u32>()? as usize;
+        let bytes = self.bytes(length)?;
+        // Some writers give an empty text no zero byte.
+        let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+        std::str::from_utf8(text).map_err(|_| DecodeFault::Text)
+    }
+}

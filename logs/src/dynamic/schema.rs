@@ -1,0 +1,192 @@
+//! The type of a message, with the types that it uses.
+
+use super::definition::{Count, FieldLine, Primitive, TypeName, fields};
+use crate::schemas::{full_type_name, schema_text};
+use gridweave_runtime::message::Channel;
+use std::collections::BTreeMap;
+
+/// Types may use each other to this depth. Those of ROS reach 6 or so.
+const DEEPEST: usize = 64;
+
+/// A message type, with all types that it uses.
+#[derive(Clone, Debug)]
+pub struct Schema {
+    /// Each behind those that it uses.
+    pub(super) types: Vec<MessageType>,
+}
+
+/// One type of a schema.
+#[derive(Clone, Debug)]
+pub(super) struct MessageType {
+    pub(super) fields: Vec<Field>,
+    /// The fewest bytes that a value takes, and at least 1.
+    pub(super) least_size: usize,
+}
+
+/// A field of a type.
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    pub(super) name: String,
+    pub(super) of: Element,
+    pub(super) count: Count,
+}
+
+/// The type of a field, or of its elements.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Element {
+    Primitive(Primitive),
+    /// An index among the schema's types.
+    Message(usize),
+}
+
+/// Why messages of a type cannot be decoded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SchemaError {
+    /// The messages or the schema are encoded in another way.
+    #[error("{what} is encoded as `{found}`, and only `{expected}` can be read")]
+    Encoding {
+        /// Which of the two.
+        what: &'static str,
+        /// Its encoding.
+        found: String,
+        /// The one that can be read.
+        expected: &'static str,
+    },
+    /// There is no definition of the type.
+    #[error("there is no definition of {0}")]
+    Undefined(String),
+    /// A line of a definition cannot be understood.
+    #[error("the definition of {name} has the line `{line}`, which is no field")]
+    Line {
+        /// The type.
+        name: String,
+        /// The line.
+        line: String,
+    },
+    /// A type contains itself, or types contain each other to no end.
+    #[error("the definition of {0} contains itself, or is nested too deeply")]
+    Nested(String),
+}
+
+impl Schema {
+    /// The schema of a channel's messages. Where the channel has none, that of the type that Gridweave knows by its
+    /// name.
+    pub fn of_channel(channel: &Channel) -> Result<Self, SchemaError> {
+        let check = |what, found: &str, expected| match found == expected {
+            true => Ok(()),
+            false => Err(SchemaError::Encoding { what, found: found.to_owned(), expected }),
+        };
+        check("the message", &channel.message_encoding, "cdr")?;
+        if channel.schema.is_empty() {
+            let name = if channel.schema_name.is_empty() { "the type" } else { &channel.schema_name };
+            let text = schema_text(&channel.schema_name).ok_or_else(|| SchemaError::Undefined(name.to_owned()))?;
+            return Self::parse(&channel.schema_name, &text);
+        }
+        check("the schema", &channel.schema_encoding, "ros2msg")?;
+        Self::parse(&channel.schema_name, &String::from_utf8_lossy(&channel.schema))
+    }
+
+    /// The schema of the type `name` (`package/msg/Type`) from its text: its definition and then, each after a line of
+    /// `=` and a line `MSG: package/Type`, the definitions of all types that it uses.
+    pub fn parse(name: &str, text: &str) -> Result<Self, SchemaError> {
+        let mut sections = BTreeMap::new();
+        let mut section = (short_name(name), String::new());
+        let mut starts = false;
+        for line in text.lines() {
+            if is_separator(line) {
+                starts = true;
+            } else if let Some(name) = line.trim().strip_prefix("MSG:").filter(|_| starts) {
+                let (done, text) = std::mem::replace(&mut section, (short_name(name.trim()), String::new()));
+                sections.entry(done).or_insert(text);
+                starts = false;
+            } else {
+                section.1.push_str(line);
+                section.1.push('\n');
+            }
+        }
+        sections.entry(section.0).or_insert(section.1);
+        let mut builder = Builder { sections, done: BTreeMap::new(), types: Vec::new() };
+        builder.add(&short_name(name), 0)?;
+        Ok(Self { types: builder.types })
+    }
+
+    /// The type of the whole message.
+    pub(super) fn root(&self) -> Option<&MessageType> {
+        self.types.last()
+    }
+
+    /// The fewest bytes that a value of a type takes.
+    pub(super) fn least_size(&self, of: Element) -> usize {
+        match of {
+            Element::Primitive(primitive) => primitive.least_size(),
+            Element::Message(index) => self.types.get(index).map_or(1, |of| of.least_size),
+        }
+    }
+}
+
+fn is_separator(line: &str) -> bool {
+    let line = line.trim();
+    line.len() >= 3 && line.bytes().all(|byte| byte == b'=')
+}
+
+/// `package/Type`.
+fn short_name(name: &str) -> String {
+    full_type_name(name).replacen("/msg/", "/", 1)
+}
+
+/// Makes the types of a schema, each after those that it uses.
+struct Builder {
+    sections: BTreeMap<String, String>,
+    done: BTreeMap<String, usize>,
+    types: Vec<MessageType>,
+}
+
+impl Builder {
+    /// Adds the type and all that it uses; gives its index.
+    fn add(&mut self, name: &str, depth: usize) -> Result<usize, SchemaError> {
+        if let Some(&index) = self.done.get(name) {
+            return Ok(index);
+        }
+        if depth > DEEPEST {
+            return Err(SchemaError::Nested(name.to_owned()));
+        }
+        let text = self.sections.get(name).ok_or_else(|| SchemaError::Undefined(name.to_owned()))?;
+        let lines = fields(text).map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
+        let mut made = MessageType { fields: Vec::with_capacity(lines.len()), least_size: 0 };
+        for FieldLine { name: field, of, count } in lines {
+            let (of, size) = match of {
+                TypeName::Primitive(primitive) => (Element::Primitive(primitive), primitive.least_size()),
+                TypeName::Message(used) => {
+                    let index = self.add(&self.resolve(&used, name), depth + 1)?;
+                    (Element::Message(index), self.types[index].least_size)
+                }
+            };
+            let size = match count {
+                Count::One => size,
+                Count::Fixed(count) => size.saturating_mul(count),
+                Count::Any => 4,
+            };
+            made.least_size = made.least_size.saturating_add(size);
+            made.fields.push(Field { name: field, of, count });
+        }
+        // A message without fields is one byte, as a structure has at least one member.
+        made.least_size = made.least_size.max(1);
+        self.types.push(made);
+        self.done.insert(name.to_owned(), self.types.len() - 1);
+        Ok(self.types.len() - 1)
+    }
+
+    /// The full name of a type that the definition of `user` names. One without a package is of the same package, but
+    /// for `Header`.
+    fn resolve(&self, used: &str, user: &str) -> String {
+        if used.contains('/') {
+            return short_name(used);
+        }
+        let package = user.split_once('/').map_or("", |(package, _)| package);
+        let own = format!("{package}/{used}");
+        match self.sections.contains_key(&own) {
+            false if used == "Header" => "std_msgs/Header".to_owned(),
+            _ => own,
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! What a stage has sent, held against what is expected: message by message and field by field.
+
+use super::recording::{Recorded, Recording};
+use gridweave_logs::dynamic::{self, Schema};
+use gridweave_logs::schemas::full_type_name;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
+use std::collections::BTreeSet;
+
+/// So many grids of a case are kept to be drawn.
+const GRIDS_KEPT: usize = 12;
+
+/// How a recording differs from the expected one.
+#[derive(Debug, Default)]
+pub(super) struct Comparison {
+    /// The first differences, by topic and log time.
+    pub(super) differences: Vec<Difference>,
+    /// How many there are in all.
+    pub(super) count: usize,
+    /// How many messages differ from the expected ones.
+    pub(super) differing: usize,
+    /// How many messages are expected and were not sent.
+    pub(super) missing: usize,
+    /// How many messages were sent and are not expected.
+    pub(super) surplus: usize,
+    /// How many warnings differ in their text or count.
+    pub(super) warnings: usize,
+    /// Grids of equal size whose cells differ.
+    pub(super) grids: Vec<GridDifference>,
+}
+
+/// One thing that differs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Difference {
+    /// The topic; none for a warning.
+    pub(super) topic: Option<String>,
+    /// The message.
+    pub(super) log_time: Option<LogTime>,
+    /// The path of the field; none if it is about the message as a whole.
+    pub(super) field: Option<String>,
+    pub(super) expected: String,
+    pub(super) got: String,
+}
+
+/// Two grids of equal size whose cells differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct GridDifference {
+    pub(super) topic: String,
+    pub(super) log_time: LogTime,
+    /// How many cells differ.
+    pub(super) cells: usize,
+    /// Columns.
+    pub(super) width: usize,
+    /// The cells that are expected, and those that were sent, row by row.
+    pub(super) expected: Vec<i8>,
+    pub(super) got: Vec<i8>,
+}
+
+impl Comparison {
+    /// Compares recordings. Numbers with a fraction may differ by `tolerance`, see
+    /// [`nearly_equal`](dynamic::nearly_equal). At most `limit` differences are told.
+    pub(super) fn new(expected: &Recording, got: &Recording, tolerance: f64, limit: usize) -> Self {
+        let mut comparison = Self::default();
+        let (expected_topics, got_topics) = (expected.by_topic(), got.by_topic());
+        let topics: BTreeSet<&str> = expected_topics.keys().chain(got_topics.keys()).copied().collect();
+        for topic in topics {
+            let of = |topics: &std::collections::BTreeMap<&str, Vec<&Recorded>>| {
+                topics.get(topic).map(|messages| messages.iter().map(|&message| message.clone()).collect())
+            };
+            let expected: Vec<Recorded> = of(&expected_topics).unwrap_or_default();
+            let got: Vec<Recorded> = of(&got_topics).unwrap_or_default();
+            comparison.topic(&expected, &got, tolerance, limit);
+        }
+        comparison.compare_warnings(expected, got, limit);
+        comparison
+    }
+
+    /// Whether nothing differs.
+    pub(super) fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// What differs, in a few words.
+    pub(super) fn summary(&self) -> String {
+        let parts = [
+            (self.differing, "message differs", "messages differ"),
+            (self.missing, "message is missing", "messages are missing"),
+            (self.surplus, "message is surplus", "messages are surplus"),
+            (self.warnings, "warning differs", "warnings differ"),
+        ];
+        let parts = parts.into_iter().filter(|(count, ..)| *count > 0);
+        let texts = parts.map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many }));
+        texts.collect::<Vec<_>>().join(", ")
+    }
+
+    fn add(&mut self, difference: impl FnOnce() -> Difference, limit: usize) {
+        self.count += 1;
+        if self.differences.len() < limit {
+            self.differences.push(difference());
+        }
+    }
+
+    /// Compares the messages of one topic: those of one log time with each other, in the order that they were sent.
+    fn topic(&mut self, expected: &[Recorded], got: &[Recorded], tolerance: f64, limit: usize) {
+        let whole = |message: &Recorded, expected: &str, got: &str| Difference {
+            topic: Some(message.channel.topic.clone()),
+            log_time: Some(message.log_time),
+            field: None,
+            expected: expected.to_owned(),
+            got: got.to_owned(),
+        };
+        let (mut expected, mut got) = (expected.iter().peekable(), got.iter().peekable());
+        loop {
+            let order = match (expected.peek(), got.peek()) {
+                (None, None) => break,
+                (Some(_), None) => std::cmp::Ordering::Less,
+                (None, Some(_)) => std::cmp::Ordering::Greater,
+                (Some(a), Some(b)) => a.log_time.cmp(&b.log_time),
+            };
+            let a = if order.is_le() { expected.next() } else { None };
+            let b = if order.is_ge() { got.next() } else { None };
+            match (a, b) {
+                (Some(a), Some(b)) => self.message(a, b, tolerance, limit),
+                (Some(a), None) => {
+                    self.missing += 1;
+                    self.add(|| whole(a, "a message", "none"), limit);
+                }
+                (None, Some(b)) => {
+                    self.surplus += 1;
+                    self.add(|| whole(b, "no message", "one"), limit);
+                }
+                (None, None) => {}
+            }
+        }
+    }
+
+    fn message(&mut self, expected: &Recorded, got: &Recorded, tolerance: f64, limit: usize) {
+        let before = self.count;
+        let difference = |field: Option<&str>, expected_text: String, got_text: String| Difference {
+            topic: Some(expected.channel.topic.clone()),
+            log_time: Some(expected.log_time),
+            field: field.map(str::to_owned),
+            expected: expected_text,
+            got: got_text,
+        };
+        let types = [expected, got].map(|message| full_type_name(&message.channel.schema_name).into_owned());
+        if types[0] != types[1] {
+            let [a, b] = types;
+            self.add(|| difference(None, a, b), limit);
+        } else if expected.bytes != got.bytes {
+            let grid = grid_difference(expected, got);
+            match field_differences(expected, got, tolerance, limit.saturating_sub(self.differences.len())) {
+                Ok(found) => {
+                    self.count += found.count;
+                    // The picture says it better than the summary of the cells.
+                    let told = found.told.into_iter().filter(|field| grid.is_none() || field.path != "data");
+                    let told = told.map(|field| difference(Some(&field.path), field.expected, field.got));
+                    self.differences.extend(told);
+                }
+                Err(reason) => self.add(|| difference(None, bytes_text(&expected.bytes), reason), limit),
+            }
+            self.grids.extend(grid.filter(|_| self.grids.len() < GRIDS_KEPT));
+        }
+        if expected.publish_time != got.publish_time {
+            let times = [expected.publish_time, got.publish_time].map(|time| LogTime(time).to_string());
+            let [a, b] = times;
+            self.add(|| difference(Some("(publish time)"), a, b), limit);
+        }
+        self.differing += usize::from(self.count > before);
+    }
+
+    fn compare_warnings(&mut self, expected: &Recording, got: &Recording, limit: usize) {
+        let texts: BTreeSet<&String> = expected.warnings.keys().chain(got.warnings.keys()).collect();
+        for text in texts {
+            let count = |recording: &Recording| recording.warnings.get(text).copied().unwrap_or_default();
+            if count(expected) == count(got) {
+                continue;
+            }
+            let times = |recording| match count(recording) {
+                1 => "once".to_owned(),
+                count => format!("{count} times"),
+            };
+            self.warnings += 1;
+            let field = Some(format!("warning {text:?}"));
+            self.add(
+                || Difference { topic: None, log_time: None, field, expected: times(expected), got: times(got) },
+                limit,
+            );
+        }
+    }
+}
+
+fn bytes_text(bytes: &[u8]) -> String {
+    format!("{} bytes", bytes.len())
+}
+
+/// The fields that differ. Where one of the messages cannot be read, how the bytes differ.
+fn field_differences(
+    expected: &Recorded,
+    got: &Recorded,
+    tolerance: f64,
+    limit: usize,
+) -> Result<dynamic::Differences, String> {
+    let bytes = |reason: String| {
+        let first = expected.bytes.iter().zip(&got.bytes).position(|(a, b)| a != b);
+        let first = first.unwrap_or(expected.bytes.len().min(got.bytes.len()));
+        format!(
+            "{}, which differ from byte {first} on; they are not compared by fields: {reason}",
+            bytes_text(&got.bytes)
+        )
+    };
+    let schema = |message: &Recorded| Schema::of_channel(&message.channel).map_err(|error| bytes(error.to_string()));
+    let (expected_schema, got_schema) = (schema(expected)?, schema(got)?);
+    let a = expected_schema.decode(&expected.bytes).map_err(|error| bytes(error.to_string()))?;
+    let b = got_schema.decode(&got.bytes).map_err(|error| bytes(error.to_string()))?;
+    Ok(dynamic::compare(&a, &b, tolerance, limit))
+}
+
+/// How the cells differ, if both messages are grids of one size.
+fn grid_difference(expected: &Recorded, got: &Recorded) -> Option<GridDifference> {
+    let is_grid = |message: &Recorded| full_type_name(&message.channel.schema_name) == OccupancyGrid::NAME;
+    if !(is_grid(expected) && is_grid(got)) {
+        return None;
+    }
+    let a: OccupancyGrid<'_> = decode(&expected.bytes).ok()?;
+    let b: OccupancyGrid<'_> = decode(&got.bytes).ok()?;
+    let (width, height) = (a.info.width as usize, a.info.height as usize);
+    let same_size = (a.info.width, a.info.height) == (b.info.width, b.info.height);
+    let cells = a.cells().iter().zip(b.cells()).filter(|(a, b)| a != b).count();
+    let whole = width.checked_mul(height) == Some(a.cells().len()) && a.cells().len() == b.cells().len();
+    (same_size && whole && cells > 0).then(|| GridDifference {
+        topic: expected.channel.topic.clone(),
+        log_time: expected.log_time,
+        cells,
+        width,
+        expected: a.cells().to_vec(),
+        got: b.cells().to_vec(),
+    })
+}

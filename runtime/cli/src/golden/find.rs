@@ -1,0 +1,56 @@
+//! Which cases there are: the folders KIND/CASE.
+
+use anyhow::{Context, Result};
+use gridweave_runtime::stage::Registry;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The folder of one case.
+#[derive(Clone, Debug)]
+pub(super) struct CaseFolder {
+    /// The kind of the stage, as its folder says.
+    pub(super) kind: String,
+    /// The name of the case.
+    pub(super) case: String,
+    /// The folder.
+    pub(super) path: PathBuf,
+}
+
+impl CaseFolder {
+    /// `KIND/CASE`.
+    pub(super) fn name(&self) -> String {
+        format!("{}/{}", self.kind, self.case)
+    }
+}
+
+/// All cases in `folder`, by kind and then by name.
+pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
+    let mut cases = Vec::new();
+    for (kind, path) in folders_in(folder)? {
+        for (case, path) in folders_in(&path)? {
+            cases.push(CaseFolder { kind: kind.clone(), case, path });
+        }
+    }
+    Ok(cases)
+}
+
+/// The kinds of the registry of which there is no case.
+pub(super) fn kinds_without_a_case(registry: &Registry, cases: &[CaseFolder]) -> Vec<String> {
+    let with: BTreeSet<&str> = cases.iter().map(|case| case.kind.as_str()).collect();
+    registry.kinds().map(|kind| kind.name).filter(|kind| !with.contains(kind)).map(str::to_owned).collect()
+}
+
+/// The folders in a folder, by name. Files, and what is hidden, do not count.
+fn folders_in(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
+    let doing = || format!("cannot look for cases in {}", folder.display());
+    let mut folders = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(doing)? {
+        let path = entry.with_context(doing)?.path();
+        let Some(name) = path.file_name().map(|name| name.to_string_lossy().into_owned()) else { continue };
+        if path.is_dir() && !name.starts_with('.') {
+            folders.push((name, path));
+        }
+    }
+    folders.sort();
+    Ok(folders)
+}

@@ -1,0 +1,125 @@
+//! Runs the stage of a case alone, over the links that it has in a pipeline.
+
+use super::case_file::Case;
+use super::recording::Recording;
+use super::routes::feeds;
+use super::{sink, source};
+use anyhow::{Context, Result, bail};
+use gridweave_logs::reader::LogFile;
+use gridweave_runtime::engine::{self, EngineKind, Observer};
+use gridweave_runtime::pipeline::{DEFAULT_DEPTH, Pipeline, StageSpec, Wire};
+use gridweave_runtime::stage::StageKind;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use tempfile::TempDir;
+
+/// The names of the stages that a run has beside the one of the case, whose name has no capital letters.
+const SOURCE: &str = "INPUT";
+const SINK: &str = "OUTPUT";
+
+/// What stands in a parameter for the path of `input.mcap`, and for that of a file that the stage is to write.
+const INPUT: &str = "{input}";
+const OUTPUT: &str = "{output}";
+
+/// Runs the stage of a case; gives all that it has sent, or written.
+pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording> {
+    let has_input = case.input.exists();
+    let reads_file = case.has_placeholder(INPUT);
+    if has_input && case.inputs.is_empty() && !reads_file {
+        bail!("nothing takes input.mcap: name its topics below [inputs], or write {INPUT} in a parameter");
+    }
+    if !has_input && (!case.inputs.is_empty() || reads_file) {
+        bail!("there is no {}", case.input.display());
+    }
+    let folder = TempDir::new().context("cannot make a folder for the output of a case")?;
+    let output = folder.path().join("output.mcap");
+    let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?)];
+    let mut recording = run_stage(case, &files, observer)?;
+    if case.has_placeholder(OUTPUT) {
+        if !output.exists() {
+            bail!("the stage has not written the file {OUTPUT}");
+        }
+        let written = Recording::read(&output).context("what the stage has written cannot be read")?;
+        recording.messages.extend(written.messages);
+    }
+    Ok(recording)
+}
+
+fn text_of(path: &Path) -> Result<String> {
+    Ok(path.to_str().with_context(|| format!("the path {} is not UTF-8", path.display()))?.to_owned())
+}
+
+/// Runs source, stage and sink, of which the first and the last are left out where the stage has no use for them.
+fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> Result<Recording> {
+    let kind = &case.stage.kind;
+    let received = sink::Received::default();
+    let mut stages = Vec::new();
+    let mut inputs = Vec::new();
+    if !case.inputs.is_empty() {
+        let feeds = feeds(case, &LogFile::open(&case.input)?)?;
+        if feeds.len() > source::MOST_FEEDS {
+            bail!("{} topic patterns are too many: at most {} can be given", feeds.len(), source::MOST_FEEDS);
+        }
+        let wire =
+            |(from_port, feed): (usize, &super::routes::Feed)| Wire { port: feed.port, from_stage: 0, from_port };
+        inputs = feeds.iter().enumerate().map(wire).collect();
+        stages.push(helper(SOURCE, source::kind(SOURCE, kind, &case.input, feeds), Vec::new()));
+    }
+    let place = stages.len();
+    stages.push(StageSpec {
+        name: case.stage.name.clone(),
+        kind: kind.clone(),
+        parameters: filled_in(&case.stage.parameters, files),
+        inputs,
+        topics: case.stage.topics.clone(),
+        depth: case.stage.depth,
+    });
+    if !kind.outputs.is_empty() {
+        let wires = (0..kind.outputs.len()).map(|from_port| Wire { port: 0, from_stage: place, from_port });
+        stages.push(helper(SINK, sink::kind(SINK, Arc::clone(&received)), wires.collect()));
+    }
+    let pipeline = Pipeline {
+        name: case.stage.name.clone(),
+        reference: case.stage.reference.clone(),
+        seed: case.stage.seed,
+        batch: case.stage.batch,
+        robots: case.stage.robots.clone(),
+        stages,
+    };
+    let report = engine::run(&pipeline, EngineKind::Threads, observer)?;
+    let messages = std::mem::take(&mut *received.lock().map_err(|error| anyhow::anyhow!("{error}"))?);
+    let stage = report.stages.into_iter().nth(place);
+    let warnings = stage.map(|stage| portable(stage.warnings, files)).unwrap_or_default();
+    Ok(Recording { messages, warnings })
+}
+
+fn helper(name: &str, kind: StageKind, inputs: Vec<Wire>) -> StageSpec {
+    let topics = kind.outputs.iter().map(|port| format!("/{}", port.name)).collect();
+    StageSpec { name: name.to_owned(), kind, parameters: toml::Table::new(), inputs, topics, depth: DEFAULT_DEPTH }
+}
+
+/// Parameters with the paths of files in the place of their placeholders.
+fn filled_in(parameters: &toml::Table, files: &[(&str, String)]) -> toml::Table {
+    fn fill(value: &toml::Value, files: &[(&str, String)]) -> toml::Value {
+        match value {
+            toml::Value::String(text) => {
+                files.iter().fold(text.clone(), |text, (placeholder, path)| text.replace(placeholder, path)).into()
+            }
+            toml::Value::Array(values) => values.iter().map(|value| fill(value, files)).collect::<Vec<_>>().into(),
+            toml::Value::Table(table) => filled_in(table, files).into(),
+            other => other.clone(),
+        }
+    }
+    parameters.iter().map(|(key, value)| (key.clone(), fill(value, files))).collect()
+}
+
+/// Warnings that name a file of the case by its placeholder: its path differs from machine to machine.
+fn portable(warnings: BTreeMap<String, u64>, files: &[(&str, String)]) -> BTreeMap<String, u64> {
+    let mut portable: BTreeMap<String, u64> = BTreeMap::new();
+    for (warning, count) in warnings {
+        let text = files.iter().fold(warning, |text, (placeholder, path)| text.replace(path.as_str(), placeholder));
+        *portable.entry(text).or_default() += count;
+    }
+    portable
+}

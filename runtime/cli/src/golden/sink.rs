@@ -1,0 +1,66 @@
+//! The sink of a case: keeps what the stage sends.
+
+use super::recording::Recorded;
+use super::source::NoParameters;
+use gridweave_logs::sink::result_channel;
+use gridweave_runtime::message::{Channel, Message};
+use gridweave_runtime::stage::{InputPort, Output, PortType, Stage, StageError, StageKind};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+
+/// What came in, in the order of log time.
+pub(super) type Received = Arc<Mutex<Vec<Recorded>>>;
+
+/// The kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
+pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
+    let inputs = vec![InputPort::many("messages", PortType::Any, "what the stage sends")];
+    StageKind::stage(name, "Keeps what a stage sends.", inputs, Vec::new(), move |_: NoParameters, context| {
+        let types = context.input_types.clone();
+        Ok(CaseSink { received: Arc::clone(&received), types, channels: BTreeMap::new() })
+    })
+}
+
+struct CaseSink {
+    received: Received,
+    /// The ROS 2 type of every wire; empty for any.
+    types: Vec<String>,
+    /// By wire, number and topic; results of the stage have the number 0.
+    channels: BTreeMap<(usize, u32, String), Arc<Channel>>,
+}
+
+impl Stage for CaseSink {
+    fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+        self.channels.insert((wire, number, channel.topic.clone()), Arc::new(channel.clone()));
+        Ok(())
+    }
+
+    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
+        let (header, wire) = (message.header(), message.wire());
+        let topic = header.topic.as_str();
+        let key = (wire, header.channel, topic.to_owned());
+        let channel = match self.channels.get(&key) {
+            Some(channel) => Arc::clone(channel),
+            None => {
+                let ros_type = self.types.get(wire).filter(|name| !name.is_empty() && header.channel == 0);
+                let ros_type = ros_type.ok_or_else(|| {
+                    StageError::new(format!("keep a message on {topic}"), "nothing says what type it has")
+                        .with_help("announce a channel before the message, or give the output port a type")
+                })?;
+                let channel = Arc::new(result_channel(topic, ros_type));
+                self.channels.insert(key, Arc::clone(&channel));
+                channel
+            }
+        };
+        let recorded = Recorded {
+            channel,
+            port: Some(wire),
+            log_time: header.log_time,
+            publish_time: header.publish_time,
+            bytes: message.bytes().to_vec(),
+        };
+        // A sink that has panicked while it held the lock has ended the run.
+        let mut received = self.received.lock().map_err(|error| StageError::new("keep a message", error))?;
+        received.push(recorded);
+        Ok(())
+    }
+}
