@@ -17,8 +17,9 @@ pub(super) fn cases() -> Vec<Case> {
         source("nothing_fits", |log| {
             log.raw(1.0, "/chatter", "std_msgs/msg/String", STRING);
         }),
-        Case::new("mcap_sink", "results", every_kind),
+        Case::new("mcap_sink", "of_a_log", every_kind),
         Case::new("mcap_sink", "uncompressed", every_kind),
+        Case::new("mcap_sink", "without_the_input", every_kind),
     ]
 }
 
