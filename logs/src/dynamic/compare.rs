@@ -98,7 +98,9 @@ impl Comparison {
     fn arrays(&mut self, path: &str, expected: &Array<'_>, got: &Array<'_>) {
         let same_length = expected.len() == got.len();
         if !same_length {
-            self.differ(path, format!("{} elements", expected.len()), format!("{} elements", got.len()));
+            let elements =
+                |array: &Array<'_>| format!("{} element{}", array.len(), if array.len() == 1 { "" } else { "s" });
+            self.differ(path, elements(expected), elements(got));
         }
         if let (Array::Messages(a), Array::Messages(b)) = (expected, got) {
             for (at, (a, b)) in a.iter().zip(b).enumerate() {
@@ -129,8 +131,8 @@ impl Comparison {
             }
         }
         if same_length && differing > told {
-            let rest = differing - told;
-            self.differ(path, expected, format!("{rest} more elements that differ, {differing} in all"));
+            let total = expected.len();
+            self.differ(path, format!("{total} elements"), format!("{differing} that differ"));
         }
     }
 }

@@ -44,6 +44,9 @@ pub struct SinkParameters {
     pub file: PathBuf,
     /// Whether the messages of the input logs are written too, beside the results.
     pub pass_input: bool,
+    /// The topics to write, `{robot}` standing for any one part of the path: `["/{robot}/map", "/tf"]`. All if none are
+    /// given.
+    pub only_topics: Vec<String>,
     /// How chunks are compressed.
     pub compression: Compression,
     /// A chunk is closed when it holds this many bytes before compression. If the program is killed, the open chunk is
@@ -54,7 +57,7 @@ pub struct SinkParameters {
 impl Default for SinkParameters {
     fn default() -> Self {
         let LogOptions { compression, chunk_size } = LogOptions::default();
-        Self { file: PathBuf::new(), pass_input: true, compression, chunk_size }
+        Self { file: PathBuf::new(), pass_input: true, only_topics: Vec::new(), compression, chunk_size }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::routing::{ResultTopics, Route, result_channel};
 use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
 use gridweave_runtime::message::{Channel, FixedText, Message};
-use gridweave_runtime::stage::{Context, Output, Stage, StageError};
+use gridweave_runtime::stage::{Context, Output, Stage, StageError, match_robot};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,6 +22,8 @@ struct Lane {
 /// Where the messages of an announced channel go.
 enum Target {
     Lane(usize),
+    /// They are of no topic that is to be written.
+    Unwanted,
     LeaveOut(String),
 }
 
@@ -36,6 +38,8 @@ pub(super) struct McapSink {
     file: PathBuf,
     options: LogOptions,
     pass_input: bool,
+    /// Empty for all.
+    only_topics: Vec<String>,
     result_topics: ResultTopics,
     input_types: Vec<String>,
     log: Option<LogWriter>,
@@ -50,7 +54,7 @@ pub(super) struct McapSink {
 
 impl McapSink {
     pub(super) fn new(parameters: SinkParameters, context: &Context) -> Result<Self, StageError> {
-        let SinkParameters { file, pass_input, compression, chunk_size } = parameters;
+        let SinkParameters { file, pass_input, only_topics, compression, chunk_size } = parameters;
         if file.as_os_str().is_empty() {
             let doing = format!("write the log of stage `{}`", context.stage);
             return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
@@ -58,6 +62,7 @@ impl McapSink {
         let sink = Self {
             options: LogOptions { compression, chunk_size },
             pass_input,
+            only_topics,
             result_topics: ResultTopics::new(context),
             input_types: context.input_types.clone(),
             log: None,
@@ -69,6 +74,11 @@ impl McapSink {
         };
         LogWriter::check_path(&sink.file).map_err(failure)?;
         Ok(sink)
+    }
+
+    fn is_wanted(&self, topic: &str) -> bool {
+        self.only_topics.is_empty()
+            || self.only_topics.iter().any(|wanted| wanted == topic || match_robot(wanted, topic).is_some())
     }
 
     /// The lane of a channel; equal channels share one.
@@ -146,6 +156,7 @@ impl McapSink {
 impl Stage for McapSink {
     fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
         let target = match self.result_topics.route(channel) {
+            _ if !self.is_wanted(&channel.topic) => Target::Unwanted,
             Route::Write(channel) => Target::Lane(self.lane(channel)),
             Route::LeaveOut(reason) => Target::LeaveOut(reason),
         };
@@ -156,10 +167,12 @@ impl Stage for McapSink {
     fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
         let number = message.header().channel;
         let lane = match number {
+            0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
             0 => self.result_lane(message, output)?,
             _ if !self.pass_input => return Ok(()),
             _ => match self.announced.get(&(message.wire(), number)) {
                 Some(Target::Lane(lane)) => *lane,
+                Some(Target::Unwanted) => return Ok(()),
                 Some(Target::LeaveOut(reason)) => {
                     output.warn(reason.as_str());
                     return Ok(());

@@ -9,7 +9,8 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 2] = [
+const SHIPPED: [(&str, &str); 3] = [
+    ("cut", include_str!("../../../pipelines/cut.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),
 ];

@@ -187,6 +187,19 @@ fn without_the_input_only_results_are_written() {
 }
 
 #[test]
+fn only_the_topics_that_are_asked_for_are_written() {
+    let mut run = Run::new("only_topics = [\"/{robot}/lines/segments\", \"/robot1/scan\"]");
+    for (number, topic) in [(1, "/robot1/scan"), (2, "/robot2/scan")] {
+        run.announce(0, number, topic, "sensor_msgs/msg/LaserScan");
+        run.input(0, number, 1, b"scan").unwrap();
+    }
+    run.result(2, "/map", 2, b"map").unwrap();
+    run.result(4, "/robot1/lines/segments", 3, b"segments").unwrap();
+    run.finish();
+    assert_eq!(run.log().topics(), ["/robot1/scan", "/robot1/lines/segments"]);
+}
+
+#[test]
 fn the_input_cannot_pass_for_a_result() {
     let mut run = Run::new("");
     run.announce(0, 1, "/map", GRID);

@@ -5,7 +5,7 @@ use gridweave_logs::dynamic::{self, Schema};
 use gridweave_logs::schemas::full_type_name;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// So many grids of a case are kept to be drawn.
 const GRIDS_KEPT: usize = 12;
@@ -59,16 +59,13 @@ pub(super) struct GridDifference {
 impl Comparison {
     /// Compares recordings. Numbers with a fraction may differ by `tolerance`, see
     /// [`nearly_equal`](dynamic::nearly_equal). At most `limit` differences are told.
-    pub(super) fn new(expected: &Recording, got: &Recording, tolerance: f64, limit: usize) -> Self {
+    pub(super) fn new<'a>(expected: &'a Recording, got: &'a Recording, tolerance: f64, limit: usize) -> Self {
         let mut comparison = Self::default();
         let (expected_topics, got_topics) = (expected.by_topic(), got.by_topic());
         let topics: BTreeSet<&str> = expected_topics.keys().chain(got_topics.keys()).copied().collect();
         for topic in topics {
-            let of = |topics: &std::collections::BTreeMap<&str, Vec<&Recorded>>| {
-                topics.get(topic).map(|messages| messages.iter().map(|&message| message.clone()).collect())
-            };
-            let expected: Vec<Recorded> = of(&expected_topics).unwrap_or_default();
-            let got: Vec<Recorded> = of(&got_topics).unwrap_or_default();
+            let of = |topics: &BTreeMap<&str, Vec<&'a Recorded>>| topics.get(topic).cloned().unwrap_or_default();
+            let (expected, got) = (of(&expected_topics), of(&got_topics));
             comparison.topic(&expected, &got, tolerance, limit);
         }
         comparison.compare_warnings(expected, got, limit);
@@ -101,7 +98,7 @@ impl Comparison {
     }
 
     /// Compares the messages of one topic: those of one log time with each other, in the order that they were sent.
-    fn topic(&mut self, expected: &[Recorded], got: &[Recorded], tolerance: f64, limit: usize) {
+    fn topic(&mut self, expected: &[&Recorded], got: &[&Recorded], tolerance: f64, limit: usize) {
         let whole = |message: &Recorded, expected: &str, got: &str| Difference {
             topic: Some(message.channel.topic.clone()),
             log_time: Some(message.log_time),
@@ -152,8 +149,7 @@ impl Comparison {
             match field_differences(expected, got, tolerance, limit.saturating_sub(self.differences.len())) {
                 Ok(found) => {
                     self.count += found.count;
-                    // The picture says it better than the summary of the cells.
-                    let told = found.told.into_iter().filter(|field| grid.is_none() || field.path != "data");
+                    let told = found.told.into_iter();
                     let told = told.map(|field| difference(Some(&field.path), field.expected, field.got));
                     self.differences.extend(told);
                 }

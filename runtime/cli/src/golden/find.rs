@@ -1,9 +1,13 @@
 //! Which cases there are: the folders KIND/CASE.
 
+use crate::args::BadUse;
 use anyhow::{Context, Result};
 use gridweave_runtime::stage::Registry;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// Where a case lies.
+const FORM: &str = "a case is a folder KIND/CASE with stage.toml, such as line_extractor/room";
 
 /// The folder of one case.
 #[derive(Clone, Debug)]
@@ -24,14 +28,26 @@ impl CaseFolder {
 }
 
 /// All cases in `folder`, by kind and then by name.
+///
+/// # Errors
+///
+/// There is no case, or what looks like one lies elsewhere.
 pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
     let mut cases = Vec::new();
     for (kind, path) in folders_in(folder)? {
+        let misplaced = path.join("stage.toml");
+        if misplaced.exists() {
+            let text = format!("{} lies among the cases of a kind: {FORM}", misplaced.display());
+            return Err(BadUse(text).into());
+        }
         for (case, path) in folders_in(&path)? {
             cases.push(CaseFolder { kind: kind.clone(), case, path });
         }
     }
-    Ok(cases)
+    match cases.is_empty() {
+        true => Err(BadUse(format!("there is no case in {}: {FORM}", folder.display())).into()),
+        false => Ok(cases),
+    }
 }
 
 /// The kinds of the registry of which there is no case.

@@ -71,7 +71,7 @@ pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Outcome> 
     let fits =
         |case: &CaseFolder| args.filters.is_empty() || args.filters.iter().any(|text| case.name().contains(text));
     let cases: Vec<CaseFolder> = all.into_iter().filter(fits).collect();
-    if cases.is_empty() && !args.filters.is_empty() {
+    if cases.is_empty() {
         let text = format!("no case in {} has {} in its name", args.cases.display(), args.filters.join(" or "));
         return Err(BadUse(text).into());
     }

@@ -42,7 +42,8 @@ impl Report {
         }
         let (passed, failed) = (self.count(|status| *status == Status::Passed), self.count(|s| *s == Status::Failed));
         let blessed = self.cases.len() - passed - failed;
-        write!(text, "{} cases: {passed} as expected", self.cases.len())?;
+        let cases = if self.cases.len() == 1 { "case" } else { "cases" };
+        write!(text, "{} {cases}: {passed} as expected", self.cases.len())?;
         if blessed > 0 {
             write!(text, ", {blessed} blessed")?;
         }
@@ -108,7 +109,7 @@ fn write_differences(comparison: &Comparison, text: &mut String) -> std::fmt::Re
     }
     match comparison.count - comparison.differences.len().min(comparison.count) {
         0 => Ok(()),
-        more => writeln!(text, "    and {more} more differences (--limit COUNT shows more)"),
+        more => writeln!(text, "    and {more} more (--limit COUNT shows more of them)"),
     }
 }
 

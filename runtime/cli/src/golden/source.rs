@@ -39,7 +39,7 @@ pub(super) fn kind(name: &'static str, stage: &StageKind, path: &Path, feeds: Ve
 }
 
 fn failure(error: impl std::fmt::Display) -> StageError {
-    StageError::new("read the input of the case", error)
+    StageError::new("read input.mcap", error)
 }
 
 struct CaseSource {
