@@ -1,9 +1,12 @@
-//! The example of a stage of one's own sends what its golden case expects.
+//! Every stage sends what its golden cases expect, and so does the example of a stage of one's own.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
+mod support;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use support::gridweave;
 
 /// The folder of the whole repository.
 fn repository() -> PathBuf {
@@ -13,6 +16,22 @@ fn repository() -> PathBuf {
 /// Where differences are left to be looked at.
 fn differences(name: &str) -> String {
     format!("{}/{name}-differences", env!("CARGO_TARGET_TMPDIR"))
+}
+
+#[test]
+fn every_stage_sends_what_is_expected() {
+    let ended = gridweave(&repository(), &["golden", "--differences", &differences("golden")]);
+    assert_eq!(ended.status, 0, "{}", ended.text());
+}
+
+#[test]
+fn the_golden_files_are_small() {
+    fn size(folder: &Path) -> u64 {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        entries.map(|path| if path.is_dir() { size(&path) } else { path.metadata().unwrap().len() }).sum()
+    }
+    let bytes = size(&repository().join("tests/golden"));
+    assert!(bytes < 5_000_000, "{bytes} bytes");
 }
 
 #[test]
