@@ -19,6 +19,7 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         Case::new("mcap_sink", "of_a_log", every_kind),
         Case::new("mcap_sink", "uncompressed", every_kind),
+        Case::new("mcap_sink", "only_topics", every_kind),
         Case::new("mcap_sink", "without_the_input", every_kind),
     ]
 }
