@@ -110,15 +110,16 @@ fn equations_14_and_15(log: &mut LogBuilder) {
     place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", transform)]);
 }
 
-/// A gap between walls and free space, an unknown area beside them, and a gap in a thick wall.
+/// A gap between walls and free space, an unknown area beside them, a gap in a thick wall, and the inner corner of an
+/// unknown area.
 fn conditional_mean(log: &mut LogBuilder) {
     #[rustfmt::skip]
     let cells = [
-        100, 100, 100, -1, -1, -1, 90, 90, 90,
-         10,  -1,  10, -1, -1, -1, 90, -1, 90,
-         20,  20,  20, -1, -1, -1, 90, 90, 90,
+        100, 100, 100, -1, -1, -1, 90, 90, 90, -1, -1, 30, 30, 30,
+         10,  -1,  10, -1, -1, -1, 90, -1, 90, -1, -1, 30, -1, -1,
+         20,  20,  20, -1, -1, -1, 90, 90, 90, -1, -1, 30, -1, -1,
     ];
-    log.map(1.0, "robot1", &grid(9, &cells));
+    log.map(1.0, "robot1", &grid(14, &cells));
     place(log, 2.0, &[("robot1", Pose2::identity())]);
 }
 
