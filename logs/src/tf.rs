@@ -1,6 +1,5 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish one edge at a time.
 
-use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, TFMessage, Time, Transform};
 use gridweave_runtime::stage::{TfFrames, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -14,6 +13,11 @@ pub fn tf_topic(topic: &str) -> Option<&str> {
     matches!(last, "tf" | "tf_static").then_some(robot)
 }
 
+/// Whether the transforms on a topic of tf hold for good, as those of sensors on a robot do.
+pub fn is_static(topic: &str) -> bool {
+    topic.ends_with("tf_static")
+}
+
 /// The latest transform of every frame to its parent.
 #[derive(Clone, Debug, Default)]
 pub struct FrameTree {
@@ -25,31 +29,35 @@ pub struct FrameTree {
 struct Edge {
     parent: String,
     transform_parent_child: Isometry3<f64>,
+    /// Whether it holds for good.
+    is_static: bool,
 }
 
 /// How one frame lies in another, and the edges that say so.
 struct Chain<'a> {
     transform_target_source: Isometry3<f64>,
-    /// The child frames of the edges between the two.
+    /// The child frames of the edges between the two, from the source to the target.
     children: Vec<&'a str>,
 }
 
 impl FrameTree {
-    /// Puts in an edge, in place of the one that the child had. `false` if it cannot be used: it has values that are
-    /// not finite, or ties a frame to itself.
-    pub fn insert(&mut self, parent: &str, child: &str, transform: &Transform) -> bool {
+    /// Puts in an edge, in place of the one that the child had; it may hold for good. `false` if it cannot be used: it
+    /// has values that are not finite, or ties a frame to itself.
+    pub fn insert(&mut self, parent: &str, child: &str, transform: &Transform, is_static: bool) -> bool {
         let Some(transform_parent_child) = isometry(transform).filter(|_| parent != child && !child.is_empty()) else {
             return false;
         };
         match self.edges.get_mut(child) {
             Some(edge) => {
                 edge.transform_parent_child = transform_parent_child;
+                edge.is_static = is_static;
                 if edge.parent != parent {
                     parent.clone_into(&mut edge.parent);
                 }
             }
             None => {
-                self.edges.insert(child.to_owned(), Edge { parent: parent.to_owned(), transform_parent_child });
+                let edge = Edge { parent: parent.to_owned(), transform_parent_child, is_static };
+                self.edges.insert(child.to_owned(), edge);
             }
         }
         true
@@ -65,13 +73,21 @@ impl FrameTree {
         // The first ancestor of the target that is also one of the source's is where the two meet.
         for (steps, (frame, transform_ancestor_target)) in self.ancestors(target).enumerate() {
             let Some(meeting) = to_root.iter().position(|(other, _)| *other == frame) else { continue };
-            let children = self.ancestors(target).take(steps).chain(to_root[..meeting].iter().copied());
+            let mut to_target: Vec<&str> = self.ancestors(target).take(steps).map(|(frame, _)| frame).collect();
+            to_target.reverse();
+            let from_source = to_root[..meeting].iter().map(|(frame, _)| *frame);
             return Some(Chain {
                 transform_target_source: transform_ancestor_target.inverse() * to_root[meeting].1,
-                children: children.map(|(frame, _)| frame).collect(),
+                children: from_source.chain(to_target).collect(),
             });
         }
         None
+    }
+
+    /// The child frame of the edge of a chain that moves the source: the first that does not hold for good.
+    fn moving<'a>(&self, chain: &Chain<'a>) -> Option<&'a str> {
+        let moves = |child: &&&str| self.edges.get(**child).is_some_and(|edge| !edge.is_static);
+        chain.children.iter().find(moves).or(chain.children.first()).copied()
     }
 
     /// `frame` and then its ancestors, each with the pose of `frame` in it.
@@ -99,7 +115,11 @@ fn pose(isometry: &Isometry3<f64>) -> Pose {
     Pose { position: Point { x: t.x, y: t.y, z: t.z }, orientation: Quaternion { x: r.i, y: r.j, z: r.k, w: r.w } }
 }
 
-/// Gives the pose of each robot's base in its map whenever tf says something of it.
+/// Gives the pose of each robot's base in its map whenever tf says how the base has moved.
+///
+/// A base moves in a frame of odometry, and a SLAM system corrects how that lies in the map. A correction by itself gives
+/// no pose: joined to a movement of before it would be a pose of no time, and many systems date their corrections into
+/// the future.
 #[derive(Clone, Debug)]
 pub struct TfPoses {
     frames: TfFrames,
@@ -114,15 +134,20 @@ impl TfPoses {
         Self { frames, tree: FrameTree::default(), robots: BTreeMap::new() }
     }
 
-    /// Takes up a tf message in which the frames lack the given prefix (empty: none). Gives the poses that it changes,
-    /// by robot, and how many of its transforms could not be used.
-    pub fn update(&mut self, prefix: &str, message: &TFMessage) -> (Vec<(String, PoseStamped)>, usize) {
+    /// Takes up a tf message in which the frames lack the given prefix (empty: none), and which may hold for good. Gives
+    /// the poses that it tells, by robot, and how many of its transforms could not be used.
+    pub fn update(
+        &mut self,
+        prefix: &str,
+        is_static: bool,
+        message: &TFMessage,
+    ) -> (Vec<(String, PoseStamped)>, usize) {
         let mut changed: BTreeMap<String, Time> = BTreeMap::new();
         let mut unusable = 0;
         for edge in &message.transforms {
             let parent = full_name(prefix, &edge.header.frame_id);
             let child = full_name(prefix, &edge.child_frame_id);
-            if !self.tree.insert(&parent, &child, &edge.transform) {
+            if !self.tree.insert(&parent, &child, &edge.transform, is_static) {
                 unusable += 1;
                 continue;
             }
@@ -148,9 +173,7 @@ impl TfPoses {
     fn poses(&self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
         let pose_of = |(robot, (map, base)): (&String, &(String, String))| {
             let chain = self.tree.chain(map, base)?;
-            let stamps = chain.children.iter().filter_map(|child| changed.get(*child));
-            // The pose is as recent as the latest of the edges that have changed it.
-            let stamp = stamps.max_by_key(|stamp| LogTime::from(**stamp))?;
+            let stamp = changed.get(self.tree.moving(&chain)?)?;
             let header = Header { stamp: *stamp, frame_id: map.clone() };
             Some((robot.clone(), PoseStamped { header, pose: pose(&chain.transform_target_source) }))
         };

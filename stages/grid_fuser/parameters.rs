@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Warp {
-    /// Every cell of the fused map takes the value of the cell that its centre falls in: no gaps and no blur.
+    /// Every cell of the fused map takes the value of the cell that its centre falls in: no gaps and no blur. Walls stay
+    /// closed, but a single cell of a turned map may lie between the centres and be lost.
     #[default]
     Inverse,
     /// Every known cell of a robot's map goes to the cell that its centre falls in, and the gaps that rounding leaves

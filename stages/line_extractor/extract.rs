@@ -7,8 +7,9 @@ use super::point_index::PointIndex;
 use super::ransac::find_walls;
 use super::reliability::reliability;
 use super::scale::Scale;
+use super::surface::surface_cells;
 use super::wall::{Wall, fit_stretch};
-use crate::geometry::{Grid, Point2};
+use crate::geometry::{Cell, Grid, Point2};
 use gridweave_runtime::ros::Segment;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,8 +27,8 @@ pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, s
     let index_of =
         |points: &[Point2]| PointIndex::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let cells: Vec<Point2> =
-        grid.occupied().map(|cell| Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5)).collect();
+    let middle = |cell: Cell| Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5);
+    let cells: Vec<Point2> = surface_cells(grid, scale.reach).into_iter().map(middle).collect();
 
     let index = index_of(&sub_sample(&cells, parameters.max_points, &mut random));
     let walls = find_walls(&index, parameters, &scale, &mut random);

@@ -5,6 +5,8 @@
 //! draws the two points of a line near each other, and takes an unbroken stretch that holds enough points and is long
 //! enough. `sampling = "uniform"`, `scoring = "percentage"` and `fit = "ends"` give the paper's.
 //!
+//! What is occupied all through, deeper than a wall is thick, shows no wall but its surface.
+//!
 //! Not for curved walls, which become chains of short segments.
 
 mod extract;
@@ -16,6 +18,7 @@ mod ransac;
 mod reliability;
 mod scale;
 mod stage;
+mod surface;
 mod wall;
 
 pub use extract::extract_segments;

@@ -8,7 +8,7 @@ use super::translation::{residual, translate};
 use crate::geometry::{Pose2, turn_difference, wrap_angle};
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix3;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A first guess of an alignment.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,9 +91,6 @@ pub fn first_guess(
     })
 }
 
-/// Near 45 degrees from the directions' rotation the quarter turn is a toss of a coin, however uncertain the tags are.
-const MAX_CONTRADICTION: f64 = PI / 6.0;
-
 /// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
 fn by_directions(
     by_tags: &TagRotation,
@@ -114,7 +111,7 @@ fn by_directions(
     let angle = wrap_angle(d_theta + f64::from(quadrant(by_tags.angle, d_theta)) * FRAC_PI_2);
     let deviation = a.deviation.hypot(b.deviation);
     let limit = 3.0 * deviation.hypot(by_tags.deviation) + parameters.contradiction_angle;
-    let limit = limit.min(MAX_CONTRADICTION);
+    let limit = limit.min(parameters.max_contradiction);
     match turn_difference(by_tags.angle, angle, TAU).abs() <= limit {
         true => Ok(TagRotation { angle, deviation }),
         false => Err("rotation from the tags, which the directions of the maps contradict"),
@@ -235,6 +232,19 @@ mod tests {
         let tags = tags(&pose(3.0, 4.0, 2.0));
         let vague = Direction { deviation: 0.5, ..direction(2.0 - 0.7) };
         assert_eq!(guess(&tags, Some(&vague), Some(&direction(0.0))).unwrap().method, "tags");
+        let (contradiction_angle, max_contradiction) = (0.8, 0.8);
+        let paper = QuadrantClassifierParameters {
+            contradiction_angle,
+            max_contradiction,
+            max_residual: 9.0,
+            ..Default::default()
+        };
+        for offset in [0.7, 0.785, -0.785] {
+            let a = direction(2.0 - offset);
+            let found = first_guess(&tags, Some(&a), Some(&direction(0.0)), &paper).unwrap();
+            assert_eq!(found.method, "tags+directions");
+            assert!((found.transform_a_b.rotation.angle() - (2.0 - offset)).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -102,6 +102,10 @@ pub struct QuadrantClassifierParameters {
     /// Directions contradict the tags when the two rotations differ by more than three joint standard deviations and
     /// this angle, radians.
     pub contradiction_angle: f64,
+    /// Directions contradict the tags in any case when the two rotations differ by more than this, radians: 45 degrees
+    /// away the quarter turn is a toss of a coin. The paper has no such bounds; with 0.8 for this one and for
+    /// `contradiction_angle` they are out of reach.
+    pub max_contradiction: f64,
     /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
@@ -126,6 +130,7 @@ impl Default for QuadrantClassifierParameters {
             tag_deviation: 0.03,
             max_tag_rotation_deviation: 0.2,
             contradiction_angle: 0.01,
+            max_contradiction: 30_f64.to_radians(),
             max_residual: 0.5,
             resend_distance: 0.001,
             resend_angle: 0.0001,
@@ -159,6 +164,13 @@ impl Parameters for QuadrantClassifierParameters {
         ] {
             require(not_below_zero(value), field, "must be a number of 0 rad or more");
         }
+        // More than an eighth turn they never differ, but for rounding.
+        let contradiction = self.max_contradiction;
+        require(
+            contradiction > 0.0 && contradiction <= 0.8,
+            "max_contradiction",
+            "must be above 0 and at most 0.8 rad",
+        );
         let deviation = self.max_tag_rotation_deviation;
         // Three deviations must stay below an eighth turn, where quadrants meet.
         require(
@@ -190,11 +202,12 @@ mod tests {
             tag_deviation: f64::INFINITY,
             max_tag_rotation_deviation: 1.0,
             contradiction_angle: -0.1,
+            max_contradiction: 0.9,
             max_residual: 0.0,
             resend_distance: -0.1,
             resend_angle: f64::NAN,
             ..Default::default()
         };
-        assert_eq!(parameters.check().len(), 11);
+        assert_eq!(parameters.check().len(), 12);
     }
 }

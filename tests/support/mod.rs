@@ -1,13 +1,9 @@
 //! Running the command, and logs to run it on.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
-use gridweave_logs::schemas::schema_text;
-use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
-use gridweave_runtime::message::{Channel, LogTime};
-use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, Pose, PoseStamped, RosMessage, TagRange, encode};
-use mcap::records::MessageHeader;
-use nalgebra::{Isometry2, Vector2};
-use serde::Serialize;
+mod log_builder;
+
+pub use log_builder::{LogBuilder, TestMap};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -105,100 +101,6 @@ impl Running {
         };
         let (stdout, stderr) = (self.stdout.join().unwrap(), self.stderr.join().unwrap());
         Ended { status: status.code().unwrap_or(-1), stdout, stderr }
-    }
-}
-
-/// Writes a log message by message.
-pub struct LogBuilder {
-    writer: LogWriter,
-    sequence: u32,
-}
-
-impl LogBuilder {
-    pub fn new(path: &Path) -> Self {
-        Self { writer: LogWriter::create(path, LogOptions::default()).unwrap(), sequence: 0 }
-    }
-
-    /// A message of any type, its bytes given.
-    pub fn raw(&mut self, seconds: f64, topic: &str, type_name: &str, bytes: &[u8]) -> &mut Self {
-        let channel = Channel {
-            topic: topic.into(),
-            message_encoding: "cdr".into(),
-            schema_name: type_name.into(),
-            schema_encoding: "ros2msg".into(),
-            schema: schema_text(type_name).unwrap_or_default().into_bytes(),
-            ..Default::default()
-        };
-        let channel_id = self.writer.channel(&channel).unwrap();
-        let time = 1_700_000_000_000_000_000 + (seconds * 1e9) as u64;
-        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
-        self.sequence += 1;
-        self.writer.write(&header, bytes).unwrap();
-        self
-    }
-
-    pub fn message<T: RosMessage + Serialize>(&mut self, seconds: f64, topic: &str, message: &T) -> &mut Self {
-        self.raw(seconds, topic, T::NAME, &encode(message).unwrap())
-    }
-
-    /// A map of `robot`. `change` may spoil it.
-    pub fn map(&mut self, seconds: f64, robot: &str, map: &TestMap) -> &mut Self {
-        let bytes: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
-        let grid = OccupancyGrid {
-            header: Header::new(LogTime((seconds * 1e9) as u64), format!("{robot}/map")),
-            info: map.info,
-            data: &bytes,
-        };
-        self.message(seconds, &format!("/{robot}/map"), &grid)
-    }
-
-    pub fn pose(&mut self, seconds: f64, robot: &str, x: f64, y: f64) -> &mut Self {
-        let pose = PoseStamped {
-            header: Header::new(LogTime((seconds * 1e9) as u64), format!("{robot}/map")),
-            pose: Pose::from(Isometry2::new(Vector2::new(x, y), 0.0)),
-        };
-        self.message(seconds, &format!("/{robot}/pose"), &pose)
-    }
-
-    pub fn reading(&mut self, seconds: f64, robot: &str, tag: &str, range: f64) -> &mut Self {
-        let reading = TagRange {
-            header: Header::new(LogTime((seconds * 1e9) as u64), format!("{robot}/base_link")),
-            tag_id: tag.into(),
-            range,
-            range_stddev: 0.05,
-            rssi: -50.0,
-        };
-        self.message(seconds, &format!("/{robot}/tag_ranges"), &reading)
-    }
-
-    pub fn finish(self) {
-        self.writer.finish(Outcome::Complete).unwrap();
-    }
-}
-
-/// A map that can be spoilt.
-#[derive(Clone)]
-pub struct TestMap {
-    pub info: MapMetaData,
-    pub cells: Vec<i8>,
-}
-
-impl TestMap {
-    /// A room of 10 x 8 m with an inner wall, at 0.05 m a cell.
-    pub fn room() -> Self {
-        let (width, height) = (200, 160);
-        let mut cells = vec![0; width * height];
-        for row in 0..height {
-            for column in 0..width {
-                let is_wall = row < 2 || column < 2 || row >= height - 2 || column >= width - 2;
-                let is_inner = (80..82).contains(&column) && row < 100;
-                if is_wall || is_inner {
-                    cells[row * width + column] = 100;
-                }
-            }
-        }
-        let info = MapMetaData { resolution: 0.05, width: width as u32, height: height as u32, ..Default::default() };
-        Self { info, cells }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::LogInfo;
 use crate::schemas::full_type_name;
 use crate::source::{Classified, Role, classify};
-use crate::tf::TfPoses;
+use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::RobotTopics;
@@ -99,7 +99,7 @@ impl RobotSurvey {
             *self.unreadable.entry(topic.to_owned()).or_default() += 1;
             return;
         };
-        for (robot, _) in tf.update(prefix, &message).0 {
+        for (robot, _) in tf.update(prefix, is_static(topic), &message).0 {
             let info = self.robots.entry(robot).or_default();
             info.poses += 1;
             if !info.topics.contains(topic) {

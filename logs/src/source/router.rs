@@ -7,7 +7,7 @@ use super::route::{PoseSource, Role, classify};
 use super::{MAP, OTHER, POSE, TAGS};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::schemas::full_type_name;
-use crate::tf::TfPoses;
+use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
@@ -81,7 +81,7 @@ impl Router {
         if let (Role::Tf, Some(tf)) = (route.role, &mut self.tf)
             && let Ok(transforms) = decode::<TFMessage>(message.data)
         {
-            tf.update(&route.robot, &transforms);
+            tf.update(&route.robot, is_static(&route.channel.topic), &transforms);
         }
         Ok(())
     }
@@ -154,7 +154,7 @@ impl Router {
             output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
             return Ok(());
         };
-        let (poses, unusable) = tf.update(&route.robot, &message);
+        let (poses, unusable) = tf.update(&route.robot, is_static(&route.channel.topic), &message);
         for _ in 0..unusable {
             output.warn("transforms with values that are not finite, or between a frame and itself");
         }

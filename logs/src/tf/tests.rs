@@ -1,4 +1,5 @@
 use super::*;
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{TransformStamped, Vector3};
 use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::FRAC_PI_2;
@@ -26,9 +27,9 @@ fn robots() -> TfPoses {
 #[test]
 fn a_pose_is_the_product_of_the_chain_from_map_to_base() {
     let mut tf = robots();
-    assert!(tf.update("", &message([edge("r1/map", "r1/odom", 1.0, 2.0, FRAC_PI_2)])).0.is_empty());
+    assert!(tf.update("", false, &message([edge("r1/map", "r1/odom", 1.0, 2.0, FRAC_PI_2)])).0.is_empty());
     assert_eq!(tf.robots_without_pose(), BTreeSet::from(["r1"]));
-    let (poses, unusable) = tf.update("", &message([edge("r1/odom", "r1/base_link", 3.0, 0.0, 0.5)]));
+    let (poses, unusable) = tf.update("", false, &message([edge("r1/odom", "r1/base_link", 3.0, 0.0, 0.5)]));
     let [(robot, pose)] = &poses[..] else { panic!("{poses:?}") };
     assert_eq!((robot.as_str(), pose.header.frame_id.as_str(), unusable), ("r1", "r1/map", 0));
     assert_eq!(pose.header.stamp.sec, 3, "the stamp of the edge that changed the pose");
@@ -39,14 +40,35 @@ fn a_pose_is_the_product_of_the_chain_from_map_to_base() {
 }
 
 #[test]
-fn a_pose_is_told_only_when_its_chain_changes_and_once_a_message() {
+fn a_pose_is_told_only_when_its_base_moves_and_once_a_message() {
     let mut tf = robots();
     let chain = [edge("r1/map", "r1/odom", 1.0, 0.0, 0.0), edge("r1/odom", "r1/base_link", 2.0, 0.0, 0.0)];
-    assert_eq!(tf.update("", &message(chain.clone())).0.len(), 1);
-    assert!(tf.update("", &message([edge("r1/base_link", "r1/laser", 0.1, 0.0, 0.0)])).0.is_empty());
-    assert!(tf.update("", &message([edge("world", "r1/map", 9.0, 0.0, 0.0)])).0.is_empty());
-    assert!(tf.update("", &message([])).0.is_empty());
-    assert_eq!(tf.update("", &message([chain[0].clone()])).0.len(), 1);
+    assert_eq!(tf.update("", false, &message(chain.clone())).0.len(), 1);
+    assert!(tf.update("", false, &message([edge("r1/base_link", "r1/laser", 0.1, 0.0, 0.0)])).0.is_empty());
+    assert!(tf.update("", false, &message([edge("world", "r1/map", 9.0, 0.0, 0.0)])).0.is_empty());
+    assert!(tf.update("", false, &message([])).0.is_empty());
+    assert!(tf.update("", false, &message([chain[0].clone()])).0.is_empty());
+    assert_eq!(tf.update("", false, &message([chain[1].clone()])).0.len(), 1);
+}
+
+#[test]
+fn a_correction_that_is_dated_into_the_future_gives_no_pose_and_no_later_stamp() {
+    let mut tf = robots();
+    // The base stands on a frame that moves, and the stamp of these edges is their x in seconds.
+    let mount = edge("r1/footprint", "r1/base_link", 0.5, 0.0, 0.0);
+    assert!(tf.update("", true, &message([mount])).0.is_empty());
+    assert!(tf.update("", false, &message([edge("r1/map", "r1/odom", 9.0, 0.0, 0.0)])).0.is_empty());
+    let moved = |x| message([edge("r1/odom", "r1/footprint", x, 0.0, 0.0)]);
+    assert_eq!(tf.update("", false, &moved(1.0)).0[0].1.header.stamp.sec, 1);
+    assert!(tf.update("", false, &message([edge("r1/map", "r1/odom", 20.0, 0.0, 0.0)])).0.is_empty());
+    let (poses, _) = tf.update("", false, &moved(2.0));
+    assert_eq!((poses[0].1.header.stamp.sec, poses[0].1.pose.position.x), (2, 22.5));
+}
+
+#[test]
+fn a_base_that_never_moves_has_a_pose() {
+    let mut tf = robots();
+    assert_eq!(tf.update("", true, &message([edge("r1/map", "r1/base_link", 1.0, 0.0, 0.0)])).0.len(), 1);
 }
 
 #[test]
@@ -54,7 +76,7 @@ fn frames_without_prefix_get_the_robots() {
     let mut tf = robots();
     let prefix = tf_topic("/robot2/tf").unwrap();
     let transforms = message([edge("map", "/odom", 1.0, 0.0, 0.0), edge("odom", "robot2/base_link", 1.0, 0.0, 0.0)]);
-    let (poses, _) = tf.update(prefix, &transforms);
+    let (poses, _) = tf.update(prefix, false, &transforms);
     assert_eq!(poses[0].0, "robot2");
     assert_eq!(poses[0].1.pose.position.x, 2.0);
     assert_eq!(full_name("r1", "r10/map"), "r1/r10/map");
@@ -74,7 +96,7 @@ fn tf_topics_are_told_from_others() {
 fn a_base_and_a_map_that_meet_in_another_frame_are_tied() {
     let mut tree = FrameTree::default();
     for edge in [edge("odom", "map", -1.0, 0.0, 0.0), edge("odom", "base", 4.0, 0.0, 0.0)] {
-        assert!(tree.insert(&edge.header.frame_id, &edge.child_frame_id, &edge.transform));
+        assert!(tree.insert(&edge.header.frame_id, &edge.child_frame_id, &edge.transform, false));
     }
     assert!((tree.lookup("map", "base").unwrap().translation.x - 5.0).abs() < 1e-12);
     assert!((tree.lookup("base", "map").unwrap().translation.x + 5.0).abs() < 1e-12);
@@ -93,7 +115,7 @@ fn a_circle_of_frames_ends() {
         edge("r1/map", "r1/c", 1.0, 0.0, 0.0),
         edge("r1/map", "r1/map", 1.0, 0.0, 0.0),
     ];
-    let (poses, unusable) = tf.update("", &message(circle));
+    let (poses, unusable) = tf.update("", false, &message(circle));
     assert_eq!((poses.len(), unusable), (0, 1));
     assert_eq!(tf.robots_without_pose(), BTreeSet::from(["r1"]));
 }
@@ -101,9 +123,12 @@ fn a_circle_of_frames_ends() {
 #[test]
 fn transforms_that_are_not_finite_are_left_out() {
     let mut tf = robots();
-    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", f64::NAN, 0.0, 0.0)])), (Vec::new(), 1));
-    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", f64::INFINITY, 0.0, 0.0)])).1, 1);
-    assert_eq!(tf.update("", &message([edge("r1/map", "r1/base_link", 2.0, 0.0, 0.0)])).0[0].1.pose.position.x, 2.0);
+    assert_eq!(tf.update("", false, &message([edge("r1/map", "r1/base_link", f64::NAN, 0.0, 0.0)])), (Vec::new(), 1));
+    assert_eq!(tf.update("", false, &message([edge("r1/map", "r1/base_link", f64::INFINITY, 0.0, 0.0)])).1, 1);
+    assert_eq!(
+        tf.update("", false, &message([edge("r1/map", "r1/base_link", 2.0, 0.0, 0.0)])).0[0].1.pose.position.x,
+        2.0
+    );
 }
 
 #[test]
@@ -111,12 +136,12 @@ fn a_rotation_of_zeros_is_none_and_a_tilted_frame_is_honoured() {
     let mut tree = FrameTree::default();
     let zeros = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 0.0 };
     let ahead = Vector3 { x: 1.0, y: 0.0, z: 0.0 };
-    tree.insert("map", "odom", &Transform { translation: ahead, rotation: zeros });
+    tree.insert("map", "odom", &Transform { translation: ahead, rotation: zeros }, false);
     // Upside down: what is to its left is to the right of its parent.
     let upside_down = Quaternion { x: 1.0, y: 0.0, z: 0.0, w: 0.0 };
-    tree.insert("odom", "mount", &Transform { translation: ahead, rotation: upside_down });
+    tree.insert("odom", "mount", &Transform { translation: ahead, rotation: upside_down }, false);
     let left = Vector3 { x: 0.0, y: 1.0, z: 0.0 };
-    tree.insert("mount", "base", &Transform { translation: left, rotation: upside_down });
+    tree.insert("mount", "base", &Transform { translation: left, rotation: upside_down }, false);
     let base = tree.lookup("map", "base").unwrap();
     assert!((base.translation.vector - nalgebra::Vector3::new(2.0, -1.0, 0.0)).norm() < 1e-12);
     assert!(base.rotation.angle() < 1e-9);
