@@ -21,6 +21,7 @@ mod experiment;
 mod export;
 mod info;
 mod pipelines;
+mod processes;
 mod progress;
 mod run;
 mod simulate;
@@ -80,6 +81,8 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
         Command::Evaluate(args) => evaluate::command(&args),
         Command::Simulate(args) => simulate::simulate(&args, registry),
         Command::Demo(args) => demo::demo(&args, registry),
+        Command::Clean => processes::clean(),
+        Command::Stage(args) => processes::stage(&args, registry),
         Command::Experiment(args) => experiment::experiment(&args, registry),
     }
 }

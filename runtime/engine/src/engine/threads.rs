@@ -3,7 +3,7 @@
 use super::plan::Plan;
 use super::stage_thread::{Event, StageThread, tell};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::shared::{LinkError, RunNames, WakeEvents, Waker};
+use crate::link::shared::{Activity, LinkError, RunNames, WakeEvents, Waker};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;
 use std::sync::OnceLock;
@@ -28,9 +28,11 @@ pub(super) fn run<S: Service + 'static>(pipeline: &Pipeline, observer: &dyn Obse
     let result = thread::scope(|scope| {
         for stage in 0..pipeline.stages.len() {
             let (sender, names, plan, stop_reason) = (sender.clone(), &names, &plan, &stop_reason);
-            scope.spawn(move || match StageThread::<S>::connect(pipeline, plan, names, stage, &sender) {
-                Ok(thread) => thread.run(stop_reason),
-                Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
+            scope.spawn(move || {
+                match StageThread::<S>::connect(pipeline, plan, names, stage, Activity::default(), &sender) {
+                    Ok(thread) => thread.run(stop_reason),
+                    Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
+                }
             });
         }
         drop(sender);
@@ -61,6 +63,7 @@ fn supervise<S: Service>(
     loop {
         match events.recv_timeout(STOP_INTERVAL) {
             Ok(Event::Progress { stage, share, log_time }) => observer.progress(&name(stage), share, log_time),
+            Ok(Event::Stop { reason }) => stop(&mut first_error, RunError::of_run(Failure::Process(reason))),
             Ok(Event::Ended { stage, result: Ok(report) }) => reports[stage] = report,
             Ok(Event::Ended { result: Err(Failure::Link(LinkError::Stopped)), .. }) => {}
             Ok(Event::Ended { stage, result: Err(failure) }) => {

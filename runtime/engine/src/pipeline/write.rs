@@ -13,6 +13,7 @@ impl Pipeline {
             ("name".to_owned(), Value::from(self.name.as_str())),
             ("seed".into(), seed),
             ("batch".into(), self.batch.into()),
+            ("stall_timeout".into(), self.stall_timeout.map_or(0.0, |timeout| timeout.as_secs_f64()).into()),
         ]);
         if let Some(reference) = &self.reference {
             pipeline.insert("reference".into(), reference.as_str().into());
@@ -32,6 +33,7 @@ impl Pipeline {
         let mut table = stage.parameters.clone();
         table.insert("kind".into(), stage.kind.name.into());
         table.insert("depth".into(), Value::Integer(i64::try_from(stage.depth).unwrap_or(i64::MAX)));
+        table.insert("process".into(), stage.process.as_str().into());
         let mut inputs = Table::new();
         for wire in &stage.inputs {
             let from = &self.stages[wire.from_stage];
