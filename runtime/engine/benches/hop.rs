@@ -130,6 +130,7 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
         seed: 0,
         batch: false,
         stall_timeout: None,
+        memory_limit: None,
         robots: Default::default(),
         stages,
     };

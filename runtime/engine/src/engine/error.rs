@@ -1,5 +1,6 @@
 //! How a run fails.
 
+use super::RunFolderError;
 use crate::link::shared::LinkError;
 use crate::stage::StageError;
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,12 @@ impl fmt::Display for RunError {
     }
 }
 
+impl From<RunFolderError> for Failure {
+    fn from(error: RunFolderError) -> Self {
+        Self::Process(error.to_string())
+    }
+}
+
 /// Why a stage, or a run, has failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
@@ -52,7 +59,7 @@ pub enum Failure {
     #[error("was interrupted")]
     Interrupted,
     /// Its process could not be started or watched.
-    #[error("cannot be run as a process: {0}")]
+    #[error("cannot run in processes: {0}")]
     Process(String),
     /// Its process has ended before the stage was done.
     #[error("lost its process, which {0}")]
@@ -62,6 +69,18 @@ pub enum Failure {
     Hung {
         /// For how long.
         seconds: f64,
+    },
+    /// Its process has taken more memory than the pipeline allows.
+    #[error(
+        "was ended, as its process had taken {} MB of memory; `memory_limit` in [pipeline] allows {} MB",
+        taken / 1_000_000,
+        limit / 1_000_000
+    )]
+    Memory {
+        /// Bytes that it had taken.
+        taken: u64,
+        /// Bytes that it may take.
+        limit: u64,
     },
     /// The process that started it is gone.
     #[error("lost its supervisor")]

@@ -16,6 +16,7 @@ pub use error::{Failure, RunError};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, clean};
 
+use crate::link::shared::RunNames;
 use crate::message::LogTime;
 use crate::pipeline::Pipeline;
 use std::fmt;
@@ -88,8 +89,15 @@ impl Observer for AtomicBool {
 pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> Result<RunReport, RunError> {
     match engine {
         EngineKind::Single => single::run(pipeline, observer),
-        EngineKind::Threads => threads::run::<iceoryx2::service::local::Service>(pipeline, observer),
-        EngineKind::ThreadsIpc => threads::run::<iceoryx2::service::ipc::Service>(pipeline, observer),
+        EngineKind::Threads => {
+            threads::run::<iceoryx2::service::local::Service>(pipeline, &RunNames::unique(), observer)
+        }
+        EngineKind::ThreadsIpc => {
+            let folder = RunFolder::create().map_err(Failure::from).map_err(RunError::of_run)?;
+            let result = threads::run::<iceoryx2::service::ipc::Service>(pipeline, &folder.names(), observer);
+            let removed = folder.remove().map_err(Failure::from).map_err(RunError::of_run);
+            result.and_then(|report| removed.map(|()| report))
+        }
         EngineKind::Processes => {
             let launch = processes::Launch::this_program()
                 .map_err(|error| RunError::of_run(Failure::Process(format!("cannot find this program: {error}"))))?;

@@ -145,6 +145,6 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
     }
     stages.sort_by_key(|(place, _)| *place);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, reference, seed, batch, stall_timeout, robots, .. } = settings;
-    Pipeline { name, reference, seed, batch, stall_timeout, robots, stages }
+    let Settings { name, reference, seed, batch, stall_timeout, memory_limit, robots, .. } = settings;
+    Pipeline { name, reference, seed, batch, stall_timeout, memory_limit, robots, stages }
 }

@@ -10,6 +10,7 @@
 //! depth = 16                      # how many samples an input may hold before the sender waits
 //! batch = true                    # gather small messages in one sample; false sends each at once
 //! stall_timeout = 60.0            # a stage that works for so long on one message hangs, seconds; 0 waits for ever
+//! memory_limit = 2_000_000_000    # how much memory a process may take, bytes; 0 sets no limit
 //!
 //! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
 //! map = "/{robot}/map"
@@ -80,6 +81,8 @@ pub struct Pipeline {
     /// A stage that works for longer on one message hangs, which ends the run: on the engine `processes`, as a thread
     /// cannot be ended. None waits for ever.
     pub stall_timeout: Option<Duration>,
+    /// How much memory each process may take for itself on the engine `processes`, bytes; none sets no limit.
+    pub memory_limit: Option<u64>,
     /// How topics are told apart.
     pub robots: RobotTopics,
     /// The stages, each behind those that feed it; among those that could be next, by name.

@@ -26,6 +26,7 @@ pub(super) struct Settings {
     pub(super) depth: usize,
     pub(super) batch: bool,
     pub(super) stall_timeout: Option<Duration>,
+    pub(super) memory_limit: Option<u64>,
     pub(super) robots: RobotTopics,
 }
 
@@ -34,12 +35,21 @@ impl Settings {
     pub(super) fn new(name: &str) -> Self {
         let robots = RobotTopics::default();
         let stall_timeout = Some(DEFAULT_STALL_TIMEOUT);
-        Self { name: name.into(), reference: None, seed: 0, depth: DEFAULT_DEPTH, batch: true, stall_timeout, robots }
+        Self {
+            name: name.into(),
+            reference: None,
+            seed: 0,
+            depth: DEFAULT_DEPTH,
+            batch: true,
+            stall_timeout,
+            memory_limit: None,
+            robots,
+        }
     }
 
     /// Takes in the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 6] = ["name", "reference", "seed", "depth", "batch", "stall_timeout"];
+        const KEYS: [&str; 7] = ["name", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
                 "name" => match text(key, item, problems) {
@@ -65,6 +75,10 @@ impl Settings {
                 "stall_timeout" => match read_seconds(item) {
                     Some(seconds) => self.stall_timeout = Some(seconds).filter(|seconds| !seconds.is_zero()),
                     None => problems.push(wrong_type(key, item, "seconds, 0 or more")),
+                },
+                "memory_limit" => match item.as_integer().and_then(|bytes| u64::try_from(bytes).ok()) {
+                    Some(bytes) => self.memory_limit = Some(bytes).filter(|bytes| *bytes > 0),
+                    None => problems.push(wrong_type(key, item, "bytes, 0 or more")),
                 },
                 _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
             }

@@ -15,6 +15,9 @@ impl Pipeline {
             ("batch".into(), self.batch.into()),
             ("stall_timeout".into(), self.stall_timeout.map_or(0.0, |timeout| timeout.as_secs_f64()).into()),
         ]);
+        if let Some(limit) = self.memory_limit {
+            pipeline.insert("memory_limit".into(), Value::Integer(i64::try_from(limit).unwrap_or(i64::MAX)));
+        }
         if let Some(reference) = &self.reference {
             pipeline.insert("reference".into(), reference.as_str().into());
         }

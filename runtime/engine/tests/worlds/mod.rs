@@ -301,6 +301,7 @@ impl PipelineBuilder {
             seed: 1,
             batch: depth > 2,
             stall_timeout: None,
+            memory_limit: None,
             robots: Default::default(),
             stages,
         }

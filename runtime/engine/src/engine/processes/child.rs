@@ -32,16 +32,17 @@ pub fn run_process(
 ) -> Result<(), String> {
     let folder = RunFolder::join(folder).map_err(|error| error.to_string())?;
     let pipeline = load(&folder.pipeline(), registry)?;
+    offer_to_the_system();
     let stages = pipeline.stages_of(process);
     if stages.is_empty() {
         return Err(format!("the pipeline {} has no process `{process}`", pipeline.name));
     }
-    let supervisor = Supervisor { output: &mut io::stdout().lock(), told: Instant::now() };
+    let supervisor = Supervisor { output: &mut io::stdout(), told: Instant::now() };
     Process { pipeline: &pipeline, folder: &folder, stages: &stages }.run(supervisor);
     Ok(())
 }
 
-/// The way to the supervisor. That it is gone is seen at standard input, so a failure to write is no news.
+/// The way to the supervisor: standard output, locked for a line at a time, as stages may print. That it is gone is seen at standard input, so a failure to write is no news.
 struct Supervisor<'a> {
     output: &'a mut dyn Write,
     told: Instant,
@@ -58,6 +59,12 @@ impl Supervisor<'_> {
             self.tell(&Said::Alive);
         }
     }
+}
+
+/// When memory runs out, the system is to end a stage, which is seen and told, rather than the supervisor or a program
+/// that has nothing to do with the run. Where it does not take the offer, nothing else changes.
+fn offer_to_the_system() {
+    let _ = std::fs::write("/proc/self/oom_score_adj", "500");
 }
 
 struct Process<'a> {

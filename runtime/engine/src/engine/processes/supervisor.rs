@@ -58,9 +58,9 @@ struct Stopping {
 }
 
 pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
-    let of_run = |error: String| RunError::of_run(Failure::Process(error));
-    let folder = RunFolder::create().map_err(|error| of_run(error.to_string()))?;
-    folder.write_pipeline(&pipeline.to_toml()).map_err(|error| of_run(error.to_string()))?;
+    let of_run = |error| RunError::of_run(Failure::from(error));
+    let folder = RunFolder::create().map_err(of_run)?;
+    folder.write_pipeline(&pipeline.to_toml()).map_err(of_run)?;
     let (sender, receiver) = channel();
     let mut supervisor = Supervisor {
         pipeline,
@@ -74,7 +74,7 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
     drop(sender);
     supervisor.wait_for_all(&receiver);
     let result = supervisor.result();
-    let removed = folder.remove().map_err(|error| of_run(error.to_string()));
+    let removed = folder.remove().map_err(of_run);
     result.and_then(|report| removed.map(|()| report))
 }
 
@@ -131,7 +131,7 @@ impl Supervisor<'_> {
             if self.stopping.is_none() && self.observer.should_stop() {
                 self.fail(RunError::of_run(Failure::Interrupted));
             }
-            self.look_for_frozen();
+            self.look_at_processes();
             self.stop();
         }
     }
@@ -171,21 +171,38 @@ impl Supervisor<'_> {
                 self.reports.insert(report.name.clone(), report);
             }
             Said::Stopped { stage } => ended(&stage),
-            // A stage that hangs has failed, but its process goes on until it is killed.
             Said::Failed { stage, failure } => {
                 ended(&stage);
+                if matches!(failure, Failure::Hung { .. }) {
+                    // It hears nothing any more.
+                    let _ = self.processes[process].child.kill();
+                }
                 self.fail(RunError::of_stage(&stage, failure));
             }
         }
     }
 
-    /// A process that does not say that it is alive hangs as a whole.
-    fn look_for_frozen(&mut self) {
-        let Some(longest) = self.pipeline.stall_timeout.filter(|_| self.stopping.is_none()) else { return };
-        let frozen = self.processes.iter().find(|process| !process.ended && process.heard.elapsed() > longest);
-        if let Some(process) = frozen {
+    /// Kills a process that does not say that it is alive, as one does that was stopped as a whole, or that has taken
+    /// more memory than it may.
+    fn look_at_processes(&mut self) {
+        if self.stopping.is_some() {
+            return;
+        }
+        let Pipeline { stall_timeout, memory_limit, .. } = *self.pipeline;
+        let trouble = |process: &Process| {
+            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed() > *longest) {
+                return Some(Failure::Hung { seconds: longest.as_secs_f64() });
+            }
+            let limit = memory_limit?;
+            let taken = memory_of(process.child.id()).filter(|taken| *taken > limit)?;
+            Some(Failure::Memory { taken, limit })
+        };
+        let living = self.processes.iter_mut().filter(|process| !process.ended);
+        let troubled = living.filter_map(|process| Some((trouble(process)?, process))).next();
+        if let Some((failure, process)) = troubled {
+            let _ = process.child.kill();
             let stage = process.running.first().unwrap_or(&process.name).clone();
-            self.fail(RunError::of_stage(&stage, Failure::Hung { seconds: longest.as_secs_f64() }));
+            self.fail(RunError::of_stage(&stage, failure));
         }
     }
 
@@ -244,6 +261,16 @@ fn listen(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
         let _ = events.send(event);
     }
     let _ = events.send(Event::Silent { process });
+}
+
+/// The memory that a process has for itself alone, bytes: that of its links is not counted.
+fn memory_of(process: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let kilobytes = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        line.trim_start_matches(':').split_whitespace().next()?.parse::<u64>().ok()
+    };
+    Some(1024 * (kilobytes("RssAnon")? + kilobytes("VmSwap").unwrap_or(0)))
 }
 
 /// How a process ended, to follow "which".
