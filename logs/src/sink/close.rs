@@ -1,10 +1,13 @@
 //! Closing a log whose writer was killed.
 
+use super::log_writer::OUTCOME_RECORD;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::reader::{Damage, LogFile, LogReader, ReadError};
-use mcap::records::MessageHeader;
+use mcap::MAGIC;
+use mcap::records::{MessageHeader, op};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Why a log could not be closed.
@@ -27,13 +30,16 @@ pub enum CloseError {
 }
 
 /// Closes the log at `path` if its writer was killed: what can be read of it is written anew, with an index, and with the
-/// `reason` why it is not complete. Whether that was needed; a log that has an end is not touched.
+/// `reason` why it is not complete. Where there is no room for that, it is closed in its place, without an index.
+/// Whether any of this was needed; a log that has an end is not touched.
 pub fn close_log(path: &Path, reason: &str) -> Result<bool, CloseError> {
-    let file = match LogFile::open(path) {
-        Ok(file) if !file.damage().iter().any(|damage| matches!(damage, Damage::NoEnd { .. })) => return Ok(false),
-        Ok(file) => Some(file),
+    let (file, end) = match LogFile::open(path) {
+        Ok(file) => match file.damage().iter().find_map(end_of_records) {
+            Some(end) => (Some(file), Some(end)),
+            None => return Ok(false),
+        },
         // It was killed before it had written a chunk.
-        Err(ReadError::Empty { .. } | ReadError::NothingLeft { .. }) => None,
+        Err(ReadError::Empty { .. } | ReadError::NothingLeft { .. }) => (None, None),
         Err(error) => return Err(error.into()),
     };
     let mut name = path.file_name().unwrap_or_default().to_owned();
@@ -47,7 +53,53 @@ pub fn close_log(path: &Path, reason: &str) -> Result<bool, CloseError> {
         // It is of no use, and it may be a full disk that is in the way.
         let _ = fs::remove_file(&closing);
     }
-    replaced.map(|()| true)
+    match (replaced, end) {
+        (Err(CloseError::Write(LogWriteError::NoRoom(_))), Some(end)) => close_in_place(path, end, reason),
+        (replaced, _) => replaced,
+    }
+    .map(|()| true)
+}
+
+/// Where the last whole record of a log without an end stops.
+fn end_of_records(damage: &Damage) -> Option<u64> {
+    match damage {
+        Damage::NoEnd { position } => u64::try_from(*position).ok(),
+        _ => None,
+    }
+}
+
+/// Puts the end of a log without an index (MCAP specification: metadata, data end, footer, magic) behind its last whole
+/// record. The rest of a record that stood there makes room for it.
+fn close_in_place(path: &Path, end: u64, reason: &str) -> Result<(), CloseError> {
+    let mut metadata = Vec::new();
+    push_text(&mut metadata, OUTCOME_RECORD);
+    let mut pairs = Vec::new();
+    ["complete", "false", "reason", reason].iter().for_each(|text| push_text(&mut pairs, text));
+    push_length(&mut metadata, pairs.len());
+    metadata.extend(pairs);
+    let mut bytes = Vec::new();
+    for (opcode, body) in [(op::METADATA, metadata.as_slice()), (op::DATA_END, &[0; 4]), (op::FOOTER, &[0; 20])] {
+        bytes.push(opcode);
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(body);
+    }
+    bytes.extend(MAGIC);
+    let write = || {
+        let mut file = fs::OpenOptions::new().write(true).open(path)?;
+        file.set_len(end)?;
+        file.seek(SeekFrom::Start(end))?;
+        file.write_all(&bytes)
+    };
+    write().map_err(|error| LogWriteError::from_io(path, error).into())
+}
+
+fn push_text(bytes: &mut Vec<u8>, text: &str) {
+    push_length(bytes, text.len());
+    bytes.extend(text.as_bytes());
+}
+
+fn push_length(bytes: &mut Vec<u8>, length: usize) {
+    bytes.extend(u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes());
 }
 
 fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<(), CloseError> {
@@ -114,6 +166,23 @@ mod tests {
             assert_eq!(record.metadata["reason"], "it was killed");
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left");
         }
+    }
+
+    #[test]
+    fn a_log_can_be_closed_in_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        write(&path, 100);
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        let end = LogFile::open(&path).unwrap().damage().iter().find_map(end_of_records).unwrap();
+        close_in_place(&path, end, "the disk was full").unwrap();
+        let file = LogFile::open(&path).unwrap();
+        assert_eq!(file.damage(), [Damage::Incomplete { reason: "the disk was full".into() }]);
+        let mut reader = LogReader::new(vec![file]);
+        assert!(std::iter::from_fn(|| reader.next_message().map(drop)).count() > 20);
+        let bytes = fs::read(&path).unwrap();
+        assert!(mcap::MessageStream::new(&bytes).unwrap().all(|message| message.is_ok()));
     }
 
     #[test]
