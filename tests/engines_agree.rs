@@ -9,8 +9,15 @@ use support::{gridweave_with, logs_in, real_logs, simulate};
 use tempfile::TempDir;
 
 /// Every way to run that must not matter.
-const WAYS: [(&str, &str); 6] =
-    [("single", "1"), ("single", "4"), ("threads", "1"), ("threads", "2"), ("threads", "4"), ("threads-ipc", "2")];
+const WAYS: [(&str, &str); 7] = [
+    ("single", "1"),
+    ("single", "4"),
+    ("threads", "1"),
+    ("threads", "2"),
+    ("threads", "4"),
+    ("threads-ipc", "2"),
+    ("processes", "2"),
+];
 
 /// Merges `log` in every way, and fails the test where the outputs differ.
 fn assert_same_output(log: &Path) {

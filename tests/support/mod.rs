@@ -58,7 +58,18 @@ pub struct Running {
 /// Starts `gridweave` in `folder`.
 #[track_caller]
 pub fn start(folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Running {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_gridweave"))
+    start_program(Path::new(env!("CARGO_BIN_EXE_gridweave")), folder, args, variables)
+}
+
+/// An example program, which `cargo test` builds beside the command.
+pub fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_BIN_EXE_gridweave")).with_file_name("examples").join(name)
+}
+
+/// Starts a program in `folder`.
+#[track_caller]
+pub fn start_program(program: &Path, folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Running {
+    let mut child = Command::new(program)
         .args(args)
         .envs(variables.iter().copied())
         .current_dir(folder)
@@ -76,7 +87,7 @@ pub fn start(folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Runnin
     };
     let stdout = read(Box::new(child.stdout.take().unwrap()));
     let stderr = read(Box::new(child.stderr.take().unwrap()));
-    Running { child, command: format!("gridweave {args:?}"), stdout, stderr }
+    Running { child, command: format!("{} {args:?}", program.display()), stdout, stderr }
 }
 
 impl Running {

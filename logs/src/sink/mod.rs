@@ -8,11 +8,13 @@
 //! failed, `complete` is `false` and `reason` says why. If the program was killed, there is no such record, and all
 //! chunks but the last can be read.
 
+mod close;
 mod error;
 mod log_writer;
 mod routing;
 mod stage;
 
+pub use close::{CloseError, close_log};
 pub use error::LogWriteError;
 pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};

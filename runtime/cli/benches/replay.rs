@@ -13,7 +13,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 const RUNS: usize = 7;
-const ENGINES: [&str; 3] = ["single", "threads", "threads-ipc"];
+const ENGINES: [&str; 4] = ["single", "threads", "threads-ipc", "processes"];
 
 fn main() {
     let folder = tempfile::TempDir::new().unwrap();
@@ -25,7 +25,7 @@ fn main() {
         "| log | messages | copy, s | {} |",
         ENGINES.map(|engine| format!("{engine}, s (x copy), MB")).join(" | ")
     );
-    println!("| --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- |{}", " --- |".repeat(ENGINES.len()));
     for log in logs {
         let output = folder.path().join("out.mcap");
         let copies = (0..RUNS).map(|_| copy(&log, &output)).collect::<Vec<_>>();

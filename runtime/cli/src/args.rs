@@ -41,6 +41,11 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Run every stage alone on stored input, and compare what it sends with what is expected.
     Golden(GoldenArgs),
+    /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
+    Clean,
+    /// Run one process of a pipeline on the engine `processes`, which starts it.
+    #[command(hide = true)]
+    Stage(StageArgs),
     /// Repeat the experiments of the papers, and measure how far the stages hold.
     Experiment(ExperimentArgs),
 }
@@ -62,7 +67,7 @@ pub(crate) struct RunOptions {
     /// Draw the merged maps, each robot's walls in a colour of its own.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
-    /// What runs the stages: single, threads, or threads-ipc. The result is the same.
+    /// What runs the stages: single, threads, threads-ipc, or processes. The result is the same.
     #[arg(long, default_value_t = EngineKind::default())]
     pub(crate) engine: EngineKind,
     /// Seeds all randomness.
@@ -190,6 +195,14 @@ pub(crate) struct SimulateArgs {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct StageArgs {
+    /// The folder of the run.
+    pub(crate) folder: PathBuf,
+    /// The process: a name that stages of the pipeline have in `process`, or a stage's name.
+    pub(crate) process: String,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct DemoArgs {
     /// The folder to write to.
     #[arg(long, default_value = "demo", value_name = "FOLDER")]
@@ -197,7 +210,7 @@ pub(crate) struct DemoArgs {
     /// Another seed makes another building and other drives.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// What runs the stages: single, threads, or threads-ipc.
+    /// What runs the stages: single, threads, threads-ipc, or processes.
     #[arg(long, default_value_t = EngineKind::default())]
     pub(crate) engine: EngineKind,
 }

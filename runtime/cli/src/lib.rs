@@ -22,6 +22,7 @@ mod export;
 mod golden;
 mod info;
 mod pipelines;
+mod processes;
 mod progress;
 mod run;
 mod simulate;
@@ -85,6 +86,8 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
         Command::Simulate(args) => simulate::simulate(&args, registry),
         Command::Demo(args) => demo::demo(&args, registry),
         Command::Golden(args) => golden::golden(&args, registry),
+        Command::Clean => processes::clean(),
+        Command::Stage(args) => processes::stage(&args, registry),
         Command::Experiment(args) => experiment::experiment(&args, registry),
     }
 }

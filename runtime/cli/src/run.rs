@@ -7,10 +7,12 @@ use crate::pipelines;
 use crate::progress::{self, Progress};
 use crate::summary::Summary;
 use anyhow::{Context, Result};
+use gridweave_logs::sink::close_log;
 use gridweave_runtime::engine;
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// One run of a pipeline, put together from what the command line says.
 pub(crate) struct Job<'a> {
@@ -75,8 +77,12 @@ impl Job<'_> {
         };
         refuse_to_overwrite_inputs(&pipeline)?;
         let progress = Progress::new(progress::stop_on_interrupt());
+        let start = SystemTime::now();
         let report = engine::run(&pipeline, self.options.engine, &progress);
         progress.finish();
+        if let Err(error) = &report {
+            close_outputs(&pipeline, start, &error.to_string());
+        }
         let report = report?;
         let summary = Summary::new(&report);
         if let Some(path) = &self.options.summary {
@@ -112,6 +118,17 @@ impl Job<'_> {
 fn text_of(path: &Path) -> Result<String> {
     let text = path.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", path.display())))?;
     Ok(text.to_owned())
+}
+
+/// A sink whose process was killed has not closed its output: it is closed here, and says why it is not complete.
+fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
+    for stage in pipeline.stages.iter().filter(|stage| stage.kind.name == "mcap_sink") {
+        let Some(file) = stage.parameters.get("file").and_then(|file| file.as_str()).map(Path::new) else { continue };
+        let is_of_this_run = file.metadata().and_then(|file| file.modified()).is_ok_and(|time| time >= start);
+        if is_of_this_run && let Err(error) = close_log(file, reason) {
+            tracing::warn!("the output {} has no end: {error}", file.display());
+        }
+    }
 }
 
 /// A sink must not write to a file that a source reads, by whatever name.

@@ -120,11 +120,20 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
         parameters: format!("size = {size}").parse().unwrap(),
         inputs,
         depth: 2,
+        process: name.into(),
     };
     let stages =
         vec![spec("writer", source, vec![]), spec("reader", sink, vec![Wire { port: 0, from_stage: 0, from_port: 0 }])];
-    let pipeline =
-        Pipeline { name: "hop".into(), reference: None, seed: 0, batch: false, robots: Default::default(), stages };
+    let pipeline = Pipeline {
+        name: "hop".into(),
+        reference: None,
+        seed: 0,
+        batch: false,
+        stall_timeout: None,
+        memory_limit: None,
+        robots: Default::default(),
+        stages,
+    };
     run(&pipeline, engine, &()).unwrap();
     clock.median()
 }

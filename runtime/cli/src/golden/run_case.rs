@@ -74,6 +74,7 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         inputs,
         topics: case.stage.topics.clone(),
         depth: case.stage.depth,
+        process: case.stage.name.clone(),
     });
     if !kind.outputs.is_empty() {
         let wires = (0..kind.outputs.len()).map(|from_port| Wire { port: 0, from_stage: place, from_port });
@@ -84,6 +85,8 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         reference: case.stage.reference.clone(),
         seed: case.stage.seed,
         batch: case.stage.batch,
+        stall_timeout: None,
+        memory_limit: None,
         robots: case.stage.robots.clone(),
         stages,
     };
@@ -96,7 +99,15 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
 
 fn helper(name: &str, kind: StageKind, inputs: Vec<Wire>) -> StageSpec {
     let topics = kind.outputs.iter().map(|port| format!("/{}", port.name)).collect();
-    StageSpec { name: name.to_owned(), kind, parameters: toml::Table::new(), inputs, topics, depth: DEFAULT_DEPTH }
+    StageSpec {
+        name: name.to_owned(),
+        kind,
+        parameters: toml::Table::new(),
+        inputs,
+        topics,
+        depth: DEFAULT_DEPTH,
+        process: name.to_owned(),
+    }
 }
 
 /// Parameters with the paths of files in the place of their placeholders.

@@ -1,11 +1,13 @@
 //! How a run fails.
 
+use super::RunFolderError;
 use crate::link::shared::LinkError;
 use crate::stage::StageError;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A run has failed: which stage, and why.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct RunError {
     /// The stage that failed first; none if the run as a whole did.
     pub stage: Option<String>,
@@ -34,8 +36,15 @@ impl fmt::Display for RunError {
     }
 }
 
+impl From<RunFolderError> for Failure {
+    fn from(error: RunFolderError) -> Self {
+        Self::Process(error.to_string())
+    }
+}
+
 /// Why a stage, or a run, has failed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum Failure {
     /// It says so itself.
     #[error("failed: {0}")]
@@ -49,4 +58,31 @@ pub enum Failure {
     /// The user asked for a stop.
     #[error("was interrupted")]
     Interrupted,
+    /// Its process could not be started or watched.
+    #[error("cannot run in processes: {0}")]
+    Process(String),
+    /// Its process has ended before the stage was done.
+    #[error("lost its process, which {0}")]
+    Ended(String),
+    /// It has worked for so long without a pause.
+    #[error("hangs: it has made no progress for {seconds} s; `stall_timeout` in [pipeline] sets how long it may take")]
+    Hung {
+        /// For how long.
+        seconds: f64,
+    },
+    /// Its process has taken more memory than the pipeline allows.
+    #[error(
+        "was ended, as its process had taken {} MB of memory; `memory_limit` in [pipeline] allows {} MB",
+        taken / 1_000_000,
+        limit / 1_000_000
+    )]
+    Memory {
+        /// Bytes that it had taken.
+        taken: u64,
+        /// Bytes that it may take.
+        limit: u64,
+    },
+    /// The process that started it is gone.
+    #[error("lost its supervisor")]
+    Orphaned,
 }

@@ -4,7 +4,9 @@
 
 mod error;
 mod plan;
+pub mod processes;
 mod report;
+mod run_folder;
 mod runner;
 mod single;
 mod stage_thread;
@@ -12,7 +14,9 @@ mod threads;
 
 pub use error::{Failure, RunError};
 pub use report::{RunReport, StageReport};
+pub use run_folder::{LeftOver, RunFolder, RunFolderError, clean};
 
+use crate::link::shared::RunNames;
 use crate::message::LogTime;
 use crate::pipeline::Pipeline;
 use std::fmt;
@@ -29,6 +33,8 @@ pub enum EngineKind {
     Threads,
     /// A thread a stage, with links over the shared memory of the machine, as between processes.
     ThreadsIpc,
+    /// A process a stage. The program itself is started for each of them, with the command `stage`.
+    Processes,
 }
 
 impl FromStr for EngineKind {
@@ -39,7 +45,10 @@ impl FromStr for EngineKind {
             "single" => Ok(Self::Single),
             "threads" => Ok(Self::Threads),
             "threads-ipc" => Ok(Self::ThreadsIpc),
-            other => Err(format!("there is no engine `{other}`; the engines are single, threads and threads-ipc")),
+            "processes" => Ok(Self::Processes),
+            other => {
+                Err(format!("there is no engine `{other}`; the engines are single, threads, threads-ipc and processes"))
+            }
         }
     }
 }
@@ -50,6 +59,7 @@ impl fmt::Display for EngineKind {
             Self::Single => "single",
             Self::Threads => "threads",
             Self::ThreadsIpc => "threads-ipc",
+            Self::Processes => "processes",
         })
     }
 }
@@ -79,7 +89,19 @@ impl Observer for AtomicBool {
 pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> Result<RunReport, RunError> {
     match engine {
         EngineKind::Single => single::run(pipeline, observer),
-        EngineKind::Threads => threads::run::<iceoryx2::service::local::Service>(pipeline, observer),
-        EngineKind::ThreadsIpc => threads::run::<iceoryx2::service::ipc::Service>(pipeline, observer),
+        EngineKind::Threads => {
+            threads::run::<iceoryx2::service::local::Service>(pipeline, &RunNames::unique(), observer)
+        }
+        EngineKind::ThreadsIpc => {
+            let folder = RunFolder::create().map_err(Failure::from).map_err(RunError::of_run)?;
+            let result = threads::run::<iceoryx2::service::ipc::Service>(pipeline, &folder.names(), observer);
+            let removed = folder.remove().map_err(Failure::from).map_err(RunError::of_run);
+            result.and_then(|report| removed.map(|()| report))
+        }
+        EngineKind::Processes => {
+            let launch = processes::Launch::this_program()
+                .map_err(|error| RunError::of_run(Failure::Process(format!("cannot find this program: {error}"))))?;
+            processes::run(pipeline, &launch, observer)
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! What a run has done.
 
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -11,7 +12,7 @@ pub struct RunReport {
 }
 
 /// What one stage has done.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
     /// Its name in the pipeline.
     pub name: String,

@@ -3,7 +3,7 @@
 use super::plan::Plan;
 use super::runner::Runner;
 use super::{Failure, StageReport};
-use crate::link::shared::{LinkError, LinkReceiver, LinkSender, RunNames, SenderEnd, SharedOutputs, Wake};
+use crate::link::shared::{Activity, LinkError, LinkReceiver, LinkSender, RunNames, SenderEnd, SharedOutputs, Wake};
 use crate::link::{InputQueue, latest, lower_bound};
 use crate::message::LogTime;
 use crate::pipeline::Pipeline;
@@ -17,6 +17,8 @@ use std::sync::mpsc::Sender;
 pub(super) enum Event {
     /// A source has done a share of its work.
     Progress { stage: usize, share: f64, log_time: LogTime },
+    /// The run is to be stopped.
+    Stop { reason: String },
     /// The stage is done, or has failed.
     Ended { stage: usize, result: Result<StageReport, Failure> },
 }
@@ -73,11 +75,12 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         plan: &Plan,
         names: &RunNames,
         stage: usize,
+        activity: Activity,
         events: &'a Sender<Event>,
     ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
         let node = names.node::<S>()?;
-        let wake = Wake::new(&node, names, &spec.name, plan.stage_readers[stage], plan.peers[stage])?;
+        let wake = Wake::new(&node, names, &spec.name, plan.stage_readers[stage], plan.peers[stage], activity)?;
         let mut receivers = Vec::new();
         for (wire, input) in spec.inputs.iter().enumerate() {
             let (from, port) = (input.from_stage, input.from_port);
@@ -122,7 +125,9 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let sent = Runner::outputs(pipeline, stage, |port| {
             places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link))
         });
+        let working = wake.working();
         let runner = Runner::new(pipeline, stage, sent)?;
+        drop(working);
         let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         let flush_interval = (spec.depth / 2).max(1);
         Ok(Self { runner, queues, receivers, outputs, wake, stage, flush_interval, events })
@@ -132,7 +137,12 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         /// After so many messages a source tells how far it is.
         const REPORT_INTERVAL: usize = 256;
         let mut count = 0;
-        while self.runner.advance()? {
+        loop {
+            let working = self.wake.working();
+            if !self.runner.advance()? {
+                break;
+            }
+            drop(working);
             count += 1;
             if count % REPORT_INTERVAL == 0 {
                 self.wake.poll()?;
@@ -153,7 +163,10 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             self.wake.look_at_inputs()?;
             self.receive()?;
             let mut handled = 0;
-            while let Some(wire) = self.runner.handle_next(&mut self.queues)? {
+            loop {
+                let working = self.wake.working();
+                let Some(wire) = self.runner.handle_next(&mut self.queues)? else { break };
+                drop(working);
                 if !self.receivers[wire].taken()? {
                     continue;
                 }
@@ -167,7 +180,9 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             }
             if self.queues.iter().all(InputQueue::is_done) {
                 let time = latest(&self.queues);
+                let working = self.wake.working();
                 self.runner.finish(time)?;
+                drop(working);
                 return Ok(self.outputs.borrow_mut().end(time)?);
             }
             self.flush()?;

@@ -3,7 +3,7 @@
 use super::plan::Plan;
 use super::stage_thread::{Event, StageThread, tell};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::shared::{LinkError, RunNames, WakeEvents, Waker};
+use crate::link::shared::{Activity, LinkError, RunNames, WakeEvents, Waker};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;
 use std::sync::OnceLock;
@@ -14,31 +14,34 @@ use std::time::Duration;
 /// At least so often the run asks its observer whether it should stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
-pub(super) fn run<S: Service + 'static>(pipeline: &Pipeline, observer: &dyn Observer) -> Result<RunReport, RunError> {
-    let names = RunNames::unique();
+/// Runs a pipeline with services of the given names.
+pub(super) fn run<S: Service + 'static>(
+    pipeline: &Pipeline,
+    names: &RunNames,
+    observer: &dyn Observer,
+) -> Result<RunReport, RunError> {
     let plan = Plan::new(pipeline);
     let stop_reason = OnceLock::new();
     let node = names.node::<S>().map_err(RunError::of_run)?;
     // Made before the stages, so that a stage that fails at once finds the others stoppable.
     let wakers: Vec<Waker<S>> = (0..pipeline.stages.len())
-        .map(|stage| plan.waker(&node, &names, pipeline, stage))
+        .map(|stage| plan.waker(&node, names, pipeline, stage))
         .collect::<Result<_, LinkError>>()
         .map_err(RunError::of_run)?;
     let (sender, receiver) = channel();
-    let result = thread::scope(|scope| {
+    thread::scope(|scope| {
         for stage in 0..pipeline.stages.len() {
-            let (sender, names, plan, stop_reason) = (sender.clone(), &names, &plan, &stop_reason);
-            scope.spawn(move || match StageThread::<S>::connect(pipeline, plan, names, stage, &sender) {
-                Ok(thread) => thread.run(stop_reason),
-                Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
+            let (sender, names, plan, stop_reason) = (sender.clone(), names, &plan, &stop_reason);
+            scope.spawn(move || {
+                match StageThread::<S>::connect(pipeline, plan, names, stage, Activity::default(), &sender) {
+                    Ok(thread) => thread.run(stop_reason),
+                    Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
+                }
             });
         }
         drop(sender);
         supervise(pipeline, &wakers, &receiver, &stop_reason, observer)
-    });
-    drop((wakers, node));
-    names.remove_rest();
-    result
+    })
 }
 
 /// Waits for all stages. When one fails, stops the others.
@@ -61,6 +64,7 @@ fn supervise<S: Service>(
     loop {
         match events.recv_timeout(STOP_INTERVAL) {
             Ok(Event::Progress { stage, share, log_time }) => observer.progress(&name(stage), share, log_time),
+            Ok(Event::Stop { reason }) => stop(&mut first_error, RunError::of_run(Failure::Process(reason))),
             Ok(Event::Ended { stage, result: Ok(report) }) => reports[stage] = report,
             Ok(Event::Ended { result: Err(Failure::Link(LinkError::Stopped)), .. }) => {}
             Ok(Event::Ended { stage, result: Err(failure) }) => {

@@ -45,6 +45,13 @@ impl Item {
         }
     }
 
+    pub(super) fn as_float(&self) -> Option<f64> {
+        match &self.value {
+            Value::Plain(value) => value.as_float(),
+            _ => None,
+        }
+    }
+
     pub(super) fn as_integer(&self) -> Option<i64> {
         match &self.value {
             Value::Plain(value) => value.as_integer(),

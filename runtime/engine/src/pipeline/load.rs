@@ -139,11 +139,12 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
             inputs: wiring.inputs[index].iter().map(wire).collect(),
             topics: draft.topics.into_iter().map(|topic| topic.template).collect(),
             depth: draft.depth,
+            process: draft.process.to_owned(),
         };
         stages.push((place[index], spec));
     }
     stages.sort_by_key(|(place, _)| *place);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, reference, seed, batch, robots, .. } = settings;
-    Pipeline { name, reference, seed, batch, robots, stages }
+    let Settings { name, reference, seed, batch, stall_timeout, memory_limit, robots, .. } = settings;
+    Pipeline { name, reference, seed, batch, stall_timeout, memory_limit, robots, stages }
 }

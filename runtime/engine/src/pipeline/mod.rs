@@ -9,18 +9,21 @@
 //! seed = 7                        # seeds all randomness; 0 if left out
 //! depth = 16                      # how many samples an input may hold before the sender waits
 //! batch = true                    # gather small messages in one sample; false sends each at once
+//! stall_timeout = 60.0            # a stage that works for so long on one message hangs, seconds; 0 waits for ever
+//! memory_limit = 2_000_000_000    # how much memory a process may take, bytes; 0 sets no limit
 //!
 //! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
 //! map = "/{robot}/map"
 //!
 //! [stages.log]
 //! kind = "mcap_source"
-//! files = ["a.mcap"]              # any key but `kind`, `inputs`, `topics` and `depth` is a parameter
+//! files = ["a.mcap"]              # any key but `kind`, `inputs`, `topics`, `depth` and `process` is a parameter
 //!
 //! [stages.lines]
 //! kind = "line_extractor"
 //! inputs = ["log.map"]            # STAGE.PORT, or STAGE where it has one output only
 //! topics = { segments = "/{robot}/walls" }
+//! process = "geometry"            # stages of one name share a process; by default each has its own
 //!
 //! [stages.out]
 //! kind = "mcap_sink"
@@ -63,6 +66,7 @@ pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
 pub use single_stage::SingleStage;
 
 use crate::stage::{Context, RobotTopics, StageKind};
+use std::time::Duration;
 
 /// A pipeline that has passed every check: each stage's kind exists, each wire's ends exist and agree in type, and
 /// there is no cycle.
@@ -77,6 +81,11 @@ pub struct Pipeline {
     /// Whether small messages are gathered and sent together. It saves wake-ups where many are sent at a time; without
     /// it each is on its way at once.
     pub batch: bool,
+    /// A stage that works for longer on one message hangs, which ends the run: on the engine `processes`, as a thread
+    /// cannot be ended. None waits for ever.
+    pub stall_timeout: Option<Duration>,
+    /// How much memory each process may take for itself on the engine `processes`, bytes; none sets no limit.
+    pub memory_limit: Option<u64>,
     /// How topics are told apart.
     pub robots: RobotTopics,
     /// The stages, each behind those that feed it; among those that could be next, by name.
@@ -99,6 +108,8 @@ pub struct StageSpec {
     pub topics: Vec<String>,
     /// How many samples each of its inputs may hold before the sender waits.
     pub depth: usize,
+    /// The process that it runs in, on the engine `processes`. Stages that name the same one share it.
+    pub process: String,
 }
 
 /// What feeds one input of a stage.
@@ -113,6 +124,23 @@ pub struct Wire {
 }
 
 impl Pipeline {
+    /// The processes that the stages are placed in, in the order of their first stages.
+    pub fn processes(&self) -> Vec<String> {
+        let mut processes: Vec<String> = Vec::new();
+        for stage in &self.stages {
+            if !processes.contains(&stage.process) {
+                processes.push(stage.process.clone());
+            }
+        }
+        processes
+    }
+
+    /// The indexes of the stages that are placed in a process.
+    pub fn stages_of(&self, process: &str) -> Vec<usize> {
+        let placed = self.stages.iter().enumerate().filter(|(_, stage)| stage.process == process);
+        placed.map(|(index, _)| index).collect()
+    }
+
     /// What the stage with the given index is told when it is made.
     pub fn context(&self, stage: usize) -> Context {
         let spec = &self.stages[stage];

@@ -6,12 +6,16 @@ use super::nearest::{did_you_mean, quoted_list};
 use super::overrides::Overrides;
 use crate::message::FixedText;
 use crate::stage::{RobotTopics, TfFrames};
+use std::time::Duration;
 
 /// How many samples an input may hold where the pipeline does not say.
 pub const DEFAULT_DEPTH: usize = 16;
 
 /// The most samples that an input may hold.
 pub const MAX_DEPTH: usize = 4096;
+
+/// How long a stage may work on one message where the pipeline does not say.
+const DEFAULT_STALL_TIMEOUT: Duration = Duration::from_secs(300);
 
 /// What stands in `[pipeline]` and `[robots]`.
 #[derive(Debug)]
@@ -21,6 +25,8 @@ pub(super) struct Settings {
     pub(super) seed: u64,
     pub(super) depth: usize,
     pub(super) batch: bool,
+    pub(super) stall_timeout: Option<Duration>,
+    pub(super) memory_limit: Option<u64>,
     pub(super) robots: RobotTopics,
 }
 
@@ -28,12 +34,22 @@ impl Settings {
     /// A pipeline called `name` that says nothing of itself.
     pub(super) fn new(name: &str) -> Self {
         let robots = RobotTopics::default();
-        Self { name: name.into(), reference: None, seed: 0, depth: DEFAULT_DEPTH, batch: true, robots }
+        let stall_timeout = Some(DEFAULT_STALL_TIMEOUT);
+        Self {
+            name: name.into(),
+            reference: None,
+            seed: 0,
+            depth: DEFAULT_DEPTH,
+            batch: true,
+            stall_timeout,
+            memory_limit: None,
+            robots,
+        }
     }
 
     /// Takes in the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 5] = ["name", "reference", "seed", "depth", "batch"];
+        const KEYS: [&str; 7] = ["name", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
                 "name" => match text(key, item, problems) {
@@ -55,6 +71,14 @@ impl Settings {
                 "batch" => match item.as_bool() {
                     Some(batch) => self.batch = batch,
                     None => problems.push(wrong_type(key, item, "true or false")),
+                },
+                "stall_timeout" => match read_seconds(item) {
+                    Some(seconds) => self.stall_timeout = Some(seconds).filter(|seconds| !seconds.is_zero()),
+                    None => problems.push(wrong_type(key, item, "seconds, 0 or more")),
+                },
+                "memory_limit" => match item.as_integer().and_then(|bytes| u64::try_from(bytes).ok()) {
+                    Some(bytes) => self.memory_limit = Some(bytes).filter(|bytes| *bytes > 0),
+                    None => problems.push(wrong_type(key, item, "bytes, 0 or more")),
                 },
                 _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
             }
@@ -99,6 +123,11 @@ impl Settings {
         }
         self.seed = overrides.seed.unwrap_or(self.seed);
     }
+}
+
+fn read_seconds(item: &Item) -> Option<Duration> {
+    let seconds = item.as_float().or_else(|| item.as_integer().map(|seconds| seconds as f64))?;
+    Duration::try_from_secs_f64(seconds).ok()
 }
 
 /// TOML has no whole numbers above 2^63, so a larger seed stands in quotes.

@@ -26,6 +26,8 @@ pub(super) struct Draft<'a> {
     /// For every output port of the kind its topic.
     pub(super) topics: Vec<Topic>,
     pub(super) depth: usize,
+    /// The process it is placed in.
+    pub(super) process: &'a str,
 }
 
 /// The topic of an output port, and where it was given.
@@ -42,7 +44,7 @@ pub(super) fn read_stage<'a>(
     registry: &'a Registry,
     problems: &mut Problems,
 ) -> Draft<'a> {
-    check_name(&stage.key, &stage.key_at, problems);
+    check_name("stage", &stage.key, &stage.key_at, problems);
     let mut draft = Draft {
         name: &stage.key,
         at: &stage.key_at,
@@ -51,6 +53,7 @@ pub(super) fn read_stage<'a>(
         inputs: None,
         topics: Vec::new(),
         depth: pipeline_depth,
+        process: &stage.key,
     };
     let Value::Table(entries) = &stage.item.value else {
         let label = format!("expected a table, found {}", stage.item.describe());
@@ -62,6 +65,12 @@ pub(super) fn read_stage<'a>(
     draft.kind = read_kind(stage, find("kind"), registry, problems);
     draft.inputs = find("inputs").map(|entry| &entry.item);
     draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(pipeline_depth);
+    if let Some(entry) = find("process")
+        && let Some(process) = text("process", &entry.item, problems)
+    {
+        check_name("process", process, &entry.item.at, problems);
+        draft.process = process;
+    }
     if let Some(kind) = draft.kind {
         let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
         draft.parameters = read_parameters(kind, &given, &stage.key_at, problems);
@@ -70,12 +79,12 @@ pub(super) fn read_stage<'a>(
     draft
 }
 
-fn check_name(name: &str, at: &Location, problems: &mut Problems) {
+fn check_name(what: &str, name: &str, at: &Location, problems: &mut Problems) {
     let allowed = |char: char| char.is_ascii_lowercase() || char.is_ascii_digit() || char == '_' || char == '-';
-    let problem = Diagnostic::new(format!("`{name}` is no name for a stage"));
+    let problem = Diagnostic::new(format!("`{name}` is no name for a {what}"));
     if name.len() > LONGEST_NAME {
         let label = format!("expected at most {LONGEST_NAME} characters, found {}", name.len());
-        problems.push(Diagnostic::new("the name of this stage is too long").at(at, label));
+        problems.push(Diagnostic::new(format!("the name of this {what} is too long")).at(at, label));
     } else if name.is_empty() || !name.chars().all(allowed) {
         problems.push(problem.at(at, "expected lower-case letters a-z, digits, `_` and `-`"));
     }

@@ -13,7 +13,11 @@ impl Pipeline {
             ("name".to_owned(), Value::from(self.name.as_str())),
             ("seed".into(), seed),
             ("batch".into(), self.batch.into()),
+            ("stall_timeout".into(), self.stall_timeout.map_or(0.0, |timeout| timeout.as_secs_f64()).into()),
         ]);
+        if let Some(limit) = self.memory_limit {
+            pipeline.insert("memory_limit".into(), Value::Integer(i64::try_from(limit).unwrap_or(i64::MAX)));
+        }
         if let Some(reference) = &self.reference {
             pipeline.insert("reference".into(), reference.as_str().into());
         }
@@ -32,6 +36,7 @@ impl Pipeline {
         let mut table = stage.parameters.clone();
         table.insert("kind".into(), stage.kind.name.into());
         table.insert("depth".into(), Value::Integer(i64::try_from(stage.depth).unwrap_or(i64::MAX)));
+        table.insert("process".into(), stage.process.as_str().into());
         let mut inputs = Table::new();
         for wire in &stage.inputs {
             let from = &self.stages[wire.from_stage];

@@ -1,9 +1,10 @@
 //! How a stage fails.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Why a stage cannot go on: what it was doing, what went wrong, and what would mend it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageError {
     doing: String,
     cause: String,

@@ -281,12 +281,29 @@ impl PipelineBuilder {
         let inputs = inputs.collect();
         let topics = kind.outputs.iter().map(|output| format!("/{name}/{}", output.name)).collect();
         let parameters = parameters.parse().unwrap();
-        self.stages.push(StageSpec { name: name.into(), kind, parameters, inputs, topics, depth: 1 });
+        self.stages.push(StageSpec {
+            name: name.into(),
+            kind,
+            parameters,
+            inputs,
+            topics,
+            depth: 1,
+            process: name.into(),
+        });
     }
 
     pub fn build(&self, depth: usize) -> Pipeline {
         let mut stages = self.stages.clone();
         stages.iter_mut().for_each(|stage| stage.depth = depth);
-        Pipeline { name: "test".into(), reference: None, seed: 1, batch: depth > 2, robots: Default::default(), stages }
+        Pipeline {
+            name: "test".into(),
+            reference: None,
+            seed: 1,
+            batch: depth > 2,
+            stall_timeout: None,
+            memory_limit: None,
+            robots: Default::default(),
+            stages,
+        }
     }
 }

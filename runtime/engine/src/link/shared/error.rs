@@ -1,9 +1,11 @@
 //! How a link over shared memory fails.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A link over shared memory could not be made or used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum LinkError {
     /// iceoryx2 refused something.
     #[error("cannot {doing}: iceoryx2 says {cause}; {}", HELP)]

@@ -22,6 +22,7 @@
 //! 6. The sender's last message says that the stream has ended. A reader acknowledges it when its stage is done and has
 //!    dropped all it held; the sender keeps its publisher until then.
 
+mod activity;
 mod error;
 mod names;
 mod outputs;
@@ -30,6 +31,7 @@ mod sample;
 mod sender;
 mod wake;
 
+pub use activity::Activity;
 pub use error::LinkError;
 pub use names::RunNames;
 pub use outputs::SharedOutputs;

@@ -14,7 +14,7 @@ pub struct RunNames {
 }
 
 impl RunNames {
-    /// Names that no other run of this machine has: from the process id and a counter.
+    /// Names that no other run of this process has: for services that do not leave it.
     pub fn unique() -> Self {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -44,19 +44,6 @@ impl RunNames {
             .config(&config)
             .create::<S>()
             .map_err(|e| doing()(&e))
-    }
-
-    /// Removes what iceoryx2 leaves in `/dev/shm` even when all ports are closed: a file of 16 bytes for each prefix.
-    /// Only for the last one of a run.
-    pub fn remove_rest(&self) {
-        let Ok(entries) = std::fs::read_dir("/dev/shm") else { return };
-        for entry in entries.flatten() {
-            let name = entry.file_name();
-            if name.to_string_lossy().starts_with(&self.prefix) && name.to_string_lossy().ends_with(".global_mgmt") {
-                // Somebody else may have removed it in between.
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
     }
 
     /// The service of an output port.

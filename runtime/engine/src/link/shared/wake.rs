@@ -1,6 +1,6 @@
 //! How a stage sleeps and what wakes it.
 
-use super::{LinkError, RunNames};
+use super::{Activity, LinkError, RunNames};
 use iceoryx2::node::Node;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -55,17 +55,19 @@ pub struct Wake<S: Service> {
     /// Whether an input may have something that has not been looked at.
     data: Cell<bool>,
     stopped: Cell<bool>,
+    activity: Activity,
 }
 
 impl<S: Service> Wake<S> {
     /// The wake service of `stage`, which has `readers` readers over all its outputs and `writers` peers that may wake
-    /// it.
+    /// it. `activity` is told when it sleeps.
     pub fn new(
         node: &Node<S>,
         names: &RunNames,
         stage: &str,
         readers: usize,
         writers: usize,
+        activity: Activity,
     ) -> Result<Rc<Self>, LinkError> {
         let events = WakeEvents::new(readers);
         let listener = wake_service(node, names, stage, events, writers)?
@@ -79,6 +81,7 @@ impl<S: Service> Wake<S> {
             acknowledged: RefCell::new(vec![false; readers]),
             data: Cell::new(false),
             stopped: Cell::new(false),
+            activity,
         }))
     }
 
@@ -121,10 +124,20 @@ impl<S: Service> Wake<S> {
 
     /// Sleeps until something happens, and takes it in.
     pub(crate) fn sleep(&self) -> Result<(), LinkError> {
-        self.listener
-            .timed_wait(|event| self.note(event.id.as_value(), event.count), LONGEST_SLEEP)
-            .map_err(|e| failed(&e))?;
+        let is_working = self.activity.is_working();
+        self.activity.wait();
+        let waited = self.listener.timed_wait(|event| self.note(event.id.as_value(), event.count), LONGEST_SLEEP);
+        if is_working {
+            self.activity.work();
+        }
+        waited.map_err(|e| failed(&e))?;
         self.check()
+    }
+
+    /// Whether the stage works or waits. It is at work while this value lives and it does not sleep here.
+    pub(crate) fn working(&self) -> Working<'_> {
+        self.activity.work();
+        Working(&self.activity)
     }
 
     fn check(&self) -> Result<(), LinkError> {
@@ -146,6 +159,15 @@ impl<S: Service> Wake<S> {
                 }
             }
         }
+    }
+}
+
+/// The stage is at work while this lives.
+pub(crate) struct Working<'a>(&'a Activity);
+
+impl Drop for Working<'_> {
+    fn drop(&mut self) {
+        self.0.wait();
     }
 }
 

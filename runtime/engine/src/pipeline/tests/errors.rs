@@ -24,6 +24,19 @@ fn an_unknown_section_or_key_names_the_nearest() {
 }
 
 #[test]
+fn limits_of_processes_are_numbers_that_are_not_negative() {
+    for (line, column, underlined, says) in [
+        ("stall_timeout = -1.0", "17", "-1.0", "expected seconds, 0 or more"),
+        ("stall_timeout = \"long\"", "17", "\"long\"", "expected seconds, 0 or more, found text"),
+        ("stall_timeout = nan", "17", "nan", "expected seconds, 0 or more"),
+        ("memory_limit = -1", "16", "-1", "expected bytes, 0 or more, found `-1`"),
+        ("memory_limit = 1.5", "16", "1.5", "expected bytes, 0 or more, found a number"),
+    ] {
+        assert_error(("seed = 7", line), &format!("5:{column}"), underlined, &[says]);
+    }
+}
+
+#[test]
 fn an_unknown_kind_names_the_nearest_and_its_stage_is_not_blamed_for_more() {
     let says = ["unknown kind of stage `line_extracter`", "did you mean `line_extractor`?"];
     assert_error(("\"line_extractor\"", "\"line_extracter\""), "15:8", "\"line_extracter\"", &says);
@@ -54,6 +67,7 @@ fn a_value_of_the_wrong_type_says_what_was_expected() {
         ("mean = 3", "8", "3", "expected \"circular\" or \"groups\", found `3`"),
         ("mean = \"circlar\"", "8", "\"circlar\"", "did you mean \"circular\"?"),
         ("depth = 1.5", "9", "1.5", "expected a whole number from 1 to 4096, found a number"),
+        ("process = 3", "11", "3", "expected text in quotes, found `3`"),
     ];
     for (line, column, underlined, says) in cases {
         assert_error(("min_length = 0.8", line), &format!("17:{column}"), underlined, &[says, "wrong value of"]);

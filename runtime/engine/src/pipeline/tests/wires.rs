@@ -56,6 +56,26 @@ fn topics_come_from_the_stage_then_from_the_port_then_from_the_names() {
 }
 
 #[test]
+fn stages_have_a_process_of_their_own_unless_they_share_one() {
+    let pipeline = parse(&changed("depth = 4", "process = \"lines\"")).unwrap();
+    assert_eq!(pipeline.processes(), ["log", "lines", "align", "out"]);
+    let names = |process| pipeline.stages_of(process).into_iter().map(|stage| pipeline.stages[stage].name.as_str());
+    assert_eq!(names("lines").collect::<Vec<_>>(), ["lines", "fuse"]);
+    assert_eq!(names("fuse").count(), 0);
+}
+
+#[test]
+fn limits_of_processes_may_be_switched_off() {
+    let limits = |text: &str| {
+        let pipeline = parse(&changed("seed = 7", text)).unwrap();
+        (pipeline.stall_timeout.map(|timeout| timeout.as_secs_f64()), pipeline.memory_limit)
+    };
+    assert_eq!(limits("seed = 7"), (Some(300.0), None));
+    assert_eq!(limits("stall_timeout = 2\nmemory_limit = 1000"), (Some(2.0), Some(1000)));
+    assert_eq!(limits("stall_timeout = 0.0\nmemory_limit = 0"), (None, None));
+}
+
+#[test]
 fn depths_come_from_the_stage_then_from_the_pipeline() {
     let pipeline = parse(&changed("seed = 7", "depth = 32")).unwrap();
     let depths: Vec<(&str, usize)> = pipeline.stages.iter().map(|stage| (stage.name.as_str(), stage.depth)).collect();

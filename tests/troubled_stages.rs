@@ -1,0 +1,131 @@
+//! The command `gridweave` with stages that get into trouble when told to, for tests of runs of several processes.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::ros::{Header, PoseStamped};
+use gridweave_runtime::stage::{
+    InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// What happens, and at which message.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct Trouble {
+    /// How many messages a source sends.
+    count: u64,
+    /// The pause after each message, microseconds.
+    pause: u64,
+    /// Wait up to so many microseconds at random.
+    stall: u64,
+    /// The message at which it happens; never if 0.
+    at: u64,
+    /// fail, panic, hang, abort, eat, print, nothing_passes.
+    what: String,
+    /// Fail before the first message.
+    at_start: bool,
+    /// Bytes of each message beside the pose.
+    size: usize,
+}
+
+impl Parameters for Trouble {}
+
+impl Trouble {
+    fn happen(&self, number: u64) -> Result<(), StageError> {
+        if self.pause > 0 {
+            std::thread::sleep(Duration::from_micros(self.pause));
+        }
+        if self.stall > 0 {
+            let random = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407) >> 33;
+            if random.is_multiple_of(16) {
+                std::thread::sleep(Duration::from_micros(random % self.stall));
+            }
+        }
+        if self.at == 0 || number != self.at {
+            return Ok(());
+        }
+        match self.what.as_str() {
+            "fail" => Err(StageError::new("go on", "it was told so")),
+            "panic" => panic!("it was told so"),
+            "abort" => std::process::abort(),
+            "hang" => loop {
+                std::thread::sleep(Duration::from_secs(1));
+            },
+            "eat" => {
+                let mut meals: Vec<Vec<u8>> = Vec::new();
+                loop {
+                    meals.push(vec![1; 1 << 24]);
+                }
+            }
+            "print" => {
+                println!("a stage prints this");
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn start(self) -> Result<Self, StageError> {
+        match self.at_start {
+            true => Err(StageError::new("start", "it was told so")),
+            false => Ok(self),
+        }
+    }
+
+    fn pose(&self, log_time: LogTime) -> PoseStamped {
+        PoseStamped { header: Header::new(log_time, "x".repeat(self.size)), ..Default::default() }
+    }
+}
+
+struct TroubledSource(Trouble, u64);
+
+impl Source for TroubledSource {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        let Self(trouble, number) = self;
+        if *number == trouble.count {
+            return Ok(false);
+        }
+        *number += 1;
+        trouble.happen(*number)?;
+        let log_time = LogTime(1_000_000_000 + *number * 1_000_000);
+        output.set_log_time(log_time);
+        output.send(0, "robot1", &trouble.pose(log_time))?;
+        Ok(true)
+    }
+}
+
+struct TroubledStage(Trouble, u64);
+
+impl Stage for TroubledStage {
+    fn receive(&mut self, _port: usize, _message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let Self(trouble, number) = self;
+        *number += 1;
+        trouble.happen(*number)?;
+        if trouble.what == "nothing_passes" {
+            return Ok(());
+        }
+        let pose = trouble.pose(output.log_time());
+        output.send(0, "robot1", &pose)
+    }
+}
+
+fn main() -> ExitCode {
+    let pose = PortType::of::<PoseStamped>();
+    let outputs = || vec![OutputPort::new("out", pose, "poses")];
+    gridweave::command([
+        StageKind::source("troubled_source", "Sends poses.", outputs(), |trouble: Trouble, _| {
+            Ok(TroubledSource(trouble.start()?, 0))
+        }),
+        StageKind::stage(
+            "troubled_stage",
+            "Sends a pose for each message.",
+            vec![InputPort::many("in", pose, "poses")],
+            outputs(),
+            |trouble: Trouble, _| Ok(TroubledStage(trouble.start()?, 0)),
+        ),
+    ])
+}
