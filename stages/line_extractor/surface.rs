@@ -8,8 +8,8 @@ use crate::geometry::{Cell, Grid, is_occupied};
 /// A surface is at most this many cells deep, whatever the size of a cell.
 const MOST_DEPTH: f64 = 10.0;
 
-/// The occupied cells, row by row, but for those that lie deeper inside a solid than `reach` cells. What is off the grid
-/// counts as solid: the edge of a map is no wall.
+/// The occupied cells, row by row, but for those that lie deeper inside a solid than `reach` cells. What is off the
+/// grid counts as solid: the edge of a map is no wall.
 pub(super) fn surface_cells(grid: &Grid<'_>, reach: f64) -> Vec<Cell> {
     let depth = reach.ceil().clamp(1.0, MOST_DEPTH) as usize;
     grid.occupied().filter(|cell| !is_inside(grid, *cell, depth)).collect()

@@ -1,5 +1,5 @@
 //! Running the command, and logs to run it on.
-#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
+#![allow(dead_code, unused_imports, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 mod log_builder;
 

@@ -3,9 +3,10 @@
 //!     cargo run -p gridweave --example golden_inputs             # those that are made up
 //!     cargo run -p gridweave --example golden_inputs -- --cuts   # and those that are cut out of a simulated log
 //!
-//! What is made up comes out the same whenever the program runs, and the test `golden_inputs` compares it with the files. A cut is
-//! what a stage was given in a merge of a simulated log on the day it was made: it stays as it is when the stages before it
-//! change, so that a case tells of its own stage alone. A file that holds the right messages already is not touched.
+//! What is made up comes out the same whenever the program runs, and the test `golden_inputs` compares it with the
+//! files. A cut is what a stage was given in a merge of a simulated log when it was made: it stays as it is when the
+//! stages before it change, so that a case tells of its own stage alone. A file that holds the right messages already is
+//! not touched. What a stage makes of its input is then blessed with `gridweave golden --bless`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 

@@ -15,7 +15,7 @@ const NOISE: f64 = 0.05;
 const REACH: f64 = 3.0;
 /// Seconds between two poses.
 const TICK: f64 = 0.1;
-/// Where tags are, metres. The first is on the middle of a block of the paper's grid about the origin, 3 x 3 cells of 0.02 m.
+/// Where a tag is, metres: in the middle of a block of the paper's grid about the origin, 3 x 3 cells of 0.02 m.
 const TAG: Point2 = Point2::new(1.23, 1.05);
 /// On the border of two blocks.
 const TAG_ON_BORDER: Point2 = Point2::new(1.2, 1.05);
