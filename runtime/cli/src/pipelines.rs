@@ -9,8 +9,10 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 2] = [
+const SHIPPED: [(&str, &str); 4] = [
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
+    ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),
+    ("tag_only", include_str!("../../../pipelines/tag_only.toml")),
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),
 ];
 
