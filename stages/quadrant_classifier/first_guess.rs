@@ -33,14 +33,16 @@ pub enum GuessError {
     NoRotation(usize),
     /// The rotation is known too badly.
     #[error(
-        "the {count} common tags lie too near each other: they tell the rotation to {degrees:.0} degrees only, which \
-         does not tell the quarter turn"
+        "the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only, and at \
+         most {most:.1} are allowed"
     )]
     WeakRotation {
         /// Tags there are.
         count: usize,
         /// Standard deviation of the rotation, degrees.
         degrees: f64,
+        /// What is allowed, degrees.
+        most: f64,
     },
     /// The tags do not fit each other.
     #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
@@ -67,7 +69,8 @@ pub fn first_guess(
     let count = pairs.len();
     let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
     if by_tags.deviation > parameters.max_tag_rotation_deviation {
-        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
+        let most = parameters.max_tag_rotation_deviation.to_degrees();
+        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees(), most });
     }
     let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
         Ok(rotation) if parameters.rotation == RotationFrom::Both => {

@@ -5,6 +5,8 @@
 //! - The **mean square error** of a robot is the mean of `|T_found p - T_true p|^2` over the centres p of the occupied
 //!   cells of the robot's last map: in square metres, and in the squared cell width of that map. The paper's is that
 //!   between the points of the second map as transformed and as they should lie.
+//! - How far the walls of the two maps lie apart, at the found place and at the true one, says whose error it is: where a
+//!   drifting robot has bent its map, walls do not lie on walls at the true place either.
 //! - The time of **one alignment** is what the paper measures: from the last maps of a pair and the tags that they have in
 //!   common to the transform. The busy time of a whole run is all that its stages did: reading the log, localizing the
 //!   tags, an alignment for each of the many times that a map or a tag changed, fusing and writing.
@@ -12,6 +14,7 @@
 mod one_alignment;
 mod record;
 mod report;
+mod wall_distance;
 
 use super::results::Results;
 use super::trial::World;
@@ -65,8 +68,8 @@ pub(super) fn run(args: &MethodsArgs, registry: &Registry, results: &mut Results
 
     let mut sets = Vec::new();
     for (name, title, settings) in [
-        ("exact", format!("{} simulated worlds, exact poses", args.seeds), vec!["drift=0"]),
-        ("drift", format!("{} simulated worlds, the simulator's default drift", args.seeds), vec![]),
+        ("exact", format!("{}, exact poses", counted(args.seeds, "simulated world")), vec!["drift=0"]),
+        ("drift", format!("{}, drifting poses", counted(args.seeds, "simulated world")), vec![]),
     ] {
         let settings: Vec<String> = WORLD.into_iter().chain(settings).map(str::to_owned).collect();
         let mut records = Vec::new();
@@ -87,7 +90,7 @@ pub(super) fn run(args: &MethodsArgs, registry: &Registry, results: &mut Results
             let world = if truth.exists() { World::recorded(log, &truth) } else { World::unrelated(log) }?;
             records.extend(trial.records(&world, &name).with_context(|| format!("in the log {}", log.display()))?);
         }
-        sets.push(Set { name: "logs", title: format!("{} recorded logs", logs.len()), records });
+        sets.push(Set { name: "logs", title: counted(logs.len() as u64, "recorded log"), records });
     }
     report::write(&sets, results)
 }
@@ -118,12 +121,15 @@ impl Trial<'_> {
                     (Some(maps), Some(tags)) if tags.accepted => aligner.measure(maps, &tags.tags, self.repetitions),
                     _ => None,
                 };
-                let map = pair_maps.as_ref().map(|maps| &maps.b);
-                records.push(Record::new(name, number + 1, robot, map, alignment, &merge));
+                records.push(Record::new(name, number + 1, robot, pair_maps.as_ref(), alignment, &merge));
             }
         }
         Ok(records)
     }
+}
+
+fn counted(count: u64, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Every robot's last map in a log, by robot.

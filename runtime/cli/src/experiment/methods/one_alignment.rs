@@ -95,29 +95,32 @@ impl Aligner {
     }
 
     fn align(&self, maps: &PairMaps<'_>, tags: &[CommonTag]) -> Option<Timed> {
-        let start = ProcessorTime::now();
-        let segments = self
-            .lines
-            .as_ref()
-            .map(|(parameters, seed)| [&maps.a, &maps.b].map(|map| extract_segments(map, parameters, *seed)));
-        let lines_done = ProcessorTime::now();
-        let directions = segments.map(|segments| segments.map(|walls| map_direction(&walls, &self.classifier)));
-        let [a, b] = directions.as_ref().map_or([None, None], |[a, b]| [Some(a), Some(b)]);
-        let guess = first_guess(tags, a, b, &self.classifier).ok()?;
-        let classifier_done = ProcessorTime::now();
-        let transform_a_b = match &self.icp {
-            Some(parameters) => {
-                let [a, b] = [&maps.a, &maps.b].map(|map| WallMap::new(map, parameters.normal_radius));
-                let (a, b) = (MapView { grid: maps.a, walls: &a }, MapView { grid: maps.b, walls: &b });
-                let guess = icp_refiner::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
-                refine(&a, &b, &guess, parameters).registration.transform_a_b
-            }
-            None => guess.transform_a_b,
-        };
-        let end = ProcessorTime::now();
-        let parts = [lines_done.since(start), classifier_done.since(lines_done), end.since(classifier_done)];
-        Some(Timed { transform_a_b, parts })
+        let (segments, lines_time) = timed(self.lines.as_ref(), |(parameters, seed)| {
+            [&maps.a, &maps.b].map(|map| extract_segments(map, parameters, *seed))
+        });
+        let (guess, classifier_time) = timed(Some(&self.classifier), |parameters| {
+            let directions = segments.map(|segments| segments.map(|walls| map_direction(&walls, parameters)));
+            let [a, b] = directions.as_ref().map_or([None, None], |[a, b]| [Some(a), Some(b)]);
+            first_guess(tags, a, b, parameters)
+        });
+        let guess = guess?.ok()?;
+        let (refined, icp_time) = timed(self.icp.as_ref(), |parameters| {
+            let [a, b] = [&maps.a, &maps.b].map(|map| WallMap::new(map, parameters.normal_radius));
+            let (a, b) = (MapView { grid: maps.a, walls: &a }, MapView { grid: maps.b, walls: &b });
+            let guess = icp_refiner::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
+            refine(&a, &b, &guess, parameters).registration.transform_a_b
+        });
+        let transform_a_b = refined.unwrap_or(guess.transform_a_b);
+        Some(Timed { transform_a_b, parts: [lines_time, classifier_time, icp_time] })
     }
+}
+
+/// What a stage makes, if the pipeline has it, and the processor time that it takes; none for a stage that is not there.
+fn timed<P, T>(parameters: Option<&P>, work: impl FnOnce(&P) -> T) -> (Option<T>, Duration) {
+    let Some(parameters) = parameters else { return (None, Duration::ZERO) };
+    let start = ProcessorTime::now();
+    let made = work(parameters);
+    (Some(made), ProcessorTime::now().since(start))
 }
 
 /// The parameters and the seed of the only stage of a kind; none if there is no such stage.

@@ -1,6 +1,7 @@
 //! What one method has made of one robot.
 
-use super::one_alignment::{AlignmentTime, OneAlignment};
+use super::one_alignment::{AlignmentTime, OneAlignment, PairMaps};
+use super::wall_distance::wall_distance;
 use crate::evaluate::{Outcome, RobotResult};
 use crate::experiment::trial::Merge;
 use crate::table::Table;
@@ -44,30 +45,42 @@ pub(super) struct PlaceError {
     pub(super) metres: f64,
     /// Degrees.
     pub(super) degrees: f64,
+    /// How far its walls lie from those of the reference robot, metres.
+    pub(super) walls: f64,
+    /// How far they would lie from them at the true place, metres.
+    pub(super) true_walls: f64,
 }
 
 impl Record {
-    /// What a method has made of a robot, whose last map is `map`.
+    /// What a method has made of a robot, the second of `maps`; the first is the reference.
     pub(super) fn new(
         world: &str,
         method: usize,
         robot: &RobotResult,
-        map: Option<&Grid<'_>>,
+        maps: Option<&PairMaps<'_>>,
         alignment: Option<OneAlignment>,
         merge: &Merge,
     ) -> Self {
-        let error = match (robot.error_m, robot.error_deg, &robot.transform_true_found, map) {
-            (Some(metres), Some(degrees), Some(transform), Some(map)) => {
-                let square_metres = mean_square_distance(map, &Pose2::identity(), transform);
-                let square_cells = square_metres / map.geometry.resolution.powi(2);
-                Some(PlaceError { square_metres, square_cells, metres, degrees })
+        let found = merge.summary.frames().find(|(name, _)| *name == robot.robot);
+        let found = found.map(|(_, [x, y, yaw])| pose(x, y, yaw));
+        let error = match (robot.error_m, robot.error_deg, robot.transform_true_found, found, maps) {
+            (Some(metres), Some(degrees), Some(transform_true_found), Some(found), Some(maps)) => {
+                let square_metres = mean_square_distance(&maps.b, &Pose2::identity(), &transform_true_found);
+                Some(PlaceError {
+                    square_metres,
+                    square_cells: square_metres / maps.b.geometry.resolution.powi(2),
+                    metres,
+                    degrees,
+                    walls: wall_distance(maps, &found),
+                    true_walls: wall_distance(maps, &(found * transform_true_found.inverse())),
+                })
             }
             _ => None,
         };
-        let found =
-            merge.summary.frames().find(|(name, _)| *name == robot.robot).map(|(_, [x, y, yaw])| pose(x, y, yaw));
-        let apart = match (&alignment, found, map) {
-            (Some(one), Some(found), Some(map)) => Some(mean_square_distance(map, &found, &one.transform_a_b).sqrt()),
+        let apart = match (&alignment, found, maps) {
+            (Some(one), Some(found), Some(maps)) => {
+                Some(mean_square_distance(&maps.b, &found, &one.transform_a_b).sqrt())
+            }
             _ => None,
         };
         let busy = STAGES.map(|name| {
@@ -105,6 +118,8 @@ impl Record {
             "mse m2",
             "error m",
             "error deg",
+            "walls apart m",
+            "walls apart at truth m",
             "alignment lines ms",
             "alignment classifier ms",
             "alignment icp ms",
@@ -129,6 +144,8 @@ impl Record {
             error(|error| error.square_metres),
             error(|error| error.metres),
             error(|error| error.degrees),
+            error(|error| error.walls),
+            error(|error| error.true_walls),
             time(|time| time.lines),
             time(|time| time.classifier),
             time(|time| time.icp),

@@ -29,9 +29,15 @@ pub(super) fn write(sets: &[Set], results: &mut Results) -> Result<()> {
         &errors(sets),
     )?;
     results.table(
+        "methods_walls",
+        "How far the walls of the two maps lie apart, m (root mean square; median of the robots), at the found place and \
+         at the true one, and the share of the robots whose walls lie nearer at the found place.",
+        &walls(sets),
+    )?;
+    results.table(
         "methods_alignment",
-        "Time of one alignment, ms: from the last maps of a pair and their common tags to the transform (medians; in \
-         brackets the slowest). The last column is how far it places the map from where the whole run does, at most.",
+        "Time of one alignment, ms of one processor: from the last maps of a pair and their common tags to the transform \
+         (medians; in brackets the slowest). The last column is how far it places the map from where the whole run does, at most.",
         &alignment_times(sets),
     )?;
     results.table(
@@ -78,8 +84,18 @@ fn table_4(sets: &[Set]) -> Table {
 }
 
 fn errors(sets: &[Set]) -> Table {
-    let heads = ["worlds", "method", "mse px2", "mse m2", "translation m", "rotation deg", "right", "wrong", "refused"];
-    let mut table = Table::new(heads.into_iter().chain(["rightly refused"]));
+    let mut table = Table::new([
+        "worlds",
+        "method",
+        "mse px2",
+        "mse m2",
+        "translation m",
+        "rotation deg",
+        "right",
+        "wrong",
+        "refused",
+        "rightly refused",
+    ]);
     for set in sets {
         for (method, pipeline) in METHODS.iter().enumerate() {
             let error = |value: fn(&PlaceError) -> f64| {
@@ -100,6 +116,25 @@ fn errors(sets: &[Set]) -> Table {
                 count(Outcome::Wrong),
                 count(Outcome::Refused),
                 count(Outcome::RightlyRefused),
+            ]);
+        }
+    }
+    table
+}
+
+fn walls(sets: &[Set]) -> Table {
+    let mut table = Table::new(["worlds", "method", "found place", "true place", "nearer at the found place"]);
+    for set in sets {
+        for method in 0..METHODS.len() {
+            let found = error_values(set, method, |error| error.walls);
+            let truth = error_values(set, method, |error| error.true_walls);
+            let nearer = found.iter().zip(&truth).filter(|(found, truth)| found < truth).count();
+            table.row([
+                set.title.clone(),
+                (method + 1).to_string(),
+                significant(median(&found)),
+                significant(median(&truth)),
+                format!("{nearer} of {}", found.len()),
             ]);
         }
     }
