@@ -32,17 +32,12 @@ pub enum GuessError {
     #[error("{0} common tags do not tell the rotation: it takes two or more in different places")]
     NoRotation(usize),
     /// The rotation is known too badly.
-    #[error(
-        "the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only, and at \
-         most {most:.1} are allowed"
-    )]
+    #[error("the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only")]
     WeakRotation {
         /// Tags there are.
         count: usize,
         /// Standard deviation of the rotation, degrees.
         degrees: f64,
-        /// What is allowed, degrees.
-        most: f64,
     },
     /// The tags do not fit each other.
     #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
@@ -69,8 +64,7 @@ pub fn first_guess(
     let count = pairs.len();
     let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
     if by_tags.deviation > parameters.max_tag_rotation_deviation {
-        let most = parameters.max_tag_rotation_deviation.to_degrees();
-        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees(), most });
+        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
     }
     let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
         Ok(rotation) if parameters.rotation == RotationFrom::Both => {
