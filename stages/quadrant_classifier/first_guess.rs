@@ -32,10 +32,7 @@ pub enum GuessError {
     #[error("{0} common tags do not tell the rotation: it takes two or more in different places")]
     NoRotation(usize),
     /// The rotation is known too badly.
-    #[error(
-        "the {count} common tags lie too near each other: they tell the rotation to {degrees:.0} degrees only, which \
-         does not tell the quarter turn"
-    )]
+    #[error("the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only")]
     WeakRotation {
         /// Tags there are.
         count: usize,

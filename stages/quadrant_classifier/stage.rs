@@ -1,10 +1,10 @@
 //! The stage `quadrant_classifier`.
 
-use super::{Direction, QuadrantClassifierParameters, first_guess, map_direction};
+use super::{Direction, QuadrantClassifierParameters, RotationFrom, first_guess, map_direction};
 use crate::geometry::{row_by_row, turn_difference};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, CommonTags, Header, MapDirection, Segments};
-use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
+use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -18,7 +18,12 @@ pub fn kind() -> StageKind {
         "quadrant_classifier",
         "Finds the direction of each map's walls, and with common tags how two maps lie to each other",
         vec![
-            InputPort::one("segments", PortType::of::<Segments>(), "The straight walls of each map"),
+            InputPort::one(
+                "segments",
+                PortType::of::<Segments>(),
+                "The straight walls of each map; not needed where the rotation comes from the tags alone",
+            )
+            .or_none(),
             InputPort::one("common", PortType::of::<CommonTags>(), "The common tags of each pair of robots"),
         ],
         vec![
@@ -29,7 +34,7 @@ pub fn kind() -> StageKind {
                 "A first guess of how two maps lie to each other",
             ),
         ],
-        |parameters: QuadrantClassifierParameters, _| Ok(QuadrantClassifier { parameters, ..Default::default() }),
+        QuadrantClassifier::new,
     )
 }
 
@@ -83,6 +88,16 @@ fn warn_undecoded(what: &str, error: &impl std::fmt::Display, output: &mut Outpu
 }
 
 impl QuadrantClassifier {
+    fn new(parameters: QuadrantClassifierParameters, context: &Context) -> Result<Self, StageError> {
+        // The common tags must be wired, so a single input is theirs.
+        if parameters.rotation != RotationFrom::Tags && context.input_types.len() == 1 {
+            let cause = "its input `segments` is not wired, and the rotation is to come from the walls";
+            return Err(StageError::new(format!("make the stage {}", context.stage), cause)
+                .with_help("wire a line_extractor to it, or set rotation = \"tags\""));
+        }
+        Ok(Self { parameters, ..Default::default() })
+    }
+
     fn receive_segments(&mut self, segments: Segments, output: &mut Output<'_>) -> Result<(), StageError> {
         let Segments { header, robot, segments } = segments;
         let direction = map_direction(&segments, &self.parameters);
@@ -173,7 +188,7 @@ mod tests {
     use crate::geometry::{Point2, Pose2, pose};
     use gridweave_runtime::message::{LogTime, MessageHeader};
     use gridweave_runtime::ros::{CommonTag, Segment, encode};
-    use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
+    use gridweave_runtime::stage::{CollectedOutputs, Node};
 
     const COMMON: usize = 1;
 
@@ -270,6 +285,17 @@ mod tests {
         let together = CommonTags { tags: vec![refused.tags[0].clone(); 3], accepted: true, ..refused };
         let sent = run.receive(COMMON, &together);
         assert!(!sent[0].accepted && sent[0].reason.contains("do not tell the rotation"), "{}", sent[0].reason);
+    }
+
+    #[test]
+    fn walls_may_be_left_unwired_where_the_tags_alone_tell_the_rotation() {
+        let context = Context { input_types: vec!["gridweave_msgs/msg/CommonTags".into()], ..Default::default() };
+        let make = |parameters: &str| kind().make(parameters.parse().unwrap(), &context).err();
+        assert!(make("rotation = \"tags\"").is_none());
+        for rotation in ["directions", "both"] {
+            let error = make(&format!("rotation = \"{rotation}\"")).unwrap().to_string();
+            assert!(error.contains("`segments` is not wired"), "{error}");
+        }
     }
 
     #[test]

@@ -59,6 +59,10 @@ pub(crate) struct RobotResult {
     /// Why it is not merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) reason: Option<String>,
+    /// `T_true_found`: where its map frame was found to be, in the frame where it is in truth; none if there is nothing
+    /// to compare. It takes a point of the map from its true place to its found one.
+    #[serde(skip)]
+    pub(crate) transform_true_found: Option<Isometry2<f64>>,
 }
 
 /// A run, measured.
@@ -165,6 +169,7 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
             error_m: errors.map(|(metres, _)| metres),
             error_deg: errors.map(|(_, degrees)| degrees),
             reason,
+            transform_true_found: found.zip(expected).map(|(found, expected)| expected.inverse() * found),
         }
     };
     let robots: Vec<RobotResult> =

@@ -9,10 +9,12 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 3] = [
+const SHIPPED: [(&str, &str); 5] = [
     ("cut", include_str!("../../../pipelines/cut.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
+    ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),
+    ("tag_only", include_str!("../../../pipelines/tag_only.toml")),
 ];
 
 /// Loads a pipeline file or a shipped pipeline. `None` if it is wrong: then all its errors have been shown.

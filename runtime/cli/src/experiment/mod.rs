@@ -8,6 +8,7 @@ mod localization;
 mod methods;
 mod noise;
 mod plot;
+mod processor_time;
 mod results;
 mod statistics;
 mod trial;

@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow, bail};
 use plotters::coord::ranged1d::{KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use std::ops::Range;
 
 const WIDTH: u32 = 720;
 const HEIGHT: u32 = 440;
@@ -101,7 +102,7 @@ impl Ranged for ScaledAxis {
         places.filter(|place| (self.low - 1e-9..=self.high + 1e-9).contains(place)).collect()
     }
 
-    fn range(&self) -> std::ops::Range<f64> {
+    fn range(&self) -> Range<f64> {
         self.low..self.high
     }
 }
@@ -115,18 +116,27 @@ pub(super) struct Series {
     pub(super) points: Vec<(f64, f64)>,
     /// Where each point may lie as well: (x, lowest y, highest y). None draws no band.
     pub(super) band: Vec<(f64, f64, f64)>,
+    /// Where a dashed line stands upright in the curve's colour, in the unit of the x axis.
+    pub(super) mark: Option<f64>,
 }
 
 impl Series {
     /// A curve without a band.
     pub(super) fn new(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), points, band: Vec::new() }
+        Self { name: name.into(), points, band: Vec::new(), mark: None }
     }
 
     /// The same curve with a band.
     #[must_use]
     pub(super) fn with_band(mut self, band: Vec<(f64, f64, f64)>) -> Self {
         self.band = band;
+        self
+    }
+
+    /// The same curve with an upright dashed line.
+    #[must_use]
+    pub(super) fn with_mark(mut self, x: f64) -> Self {
+        self.mark = Some(x);
         self
     }
 }
@@ -214,6 +224,10 @@ impl Plot {
                 chart.draw_series(bars).map_err(plain)?;
             }
             Shape::Lines(series) => {
+                // The curves' points as shares of the width and the height of the plot.
+                let mut drawn: Vec<(f64, f64)> = Vec::new();
+                let share = |range: Range<f64>| move |place: f64| (place - range.start) / (range.end - range.start);
+                let (x_place, y_place) = (share(chart.x_range()), share(chart.y_range()));
                 for (series, colour) in series.iter().zip(COLOURS.iter().cycle().copied()) {
                     let place = |(x, y): (f64, f64)| (self.x.place(x), self.y.place(y));
                     let is_drawn = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
@@ -224,6 +238,13 @@ impl Plot {
                         let outline: Vec<_> = upper.chain(lower).map(place).filter(is_drawn).collect();
                         chart.draw_series([Polygon::new(outline, colour.mix(0.15))]).map_err(plain)?;
                     }
+                    if let Some(mark) = series.mark.map(|mark| self.x.place(mark)) {
+                        let Range { start, end } = chart.y_range();
+                        let upright = [(mark, start), (mark, end)];
+                        let dashed = DashedLineSeries::new(upright, 6, 4, colour.stroke_width(1));
+                        chart.draw_series(dashed).map_err(plain)?;
+                    }
+                    drawn.extend(points.iter().map(|&(x, y)| (x_place(x), y_place(y))));
                     chart
                         .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))
                         .map_err(plain)?
@@ -235,6 +256,7 @@ impl Plot {
                 if series.len() > 1 {
                     chart
                         .configure_series_labels()
+                        .position(emptiest_corner(&drawn))
                         .background_style(WHITE.mix(0.85))
                         .border_style(GRID)
                         .label_font(("sans-serif", 13))
@@ -261,10 +283,27 @@ impl Plot {
                     let band = series.band.iter().flat_map(|&(x, low, high)| [(x, low), (x, high)]);
                     series.points.iter().copied().chain(band)
                 });
-                Ok((self.x.over(points.clone().map(|(x, _)| x)), self.y.over(points.map(|(_, y)| y))))
+                let marks = series.iter().filter_map(|series| series.mark);
+                let x = points.clone().map(|(x, _)| x).chain(marks);
+                Ok((self.x.over(x), self.y.over(points.map(|(_, y)| y))))
             }
         }
     }
+}
+
+/// The corner of the plot that holds fewest of the points, which are shares of its width and height; of several the first
+/// here.
+fn emptiest_corner(points: &[(f64, f64)]) -> SeriesLabelPosition {
+    let corners = [
+        (SeriesLabelPosition::UpperRight, 0.75, 0.75),
+        (SeriesLabelPosition::UpperLeft, 0.25, 0.75),
+        (SeriesLabelPosition::LowerRight, 0.75, 0.25),
+        (SeriesLabelPosition::LowerLeft, 0.25, 0.25),
+    ];
+    let near =
+        |x: f64, y: f64| points.iter().filter(|point| (point.0 - x).abs() < 0.25 && (point.1 - y).abs() < 0.25).count();
+    let emptiest = corners.into_iter().min_by_key(|&(_, x, y)| near(x, y));
+    emptiest.map_or(SeriesLabelPosition::UpperRight, |(position, ..)| position)
 }
 
 fn plain<E: std::fmt::Display>(error: E) -> anyhow::Error {
@@ -289,6 +328,23 @@ mod tests {
         for part in ["<svg", "a title", "way, m", "error, m", "one", "two", "</svg>"] {
             assert!(svg.contains(part), "no {part} in {svg}");
         }
+    }
+
+    #[test]
+    fn a_mark_beyond_the_curve_is_on_the_axis() {
+        let series = |mark: fn(Series) -> Series| mark(Series::new("one", vec![(1.0, 1.0), (2.0, 2.0)]));
+        let svg = |series| plot(Shape::Lines(vec![series]), Axis::new("error, m"));
+        let (with, without) = (svg(series(|one| one.with_mark(100.0))), svg(series(|one| one)));
+        assert!(with.contains(">\n80\n") && !without.contains(">\n80\n"), "{with}");
+        assert!(with.len() > without.len() + 1000, "it is dashed");
+    }
+
+    #[test]
+    fn the_legend_takes_the_emptiest_corner() {
+        let at = |points: &[(f64, f64)]| emptiest_corner(points);
+        assert!(matches!(at(&[]), SeriesLabelPosition::UpperRight));
+        assert!(matches!(at(&[(0.9, 0.9), (0.6, 0.9), (0.1, 0.9)]), SeriesLabelPosition::LowerRight));
+        assert!(matches!(at(&[(0.9, 0.9), (0.1, 0.9), (0.8, 0.1)]), SeriesLabelPosition::LowerLeft));
     }
 
     #[test]

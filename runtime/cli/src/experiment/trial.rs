@@ -57,10 +57,23 @@ impl World {
         Ok(Self { log: log.to_owned(), truth: truth.to_owned(), folder })
     }
 
+    /// A log of robots that have nothing to do with each other.
+    pub(super) fn unrelated(log: &Path) -> Result<Self> {
+        let folder = TempDir::new().context("cannot make a folder for the output of a merge")?;
+        let truth = folder.path().join("unrelated.truth.json");
+        std::fs::write(&truth, r#"{"frames": {}}"#).with_context(|| format!("cannot write {}", truth.display()))?;
+        Ok(Self { log: log.to_owned(), truth, folder })
+    }
+
+    /// What the last merge has written, but the input's messages.
+    pub(super) fn output(&self) -> PathBuf {
+        self.folder.path().join("merged.mcap")
+    }
+
     /// Merges the world's log by a shipped pipeline, in one thread. `settings` are `STAGE.PARAMETER=VALUE`.
     pub(super) fn merge(&self, pipeline: &str, settings: &[String], registry: &Registry) -> Result<Merge> {
         let start = Instant::now();
-        let report = self.run(pipeline, settings, None, &self.folder.path().join("merged.mcap"), registry)?;
+        let report = self.run(pipeline, settings, None, &self.output(), registry)?;
         let elapsed = start.elapsed();
         let summary = Summary::new(&report);
         let path = self.folder.path().join("summary.json");
