@@ -188,7 +188,7 @@ fn time_of(stamp: Time, message: &Message) -> LogTime {
 mod tests {
     use super::*;
     use gridweave_runtime::message::{FixedText, MessageHeader};
-    use gridweave_runtime::ros::{PoseStamped, PoseWithCovariance, RosMessage, encode};
+    use gridweave_runtime::ros::{PoseStamped, RosMessage, encode};
     use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
     use serde::Serialize;
 
