@@ -19,6 +19,7 @@ definitions![
     "geometry_msgs/Pose",
     "geometry_msgs/PoseStamped",
     "geometry_msgs/PoseWithCovariance",
+    "geometry_msgs/PoseWithCovarianceStamped",
     "geometry_msgs/Quaternion",
     "geometry_msgs/Transform",
     "geometry_msgs/TransformStamped",

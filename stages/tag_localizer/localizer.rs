@@ -1,8 +1,10 @@
 //! The tags of one robot.
 
-use super::{GridSize, NoPose, PoseTrack, Posterior, Reading, ReadingGroups, RingProduct, TagLocalizerParameters};
+use super::{
+    GridSize, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups, RingProduct, TagLocalizerParameters,
+};
 use super::{TagMode, read_out};
-use crate::geometry::{Point2, Pose2};
+use crate::geometry::Point2;
 use gridweave_runtime::message::LogTime;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -38,7 +40,7 @@ struct RangeReading {
 #[derive(Clone, Debug)]
 struct Tag {
     /// Where the robot was at the first reading: the middle of the grid.
-    first_position: Point2,
+    first_place: Point2,
     groups: ReadingGroups,
     /// When, where and how far off the tag was heard last.
     last: (LogTime, Point2, f64),
@@ -80,9 +82,10 @@ impl TagLocalizer {
         Self { parameters, track: PoseTrack::default(), tags: BTreeMap::new(), pending: BTreeMap::new(), waited: 0 }
     }
 
-    /// Adds a pose, and the readings that waited for it. `false`, and it is left out, if it is older than the last one.
-    pub fn add_pose(&mut self, time: LogTime, pose: Pose2, mut problem: impl FnMut(ReadingProblem)) -> bool {
-        if !self.track.add(time, pose) {
+    /// Adds where the robot is, and the readings that waited for it. `false`, and it is left out, if it is older than the
+    /// last one.
+    pub fn add_pose(&mut self, time: LogTime, position: Position, mut problem: impl FnMut(ReadingProblem)) -> bool {
+        if !self.track.add(time, position) {
             return false;
         }
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.key().0 <= time) {
@@ -132,27 +135,27 @@ impl TagLocalizer {
             NoPose::TooOld => ReadingProblem::PoseTooOld,
         })?;
         let tag = self.tags.entry(tag_id).or_insert_with(|| Tag {
-            first_position: position,
+            first_place: position.place,
             groups: ReadingGroups::default(),
-            last: (time, position, range),
+            last: (time, position.place, range),
             changed: false,
             mode: None,
         });
         tag.groups.add(&Reading { position, range, stddev }, self.parameters.min_travel);
-        tag.last = (time, position, range);
+        tag.last = (time, position.place, range);
         tag.changed = true;
         Ok(())
     }
 
     /// Reads out the tags that are out of reach and have changed since their last read-out. Whether there were any.
     pub fn read_out_lost(&mut self) -> bool {
-        let (Some(time), Some(position)) = (self.track.latest_time(), self.track.latest_position()) else {
+        let (Some(time), Some(place)) = (self.track.latest_time(), self.track.latest_place()) else {
             return false;
         };
         let TagLocalizerParameters { timeout, reach, .. } = self.parameters;
-        self.read_out_if(|&(last_time, last_position, last_range)| {
+        self.read_out_if(|&(last_time, last_place, last_range)| {
             // By the triangle inequality the tag is at least this far away.
-            let distance = (position - last_position).norm() - last_range;
+            let distance = (place - last_place).norm() - last_range;
             let age = time.seconds_since(last_time);
             age > timeout || (distance > reach && age > LEAST_ABSENCE)
         })
@@ -187,8 +190,9 @@ impl Tag {
         let TagLocalizerParameters { pose_stddev, outlier_share, reach, resolution, readout, position_stddev, .. } =
             *parameters;
         let product = RingProduct::new(self.groups.rings(pose_stddev), outlier_share, reach);
-        let grid = GridSize { centre: self.first_position, cells: parameters.cells(), resolution };
+        let grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
         let mut mode = read_out(&Posterior::new(&product, grid)?, readout, parameters.window_cells())?;
+        mode.covariance += self.groups.shared_covariance(pose_stddev);
         for axis in 0..2 {
             mode.covariance[(axis, axis)] += position_stddev * position_stddev;
         }
@@ -199,12 +203,15 @@ impl Tag {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, Normal};
 
     const TAG: Point2 = Point2::new(1.2, 1.1);
+
+    fn position(x: f64, y: f64) -> Position {
+        Position::new(Point2::new(x, y))
+    }
 
     fn at(seconds: f64) -> LogTime {
         LogTime(1_000_000_000).plus_seconds(seconds)
@@ -217,7 +224,7 @@ mod tests {
         let mut localizer = TagLocalizer::new(parameters);
         for (step, (x, y)) in path.enumerate() {
             let time = at(0.1 * step as f64);
-            assert!(localizer.add_pose(time, pose(x, y, 0.0), |problem| panic!("{problem}")));
+            assert!(localizer.add_pose(time, position(x, y), |problem| panic!("{problem}")));
             let range = match random.random::<f64>() < outliers {
                 true => 0.1 + 2.8 * random.random::<f64>(),
                 false => (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random),
@@ -268,7 +275,7 @@ mod tests {
         let noise = Normal::new(0.0, 0.05).unwrap();
         for (step, (x, y)) in corner().enumerate() {
             let time = at(0.1 * step as f64);
-            localizer.add_pose(time, pose(x + 5e5, y - 4e6, 0.0), |problem| panic!("{problem}"));
+            localizer.add_pose(time, position(x + 5e5, y - 4e6), |problem| panic!("{problem}"));
             let _outlier: f64 = random.random();
             let range = (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random);
             localizer.add_reading(time, "tag", range, 0.05).unwrap();
@@ -283,18 +290,18 @@ mod tests {
     fn a_reading_between_two_poses_waits_for_the_second() {
         let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
         let ignore = |_| ();
-        localizer.add_pose(at(0.0), pose(0.0, 0.0, 0.0), ignore);
+        localizer.add_pose(at(0.0), position(0.0, 0.0), ignore);
         localizer.add_reading(at(0.25), "tag", 1.0, 0.05).unwrap();
         assert!(!localizer.read_out_all(), "it has no place yet");
-        localizer.add_pose(at(0.5), pose(1.0, 0.0, 0.0), ignore);
-        assert_eq!(localizer.tags["tag"].first_position, Point2::new(0.5, 0.0));
+        localizer.add_pose(at(0.5), position(1.0, 0.0), ignore);
+        assert_eq!(localizer.tags["tag"].first_place, Point2::new(0.5, 0.0));
         assert!(localizer.read_out_all());
     }
 
     #[test]
     fn a_standard_deviation_that_is_no_number_is_replaced() {
         let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
-        localizer.add_pose(at(0.0), pose(0.0, 0.0, 0.0), |_| ());
+        localizer.add_pose(at(0.0), position(0.0, 0.0), |_| ());
         for stddev in [f64::NAN, -1.0, 0.0, f64::INFINITY, 1e300] {
             localizer.add_reading(at(0.0), "tag", 1.0, stddev).unwrap();
         }

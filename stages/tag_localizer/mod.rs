@@ -8,10 +8,11 @@
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
 //! - [`Posterior`] holds the product on the grid. It looks at cells from coarse to fine and drops what cannot matter.
 //! - [`read_out`] finds the window, and the mode that it lies in.
-//! - [`PoseTrack`] tells where the robot was at the time of a reading.
+//! - [`PoseTrack`] tells where the robot was at the time of a reading, and how exactly that is known.
 
 mod localizer;
 mod parameters;
+mod pose_covariance;
 mod pose_track;
 mod posterior;
 mod read_out;
@@ -21,7 +22,8 @@ mod stage;
 
 pub use localizer::{ReadingProblem, TagLocalizer};
 pub use parameters::{Readout, TagLocalizerParameters};
-pub use pose_track::{NoPose, PoseTrack};
+pub use pose_covariance::{CovarianceProblem, largest_variance, position_covariance};
+pub use pose_track::{NoPose, PoseTrack, Position};
 pub use posterior::{GridSize, Leaf, Posterior};
 pub use read_out::{TagMode, read_out};
 pub use reading_groups::{Reading, ReadingGroups};

@@ -10,9 +10,9 @@ const NEGLIGIBLE: f64 = 20.0;
 const COARSEST: i32 = 5;
 /// A cell is split into parts of 2^-4 of its width at the most.
 const FINEST: i32 = -4;
-/// The probability is resolved when this many places hold it: then one is about 1.5 standard deviations wide, and
-/// sums over them are right to a thousandth.
-const RESOLVED: usize = 64;
+/// The probability is resolved when a place is at most so many standard deviations wide, taken across the mode, where it
+/// is narrowest: then sums over places are right to a hundredth.
+const RESOLVED: f64 = 2.0;
 
 /// Where a tag's square grid lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +56,13 @@ struct Node {
     row: usize,
 }
 
+/// The best place seen, with its log-likelihood.
+#[derive(Clone, Copy, Debug)]
+struct Summit {
+    place: Point2,
+    value: f64,
+}
+
 /// Nodes of one size.
 #[derive(Clone, Copy, Debug)]
 struct Level {
@@ -76,37 +83,27 @@ impl Posterior {
         }
         let mut level = Level { grid, level: COARSEST };
         let mut nodes = level.all();
-        let mut best = level.climb(product, &nodes)?;
+        let mut summit = level.climb(product, &nodes)?;
         loop {
             for node in &nodes {
-                if let Some(centre) = level.centre_on_grid(*node)
-                    && let Some(value) = product.log_likelihood(&centre, best)
+                if let Some(place) = level.centre_on_grid(*node)
+                    && let Some(value) = product.log_likelihood(&place, summit.value)
                 {
-                    best = value;
+                    summit = Summit { place, value };
                 }
             }
-            level.drop_negligible(&mut nodes, product, best);
+            level.drop_negligible(&mut nodes, product, summit.value);
             if level.level == 0 {
                 break;
             }
             (level, nodes) = level.halved(&nodes);
         }
-        // The summit may be sharper than a cell; of the leaves, only the best of their middles counts.
-        best = f64::NEG_INFINITY;
-        loop {
-            while nodes.len() < RESOLVED && level.level > FINEST {
-                (level, nodes) = level.halved(&nodes);
-            }
-            let mut leaves = level.leaves(product, &nodes, best);
-            best = leaves.iter().map(|leaf| leaf.mass).fold(best, f64::max);
-            leaves.retain(|leaf| leaf.mass >= best - NEGLIGIBLE);
-            // A spot that is very narrow lies in few of the parts.
-            if leaves.len() >= RESOLVED / 4 || level.level == FINEST {
-                return Self::normalised(grid, level.size(), leaves);
-            }
-            level.drop_negligible(&mut nodes, product, best);
+        let widest = RESOLVED * product.narrowest_stddev(&summit.place);
+        while level.size() > widest && level.level > FINEST {
             (level, nodes) = level.halved(&nodes);
+            level.drop_negligible(&mut nodes, product, summit.value);
         }
+        Self::normalised(grid, level.size(), level.leaves(product, &nodes))
     }
 
     /// Turns the log-likelihoods that the leaves carry into shares.
@@ -131,10 +128,10 @@ impl Level {
         self.grid.resolution * f64::from(self.level).exp2()
     }
 
-    /// The log-likelihood at a summit near the best of the nodes' centres, found by steps along the axes that are
+    /// The summit near the best of the nodes' centres, found by steps along the axes that are
     /// halved where none leads up. The better the best that is known, the more can be dropped while nodes are large.
     /// `None` if no centre lies on the grid.
-    fn climb(&self, product: &RingProduct, nodes: &[Node]) -> Option<f64> {
+    fn climb(&self, product: &RingProduct, nodes: &[Node]) -> Option<Summit> {
         let value_at = |place: &Point2| product.log_likelihood(place, f64::NEG_INFINITY);
         let centres = nodes.iter().filter_map(|node| self.centre_on_grid(*node));
         let values = centres.filter_map(|centre| Some((value_at(&centre)?, centre)));
@@ -152,7 +149,7 @@ impl Level {
                 _ => step /= 2.0,
             }
         }
-        Some(best)
+        Some(Summit { place, value: best })
     }
 
     /// Drops the nodes in which no place comes near the best.
@@ -162,15 +159,20 @@ impl Level {
         nodes.retain(|node| bound(node).is_some());
     }
 
-    /// The nodes near the best as leaves, which carry their log-likelihood.
-    fn leaves(&self, product: &RingProduct, nodes: &[Node], best: f64) -> Vec<Leaf> {
+    /// The nodes near the best of them as leaves, which carry their log-likelihood. The summit may be sharper than a node,
+    /// so that only their middles count.
+    fn leaves(&self, product: &RingProduct, nodes: &[Node]) -> Vec<Leaf> {
+        let mut best = f64::NEG_INFINITY;
         let leaf = |node: &Node| {
             let place = self.centre(*node);
             let mass = product.log_likelihood(&place, best - NEGLIGIBLE)?;
+            best = best.max(mass);
             let (column, row) = self.cell(*node);
             Some(Leaf { place, column, row, mass })
         };
-        nodes.iter().filter_map(leaf).collect()
+        let mut leaves: Vec<Leaf> = nodes.iter().filter_map(leaf).collect();
+        leaves.retain(|leaf| leaf.mass >= best - NEGLIGIBLE);
+        leaves
     }
 
     fn centre(&self, node: Node) -> Point2 {
@@ -288,6 +290,31 @@ mod tests {
         let mean =
             posterior.leaves.iter().fold(nalgebra::Vector2::zeros(), |sum, leaf| sum + leaf.place.coords * leaf.mass);
         assert!((mean - tag.coords).norm() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn a_mode_that_is_narrow_and_lies_across_the_raster_is_resolved() {
+        // Seen from far off, the mode is eight times as long as it is wide, and at 45 degrees to the raster.
+        let drive: Vec<_> =
+            (0..200).map(|step| 0.0314 * f64::from(step)).map(|a| (0.4 * a.cos(), 0.4 * a.sin())).collect();
+        for shift in [0.0, 0.007, 0.013] {
+            let tag = Point2::new(1.6 + shift, 1.6 - shift);
+            let product = product(tag, &drive, &[0.05, -0.05], 0.0);
+            let posterior = Posterior::new(&product, GRID).unwrap();
+            let mean = posterior.leaves.iter().map(|leaf| leaf.place.coords * leaf.mass).sum::<Vector2<f64>>();
+            let along = |direction: Vector2<f64>| -> f64 {
+                let square = |leaf: &Leaf| direction.dot(&(leaf.place.coords - mean)).powi(2) * leaf.mass;
+                posterior.leaves.iter().map(square).sum::<f64>().sqrt()
+            };
+            let (away, across) =
+                (along(Vector2::new(0.5f64.sqrt(), 0.5f64.sqrt())), along(Vector2::new(0.5f64.sqrt(), -0.5f64.sqrt())));
+            // By the Fisher information: 0.05 m / sqrt(200), and that over the spread of the directions.
+            let expected = 0.05 / 200f64.sqrt();
+            let spread = 0.4 / 2f64.sqrt() / tag.coords.norm();
+            assert!((away / expected - 1.0).abs() < 0.03, "{away} {expected}");
+            assert!((across / (expected / spread) - 1.0).abs() < 0.05, "{across} {}", expected / spread);
+            assert!((mean - tag.coords).norm() < 0.1 * expected / spread, "{mean}");
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Readings of one place, joined.
 
-use super::Ring;
+use super::{Position, Ring, largest_variance};
 use crate::geometry::Point2;
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 /// Two readings of one place belong together when they differ by less than this many standard deviations.
 const SAME_RANGE: f64 = 4.0;
@@ -10,8 +10,8 @@ const SAME_RANGE: f64 = 4.0;
 /// One range reading with the place it was taken at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Where the robot was, metres, map frame.
-    pub position: Point2,
+    /// Where the robot was.
+    pub position: Position,
     /// Distance to the tag, metres.
     pub range: f64,
     /// Standard deviation of the distance, metres.
@@ -38,6 +38,7 @@ struct Group {
     weight: f64,
     offset: Vector2<f64>,
     range: f64,
+    pose_covariance: Matrix2<f64>,
 }
 
 impl ReadingGroups {
@@ -46,12 +47,12 @@ impl ReadingGroups {
     pub fn add(&mut self, reading: &Reading, min_travel: f64) {
         self.readings = self.readings.saturating_add(1);
         let place = self.groups.get(self.here).map(|group| group.anchor);
-        if !place.is_some_and(|anchor| (reading.position - anchor).norm() < min_travel) {
+        if !place.is_some_and(|anchor| (reading.position.place - anchor).norm() < min_travel) {
             self.here = self.groups.len();
         }
-        let anchor = self.groups.get(self.here).map_or(reading.position, |group| group.anchor);
+        let anchor = self.groups.get(self.here).map_or(reading.position.place, |group| group.anchor);
         let weight = 1.0 / (reading.stddev * reading.stddev);
-        let offset = reading.position - anchor;
+        let offset = reading.position.place - anchor;
         let gate = SAME_RANGE * reading.stddev + offset.norm();
         let here = &mut self.groups[self.here..];
         match here.iter_mut().find(|group| (group.range / group.weight - reading.range).abs() < gate) {
@@ -59,9 +60,16 @@ impl ReadingGroups {
                 group.weight += weight;
                 group.offset += offset * weight;
                 group.range += reading.range * weight;
+                group.pose_covariance += reading.position.covariance * weight;
             }
             None => {
-                self.groups.push(Group { anchor, weight, offset: offset * weight, range: reading.range * weight });
+                self.groups.push(Group {
+                    anchor,
+                    weight,
+                    offset: offset * weight,
+                    range: reading.range * weight,
+                    pose_covariance: reading.position.covariance * weight,
+                });
             }
         }
     }
@@ -72,12 +80,41 @@ impl ReadingGroups {
     }
 
     /// One ring a group: variance of the mean range, and that of the pose.
+    ///
+    /// An error of the pose changes a distance by its part along the line to the tag. Where on the ring the tag is, and so
+    /// along which line, is what is asked for; and the mirror image lies along another. So the pose counts with its largest
+    /// variance, whatever the direction: that never claims too much, and at most twice the mean over all directions.
+    /// `pose_stddev`, metres, is the least that it counts with.
     pub fn rings(&self, pose_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
         self.groups.iter().map(move |group| Ring {
             centre: group.anchor + group.offset / group.weight,
             radius: group.range / group.weight,
-            variance: 1.0 / group.weight + pose_stddev * pose_stddev,
+            variance: group.variance(pose_stddev),
         })
+    }
+
+    /// The error that the poses may have in common, which moves the tag and which no number of places averages out:
+    /// their mean covariance, weighed by what each ring says, square metres. Zeros if it is not known.
+    ///
+    /// How much the errors of the poses have in common is not told. If it is all, the error of the tag is theirs; and
+    /// whatever it is, a mean of errors varies by no more than the mean of their variances.
+    pub fn shared_covariance(&self, pose_stddev: f64) -> Matrix2<f64> {
+        let mut sum = Matrix2::zeros();
+        let mut weights = 0.0;
+        for group in &self.groups {
+            let weight = 1.0 / group.variance(pose_stddev);
+            sum += group.pose_covariance * (weight / group.weight);
+            weights += weight;
+        }
+        if weights > 0.0 { sum / weights } else { sum }
+    }
+}
+
+impl Group {
+    /// Variance of the distance between the place and the tag, square metres.
+    fn variance(&self, pose_stddev: f64) -> f64 {
+        let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
+        1.0 / self.weight + pose_variance.max(pose_stddev * pose_stddev)
     }
 }
 
@@ -86,7 +123,7 @@ mod tests {
     use super::*;
 
     fn reading(x: f64, range: f64) -> Reading {
-        Reading { position: Point2::new(x, 5.0), range, stddev: 0.05 }
+        Reading { position: Position::new(Point2::new(x, 5.0)), range, stddev: 0.05 }
     }
 
     fn rings(readings: &[Reading], min_travel: f64, pose_stddev: f64) -> Vec<Ring> {

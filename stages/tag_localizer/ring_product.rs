@@ -1,6 +1,8 @@
 //! The product of the rings of one tag, as a function of the place.
 
+use super::largest_variance;
 use crate::geometry::Point2;
+use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
 /// So many factors are evaluated together, and multiplied before their logarithm is taken: fewer than underflow.
@@ -102,6 +104,25 @@ impl RingProduct {
             }
         }
         Some(sum)
+    }
+}
+
+impl RingProduct {
+    /// Standard deviation at a place of the tag along the direction in which the rings tell most, metres: from the Fisher
+    /// information of those that go through that place.
+    pub fn narrowest_stddev(&self, place: &Point2) -> f64 {
+        let mut information = Matrix2::zeros();
+        for block in &self.blocks {
+            let exponents = block.exponents(place, 0.0);
+            for lane in 0..LANES {
+                let offset = Vector2::new(place.x - block.x[lane], place.y - block.y[lane]);
+                let inlier = block.inlier_share[lane] * exp(exponents[lane]);
+                let share = if self.pure { 1.0 } else { inlier / (inlier + block.floor[lane]) };
+                let along = offset / offset.norm().max(f64::MIN_POSITIVE);
+                information += along * along.transpose() * (-2.0 * share * block.scale[lane]);
+            }
+        }
+        largest_variance(&information).sqrt().recip()
     }
 }
 

@@ -1,14 +1,25 @@
 //! The stage `tag_localizer`.
 
-use super::{TagLocalizer, TagLocalizerParameters};
+use super::{CovarianceProblem, Position, TagLocalizer, TagLocalizerParameters, position_covariance};
+use crate::geometry::Point2;
 use gridweave_runtime::message::{LogTime, Message};
-use gridweave_runtime::ros::{Header, PoseStamped, TagEstimate, TagEstimates, TagRange, Time};
+use gridweave_runtime::ros::{Header, Pose, PoseWithCovarianceStamped, TagEstimate, TagEstimates, TagRange, Time};
 use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 const POSE: usize = 0;
 const ESTIMATES: usize = 0;
+
+/// The beginning of a `PoseWithCovarianceStamped`: its header, the pose, and the first two rows of the covariance.
+/// A log holds tens of thousands of them, and nobody asks for the other rows.
+#[derive(Deserialize)]
+struct PoseStart {
+    header: Header,
+    pose: Pose,
+    covariance: [[f64; 6]; 2],
+}
 
 /// The stage kind `tag_localizer`.
 pub fn kind() -> StageKind {
@@ -17,7 +28,11 @@ pub fn kind() -> StageKind {
         "Locates radio tags in each robot's map from range readings (Tsardoulias et al., section 3). Sends all tags of a \
          robot whenever one of them gets out of reach, and at the end.",
         vec![
-            InputPort::one("pose", PortType::of::<PoseStamped>(), "poses of the robots in their maps"),
+            InputPort::one(
+                "pose",
+                PortType::of::<PoseWithCovarianceStamped>(),
+                "poses of the robots in their maps; a covariance of zeros is not known",
+            ),
             InputPort::one("tags", PortType::of::<TagRange>(), "range readings of tags"),
         ],
         vec![OutputPort::new(
@@ -36,6 +51,8 @@ struct TagLocalizerStage {
 
 struct Robot {
     localizer: TagLocalizer,
+    /// How far a tag can be heard, metres.
+    reach: f64,
     frame_id: Option<String>,
     sent: bool,
 }
@@ -49,7 +66,8 @@ impl Stage for TagLocalizerStage {
         }
         if !self.robots.contains_key(name) {
             let localizer = TagLocalizer::new(self.parameters.clone());
-            self.robots.insert(name.to_owned(), Robot { localizer, frame_id: None, sent: false });
+            let reach = self.parameters.reach;
+            self.robots.insert(name.to_owned(), Robot { localizer, reach, frame_id: None, sent: false });
         }
         match self.robots.get_mut(name) {
             Some(robot) if port == POSE => robot.receive_pose(name, message, output),
@@ -85,28 +103,39 @@ impl Stage for TagLocalizerStage {
 
 impl Robot {
     fn receive_pose(&mut self, name: &str, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let stamped: PoseStamped = match message.decode() {
-            Ok(stamped) => stamped,
+        let start: PoseStart = match message.decode() {
+            Ok(start) => start,
             Err(error) => {
                 output.warn(format!("poses that cannot be read are left out: {error}"));
                 return Ok(());
             }
         };
-        let frame_id = self.frame_id.get_or_insert_with(|| stamped.header.frame_id.clone());
-        if *frame_id != stamped.header.frame_id {
+        let frame_id = self.frame_id.get_or_insert_with(|| start.header.frame_id.clone());
+        if *frame_id != start.header.frame_id {
             output.warn(format!(
                 "poses of {name} in frame `{}` are left out, because its first pose is in frame `{frame_id}`",
-                stamped.header.frame_id
+                start.header.frame_id
             ));
             return Ok(());
         }
-        let pose = stamped.pose.planar();
-        if !pose.translation.vector.iter().all(|value| value.is_finite()) {
+        let place = Point2::new(start.pose.position.x, start.pose.position.y);
+        if !place.iter().all(|value| value.is_finite()) {
             output.warn("poses with a value that is no finite number are left out");
             return Ok(());
         }
-        let time = time_of(stamped.header.stamp, message);
-        if !self.localizer.add_pose(time, pose, |problem| output.warn(problem.to_string())) {
+        let (covariance, problem) = position_covariance(&start.covariance, self.reach);
+        match problem {
+            Some(CovarianceProblem::Impossible) => output.warn(format!(
+                "covariances of poses of {name} that are no covariances (not finite, or below 0) are taken as not known"
+            )),
+            Some(CovarianceProblem::Huge) => output.warn(format!(
+                "poses of {name} are known less exactly than `reach`: readings there say next to nothing"
+            )),
+            None => {}
+        }
+        let position = Position { place, covariance };
+        let time = time_of(start.header.stamp, message);
+        if !self.localizer.add_pose(time, position, |problem| output.warn(problem.to_string())) {
             output.warn("poses that are older than the one before are left out");
         }
         match self.localizer.read_out_lost() {
@@ -159,7 +188,7 @@ fn time_of(stamp: Time, message: &Message) -> LogTime {
 mod tests {
     use super::*;
     use gridweave_runtime::message::{FixedText, MessageHeader};
-    use gridweave_runtime::ros::{Pose, RosMessage, encode};
+    use gridweave_runtime::ros::{PoseStamped, RosMessage, encode};
     use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
     use serde::Serialize;
 
@@ -191,7 +220,8 @@ mod tests {
         fn pose(&mut self, seconds: f64, x: f64, y: f64) {
             self.seconds = seconds;
             let pose = Pose::from(nalgebra::Isometry2::translation(x, y));
-            self.send("robot1", POSE, &PoseStamped { header: Header::new(at(seconds), "robot1/map"), pose });
+            let stamped = PoseStamped { header: Header::new(at(seconds), "robot1/map"), pose };
+            self.send("robot1", POSE, &PoseWithCovarianceStamped::from(stamped));
         }
 
         fn reading(&mut self, seconds: f64, tag_id: &str, range: f64) {
@@ -349,7 +379,7 @@ mod tests {
     fn poses_in_another_frame_are_left_out() {
         let mut bench = Bench::new("min_readings = 1");
         bench.pose(0.0, 0.0, 0.0);
-        let odometry = PoseStamped { header: Header::new(at(0.1), "odom"), ..Default::default() };
+        let odometry = PoseWithCovarianceStamped { header: Header::new(at(0.1), "odom"), ..Default::default() };
         bench.send("robot1", POSE, &odometry);
         assert_eq!(bench.warnings().len(), 1);
         assert!(bench.warnings()[0].0.contains("`odom`"), "{:?}", bench.warnings());

@@ -81,7 +81,7 @@ impl RobotSurvey {
         let Some(info) = self.robots.get_mut(robot) else { return };
         match role {
             Role::Map => info.maps += 1,
-            Role::Pose | Role::PoseSource(_) => info.poses += 1,
+            Role::Pose(_) => info.poses += 1,
             Role::Tags => {
                 info.readings += 1;
                 match decode::<TagRangeStart>(data) {

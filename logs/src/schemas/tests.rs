@@ -127,9 +127,10 @@ fn a_grid_agrees_with_its_definition() {
     assert_eq!(read_by_schema(OccupancyGrid::NAME, &message), expected);
 }
 
-/// The Rust type holds the twist in parts, so that names differ; the values must come in the same order.
+/// The Rust types hold covariances as rows, and the twist in parts, so that names differ; the values must come in the same
+/// order.
 #[test]
-fn odometry_agrees_with_its_definition() {
+fn odometry_and_poses_with_covariance_agree_with_their_definitions() {
     fn numbers(value: &Value, into: &mut Vec<f64>) {
         match value {
             Value::Array(items) => items.iter().for_each(|item| numbers(item, into)),
@@ -146,10 +147,17 @@ fn odometry_agrees_with_its_definition() {
         twist_angular: Vector3 { x: 4.0, y: 5.0, z: 6.0 },
         twist_covariance: square(200),
     };
-    let (mut read, mut written) = (Vec::new(), Vec::new());
-    numbers(&read_by_schema(Odometry::NAME, &encode(&message).unwrap()), &mut read);
-    numbers(&serde_json::to_value(&message).unwrap(), &mut written);
-    assert_eq!(read, written);
+    let pose = PoseWithCovarianceStamped { header: header(), pose: message.pose };
+    for (name, bytes, value) in [
+        (Odometry::NAME, encode(&message).unwrap(), serde_json::to_value(&message).unwrap()),
+        (PoseWithCovarianceStamped::NAME, encode(&pose).unwrap(), serde_json::to_value(&pose).unwrap()),
+    ] {
+        let (mut read, mut written) = (Vec::new(), Vec::new());
+        numbers(&read_by_schema(name, &bytes), &mut read);
+        numbers(&value, &mut written);
+        assert_eq!(read, written, "{name}");
+        assert!(read.len() >= 45);
+    }
 }
 
 #[test]

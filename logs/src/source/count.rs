@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 pub(crate) struct RobotCount {
     /// Occupancy grids.
     pub(crate) maps: u64,
-    /// Poses, those that were made from other messages among them.
+    /// Poses, those that were made from transforms among them.
     pub(crate) poses: u64,
     /// Range readings of tags.
     pub(crate) readings: u64,

@@ -13,7 +13,7 @@ mod tests;
 pub(crate) use route::{Classified, Role, classify};
 pub use stage::McapSource;
 
-use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, TagRange};
+use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange};
 use gridweave_runtime::stage::{OutputPort, ParameterError, Parameters, PortType, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -64,14 +64,15 @@ pub fn kind() -> StageKind {
             OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, as they were logged"),
             OutputPort::new(
                 "pose",
-                PortType::of::<PoseStamped>(),
-                "the robots' poses: as they were logged, or made from odometry, poses with covariance, or tf",
+                PortType::of::<PoseWithCovarianceStamped>(),
+                "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
+                 covariance, odometry, or tf",
             ),
             OutputPort::new("tags", PortType::of::<TagRange>(), "range readings of tags, as they were logged"),
             OutputPort::new(
                 "other",
                 PortType::Any,
-                "all other messages, as they were logged, and those from which poses were made",
+                "all other messages, and those from which poses were made, as they were logged",
             ),
         ],
         McapSource::new,

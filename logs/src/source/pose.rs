@@ -1,8 +1,18 @@
-//! Poses from the other types that hold one.
+//! Poses from all types that hold one.
 
 use super::route::PoseSource;
-use gridweave_runtime::ros::{DecodeError, Header, Pose, PoseStamped, decode};
+use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
 use serde::Deserialize;
+use std::borrow::Cow;
+
+/// The four bytes that say which byte order the fields have. Fields are aligned from behind them.
+const ENCAPSULATION: usize = 4;
+/// Two parts of a time stamp and the length of the frame's name stand before that name.
+const BEFORE_FRAME: usize = 12;
+const ALIGNMENT: usize = 8;
+/// Three numbers of a position and four of an orientation.
+const POSE_SIZE: usize = 7 * 8;
+const COVARIANCE_SIZE: usize = 36 * 8;
 
 /// The fields of `nav_msgs/msg/Odometry` up to the pose.
 #[derive(Deserialize)]
@@ -10,22 +20,97 @@ struct OdometryStart {
     header: Header,
     #[serde(rename = "child_frame_id")]
     _child_frame_id: String,
-    pose: Pose,
+    pose: PoseWithCovariance,
 }
 
-/// The fields of `geometry_msgs/msg/PoseWithCovarianceStamped` up to the pose.
-#[derive(Deserialize)]
-struct PoseWithCovarianceStart {
-    header: Header,
-    pose: Pose,
-}
+/// A message could not be read as a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NoPose;
 
-/// The pose that an encoded message of the given type holds.
-pub(crate) fn to_pose_stamped(source: PoseSource, bytes: &[u8]) -> Result<PoseStamped, DecodeError> {
+/// The pose that an encoded message of the given type holds, encoded as [`PoseWithCovarianceStamped`]; its covariance is
+/// zeros where the type has none.
+pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<Cow<'_, [u8]>, NoPose> {
     match source {
-        PoseSource::Odometry => decode(bytes).map(|OdometryStart { header, pose, .. }| PoseStamped { header, pose }),
+        PoseSource::Pose => with_unknown_covariance(bytes).map(Cow::Owned).ok_or(NoPose),
         PoseSource::PoseWithCovariance => {
-            decode(bytes).map(|PoseWithCovarianceStart { header, pose }| PoseStamped { header, pose })
+            decode::<PoseWithCovarianceStamped>(bytes).map(|_| Cow::Borrowed(bytes)).map_err(|_| NoPose)
         }
+        PoseSource::Odometry => {
+            let OdometryStart { header, pose, .. } = decode(bytes).map_err(|_| NoPose)?;
+            encode(&PoseWithCovarianceStamped { header, pose }).map(Cow::Owned).map_err(|_| NoPose)
+        }
+    }
+}
+
+/// An encoded [`PoseStamped`] with a covariance of zeros behind it, which makes it a [`PoseWithCovarianceStamped`]: the
+/// one is the beginning of the other. There are tens of thousands of them in a log, and this is far quicker than to
+/// decode and encode each. `None` if the message is cut.
+fn with_unknown_covariance(bytes: &[u8]) -> Option<Vec<u8>> {
+    let length: [u8; 4] = bytes.get(ENCAPSULATION + BEFORE_FRAME - 4..ENCAPSULATION + BEFORE_FRAME)?.try_into().ok()?;
+    let length = match bytes[..2] {
+        [0, 0] => u32::from_be_bytes(length),
+        [0, 1] => u32::from_le_bytes(length),
+        _ => return None,
+    };
+    let before_pose = BEFORE_FRAME.checked_add(length as usize)?.checked_next_multiple_of(ALIGNMENT)?;
+    let pose = bytes.get(..ENCAPSULATION.checked_add(before_pose)?.checked_add(POSE_SIZE)?)?;
+    let mut with_covariance = Vec::with_capacity(pose.len() + COVARIANCE_SIZE);
+    with_covariance.extend_from_slice(pose);
+    with_covariance.resize(pose.len() + COVARIANCE_SIZE, 0);
+    Some(with_covariance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::message::LogTime;
+    use gridweave_runtime::ros::{Odometry, Point, Pose};
+
+    #[test]
+    fn a_pose_with_zeros_behind_it_is_a_pose_with_covariance() {
+        for length in 0..20 {
+            let header = Header::new(LogTime(123_456_789_012), "f".repeat(length));
+            let position = Point { x: 1.5, y: -2.5, z: 3.5 };
+            let stamped = PoseStamped { header, pose: Pose { position, ..Default::default() } };
+            let bytes = encode(&stamped).unwrap();
+            let made = pose_with_covariance(PoseSource::Pose, &bytes).unwrap();
+            assert_eq!(made, encode(&PoseWithCovarianceStamped::from(stamped)).unwrap());
+            let padded = [bytes.as_slice(), &[7; 4]].concat();
+            assert_eq!(pose_with_covariance(PoseSource::Pose, &padded).unwrap(), made, "what follows is left out");
+        }
+    }
+
+    #[test]
+    fn the_other_byte_order_is_kept() {
+        // A stamp of 1.2 s, the frame "m", and the numbers 1 to 7.
+        let mut bytes = vec![0, 0, 0, 0, 0, 0, 0, 1, 11, 235, 194, 0, 0, 0, 0, 2, b'm', 0, 0, 0];
+        (1..=7).for_each(|number| bytes.extend_from_slice(&f64::from(number).to_be_bytes()));
+        let made = pose_with_covariance(PoseSource::Pose, &bytes).unwrap();
+        let made: PoseWithCovarianceStamped = decode(&made).unwrap();
+        assert_eq!(made, decode::<PoseStamped>(&bytes).unwrap().into());
+        assert_eq!((made.header.frame_id.as_str(), made.pose.pose.position.y), ("m", 2.0));
+    }
+
+    #[test]
+    fn a_message_that_is_cut_is_no_pose() {
+        let pose = encode(&PoseStamped { header: Header::new(LogTime(1), "map"), ..Default::default() }).unwrap();
+        let with_covariance = encode(&PoseWithCovarianceStamped::default()).unwrap();
+        let odometry = encode(&Odometry::default()).unwrap();
+        // Behind the pose of odometry stand 6 + 36 numbers of its twist, which are not read.
+        for (source, bytes, least) in [
+            (PoseSource::Pose, &pose, pose.len()),
+            (PoseSource::PoseWithCovariance, &with_covariance, with_covariance.len()),
+            (PoseSource::Odometry, &odometry, odometry.len() - 42 * 8),
+        ] {
+            for length in 0..=bytes.len() {
+                let made = pose_with_covariance(source, &bytes[..length]);
+                assert_eq!(made.is_ok(), length >= least, "{source:?} {length}");
+            }
+        }
+        let mut endless = pose.clone();
+        endless[12..16].copy_from_slice(&[0xff; 4]);
+        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NoPose));
+        endless[0] = 9;
+        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NoPose));
     }
 }

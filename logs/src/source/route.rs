@@ -3,7 +3,9 @@
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
-use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TFMessage, TagRange};
+use gridweave_runtime::ros::{
+    OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TFMessage, TagRange,
+};
 use gridweave_runtime::stage::{RobotTopics, match_robot};
 
 /// What a channel carries.
@@ -12,9 +14,7 @@ pub(crate) enum Role {
     /// Occupancy grids of a robot.
     Map,
     /// Poses of a robot.
-    Pose,
-    /// Messages of another type from which poses of a robot are made.
-    PoseSource(PoseSource),
+    Pose(PoseSource),
     /// Tag readings of a robot.
     Tags,
     /// Transforms from which poses of robots are made.
@@ -26,6 +26,8 @@ pub(crate) enum Role {
 /// A type that holds a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PoseSource {
+    /// `geometry_msgs/msg/PoseStamped`.
+    Pose,
     /// `nav_msgs/msg/Odometry`.
     Odometry,
     /// `geometry_msgs/msg/PoseWithCovarianceStamped`.
@@ -89,9 +91,9 @@ fn role_of_map(type_name: &str) -> Option<Role> {
 
 fn role_of_pose(type_name: &str) -> Option<Role> {
     match type_name {
-        PoseStamped::NAME => Some(Role::Pose),
-        "nav_msgs/msg/Odometry" => Some(Role::PoseSource(PoseSource::Odometry)),
-        "geometry_msgs/msg/PoseWithCovarianceStamped" => Some(Role::PoseSource(PoseSource::PoseWithCovariance)),
+        PoseStamped::NAME => Some(Role::Pose(PoseSource::Pose)),
+        Odometry::NAME => Some(Role::Pose(PoseSource::Odometry)),
+        PoseWithCovarianceStamped::NAME => Some(Role::Pose(PoseSource::PoseWithCovariance)),
         _ => None,
     }
 }

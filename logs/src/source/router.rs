@@ -2,14 +2,14 @@
 
 use super::carry::{Carried, Carry, Latch};
 use super::count::{RobotCount, SourceCount};
-use super::pose::to_pose_stamped;
+use super::pose::{NoPose, pose_with_covariance};
 use super::route::{PoseSource, Role, classify};
 use super::{MAP, OTHER, POSE, TAGS};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
-use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
+use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -24,6 +24,8 @@ struct Route {
     latch: Latch,
     announced: bool,
     messages: u64,
+    /// How many of the messages hold no pose although their type has one.
+    unreadable: u64,
 }
 
 /// What a message is, besides its bytes.
@@ -42,8 +44,8 @@ pub(crate) struct Router {
     by_number: Vec<Vec<Option<usize>>>,
     by_channel: BTreeMap<Channel, usize>,
     tf: Option<TfPoses>,
-    /// How many poses were made from other messages, by robot.
-    poses_made: BTreeMap<String, u64>,
+    /// How many poses were made from transforms, by robot.
+    tf_poses: BTreeMap<String, u64>,
     bytes: u64,
 }
 
@@ -56,7 +58,7 @@ impl Router {
             files,
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
-            poses_made: BTreeMap::new(),
+            tf_poses: BTreeMap::new(),
             bytes: 0,
         }
     }
@@ -101,9 +103,8 @@ impl Router {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
         let port = match route.role {
             Role::Map => MAP,
-            Role::Pose => POSE,
             Role::Tags => TAGS,
-            Role::PoseSource(_) | Role::Tf | Role::Other => OTHER,
+            Role::Pose(_) | Role::Tf | Role::Other => OTHER,
         };
         if !route.announced {
             route.announced = true;
@@ -119,7 +120,7 @@ impl Router {
         };
         output.send_encoded(port, header, data)?;
         match route.role {
-            Role::PoseSource(source) => self.send_pose(index, source, data, output),
+            Role::Pose(source) => self.send_pose(index, source, data, output),
             Role::Tf => self.send_tf_poses(index, data, output),
             _ => Ok(()),
         }
@@ -132,13 +133,11 @@ impl Router {
         data: &[u8],
         output: &mut Output<'_>,
     ) -> Result<(), StageError> {
-        let Some(route) = self.routes.get(route).filter(|_| output.is_read(POSE)) else { return Ok(()) };
-        match to_pose_stamped(source, data) {
-            Ok(pose) => {
-                count(&mut self.poses_made, &route.robot);
-                output.send(POSE, &route.robot, &pose)
-            }
-            Err(_) => {
+        let Some(route) = self.routes.get_mut(route).filter(|_| output.is_read(POSE)) else { return Ok(()) };
+        match pose_with_covariance(source, data) {
+            Ok(pose) => output.send_bytes(POSE, &route.robot, &pose),
+            Err(NoPose) => {
+                route.unreadable += 1;
                 output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
                 Ok(())
             }
@@ -159,8 +158,8 @@ impl Router {
             output.warn("transforms with values that are not finite, or between a frame and itself");
         }
         for (robot, pose) in poses {
-            count(&mut self.poses_made, &robot);
-            output.send(POSE, &robot, &pose)?;
+            count(&mut self.tf_poses, &robot);
+            output.send(POSE, &robot, &PoseWithCovarianceStamped::from(pose))?;
         }
         Ok(())
     }
@@ -206,21 +205,23 @@ impl Router {
         let (role, robot) = (classified.role, classified.robot.to_owned());
         self.by_channel.insert(channel.clone(), index);
         let latch = Latch::of(&channel, role == Role::Map);
-        self.routes.push(Route { channel, role, robot, header, latch, announced: false, messages: 0 });
+        self.routes.push(Route { channel, role, robot, header, latch, announced: false, messages: 0, unreadable: 0 });
         Ok(index)
     }
 
     /// Warns of what the logs were expected to hold, and do not.
     pub(crate) fn warn_of_missing(&self, output: &mut Output<'_>) {
-        let routed = |role: Role| self.routes.iter().any(|route| route.role == role && route.messages > 0);
-        if output.is_read(MAP) && !routed(Role::Map) {
+        let routed = |role: fn(Role) -> bool| {
+            self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
+        };
+        if output.is_read(MAP) && !routed(|role| role == Role::Map) {
             let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
             let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
             let others =
                 if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
         }
-        if output.is_read(POSE) && !routed(Role::Pose) && self.poses_made.is_empty() {
+        if output.is_read(POSE) && !routed(|role| matches!(role, Role::Pose(_))) && self.tf_poses.is_empty() {
             match &self.robots.tf {
                 Some(frames) => output.warn(format!(
                     "no pose was found: tf never ties `{}` to `{}`",
@@ -229,7 +230,7 @@ impl Router {
                 None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
             }
         }
-        if output.is_read(TAGS) && !routed(Role::Tags) {
+        if output.is_read(TAGS) && !routed(|role| role == Role::Tags) {
             output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
         }
         if let Some(tf) = self.tf.as_ref().filter(|_| output.is_read(POSE)) {
@@ -242,7 +243,7 @@ impl Router {
     /// What was sent.
     pub(crate) fn count(&self) -> SourceCount {
         let mut robots: BTreeMap<String, RobotCount> = BTreeMap::new();
-        for (robot, &poses) in &self.poses_made {
+        for (robot, &poses) in &self.tf_poses {
             robots.entry(robot.clone()).or_default().poses += poses;
         }
         for route in &self.routes {
@@ -252,9 +253,9 @@ impl Router {
             };
             match route.role {
                 Role::Map => robot.maps += route.messages,
-                Role::Pose => robot.poses += route.messages,
+                Role::Pose(_) => robot.poses += route.messages - route.unreadable,
                 Role::Tags => robot.readings += route.messages,
-                Role::PoseSource(_) | Role::Tf | Role::Other => {}
+                Role::Tf | Role::Other => {}
             }
         }
         SourceCount {

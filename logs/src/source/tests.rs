@@ -3,7 +3,7 @@ use crate::schemas::full_type_name;
 use crate::test_log::{Folder, TestLog, layouts};
 use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{
-    Header, MapMetaData, Odometry, Pose, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
+    Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
 use gridweave_runtime::stage::{
     CollectedOutputs, Context, Node, Output, OutputSink, RobotTopics, Sent, Source, StageError, TfFrames,
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 const ODOMETRY: &str = Odometry::NAME;
-const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
+const POSE_WITH_COVARIANCE: &str = PoseWithCovarianceStamped::NAME;
 
 /// What was sent: the port, the header and the bytes.
 type Sending = (usize, MessageHeader, Vec<u8>);
@@ -127,22 +127,26 @@ fn each_message_comes_on_its_port_as_it_was_logged() {
             .raw("/robot1/scan", "sensor_msgs/msg/LaserScan", 13, b"scan");
     });
     let run = run(files);
+    let mut announced = BTreeMap::<usize, Vec<_>>::new();
     for (port, robot, topic, number) in [
         (MAP, "robot1", "/robot1/map", 1),
-        (POSE, "robot1", "/robot1/pose", 2),
+        (OTHER, "robot1", "/robot1/pose", 2),
         (TAGS, "robot2", "/robot2/tag_ranges", 3),
         (OTHER, "", "/robot1/scan", 4),
     ] {
+        let announced = announced.entry(port).or_default();
         let messages = run.on(port);
-        let header = messages[0].header();
-        assert_eq!(messages.len(), 1);
-        assert_eq!((messages[0].robot(), header.topic.as_str(), header.channel), (robot, topic, number));
-        assert_eq!((header.log_time.0, header.publish_time), (10 + port as u64, 9 + port as u64));
-        assert_eq!(header.log_sequence, number);
-        assert_eq!(run.announced(port), [(number, topic.to_owned())]);
+        let header = messages[announced.len()].header();
+        assert_eq!((messages[announced.len()].robot(), header.topic.as_str()), (robot, topic));
+        assert_eq!((header.channel, header.log_sequence), (number, number));
+        assert_eq!((header.log_time.0, header.publish_time), (9 + u64::from(number), 8 + u64::from(number)));
+        announced.push((number, topic.to_owned()));
+    }
+    for (port, announced) in announced {
+        assert_eq!((run.announced(port), run.on(port).len()), (announced.clone(), announced.len()));
     }
     assert_eq!(run.on(MAP)[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
-    assert_eq!(run.on(OTHER)[0].bytes(), b"scan");
+    assert_eq!(run.on(OTHER)[1].bytes(), b"scan");
     assert_eq!(run.report["messages"], 4);
     assert_eq!(run.report["robots"]["robot1"], serde_json::json!({ "maps": 1, "poses": 1, "readings": 0 }));
     assert!(run.warnings.is_empty(), "{:?}", run.warnings);
@@ -166,30 +170,48 @@ fn a_channel_is_announced_before_its_first_message_and_shared_between_files() {
 }
 
 #[test]
-fn odometry_and_poses_with_covariance_are_made_poses_and_kept() {
+fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
+    let covariance = std::array::from_fn(|row| std::array::from_fn(|column| (10 * row + column) as f64));
     let odometry = Odometry {
         header: Header::new(LogTime(7), "odom"),
         child_frame_id: "base".into(),
-        pose: PoseWithCovariance { pose: at(3.0), ..Default::default() },
+        pose: PoseWithCovariance { pose: at(3.0), covariance },
         ..Default::default()
     };
-    let with_covariance = (Header::new(LogTime(8), "map"), PoseWithCovariance { pose: at(4.0), ..Default::default() });
+    let with_covariance = PoseWithCovarianceStamped {
+        header: Header::new(LogTime(8), "map"),
+        pose: PoseWithCovariance { pose: at(4.0), covariance },
+    };
+    let without = PoseStamped { header: Header::new(LogTime(9), "map"), pose: at(5.0) };
     let (_folder, files) = write(|log| {
         log.add("/robot1/pose", ODOMETRY, 10, &odometry)
             .add("/robot2/pose", POSE_WITH_COVARIANCE, 11, &with_covariance)
-            .raw("/robot1/pose", ODOMETRY, 12, b"cut");
+            .raw("/robot1/pose", ODOMETRY, 12, b"cut")
+            .add("/robot3/pose", PoseStamped::NAME, 13, &without)
+            .raw("/robot3/pose", PoseStamped::NAME, 14, b"cut");
     });
     let run = run(files);
-    let poses: Vec<PoseStamped> = run.on(POSE).iter().map(|message| message.decode().unwrap()).collect();
-    assert_eq!(poses[0], PoseStamped { header: odometry.header.clone(), pose: at(3.0) });
-    assert_eq!(poses[1], PoseStamped { header: with_covariance.0.clone(), pose: at(4.0) });
+    let poses: Vec<PoseWithCovarianceStamped> = run.on(POSE).iter().map(|message| message.decode().unwrap()).collect();
+    assert_eq!(poses[0], PoseWithCovarianceStamped { header: odometry.header.clone(), pose: odometry.pose });
+    assert_eq!(poses[1], with_covariance);
+    assert_eq!((poses[2].header.clone(), poses[2].pose.pose), (without.header.clone(), without.pose));
+    assert_eq!((poses.len(), poses[2].pose.covariance), (3, [[0.0; 6]; 6]));
     let header = *run.on(POSE)[0].header();
     assert_eq!((header.channel, header.topic.as_str(), header.robot.as_str()), (0, "/robot1/log/pose", "robot1"));
     assert_eq!(header.log_time.0, 10);
     assert!(run.announced(POSE).is_empty(), "what was made here was not logged");
-    assert_eq!(run.times(OTHER), [10, 11, 12], "what it was made of goes on");
+    assert_eq!(run.times(OTHER), [10, 11, 12, 13, 14], "what they were made of goes on");
     assert_eq!(run.on(OTHER)[0].decode::<Odometry>().unwrap(), odometry);
-    assert!(run.warnings.keys().any(|warning| warning.contains("could not be read as a pose")));
+    assert_eq!(run.on(OTHER)[3].decode::<PoseStamped>().unwrap(), without);
+    assert_eq!(
+        run.announced(OTHER).iter().map(|(_, topic)| topic.as_str()).collect::<Vec<_>>(),
+        ["/robot1/pose", "/robot2/pose", "/robot3/pose"]
+    );
+    for robot in ["robot1", "robot2", "robot3"] {
+        assert_eq!(run.report["robots"][robot]["poses"], 1, "those that could not be read do not count");
+        let warning = format!("messages on `/{robot}/pose` could not be read as a pose");
+        assert_eq!(run.warnings.contains_key(&warning), robot != "robot2");
+    }
 }
 
 #[test]
@@ -236,7 +258,7 @@ fn tf_gives_poses_and_goes_on_as_it_is() {
     let run = try_run(parameters.clone(), robots).unwrap();
     let poses: Vec<_> = run.on(POSE).iter().map(|message| message.robot().to_owned()).collect();
     assert_eq!(poses, ["robot1", "robot2"]);
-    assert_eq!(run.on(POSE)[1].decode::<PoseStamped>().unwrap().header.frame_id, "robot2/map");
+    assert_eq!(run.on(POSE)[1].decode::<PoseWithCovarianceStamped>().unwrap().header.frame_id, "robot2/map");
     assert_eq!(run.times(OTHER), [1, 2, 3, 4, 5]);
     assert_eq!(run.report["robots"]["robot2"]["poses"], 1);
     assert_eq!(run.warnings.len(), 4, "not finite, not readable, no map, no tags: {:?}", run.warnings);

@@ -98,6 +98,25 @@ pub struct PoseWithCovariance {
     pub covariance: [[f64; 6]; 6],
 }
 
+/// `geometry_msgs/msg/PoseWithCovarianceStamped`. A covariance of zeros alone says that it is not known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct PoseWithCovarianceStamped {
+    pub header: Header,
+    pub pose: PoseWithCovariance,
+}
+
+impl RosMessage for PoseWithCovarianceStamped {
+    const NAME: &'static str = "geometry_msgs/msg/PoseWithCovarianceStamped";
+}
+
+impl From<PoseStamped> for PoseWithCovarianceStamped {
+    /// The pose with a covariance that is not known.
+    fn from(PoseStamped { header, pose }: PoseStamped) -> Self {
+        Self { header, pose: PoseWithCovariance { pose, ..Default::default() } }
+    }
+}
+
 /// `geometry_msgs/msg/Transform`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]

@@ -12,7 +12,8 @@ mod std_msgs;
 
 pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
 pub use geometry::{
-    Point, Pose, PoseStamped, PoseWithCovariance, Quaternion, TFMessage, Transform, TransformStamped, Vector3,
+    Point, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, TFMessage, Transform,
+    TransformStamped, Vector3,
 };
 pub use gridweave::{
     Alignment, CommonTag, CommonTags, MapDirection, RobotFrame, RobotFrames, Segment, Segments, TagEstimate,

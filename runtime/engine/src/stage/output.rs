@@ -96,8 +96,13 @@ impl<'a> Output<'a> {
     /// Sends a message about `robot` (empty: about none in particular).
     pub fn send<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Result<(), StageError> {
         let bytes = ros::encode(message).map_err(|error| StageError::new(format!("send a {}", T::NAME), error))?;
+        self.send_bytes(port, robot, &bytes)
+    }
+
+    /// Sends a message about `robot` that is encoded already.
+    pub fn send_bytes(&mut self, port: usize, robot: &str, bytes: &[u8]) -> Result<(), StageError> {
         let header = self.header(port, robot, bytes.len())?;
-        self.send_encoded(port, header, &bytes)
+        self.send_encoded(port, header, bytes)
     }
 
     /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. The
