@@ -4,7 +4,9 @@
 use gridweave_logs::schemas::schema_text;
 use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::message::{Channel, LogTime};
-use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, Pose, PoseStamped, RosMessage, TagRange, encode};
+use gridweave_runtime::ros::{
+    Header, MapMetaData, OccupancyGrid, Pose, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange, encode,
+};
 use mcap::records::MessageHeader;
 use nalgebra::{Isometry2, Vector2};
 use serde::Serialize;
@@ -66,6 +68,15 @@ impl LogBuilder {
         let header = header(seconds, format!("{robot}/map"));
         let pose = Pose::from(Isometry2::new(Vector2::new(x, y), 0.0));
         self.message(seconds, &format!("/{robot}/pose"), &PoseStamped { header, pose })
+    }
+
+    /// A pose whose position is known to so many metres; 0 if that is not known.
+    pub fn uncertain_pose(&mut self, seconds: f64, robot: &str, x: f64, y: f64, deviation: f64) -> &mut Self {
+        let header = header(seconds, format!("{robot}/map"));
+        let pose = Pose::from(Isometry2::new(Vector2::new(x, y), 0.0));
+        let mut message = PoseWithCovarianceStamped::from(PoseStamped { header, pose });
+        (message.pose.covariance[0][0], message.pose.covariance[1][1]) = (deviation.powi(2), deviation.powi(2));
+        self.message(seconds, &format!("/{robot}/pose"), &message)
     }
 
     pub fn reading(&mut self, seconds: f64, robot: &str, tag: &str, range: f64) -> &mut Self {

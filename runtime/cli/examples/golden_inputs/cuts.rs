@@ -4,6 +4,7 @@ use crate::cases::log_builder::LogBuilder;
 use crate::cases::messages;
 use gridweave_runtime::engine::{EngineKind, run};
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
+use gridweave_runtime::ros::{PoseStamped, PoseWithCovarianceStamped, RosMessage, decode};
 use gridweave_runtime::stage::{Registry, match_robot};
 use std::path::{Path, PathBuf};
 
@@ -82,8 +83,18 @@ impl Merge {
         let start = messages.first().expect("the merge has messages").log_time;
         for message in messages.iter().filter(|message| kept(&message.topic)) {
             let seconds = (message.log_time - start) as f64 * 1e-9;
-            if seconds <= cut.seconds {
-                log.raw(seconds, &message.topic, &message.type_name, &message.data);
+            if seconds > cut.seconds {
+                continue;
+            }
+            match message.type_name.as_str() {
+                // The source makes every pose one with a covariance before it hands it on.
+                PoseStamped::NAME => {
+                    let pose: PoseStamped = decode(&message.data).unwrap();
+                    log.message(seconds, &message.topic, &PoseWithCovarianceStamped::from(pose));
+                }
+                other => {
+                    log.raw(seconds, &message.topic, other, &message.data);
+                }
             }
         }
         log.finish();

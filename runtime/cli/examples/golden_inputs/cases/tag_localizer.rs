@@ -2,7 +2,7 @@
 
 use super::Case;
 use super::log_builder::{LogBuilder, header};
-use gridweave_runtime::ros::{Pose, PoseStamped, TagRange};
+use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagRange};
 use gridweave_stages::geometry::{Point2, pose};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -35,6 +35,9 @@ pub(super) fn cases() -> Vec<Case> {
         case("outliers", |log| {
             Drive { outliers: 0.2, ..Drive::past("tag", TAG) }.along(log, "robot1", circle(150));
         }),
+        case("uncertain_poses", |log| {
+            Drive { deviation: 0.3, ..Drive::past("tag", TAG) }.along(log, "robot1", circle(100));
+        }),
         case("out_of_reach", out_of_reach),
         case("before_the_first_pose", before_the_first_pose),
         case("poses_missing", poses_missing),
@@ -63,13 +66,15 @@ struct Drive {
     noise: f64,
     /// Share of the readings that say any range.
     outliers: f64,
+    /// What the poses claim to be known to, metres; 0 if they claim nothing.
+    deviation: f64,
     /// When it begins, seconds.
     start: f64,
 }
 
 impl Drive {
     fn past(id: &'static str, place: Point2) -> Self {
-        Self { tags: vec![(id, place)], noise: NOISE, outliers: 0.0, start: 1.0 }
+        Self { tags: vec![(id, place)], noise: NOISE, outliers: 0.0, deviation: 0.0, start: 1.0 }
     }
 
     /// The same without noise.
@@ -83,7 +88,7 @@ impl Drive {
         let noise = Normal::new(0.0, self.noise).unwrap();
         for (tick, place) in path.enumerate() {
             let seconds = self.start + TICK * tick as f64;
-            log.pose(seconds, robot, place.x, place.y);
+            log.uncertain_pose(seconds, robot, place.x, place.y, self.deviation);
             for (id, tag) in &self.tags {
                 let is_outlier = random.random::<f64>() < self.outliers;
                 let (any, error) = (0.1 + 2.8 * random.random::<f64>(), noise.sample(&mut random));
@@ -118,7 +123,7 @@ fn poses_missing(log: &mut LogBuilder) {
     for (tick, place) in circle(100).enumerate() {
         let seconds = 1.0 + TICK * tick as f64;
         if !(40..60).contains(&tick) && tick % 2 == 0 && tick < 98 {
-            log.pose(seconds, "robot1", place.x, place.y);
+            log.uncertain_pose(seconds, "robot1", place.x, place.y, 0.0);
         }
         log.reading(seconds, "robot1", "tag", (TAG - place).norm());
     }
@@ -133,8 +138,10 @@ fn no_readings(log: &mut LogBuilder) {
         range_stddev,
         rssi: -50.0,
     };
-    let pose_in =
-        |seconds, frame: &str, x| PoseStamped { header: header(seconds, frame), pose: Pose::from(pose(x, 0.0, 0.0)) };
+    let pose_in = |seconds, frame: &str, x| {
+        let (header, pose) = (header(seconds, frame), Pose::from(pose(x, 0.0, 0.0)));
+        PoseWithCovarianceStamped::from(PoseStamped { header, pose })
+    };
     Drive::past("tag", TAG).along(log, "robot1", circle(60));
     let (poses, readings) = ("/robot1/pose", "/robot1/tag_ranges");
     for (tick, range) in [f64::NAN, f64::INFINITY, 0.0, -1.0, 4.0].into_iter().enumerate() {
@@ -147,10 +154,10 @@ fn no_readings(log: &mut LogBuilder) {
     log.message(7.5, poses, &pose_in(7.5, "robot1/odom", 0.0));
     log.message(7.6, poses, &pose_in(6.0, "robot1/map", 0.0));
     // A standard deviation that is none is replaced.
-    log.pose(7.65, "robot1", 0.0, 0.0);
+    log.uncertain_pose(7.65, "robot1", 0.0, 0.0, 0.0);
     for (tick, stddev) in [f64::NAN, -1.0, 0.0, 1e9].into_iter().enumerate() {
         let seconds = 7.7 + 0.01 * tick as f64;
         log.message(seconds, readings, &reading(seconds, "tag", (TAG.coords).norm(), stddev));
     }
-    log.pose(7.8, "robot1", 0.0, 0.0);
+    log.uncertain_pose(7.8, "robot1", 0.0, 0.0, 0.0);
 }
