@@ -102,6 +102,11 @@ pub struct QuadrantClassifierParameters {
     /// Directions contradict the tags when the two rotations differ by more than three joint standard deviations and
     /// this angle, radians.
     pub contradiction_angle: f64,
+    /// Two common tags, or more of which it may be chance that they agree, count only where the directions of both maps
+    /// do not contradict them, and could have: where the bound on the difference of the two rotations (see
+    /// `contradiction_angle`) is at most this angle, radians. The next quarter turn then is dozens of standard
+    /// deviations away.
+    pub max_confirming_angle: f64,
     /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
@@ -126,6 +131,7 @@ impl Default for QuadrantClassifierParameters {
             tag_deviation: 0.03,
             max_tag_rotation_deviation: 0.2,
             contradiction_angle: 0.01,
+            max_confirming_angle: 0.12,
             max_residual: 0.5,
             resend_distance: 0.001,
             resend_angle: 0.0001,
@@ -155,6 +161,7 @@ impl Parameters for QuadrantClassifierParameters {
         for (field, value) in [
             ("min_deviation", self.min_deviation),
             ("contradiction_angle", self.contradiction_angle),
+            ("max_confirming_angle", self.max_confirming_angle),
             ("resend_angle", self.resend_angle),
         ] {
             require(not_below_zero(value), field, "must be a number of 0 rad or more");
@@ -190,11 +197,12 @@ mod tests {
             tag_deviation: f64::INFINITY,
             max_tag_rotation_deviation: 1.0,
             contradiction_angle: -0.1,
+            max_confirming_angle: -0.1,
             max_residual: 0.0,
             resend_distance: -0.1,
             resend_angle: f64::NAN,
             ..Default::default()
         };
-        assert_eq!(parameters.check().len(), 11);
+        assert_eq!(parameters.check().len(), 12);
     }
 }
