@@ -108,6 +108,12 @@ pub fn solve(
 
 /// The transform of an alignment with the floors added, or why it cannot be used.
 fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<UncertainPose, String> {
+    if alignment.provisional {
+        return Err(format!(
+            "it is provisional, and no stage between has confirmed it by the walls of the maps, as icp_refiner does ({})",
+            alignment.reason
+        ));
+    }
     let values = [alignment.x, alignment.y, alignment.yaw].into_iter().chain(alignment.covariance);
     if !values.into_iter().all(|value| value.abs() < ABSURD) {
         return Err("its transform or covariance holds a value that is no finite number or absurdly large".into());

@@ -97,6 +97,19 @@ fn between(a: usize, b: usize) -> Alignment {
 }
 
 #[test]
+fn a_provisional_alignment_is_left_out() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    run.align(&Alignment { provisional: true, reason: "2 tags only".into(), ..between(1, 2) });
+    assert_eq!(run.pose_of("robot2"), None);
+    let reason = run.reason("robot2");
+    assert!(reason.contains("provisional") && reason.contains("2 tags only"), "{reason}");
+    run.align(&between(1, 2));
+    assert!(run.pose_of("robot2").is_some());
+}
+
+#[test]
 fn the_reference_is_exactly_at_the_origin() {
     let mut run = Run::new(None);
     run.map("robot1", "map");

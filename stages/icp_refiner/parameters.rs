@@ -78,6 +78,18 @@ pub struct IcpParameters {
     /// free space in the other. On maps of six buildings that were drawn from laser scans, and where the two bounds above
     /// are met, right alignments have 0.89 to 0.99, and the best of 17,000 registrations from wrong starts has 0.66.
     pub min_wall_agreement: f64,
+    /// The least area that both maps know where the first guess is provisional (it rests on two tags, say), square metres.
+    pub provisional_overlap: f64,
+    /// The least length of wall on which the maps agree where the first guess is provisional, metres.
+    pub provisional_wall_length: f64,
+    /// The least share of the walls seen by both maps on which they agree where the first guess is provisional, 0 to 1.
+    pub provisional_wall_agreement: f64,
+    /// Where the first guess is provisional, map b is also laid elsewhere: turned by quarter turns, and moved by up to this
+    /// many metres. 0 only turns it.
+    pub rival_reach: f64,
+    /// At each of these other places the share of the walls that agree must be less than at the refined one by this,
+    /// 0 to 1.
+    pub rival_margin: f64,
     /// The greatest standard deviation of the position in the common section, in any direction, metres.
     pub max_position_deviation: f64,
     /// The greatest standard deviation of the rotation, radians.
@@ -113,10 +125,27 @@ impl Default for IcpParameters {
             min_overlap: 40.0,
             min_wall_length: 25.0,
             min_wall_agreement: 0.8,
+            provisional_overlap: 80.0,
+            provisional_wall_length: 50.0,
+            provisional_wall_agreement: 0.9,
+            rival_reach: 4.0,
+            rival_margin: 0.15,
             max_position_deviation: 0.2,
             max_yaw_deviation: 0.02,
             reuse_within: 0.05,
             reuse_within_yaw: 0.01,
+        }
+    }
+}
+
+impl IcpParameters {
+    /// The same with what a provisional first guess must meet, for what any first guess must meet.
+    pub(super) fn for_provisional(&self) -> Self {
+        Self {
+            min_overlap: self.min_overlap.max(self.provisional_overlap),
+            min_wall_length: self.min_wall_length.max(self.provisional_wall_length),
+            min_wall_agreement: self.min_wall_agreement.max(self.provisional_wall_agreement),
+            ..self.clone()
         }
     }
 }
@@ -147,6 +176,9 @@ impl Parameters for IcpParameters {
         let not_negative = [
             ("min_overlap", self.min_overlap),
             ("min_wall_length", self.min_wall_length),
+            ("provisional_overlap", self.provisional_overlap),
+            ("provisional_wall_length", self.provisional_wall_length),
+            ("rival_reach", self.rival_reach),
             ("reuse_within", self.reuse_within),
             ("reuse_within_yaw", self.reuse_within_yaw),
         ];
@@ -161,9 +193,15 @@ impl Parameters for IcpParameters {
         if !(self.shrink > 0.0 && self.shrink < 1.0) {
             errors.push(ParameterError::new("shrink", format!("must lie between 0 and 1, not {}", self.shrink)));
         }
-        if !(0.0..=1.0).contains(&self.min_wall_agreement) {
-            let problem = format!("must lie between 0 and 1, not {}", self.min_wall_agreement);
-            errors.push(ParameterError::new("min_wall_agreement", problem));
+        let shares = [
+            ("min_wall_agreement", self.min_wall_agreement),
+            ("provisional_wall_agreement", self.provisional_wall_agreement),
+            ("rival_margin", self.rival_margin),
+        ];
+        for (field, value) in shares {
+            if !(0.0..=1.0).contains(&value) {
+                errors.push(ParameterError::new(field, format!("must lie between 0 and 1, not {value}")));
+            }
         }
         for (field, value) in [("max_iterations", self.max_iterations), ("coarse_points", self.coarse_points)] {
             if value == 0 {

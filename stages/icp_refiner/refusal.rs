@@ -1,6 +1,6 @@
 //! Why a refined alignment may not be used.
 
-use super::{Agreement, IcpParameters, Registration};
+use super::{Agreement, IcpParameters, Registration, Rival};
 use nalgebra::{Matrix2, SymmetricEigen};
 
 /// More steps than the main axes of two numbers ever take.
@@ -75,6 +75,26 @@ pub enum Refusal {
         /// What is allowed, metres.
         most: f64,
     },
+    /// The first guess is provisional, and the maps fit elsewhere nearly as well.
+    #[error(
+        "{:.0} % of the walls agree, but {:.0} % do with the map moved by {shift:.1} m and turned by {turn:.0} degrees, and \
+         at least {:.0} % less are needed: it cannot be told which is right",
+        share * 100.0,
+        rival * 100.0,
+        margin * 100.0
+    )]
+    Rival {
+        /// The share of the walls that agree, 0 to 1.
+        share: f64,
+        /// The share that agrees elsewhere, 0 to 1.
+        rival: f64,
+        /// How far elsewhere is, metres.
+        shift: f64,
+        /// How much the map is turned there, degrees.
+        turn: f64,
+        /// By how much the share must be less, 0 to 1.
+        margin: f64,
+    },
     /// The rotation is open.
     #[error("the maps leave the rotation open: it is known to {deviation:.1} degrees, and {most:.1} are allowed")]
     OpenRotation {
@@ -115,6 +135,21 @@ impl Refusal {
         } else {
             None
         }
+    }
+}
+
+impl Refusal {
+    /// The reason against a provisional alignment that a rival gives, if it comes near.
+    pub(super) fn by_rival(agreement: &Agreement, rival: &Rival, parameters: &IcpParameters) -> Option<Self> {
+        let (share, margin) = (agreement.wall_agreement(), parameters.rival_margin);
+        let is_clear = share - rival.agreement.wall_agreement() >= margin;
+        (!is_clear).then(|| Self::Rival {
+            share,
+            rival: rival.agreement.wall_agreement(),
+            shift: rival.shift,
+            turn: rival.turn.to_degrees(),
+            margin,
+        })
     }
 }
 

@@ -45,19 +45,12 @@ pub struct Registration {
 /// of them to a wall goes on.
 pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
-    let stride = b.walls.points().len().div_ceil(parameters.coarse_points.max(1)).max(1);
+    let stride = coarse_stride(b, parameters);
     let mut best: Option<(f64, Pose2)> = None;
     let mut iterations = 0;
     for start in starts(&mut iteration, first_guess, stride, parameters) {
-        let mut transform_a_b = start;
-        let mut distance = parameters.max_distance;
-        iterations = 0;
-        while distance > parameters.min_distance {
-            let Some(change) = iteration.run(&transform_a_b, distance, stride) else { break };
-            transform_a_b = change.transform_a_b;
-            distance *= parameters.shrink;
-            iterations += 1;
-        }
+        let transform_a_b;
+        (transform_a_b, iterations) = draw_near(&mut iteration, start, stride, parameters);
         let matched = iteration.matched(&transform_a_b, stride);
         if best.is_none_or(|(most, _)| matched > most) {
             best = Some((matched, transform_a_b));
@@ -91,6 +84,30 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
         centre_covariance: metres_to_radians * state.covariance * metres_to_radians,
         step: first_guess.distance(&transform_a_b, &frame, parameters),
     }
+}
+
+/// Registers roughly, to within the cells of the maps: a sample of the points of map b, from the first guess only.
+pub(super) fn approach(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Pose2 {
+    let mut iteration = Iteration::new(a, b, first_guess, parameters);
+    draw_near(&mut iteration, first_guess.transform_a_b, coarse_stride(b, parameters), parameters).0
+}
+
+/// One of so many points of map b makes a sample of the size that the parameters want.
+fn coarse_stride(b: &WallMap, parameters: &IcpParameters) -> usize {
+    b.walls.points().len().div_ceil(parameters.coarse_points.max(1)).max(1)
+}
+
+/// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the
+/// number of iterations.
+fn draw_near(iteration: &mut Iteration<'_>, start: Pose2, stride: usize, parameters: &IcpParameters) -> (Pose2, usize) {
+    let (mut transform_a_b, mut distance, mut iterations) = (start, parameters.max_distance, 0);
+    while distance > parameters.min_distance {
+        let Some(change) = iteration.run(&transform_a_b, distance, stride) else { break };
+        transform_a_b = change.transform_a_b;
+        distance *= parameters.shrink;
+        iterations += 1;
+    }
+    (transform_a_b, iterations)
 }
 
 /// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as

@@ -1,6 +1,6 @@
 //! The stage: keeps each robot's map with its walls, and refines each pair's first guess when one of the three changes.
 
-use super::{FirstGuess, IcpParameters, MapView, Refinement, WallMap, refine};
+use super::{FirstGuess, IcpParameters, MapView, Refinement, WallMap, refine, refine_provisional};
 use crate::geometry::{read_map, row_by_row, wrap_angle};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, Header};
@@ -162,6 +162,9 @@ impl Refined {
     /// guess, and holds for that alone.
     fn holds_for(&self, first_guess: &Alignment, parameters: &IcpParameters) -> bool {
         let before = &self.first_guess;
+        if before.provisional != first_guess.provisional {
+            return false;
+        }
         if self.refinement.refusal.is_some() {
             return (before.x, before.y, before.yaw, before.covariance)
                 == (first_guess.x, first_guess.y, first_guess.yaw, first_guess.covariance);
@@ -173,9 +176,27 @@ impl Refined {
             && wrap_angle(before.yaw - first_guess.yaw).abs() <= parameters.reuse_within_yaw
     }
 
+    /// What speaks for or against it. A provisional first guess has its own reason in it, for the walls alone are not
+    /// what the alignment rests on.
+    fn reason(&self, first_guess: &Alignment) -> String {
+        let by_walls = self.refinement.reason();
+        let Refinement { rival, refusal, agreement, .. } = &self.refinement;
+        let before = &first_guess.reason;
+        match (first_guess.provisional, refusal, rival) {
+            (false, ..) => by_walls,
+            (true, Some(_), _) => format!("{before}; the walls do not confirm them: {by_walls}"),
+            (true, None, None) => format!("{before}; the walls confirm them: {by_walls}"),
+            (true, None, Some(rival)) => format!(
+                "{before}; the walls confirm them: {by_walls}; {:.0} % of the walls agree, and {:.0} % at the best of other places",
+                100.0 * agreement.wall_agreement(),
+                100.0 * rival.agreement.wall_agreement(),
+            ),
+        }
+    }
+
     /// The message that tells of it.
     fn alignment(&self, first_guess: &Alignment, output: &Output<'_>) -> Alignment {
-        let Refinement { registration, agreement, refusal } = &self.refinement;
+        let Refinement { registration, agreement, refusal, .. } = &self.refinement;
         let mut alignment = Alignment {
             header: Header::new(output.log_time(), first_guess.header.frame_id.clone()),
             a: first_guess.a.clone(),
@@ -184,7 +205,7 @@ impl Refined {
             score: agreement.wall_agreement(),
             method: format!("{}+icp", first_guess.method),
             accepted: refusal.is_none(),
-            reason: self.refinement.reason(),
+            reason: self.reason(first_guess),
             ..Alignment::default()
         };
         alignment.set_transform_a_b(&registration.transform_a_b);
@@ -204,6 +225,7 @@ fn refine_pair(
     let walls_a = a.walls.get_or_init(|| WallMap::new(&grid_a, parameters.normal_radius));
     let walls_b = b.walls.get_or_init(|| WallMap::new(&grid_b, parameters.normal_radius));
     let covariance = Matrix3::from_row_slice(&first_guess.covariance);
+    let refine = if first_guess.provisional { refine_provisional } else { refine };
     let first_guess = FirstGuess::new(first_guess.transform_a_b(), covariance, parameters);
     let (a, b) = (MapView { grid: grid_a, walls: walls_a }, MapView { grid: grid_b, walls: walls_b });
     Ok(refine(&a, &b, &first_guess, parameters))

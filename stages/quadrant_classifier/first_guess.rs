@@ -2,13 +2,13 @@
 
 use super::direction::Direction;
 use super::parameters::{QuadrantClassifierParameters, RotationFrom};
-use super::quadrant::quadrant;
+use super::rotation_by_directions::{MissingDirection, rotation_by_directions};
 use super::tag_rotation::{TagPair, TagRotation, tag_rotation};
 use super::translation::{residual, translate};
 use crate::geometry::{Pose2, turn_difference, wrap_angle};
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix3;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 /// A first guess of an alignment.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct FirstGuess {
     pub covariance: Matrix3<f64>,
     /// The least common precision of the tags, 0 to 1.
     pub score: f64,
-    /// `tags+directions` or `tags`.
+    /// `tags+directions`, `tags`, or `few tags+directions`.
     pub method: &'static str,
     /// What the guess rests on.
     pub reason: String,
@@ -29,7 +29,10 @@ pub struct FirstGuess {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GuessError {
     /// There are too few tags, or they lie in one place.
-    #[error("{0} common tags do not tell the rotation: it takes two or more in different places")]
+    #[error(
+        "{0} common tags do not tell the rotation: it takes two or more in different places, and three for the paper's \
+         triplet"
+    )]
     NoRotation(usize),
     /// The rotation is known too badly.
     #[error("the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only")]
@@ -38,6 +41,40 @@ pub enum GuessError {
         count: usize,
         /// Standard deviation of the rotation, degrees.
         degrees: f64,
+    },
+    /// The tags do not suffice by themselves, and there are no directions to confirm them.
+    #[error("the directions of both maps must confirm {count} common tags, but {missing}")]
+    NoDirections {
+        /// Tags there are.
+        count: usize,
+        /// What is missing.
+        missing: MissingDirection,
+    },
+    /// The tags do not suffice by themselves, and too many rotations would be confirmed.
+    #[error(
+        "the directions of both maps must confirm {count} common tags, but together they tell the rotation to {limit:.1} \
+         degrees only, and {most:.1} are allowed"
+    )]
+    VagueDirections {
+        /// Tags there are.
+        count: usize,
+        /// By how much the two rotations could differ, degrees.
+        limit: f64,
+        /// What is allowed, degrees.
+        most: f64,
+    },
+    /// The tags do not suffice by themselves, and the directions say otherwise.
+    #[error(
+        "the directions of both maps must confirm {count} common tags, but tell a rotation {off:.1} degrees off theirs, and \
+         {limit:.1} are allowed"
+    )]
+    Unconfirmed {
+        /// Tags there are.
+        count: usize,
+        /// By how much the two rotations differ, degrees.
+        off: f64,
+        /// What is allowed, degrees.
+        limit: f64,
     },
     /// The tags do not fit each other.
     #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
@@ -60,17 +97,15 @@ pub fn first_guess(
     direction_b: Option<&Direction>,
     parameters: &QuadrantClassifierParameters,
 ) -> Result<FirstGuess, GuessError> {
-    let pairs: Vec<TagPair> = tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect();
+    let pairs = tag_pairs(tags, parameters);
     let count = pairs.len();
-    let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
-    if by_tags.deviation > parameters.max_tag_rotation_deviation {
-        return Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() });
-    }
+    let by_tags = rotation_of_tags(tags, parameters)?;
     let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
         Ok(rotation) if parameters.rotation == RotationFrom::Both => {
-            (mean_rotation(&by_tags, &rotation), "tags+directions", "rotation from the tags and both maps' directions")
+            let reason = "rotation from the tags and both maps' directions".to_owned();
+            (mean_rotation(&by_tags, &rotation), "tags+directions", reason)
         }
-        Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps"),
+        Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps".to_owned()),
         Err(reason) => (by_tags, "tags", reason),
     };
     let transform = translate(&pairs, &rotation, parameters.translation).ok_or(GuessError::NoRotation(count))?;
@@ -88,30 +123,38 @@ pub fn first_guess(
     })
 }
 
+/// The rotation that the tags tell, if they tell the quarter turn.
+pub(super) fn rotation_of_tags(
+    tags: &[CommonTag],
+    parameters: &QuadrantClassifierParameters,
+) -> Result<TagRotation, GuessError> {
+    let pairs = tag_pairs(tags, parameters);
+    let count = pairs.len();
+    let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
+    match by_tags.deviation > parameters.max_tag_rotation_deviation {
+        true => Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() }),
+        false => Ok(by_tags),
+    }
+}
+
+fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
+    tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect()
+}
+
 /// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
 fn by_directions(
     by_tags: &TagRotation,
     a: Option<&Direction>,
     b: Option<&Direction>,
     parameters: &QuadrantClassifierParameters,
-) -> Result<TagRotation, &'static str> {
+) -> Result<TagRotation, String> {
     if parameters.rotation == RotationFrom::Tags {
-        return Err("rotation from the tags");
+        return Err("rotation from the tags".into());
     }
-    let (Some(a), Some(b)) = (a, b) else {
-        return Err("rotation from the tags, for a map has not come yet");
-    };
-    if !(a.valid && b.valid) {
-        return Err("rotation from the tags, for the walls of a map have no common direction");
-    }
-    let d_theta = a.angle - b.angle;
-    let angle = wrap_angle(d_theta + f64::from(quadrant(by_tags.angle, d_theta)) * FRAC_PI_2);
-    let deviation = a.deviation.hypot(b.deviation);
-    let limit = 3.0 * deviation.hypot(by_tags.deviation) + parameters.contradiction_angle;
-    let limit = limit.min(parameters.max_contradiction);
-    match turn_difference(by_tags.angle, angle, TAU).abs() <= limit {
-        true => Ok(TagRotation { angle, deviation }),
-        false => Err("rotation from the tags, which the directions of the maps contradict"),
+    match rotation_by_directions(by_tags, a, b, parameters) {
+        Ok(found) if found.agrees() => Ok(found.rotation),
+        Ok(_) => Err("rotation from the tags, which the directions of the maps contradict".into()),
+        Err(missing) => Err(format!("rotation from the tags, for {missing}")),
     }
 }
 
@@ -129,6 +172,7 @@ mod tests {
     use crate::geometry::{Point2, pose};
     use crate::quadrant_classifier::{TagRotationFrom, TranslationFrom};
     use proptest::prelude::*;
+    use std::f64::consts::FRAC_PI_2;
 
     fn tags(transform_a_b: &Pose2) -> Vec<CommonTag> {
         let tag = |(x, y, certainty): (f64, f64, f64)| {

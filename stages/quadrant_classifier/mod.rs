@@ -2,7 +2,8 @@
 //!
 //! After Tsardoulias et al., sections 4.1.2 to 4.2. Walls stand at right angles, so the directions of two maps give
 //! their rotation up to quarter turns, and more precisely than tags do; the tags tell the quarter turn and the
-//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags.
+//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags. Tags that do not suffice by
+//! themselves, such as two, are refused there.
 //!
 //! Not for buildings without right angles: there every rotation comes from the tags.
 
@@ -10,7 +11,9 @@ mod direction;
 mod first_guess;
 mod grouping;
 mod parameters;
+mod provisional;
 mod quadrant;
+mod rotation_by_directions;
 mod stage;
 mod tag_rotation;
 mod translation;
@@ -20,5 +23,7 @@ pub use direction::{Direction, map_direction};
 pub use first_guess::{FirstGuess, GuessError, first_guess};
 pub use grouping::{Group, classify};
 pub use parameters::{Mean, QuadrantClassifierParameters, RotationFrom, TagRotationFrom, TranslationFrom, Weighting};
+pub use provisional::provisional_guess;
 pub use quadrant::quadrant;
+pub use rotation_by_directions::MissingDirection;
 pub use stage::kind;

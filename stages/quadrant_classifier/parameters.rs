@@ -106,6 +106,11 @@ pub struct QuadrantClassifierParameters {
     /// away the quarter turn is a toss of a coin. The paper has no such bounds; with 0.8 for this one and for
     /// `contradiction_angle` they are out of reach.
     pub max_contradiction: f64,
+    /// Two common tags, or more of which it may be chance that they agree, count only where the directions of both maps
+    /// do not contradict them, and could have: where the bound on the difference of the two rotations (see
+    /// `contradiction_angle`) is at most this angle, radians. The next quarter turn then is dozens of standard
+    /// deviations away.
+    pub max_confirming_angle: f64,
     /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
@@ -131,6 +136,7 @@ impl Default for QuadrantClassifierParameters {
             max_tag_rotation_deviation: 0.2,
             contradiction_angle: 0.01,
             max_contradiction: 30_f64.to_radians(),
+            max_confirming_angle: 0.12,
             max_residual: 0.5,
             resend_distance: 0.001,
             resend_angle: 0.0001,
@@ -160,6 +166,7 @@ impl Parameters for QuadrantClassifierParameters {
         for (field, value) in [
             ("min_deviation", self.min_deviation),
             ("contradiction_angle", self.contradiction_angle),
+            ("max_confirming_angle", self.max_confirming_angle),
             ("resend_angle", self.resend_angle),
         ] {
             require(not_below_zero(value), field, "must be a number of 0 rad or more");
@@ -203,11 +210,12 @@ mod tests {
             max_tag_rotation_deviation: 1.0,
             contradiction_angle: -0.1,
             max_contradiction: 0.9,
+            max_confirming_angle: -0.1,
             max_residual: 0.0,
             resend_distance: -0.1,
             resend_angle: f64::NAN,
             ..Default::default()
         };
-        assert_eq!(parameters.check().len(), 12);
+        assert_eq!(parameters.check().len(), 13);
     }
 }

@@ -1,6 +1,6 @@
 //! The stage `quadrant_classifier`.
 
-use super::{Direction, QuadrantClassifierParameters, RotationFrom, first_guess, map_direction};
+use super::{Direction, QuadrantClassifierParameters, RotationFrom, first_guess, map_direction, provisional_guess};
 use crate::geometry::{row_by_row, turn_difference};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, CommonTags, Header, MapDirection, Segments};
@@ -152,7 +152,8 @@ impl QuadrantClassifier {
             return Some(alignment);
         }
         let direction = |map: Option<&Map>| map.map(|map| map.direction);
-        match first_guess(&common.tags, direction(a).as_ref(), direction(b).as_ref(), &self.parameters) {
+        let guess = if common.provisional { provisional_guess } else { first_guess };
+        match guess(&common.tags, direction(a).as_ref(), direction(b).as_ref(), &self.parameters) {
             Ok(guess) => {
                 alignment.set_transform_a_b(&guess.transform_a_b);
                 alignment.covariance = row_by_row(&guess.covariance);
@@ -160,6 +161,7 @@ impl QuadrantClassifier {
                 alignment.method = guess.method.into();
                 alignment.reason = guess.reason;
                 alignment.accepted = true;
+                alignment.provisional = common.provisional;
             }
             Err(error) => alignment.reason = error.to_string(),
         }
@@ -172,7 +174,8 @@ impl QuadrantClassifier {
         let turned = turn_difference(alignment.yaw, sent.yaw, TAU).abs();
         moved > self.parameters.resend_distance
             || turned > self.parameters.resend_angle
-            || (alignment.accepted, &alignment.method, &alignment.reason) != (sent.accepted, &sent.method, &sent.reason)
+            || (alignment.accepted, alignment.provisional, &alignment.method, &alignment.reason)
+                != (sent.accepted, sent.provisional, &sent.method, &sent.reason)
     }
 
     fn send(&mut self, pair: Pair, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
@@ -296,6 +299,29 @@ mod tests {
             let error = make(&format!("rotation = \"{rotation}\"")).unwrap().to_string();
             assert!(error.contains("`segments` is not wired"), "{error}");
         }
+    }
+
+    #[test]
+    fn two_tags_wait_for_both_maps_and_stay_provisional() {
+        let mut run = Run::new();
+        let truth = pose(4.0, -2.0, 2.5);
+        let all = common(&truth);
+        let two = CommonTags { tags: all.tags[..2].to_vec(), provisional: true, ..all.clone() };
+        run.receive(SEGMENTS, &segments("robot1", 2.5));
+        let sent = run.receive(COMMON, &two);
+        assert!(!sent[0].accepted && sent[0].reason.contains("a map has not come yet"), "{}", sent[0].reason);
+        let sent = run.receive(SEGMENTS, &segments("robot2", 0.0));
+        assert_eq!((sent[0].accepted, sent[0].provisional), (true, true));
+        assert_eq!(sent[0].method, "few tags+directions");
+        assert!(sent[0].reason.starts_with("2 common tags only"), "{}", sent[0].reason);
+        let error = sent[0].transform_a_b() * truth.inverse();
+        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-9);
+        let sent = run.receive(COMMON, &all);
+        assert_eq!((sent[0].accepted, sent[0].provisional), (true, false), "the third tag suffices");
+        let sent = run.receive(SEGMENTS, &segments("robot2", 0.3));
+        assert!(sent[0].accepted, "directions that contradict three tags are left out");
+        let sent = run.receive(COMMON, &two);
+        assert!(!sent[0].accepted && sent[0].reason.contains("must confirm"), "{}", sent[0].reason);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 /// same in both maps; each further one must then fall into its gate.
 pub fn chance_of_agreement(pairs: &[TagPair], agreeing: usize, gate: f64) -> f64 {
     let count = pairs.len();
-    if agreeing < 3 || agreeing > count {
+    if agreeing < 2 || agreeing > count {
         return 1.0;
     }
     let middle = pairs.iter().fold(nalgebra::Vector2::zeros(), |sum, pair| sum + pair.a.coords / count as f64);
@@ -63,6 +63,14 @@ mod tests {
     }
 
     #[test]
+    fn two_of_two_agree_by_chance_as_often_as_a_length_falls_into_its_gate() {
+        // About 20 m apart, to within 3.5 standard deviations of 0.06 m to either side.
+        let chance = chance_of_agreement(&tags(2, 10.0), 2, 3.5);
+        assert!(chance > 0.01 && chance < 0.05, "{chance}");
+        assert!(chance_of_agreement(&tags(2, 1.0), 2, 3.5) > 0.1);
+    }
+
+    #[test]
     fn more_agreement_is_less_chance_and_less_room_is_more() {
         let tags_10 = tags(10, 10.0);
         let chances: Vec<f64> = (3..=10).map(|agreeing| chance_of_agreement(&tags_10, agreeing, 3.5)).collect();
@@ -73,7 +81,8 @@ mod tests {
     #[test]
     fn what_cannot_be_told_is_chance() {
         assert_eq!(chance_of_agreement(&[], 3, 3.5), 1.0);
-        assert_eq!(chance_of_agreement(&tags(2, 10.0), 2, 3.5), 1.0);
+        assert_eq!(chance_of_agreement(&tags(1, 10.0), 1, 3.5), 1.0);
+        assert_eq!(chance_of_agreement(&tags(2, 10.0), 3, 3.5), 1.0);
         assert_eq!(chance_of_agreement(&tags(4, 0.0), 4, 3.5), 1.0);
     }
 }

@@ -49,6 +49,21 @@ impl TagPair {
         0.5 * (self.covariance_a.trace() + self.covariance_b.trace())
     }
 
+    /// How far the tag lies from another one, metres: in map a and in map b.
+    pub fn lengths(&self, other: &Self) -> [f64; 2] {
+        [(self.a - other.a).norm(), (self.b - other.b).norm()]
+    }
+
+    /// Whether the two lengths are the same up to `gate` standard deviations, of which only what lies along the line
+    /// through the two tags counts.
+    pub fn lengths_agree(&self, other: &Self, gate: f64) -> bool {
+        let [length_a, length_b] = self.lengths(other);
+        let along = |arm: Vector2<f64>, covariance: Matrix2<f64>| arm.dot(&(covariance * arm)) / arm.norm_squared();
+        let variance = along(self.a - other.a, self.covariance_a + other.covariance_a)
+            + along(self.b - other.b, self.covariance_b + other.covariance_b);
+        (length_a - length_b).powi(2) <= gate * gate * variance
+    }
+
     /// The squared distance of `a` from `T_a_b * b` in standard deviations, `extra` being added to the covariance. Not
     /// finite if the covariance has no inverse.
     fn mahalanobis_squared(&self, fit: &RigidFit, extra: &Matrix2<f64>) -> f64 {
@@ -93,7 +108,7 @@ pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> Cons
     let mut found: BTreeMap<Vec<usize>, Consensus> = BTreeMap::new();
     for second in 1..seeds {
         for first in 0..second {
-            if lengths_agree(&pairs[first], &pairs[second], gate)
+            if lengths_may_agree(&pairs[first], &pairs[second], gate)
                 && let Some(consensus) = settle(pairs, first, second, gate)
             {
                 found.insert(consensus.members.clone(), consensus);
@@ -119,9 +134,11 @@ pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> Cons
     ConsensusSearch { best, rival }
 }
 
-/// Whether two tags are as far from each other in map a as in map b.
-fn lengths_agree(one: &TagPair, other: &TagPair, gate: f64) -> bool {
-    let difference = (one.a - other.a).norm() - (one.b - other.b).norm();
+/// Whether two tags can be as far from each other in map a as in map b, to a bound that lets no pair through the gate
+/// be missed.
+fn lengths_may_agree(one: &TagPair, other: &TagPair, gate: f64) -> bool {
+    let [length_a, length_b] = one.lengths(other);
+    let difference = length_a - length_b;
     // Along any direction the variance of a place is at most the trace of its covariance.
     let variance = 2.0 * (one.variance() + other.variance());
     difference * difference <= gate * gate * variance
@@ -195,6 +212,22 @@ mod tests {
             let error = best.fit.transform_a_b.inverse() * pose(x, y, yaw);
             prop_assert!(error.translation.vector.norm() < 0.2 && error.rotation.angle().abs() < 0.03);
         }
+    }
+
+    #[test]
+    fn lengths_are_compared_along_the_line_through_two_tags() {
+        let mut two = pairs(&pose(1.0, 2.0, 0.5), &[(0.0, 0.0), (8.0, 0.0)]);
+        let along = two[1].a - two[0].a;
+        two[1].a += along.normalize() * 0.2;
+        // Four times 0.03 m squared: a standard deviation of 0.06 m.
+        assert!(two[0].lengths_agree(&two[1], 3.5) && !two[0].lengths_agree(&two[1], 3.0));
+        let [length_a, length_b] = two[0].lengths(&two[1]);
+        assert!((length_a - length_b - 0.2).abs() < 1e-9);
+        // What is vague across the line does not excuse it.
+        two.iter_mut().for_each(|pair| pair.covariance_b.m22 = 1.0);
+        assert!(!two[0].lengths_agree(&two[1], 3.0));
+        two.iter_mut().for_each(|pair| pair.covariance_b.m11 = 1.0);
+        assert!(two[0].lengths_agree(&two[1], 3.0));
     }
 
     #[test]

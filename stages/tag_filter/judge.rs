@@ -14,6 +14,8 @@ pub struct Judgement {
     pub tags: Vec<CommonTag>,
     /// Whether they suffice.
     pub accepted: bool,
+    /// Whether they suffice only if the directions and the walls of the maps confirm the transform.
+    pub provisional: bool,
     /// Why they do not or, if they do, how well they agree and what was left out.
     pub reason: String,
     /// If accepted, the transform that they agree on.
@@ -33,16 +35,21 @@ pub struct RobotTags<'a> {
 ///
 /// Besides the paper's conditions on certainties, the tags that count must agree on one rigid transform; see the
 /// parameters for what makes an agreement strong enough.
+///
+/// Two tags always agree on some transform, up to their distance: it must be the same in both maps. That may be chance, as
+/// may be the agreement of three that lie near to each other. It suffices only where no other common tag contradicts it,
+/// and is provisional.
 pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> Judgement {
     let tags = common_tags(a.tags, b.tags, parameters.certainty);
     let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| agreement(&tags, parameters));
     match outcome {
-        Ok(consensus) => {
-            let reason = praise(&tags, &consensus);
+        Ok(Agreement { consensus, doubt }) => {
+            let provisional = doubt.is_some();
+            let reason = praise(&tags, &consensus) + &doubt.unwrap_or_default();
             let members = consensus.members.iter().filter_map(|&index| tags.get(index).cloned()).collect();
-            Judgement { tags: members, accepted: true, reason, fit: Some(consensus.fit) }
+            Judgement { tags: members, accepted: true, provisional, reason, fit: Some(consensus.fit) }
         }
-        Err(reason) => Judgement { tags, accepted: false, reason, fit: None },
+        Err(reason) => Judgement { tags, accepted: false, provisional: false, reason, fit: None },
     }
 }
 
@@ -88,8 +95,15 @@ fn enough_certain(
     }
 }
 
+/// Tags that agree.
+struct Agreement {
+    consensus: Consensus,
+    /// Why they do not suffice by themselves, to be said after what speaks for them.
+    doubt: Option<String>,
+}
+
 /// The conditions on the places of the tags.
-fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Consensus, String> {
+fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agreement, String> {
     let TagFilterParameters { gate, map_stddev, min_tags, rival_distance, best_certainty, .. } = *parameters;
     let pairs: Vec<TagPair> = tags.iter().map(|tag| TagPair::new(tag, map_stddev)).collect();
     let search = find_consensus(&pairs, gate, rival_distance);
@@ -102,6 +116,15 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Con
     };
     let agreeing = best.members.len();
     let names = listed(best.members.iter().filter_map(|&index| tags.get(index)), " (", ")");
+    if let [first, second] = best.members[..] {
+        let [in_a, in_b] = pairs[first].lengths(&pairs[second]);
+        if !pairs[first].lengths_agree(&pairs[second], gate) {
+            return Err(format!(
+                "the tags in common{names} lie {in_a:.2} m apart in one map and {in_b:.2} m in the other; the tags of two \
+                 places may bear the same ids"
+            ));
+        }
+    }
     if agreeing as f64 <= parameters.min_agreement * count as f64 {
         return Err(format!(
             "only {agreeing} of the {count} tags in common agree on one transform{names}; the tags of two places may bear \
@@ -117,13 +140,15 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Con
         ));
     }
     let chance = chance_of_agreement(&pairs, agreeing, gate);
-    if chance > parameters.max_chance {
+    let may_be_chance = format!("as many would agree by chance with a probability of up to {:.1} %", 100.0 * chance);
+    let is_provisional = agreeing == 2 || chance > parameters.max_chance;
+    if is_provisional && (agreeing < count || chance > parameters.max_provisional_chance) {
         return Err(format!(
-            "{agreeing} of the {count} tags in common agree on one transform{names}, but as many would agree by chance with \
-             a probability of up to {:.1} %",
-            100.0 * chance
+            "{agreeing} of the {count} tags in common agree on one transform{names}, but {may_be_chance}"
         ));
     }
+    let doubt = is_provisional
+        .then(|| format!("; but {may_be_chance}: the directions and the walls of the maps must confirm it"));
     if let Some(rival) = &search.rival {
         let size = rival.members.len();
         if size >= min_tags && size as f64 > parameters.max_rival_share * agreeing as f64 {
@@ -142,7 +167,7 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Con
              {best_certainty:.2} in both maps; the best has {best_precision:.2}"
         ));
     }
-    Ok(best)
+    Ok(Agreement { consensus: best, doubt })
 }
 
 /// What speaks for a consensus, and which tags are not in it by how much.
@@ -246,12 +271,8 @@ mod tests {
     fn too_few_certain_tags_are_refused() {
         let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
         let mut b = a.clone();
-        b[1..5].iter_mut().for_each(|tag| tag.certainty = 0.5);
-        refused(
-            &a,
-            &b,
-            "have 6 tags in common, of which 2 have a certainty of 0.75 in both maps (tag0, tag5); 3 are needed",
-        );
+        b[1..].iter_mut().for_each(|tag| tag.certainty = 0.5);
+        refused(&a, &b, "have 6 tags in common, of which 1 has a certainty of 0.75 in both maps (tag0); 2 are needed");
         let mut b = a.clone();
         b.iter_mut().for_each(|tag| tag.certainty = 0.89);
         refused(&a, &b, "none has a certainty of 0.90");
@@ -288,10 +309,67 @@ mod tests {
     }
 
     #[test]
-    fn an_agreement_that_may_be_chance_is_refused() {
+    fn two_tags_as_far_apart_in_both_maps_are_provisional() {
+        let (a, b) = (tags(&pose(1.0, 2.0, 3.0), &SHAPE[..2]), tags(&pose(-4.0, 0.0, 1.0), &SHAPE[..2]));
+        let judgement = judged(&a, &b);
+        assert!(judgement.accepted && judgement.provisional && judgement.fit.is_some());
+        let reason =
+            "all 2 tags in common agree within 0.000 m; but as many would agree by chance with a probability of";
+        assert!(judgement.reason.starts_with(reason), "{}", judgement.reason);
+        assert!(judgement.reason.ends_with("the directions and the walls of the maps must confirm it"));
+        assert!(!judged(&tags(&pose(1.0, 2.0, 3.0), &SHAPE), &tags(&pose(0.0, 0.0, 0.0), &SHAPE)).provisional);
+    }
+
+    #[test]
+    fn the_paper_needs_three_tags() {
+        let two = tags(&pose(1.0, 2.0, 3.0), &SHAPE[..2]);
+        let robot = |robot| RobotTags { robot, tags: &two };
+        let parameters = TagFilterParameters { min_tags: 3, ..Default::default() };
+        let judgement = judge(robot("robot1"), robot("robot2"), &parameters);
+        assert!(!judgement.accepted && judgement.reason.contains("3 are needed"), "{}", judgement.reason);
+    }
+
+    #[test]
+    fn two_tags_that_are_farther_apart_in_one_map_are_refused() {
+        let a = tags(&pose(0.0, 0.0, 0.0), &SHAPE[..2]);
+        let mut b = a.clone();
+        b[1].x += 0.35;
+        refused(&a, &b, "the tags in common (tag0, tag1) lie 5.10 m apart in one map and 5.44 m in the other");
+        b[1].x += 2.0;
+        refused(&a, &b, "the same ids");
+    }
+
+    #[test]
+    fn two_tags_that_a_third_contradicts_are_refused() {
+        let a = tags(&pose(0.0, 0.0, 0.0), &SHAPE[..3]);
+        let mut b = a.clone();
+        b[2].x += 1.5;
+        refused(
+            &a,
+            &b,
+            "2 of the 3 tags in common agree on one transform (tag0, tag1), but as many would agree by chance",
+        );
+    }
+
+    #[test]
+    fn two_tags_near_each_other_are_refused() {
+        for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "lie so near"), ([(0.0, 0.0), (2.5, 0.5)], "by chance")] {
+            let tags = tags(&pose(0.0, 0.0, 0.0), &places);
+            refused(&tags, &tags, part);
+        }
+    }
+
+    #[test]
+    fn an_agreement_of_three_that_may_be_chance_is_provisional() {
         let close = [(0.0, 0.0), (1.4, 0.2), (0.3, 1.3)];
-        let tags = tags(&pose(0.0, 0.0, 0.0), &close);
-        refused(&tags, &tags, "by chance");
+        let mut tags = tags(&pose(0.0, 0.0, 0.0), &close);
+        let judgement = judged(&tags, &tags);
+        assert!(judgement.accepted && judgement.provisional, "{judgement:?}");
+        assert!(judgement.reason.starts_with("all 3 tags in common agree"), "{}", judgement.reason);
+        tags.push(TagEstimate { tag_id: "tag9".into(), x: -1.0, y: 0.5, ..tags[0].clone() });
+        let mut b = tags.clone();
+        b[3].x = 2.5;
+        refused(&tags, &b, "3 of the 4 tags in common agree on one transform (tag0, tag1, tag2), but as many");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! - [`chance_of_agreement`] says how likely tags at random places would agree as well.
 //! - [`judge`] puts this together: accepted or refused, with the reason in words.
 //!
+//! Two tags agree with everything that has them as far apart: what they say is **provisional**, for later stages to confirm.
 //! Tags on one straight line are enough for a rigid transform. But mirroring a whole map at that line would
 //! not move them, so they cannot tell that all of them are mirrored.
 

@@ -12,7 +12,8 @@ pub struct TagFilterParameters {
     pub certainty: f64,
     /// At least one common tag needs this certainty in both maps. The paper has 0.90.
     pub best_certainty: f64,
-    /// So many common tags must agree, 3 or more. The paper has 3.
+    /// So many common tags must agree, 2 or more. The paper has 3. What two say is provisional: the directions and the
+    /// walls of the maps must confirm it.
     pub min_tags: usize,
     /// Two tags agree when they lie within so many standard deviations of each other.
     pub gate: f64,
@@ -21,8 +22,12 @@ pub struct TagFilterParameters {
     pub map_stddev: f64,
     /// More than this share of the common tags must agree.
     pub min_agreement: f64,
-    /// Refused when tags at random places would agree as well with more than this probability.
+    /// What the tags say is provisional when tags at random places would agree as well with more than this probability;
+    /// and refused if, beside that, some of the common tags do not agree.
     pub max_chance: f64,
+    /// Refused when tags at random places would agree as well with more than this probability, whatever may confirm it.
+    /// With two tags that lie far apart it is about 0.7 m divided by their distance.
+    pub max_provisional_chance: f64,
     /// Refused when the agreeing tags leave the rotation uncertain by more than this standard deviation, radians:
     /// they lie too near to each other.
     pub max_yaw_stddev: f64,
@@ -41,11 +46,12 @@ impl Default for TagFilterParameters {
         Self {
             certainty: 0.75,
             best_certainty: 0.90,
-            min_tags: 3,
+            min_tags: 2,
             gate: 3.5,
             map_stddev: 0.05,
             min_agreement: 0.5,
             max_chance: 1e-3,
+            max_provisional_chance: 0.2,
             max_yaw_stddev: 0.05,
             max_rival_share: 0.7,
             rival_distance: 0.5,
@@ -70,11 +76,16 @@ impl Parameters for TagFilterParameters {
             "best_certainty",
             "must lie between `certainty` and 1",
         );
-        expect(self.min_tags >= 3, "min_tags", "must be 3 or more: any two tags agree on some transform");
+        expect(self.min_tags >= 2, "min_tags", "must be 2 or more: one tag does not tell a rotation");
         expect(positive(self.gate), "gate", "must be above 0");
         expect(positive(self.map_stddev), "map_stddev", "must be above 0 m");
         expect(share(self.min_agreement), "min_agreement", "must lie between 0 and 1");
         expect(self.max_chance > 0.0 && self.max_chance <= 1.0, "max_chance", "must be above 0, and at most 1");
+        expect(
+            self.max_provisional_chance >= self.max_chance && self.max_provisional_chance <= 1.0,
+            "max_provisional_chance",
+            "must lie between `max_chance` and 1",
+        );
         expect(positive(self.max_yaw_stddev), "max_yaw_stddev", "must be above 0 rad");
         expect(share(self.max_rival_share), "max_rival_share", "must lie between 0 and 1");
         expect(positive(self.rival_distance), "rival_distance", "must be above 0 m");
@@ -97,16 +108,17 @@ mod tests {
         let wrong = TagFilterParameters {
             certainty: 1.1,
             best_certainty: 0.5,
-            min_tags: 2,
+            min_tags: 1,
             gate: 0.0,
             map_stddev: f64::NAN,
             min_agreement: -0.1,
             max_chance: 0.0,
+            max_provisional_chance: 1.5,
             max_yaw_stddev: f64::INFINITY,
             max_rival_share: 2.0,
             rival_distance: -1.0,
             min_change: f64::NAN,
         };
-        assert_eq!(wrong.check().len(), 11);
+        assert_eq!(wrong.check().len(), 12);
     }
 }

@@ -69,6 +69,7 @@ impl Stage for TagFilterStage {
                 "b": b,
                 "tags": judgement.tags.len(),
                 "accepted": judgement.accepted,
+                "provisional": judgement.provisional,
                 "reason": judgement.reason,
             })
         };
@@ -95,6 +96,7 @@ impl TagFilterStage {
             robot_b: pair.1.clone(),
             tags: judgement.tags.clone(),
             accepted: judgement.accepted,
+            provisional: judgement.provisional,
             reason: judgement.reason.clone(),
         };
         output.send(COMMON, "", &message)?;
@@ -103,7 +105,7 @@ impl TagFilterStage {
     }
 }
 
-/// Whether two judgements are equal or, if both are accepted, name the same tags within `min_change` metres.
+/// Whether two judgements are equal or, if both are accepted alike, name the same tags within `min_change` metres.
 fn says_the_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bool {
     let near = |one: &[f64; 2], other: &[f64; 2]| (one[0] - other[0]).hypot(one[1] - other[1]) <= min_change;
     let same_tags = sent.tags.len() == judgement.tags.len()
@@ -111,7 +113,12 @@ fn says_the_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bo
             let same = |other: &&CommonTag| other.tag_id == one.tag_id;
             judgement.tags.iter().find(same).is_some_and(|other| near(&one.a, &other.a) && near(&one.b, &other.b))
         });
-    sent == judgement || min_change > 0.0 && sent.accepted && judgement.accepted && same_tags
+    sent == judgement
+        || min_change > 0.0
+            && sent.accepted
+            && judgement.accepted
+            && sent.provisional == judgement.provisional
+            && same_tags
 }
 
 #[cfg(test)]
@@ -162,11 +169,21 @@ mod tests {
         let sent = bench.send("robot1", &tags());
         assert_eq!((sent[0].robot_a.as_str(), sent[0].robot_b.as_str(), sent[0].accepted), ("robot1", "robot2", true));
         assert_eq!(bench.send("robot1", &tags()), vec![], "nothing has changed");
-        let third = bench.send("robot3", &tags()[..2]);
+        let third = bench.send("robot3", &tags()[..1]);
         let pairs: Vec<_> = third.iter().map(|pair| (pair.robot_a.as_str(), pair.robot_b.as_str())).collect();
         assert_eq!(pairs, [("robot1", "robot3"), ("robot2", "robot3")]);
-        assert!(third.iter().all(|pair| !pair.accepted && pair.reason.contains("3 are needed")), "{third:?}");
+        assert!(third.iter().all(|pair| !pair.accepted && pair.reason.contains("2 are needed")), "{third:?}");
         assert_eq!(bench.send("robot2", &tags()[..3]).len(), 1, "the other pair is as it was");
+    }
+
+    #[test]
+    fn a_third_tag_ends_what_two_leave_provisional() {
+        let mut bench = Bench::new();
+        bench.send("robot1", &tags());
+        let provisional =
+            |sent: &[CommonTags]| sent.iter().map(|sent| (sent.accepted, sent.provisional)).collect::<Vec<_>>();
+        assert_eq!(provisional(&bench.send("robot2", &tags()[..2])), [(true, true)]);
+        assert_eq!(provisional(&bench.send("robot2", &tags()[..3])), [(true, false)]);
     }
 
     #[test]

@@ -56,6 +56,7 @@ fn tag_messages_agree_with_their_definitions() {
         robot_b: "robot22".into(),
         tags: vec![common("tag00"), common("tag1")],
         accepted: true,
+        provisional: true,
         reason: "three tags".into(),
     });
 }
@@ -89,6 +90,7 @@ fn result_messages_agree_with_their_definitions() {
         score: 0.5,
         method: "icp".into(),
         accepted: true,
+        provisional: true,
         reason: "it fits".into(),
     });
     let frame = |robot: &str| RobotFrame {

@@ -135,6 +135,8 @@ pub struct CommonTags {
     pub tags: Vec<CommonTag>,
     /// Whether they suffice for a merge.
     pub accepted: bool,
+    /// Whether they suffice only if the directions and the walls of the maps confirm what they say.
+    pub provisional: bool,
     /// Why they do not, or what they are.
     pub reason: String,
 }
@@ -162,6 +164,9 @@ pub struct Alignment {
     pub method: String,
     /// Whether it may be used to merge the maps.
     pub accepted: bool,
+    /// Whether it may be used only once the walls of the maps have confirmed it: it was found from too little to be
+    /// believed by itself. What confirms it sends it without this mark.
+    pub provisional: bool,
     /// Why it is refused, or what speaks for it.
     pub reason: String,
 }
