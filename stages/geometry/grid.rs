@@ -5,6 +5,9 @@ use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
 use gridweave_runtime::ros::{DecodeError, Header, MapMetaData, OccupancyGrid};
 
+/// As many cells are looked at together.
+const BLOCK: usize = 64;
+
 /// A cell's place in a grid: column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Cell {
@@ -139,11 +142,17 @@ impl<'a> Grid<'a> {
     /// The cells that hold an obstacle, row by row.
     pub fn occupied(&self) -> impl Iterator<Item = Cell> + 'a {
         let width = self.geometry.width;
-        self.cells
-            .iter()
-            .enumerate()
-            .filter(|(_, value)| is_occupied(**value))
-            .map(move |(index, _)| Cell { column: index % width, row: index / width })
+        // Most of a map is free or unknown. Whole blocks of it are passed over at once.
+        let blocks = self.cells.chunks(BLOCK).enumerate();
+        blocks.filter(|(_, block)| block.iter().fold(false, |any, value| any | is_occupied(*value))).flat_map(
+            move |(number, block)| {
+                let cells = block.iter().enumerate().filter(|(_, value)| is_occupied(**value));
+                cells.map(move |(place, _)| {
+                    let index = number * BLOCK + place;
+                    Cell { column: index % width, row: index / width }
+                })
+            },
+        )
     }
 }
 

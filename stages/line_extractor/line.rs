@@ -1,6 +1,7 @@
 //! Straight lines in the plane, in units of cells.
 
-use crate::geometry::Point2;
+use super::faces::Correction;
+use crate::geometry::{Point2, quarter_turn};
 use nalgebra::Vector2;
 
 /// A straight line: a point on it and its unit direction.
@@ -52,9 +53,22 @@ impl Line {
         self.direction
     }
 
+    /// The line turned about its point at `along`, and moved across.
+    pub(super) fn corrected(&self, along: f64, correction: &Correction) -> Option<Self> {
+        let across = quarter_turn(&self.direction);
+        let direction = (self.direction + across * correction.slope).try_normalize(f64::MIN_POSITIVE)?;
+        let point = self.at(along) + across * correction.across;
+        direction.iter().all(|v| v.is_finite()).then_some(Self { point, direction })
+    }
+
+    /// How far to the left of the line a point is.
+    pub(super) fn across(&self, point: &Point2) -> f64 {
+        self.direction.perp(&(point - self.point))
+    }
+
     /// How far from the line a point is: equation 3 of Tsardoulias et al.
     pub(super) fn distance(&self, point: &Point2) -> f64 {
-        self.direction.perp(&(point - self.point)).abs()
+        self.across(point).abs()
     }
 
     /// The place along the line that is nearest to a point, as a signed distance from [`point`](Self::point).

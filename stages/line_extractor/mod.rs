@@ -8,6 +8,7 @@
 //! Not for curved walls, which become chains of short segments.
 
 mod extract;
+mod faces;
 mod line;
 mod merge;
 mod parameters;
