@@ -8,7 +8,7 @@ use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
 
 /// How often a line is fitted to its members, and these are counted again.
-const REFITS: usize = 2;
+const REFITS: usize = 1;
 
 /// Finds the walls among the points of the index, in the order they are found. No point belongs to two.
 pub(super) fn find_walls(
@@ -200,6 +200,9 @@ impl Search<'_> {
     }
 
     fn unbroken_walls(&self, pool: &Pool, candidate: &Candidate) -> Vec<Wall> {
+        if candidate.count < self.parameters.min_points {
+            return Vec::new();
+        }
         let mut walls = self.parts(&self.recounted(pool, candidate));
         walls.retain(|wall| {
             wall.members.len() >= self.parameters.min_points && wall.stretch.length() >= self.scale.min_length
