@@ -31,8 +31,8 @@ pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, s
     let index_of =
         |points: &[Point2]| PointIndex::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let cells: Vec<Point2> =
-        grid.occupied().map(|cell| Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5)).collect();
+    let mut cells = Vec::new();
+    grid.occupied().for_each(|cell| cells.push(Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5)));
 
     let index = index_of(&sub_sample(&cells, parameters.max_points, &mut random));
     let walls = find_walls(&index, parameters, &scale, &mut random);

@@ -8,6 +8,8 @@
 
 /// Bins of the profile in a cell.
 const BINS_A_CELL: f64 = 2.0;
+/// Bins to either side that no cell falls into, for smoothing.
+const MARGIN: usize = 5;
 /// A valley parts two faces if it is at most this share of the lower of the two peaks beside it.
 const VALLEY: f64 = 0.6;
 /// The least standard deviation of the cells of a face, in cells: a straight line of single cells has 0.3.
@@ -107,7 +109,7 @@ struct Profile {
 impl Profile {
     /// An empty profile of the distances up to `reach` to both sides.
     fn new(reach: f64) -> Self {
-        let bins = (2.0 * reach * BINS_A_CELL).ceil() as usize + 4;
+        let bins = (2.0 * reach * BINS_A_CELL).ceil() as usize + 2 * MARGIN + 1;
         Self { low: -(bins as f64) / (2.0 * BINS_A_CELL), bins: vec![0.0; bins], smooth: vec![0.0; bins] }
     }
 
@@ -115,13 +117,10 @@ impl Profile {
     /// line crosses do not look like faces.
     fn fill<'a>(&mut self, cells: impl Iterator<Item = &'a Offset>, slope: f64) {
         self.bins.fill(0.0);
-        let last = self.bins.len() - 2;
+        let last = self.bins.len() - MARGIN - 1;
         for cell in cells {
-            let place = ((cell.across - slope * cell.along - self.low) * BINS_A_CELL).max(0.0);
-            let bin = (place as usize).min(last);
-            let share = place - bin as f64;
-            self.bins[bin] += 1.0 - share;
-            self.bins[bin + 1] += share;
+            let place = (cell.across - slope * cell.along - self.low) * BINS_A_CELL + 0.5;
+            self.bins[(place as usize).clamp(MARGIN, last)] += 1.0;
         }
         for _ in 0..2 {
             smooth(&self.bins, &mut self.smooth);
@@ -136,17 +135,18 @@ impl Profile {
     /// Cuts the profile at its valleys.
     fn faces(&self) -> Vec<Face> {
         let mut faces = Vec::new();
-        // The highest bin since the last border, and the lowest since that peak.
-        let (mut start, mut peak, mut valley) = (0, 0, 0);
+        // The greatest count since the last border, and the bin of the least count since then.
+        let (mut start, mut peak, mut valley) = (0, 0.0, 0);
         for (bin, &count) in self.bins.iter().enumerate() {
-            if count > self.bins[peak] && self.bins[valley] > VALLEY * self.bins[peak] {
-                (peak, valley) = (bin, bin);
-            } else if count < self.bins[valley] {
+            let least = self.bins[valley];
+            if count <= least {
                 valley = bin;
-            } else if self.bins[valley] <= VALLEY * self.bins[peak].min(count) && count > 0.0 {
+            } else if peak > 0.0 && least <= VALLEY * count.min(peak) {
                 // Past the valley the profile has risen enough for a face of its own.
                 faces.push(self.face(start, valley));
-                (start, peak, valley) = (valley, bin, bin);
+                (start, peak, valley) = (valley, count, bin);
+            } else if count > peak {
+                (peak, valley) = (count, bin);
             }
         }
         faces.push(Face { high: f64::INFINITY, ..self.face(start, self.bins.len()) });
@@ -172,12 +172,10 @@ impl Profile {
     }
 }
 
-/// Smooths with the binomial kernel of five bins, a standard deviation of one bin.
+/// Smooths with the binomial kernel of five bins, a standard deviation of one bin. The two bins at either end stay empty.
 fn smooth(from: &[f64], to: &mut [f64]) {
-    let at =
-        |bin: usize, step: isize| bin.checked_add_signed(step).and_then(|bin| from.get(bin)).copied().unwrap_or(0.0);
-    for (bin, value) in to.iter_mut().enumerate() {
-        *value = (at(bin, -2) + at(bin, 2) + 4.0 * (at(bin, -1) + at(bin, 1)) + 6.0 * from[bin]) / 16.0;
+    for (value, near) in to[2..].iter_mut().zip(from.windows(5)) {
+        *value = ((near[0] + near[4]) + 4.0 * (near[1] + near[3]) + 6.0 * near[2]) / 16.0;
     }
 }
 
@@ -237,5 +235,87 @@ impl Sums {
 
     fn variance_along(&self) -> f64 {
         self.along_squares - self.along * self.along / self.weight
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Cells of lines at the given distances across, with a slope, from `from` to `to` along. Since cells have whole
+    /// places, a line tells its slope only to about three quarters of a cell over half its length.
+    fn faces(slope: f64, faces: &[(f64, f64, f64)]) -> Vec<Offset> {
+        let face = |&(across, from, to): &(f64, f64, f64)| {
+            let steps = (to - from) as usize;
+            (0..=steps).map(move |step| {
+                let along = from + step as f64;
+                Offset { along, across: (across + slope * along - 0.5).round() + 0.5 }
+            })
+        };
+        faces.iter().flat_map(face).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn one_line_of_cells_tells_its_slope_and_its_place(slope in -0.04..0.04, across in -1.5..1.5) {
+            let correction = fit_faces(&faces(slope, &[(across, -60.0, 60.0)]), 60.0, 4.0).unwrap();
+            prop_assert!((correction.slope - slope).abs() < 0.8 / 60.0, "{correction:?}");
+            prop_assert!((correction.across - across).abs() < 0.55, "{correction:?}");
+        }
+
+        #[test]
+        fn two_faces_that_are_seen_in_different_parts_do_not_turn_the_wall(slope in -0.03..0.03, gap in 5.0..6.5f64) {
+            let cells = faces(slope, &[(-0.5 * gap, -60.0, 10.0), (0.5 * gap, -20.0, 60.0)]);
+            let correction = fit_faces(&cells, 60.0, 5.0).unwrap();
+            prop_assert!((correction.slope - slope).abs() < 0.8 / 35.0, "{correction:?}");
+        }
+
+        #[test]
+        fn whatever_the_cells_are_the_correction_is_made_of_numbers(
+            cells in prop::collection::vec((-50.0..50.0, -8.0..8.0), 0..40), half in 0.1..60.0, reach in 0.1..8.0,
+        ) {
+            let cells: Vec<Offset> = cells.iter().map(|&(along, across)| Offset { along, across }).collect();
+            if let Some(correction) = fit_faces(&cells, half, reach) {
+                prop_assert!(correction.slope.is_finite() && correction.across.is_finite());
+            }
+        }
+    }
+
+    #[test]
+    fn a_solid_wall_is_fitted_as_a_whole() {
+        let rows: Vec<(f64, f64, f64)> = (-3..=3).map(|row| (f64::from(row), -80.0, 80.0)).collect();
+        for slope in [-0.02, 0.0, 0.013] {
+            let correction = fit_faces(&faces(slope, &rows), 80.0, 5.0).unwrap();
+            assert!((correction.slope - slope).abs() < 0.002, "{slope} {correction:?}");
+        }
+    }
+
+    #[test]
+    fn furniture_at_a_wall_does_not_turn_it() {
+        let wall = (0.0, -60.0, 60.0);
+        let furniture = (3.5, 20.0, 55.0);
+        let with = fit_faces(&faces(0.01, &[wall, furniture]), 60.0, 4.5).unwrap();
+        assert!((with.slope - 0.01).abs() < 0.004, "{with:?}");
+    }
+
+    #[test]
+    fn cells_of_one_place_and_no_cells_tell_nothing() {
+        assert_eq!(fit_faces(&[], 10.0, 4.0), None);
+        assert_eq!(fit_faces(&[Offset { along: 1.0, across: 0.5 }; 9], 10.0, 4.0), None);
+    }
+
+    #[test]
+    fn a_profile_is_cut_at_its_valleys_only() {
+        let cut = |lines: &[(f64, f64, f64)]| {
+            let mut profile = Profile::new(6.0);
+            profile.fill(faces(0.0, lines).iter(), 0.0);
+            profile.faces().len()
+        };
+        assert_eq!(cut(&[(0.0, 0.0, 50.0)]), 1);
+        assert_eq!(cut(&[(-0.5, 0.0, 50.0), (0.5, 50.0, 99.0)]), 1, "a line that crosses two rows of cells");
+        assert_eq!(cut(&[(-3.0, 0.0, 50.0), (3.0, 0.0, 30.0)]), 2);
+        assert_eq!(cut(&[(-4.5, 0.0, 50.0), (-0.5, 0.0, 50.0), (3.5, 0.0, 20.0)]), 3);
+        assert_eq!(cut(&[]), 1);
     }
 }

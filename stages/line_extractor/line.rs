@@ -21,19 +21,21 @@ impl Line {
     /// The line with the least sum of squared distances to the points (total least squares). `None` for points that
     /// tell no direction.
     pub(super) fn least_squares(points: impl Iterator<Item = Point2> + Clone) -> Option<Self> {
-        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
-        for point in points.clone() {
-            sum += point.coords;
-            count += 1.0;
-        }
-        let centre = Point2::from(sum / f64::max(count, 1.0));
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        // Sums about one of the points keep their digits however far from the origin the points are.
+        let reference = points.clone().next()?;
+        let (mut x, mut y, mut xx, mut xy, mut yy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for point in points {
-            let offset = point - centre;
+            let offset = point - reference;
+            x += offset.x;
+            y += offset.y;
             xx += offset.x * offset.x;
             xy += offset.x * offset.y;
             yy += offset.y * offset.y;
+            count += 1.0;
         }
+        let mean = Vector2::new(x, y) / count;
+        let (xx, xy, yy) = (xx - x * mean.x, xy - x * mean.y, yy - y * mean.y);
+        let centre = reference + mean;
         let (difference, sum) = (xx - yy, xx + yy);
         let elongation = difference.hypot(2.0 * xy);
         if !(elongation.is_finite() && elongation > 1e-9 * sum) {
