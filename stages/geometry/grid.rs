@@ -5,6 +5,9 @@ use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
 use gridweave_runtime::ros::{DecodeError, Header, MapMetaData, OccupancyGrid};
 
+/// As many cells are looked at together.
+const BLOCK: usize = 64;
+
 /// A cell's place in a grid: column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Cell {
@@ -138,12 +141,16 @@ impl<'a> Grid<'a> {
 
     /// The cells that hold an obstacle, row by row.
     pub fn occupied(&self) -> impl Iterator<Item = Cell> + 'a {
-        let width = self.geometry.width;
-        self.cells
-            .iter()
-            .enumerate()
-            .filter(|(_, value)| is_occupied(**value))
-            .map(move |(index, _)| Cell { column: index % width, row: index / width })
+        // Most of a map is free or unknown. Whole blocks of it are passed over by their greatest value.
+        let may_hold_one = |block: &[i8]| is_occupied(block.iter().fold(UNKNOWN, |most, v| most.max(*v)).min(100));
+        let rows = self.cells.chunks(self.geometry.width.max(1)).enumerate();
+        rows.flat_map(move |(row, cells)| {
+            let blocks = cells.chunks(BLOCK).enumerate().filter(move |(_, block)| may_hold_one(block));
+            blocks.flat_map(move |(number, block)| {
+                let cells = block.iter().enumerate().filter(|(_, value)| is_occupied(**value));
+                cells.map(move |(place, _)| Cell { column: number * BLOCK + place, row })
+            })
+        })
     }
 }
 
@@ -183,6 +190,22 @@ mod tests {
             let geometry = geometry(x, y, yaw);
             let cell = Cell { column, row };
             prop_assert_eq!(geometry.cell(&geometry.centre(cell)), Some(cell));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_occupied_cells_are_those_that_a_look_at_every_cell_finds(
+            width in 0usize..200, height in 0usize..5, values in prop::collection::vec(prop::num::i8::ANY, 1000),
+        ) {
+            // Most cells are free, so that there are blocks to pass over.
+            let cells: Vec<i8> =
+                values.iter().enumerate().map(|(i, v)| if i % 7 == 0 { *v } else { 0 }).take(width * height).collect();
+            let geometry = GridGeometry { width, height, ..geometry(0.0, 0.0, 0.0) };
+            let grid = Grid::new(geometry, &cells).unwrap();
+            let all = (0..cells.len()).filter(|&index| is_occupied(cells[index]));
+            let expected: Vec<Cell> = all.map(|index| Cell { column: index % width, row: index / width }).collect();
+            prop_assert_eq!(grid.occupied().collect::<Vec<_>>(), expected);
         }
     }
 

@@ -1,5 +1,6 @@
 //! From an occupancy grid to its straight walls: section 4.1.1 of Tsardoulias et al.
 
+use super::faces::{Offset, fit_faces};
 use super::line::{Line, Stretch};
 use super::merge::merge_walls;
 use super::parameters::{Fit, LineExtractorParameters};
@@ -16,6 +17,10 @@ use rand_chacha::ChaCha8Rng;
 
 /// How often a segment is fitted to all cells near it.
 const FINAL_FITS: usize = 3;
+/// How often a segment is fitted to its faces, at most, and when it is good enough: its ends have moved by less than this,
+/// in cells.
+const FACE_FITS: usize = 3;
+const ENOUGH: f64 = 0.5;
 /// The last fits leave out cells farther from the line than this many standard deviations: what stands at a wall.
 const OUTLIER_DEVIATIONS: f64 = 2.5;
 
@@ -65,18 +70,50 @@ fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Poi
 
 /// Fits a wall to all cells near it. Gives the stretch and the number of cells.
 fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
-    let mut stretch = wall.stretch;
+    let stretch = match fit {
+        Fit::Faces => fit_to_faces(index, wall.stretch, scale),
+        Fit::LeastSquares | Fit::Ends => fit_to_cells(index, wall.stretch, fit, scale)?,
+    };
+    let count = points_along(index, &stretch, scale.reach).len();
+    (count > 0).then_some((stretch, count))
+}
+
+/// The part of a stretch that tells its direction. Where walls meet, cells of the other wall lie on one side of this one
+/// and would turn it.
+fn inner(stretch: &Stretch, scale: &Scale) -> Stretch {
+    let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
+    Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin }
+}
+
+/// Fits a stretch to the faces of its wall.
+fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stretch {
+    for _ in 0..FACE_FITS {
+        let inner = inner(&stretch, scale);
+        let middle = (inner.start + inner.end) / 2.0;
+        let cells: Vec<Offset> = points_along(index, &inner, scale.reach)
+            .iter()
+            .map(|point| Offset { along: inner.line.along(point) - middle, across: inner.line.across(point) })
+            .collect();
+        let Some(correction) = fit_faces(&cells, inner.length() / 2.0, scale.reach) else { break };
+        let Some(line) = inner.line.corrected(middle, &correction) else { break };
+        let ends = stretch.ends();
+        let Some(turned) = Stretch::between_farthest(line, ends.into_iter()) else { break };
+        let moved = ends.iter().map(|end| line.distance(end)).fold(0.0, f64::max);
+        stretch = turned;
+        if moved < ENOUGH {
+            break;
+        }
+    }
+    stretch
+}
+
+/// Fits a stretch to all cells near it.
+fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scale) -> Option<Stretch> {
     let mut reach = scale.reach;
-    let mut near = Vec::new();
     for _ in 0..FINAL_FITS {
-        near.clear();
-        let Stretch { line, start, end } = stretch;
-        // Where walls meet, cells of the other wall lie on one side of this one and would turn it.
-        let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
-        let inside = |id: usize| (start + margin..=end - margin).contains(&line.along(&index.points()[id]));
-        index.near_line(&line, &line.at((start + end) / 2.0), reach, f64::INFINITY, inside, &mut near);
-        let cells = near.iter().map(|&id| index.points()[id]);
-        let Some(fitted) = fit_stretch(fit, &line, cells.clone()) else { break };
+        let near = points_along(index, &inner(&stretch, scale), reach);
+        let cells = near.iter().copied();
+        let Some(fitted) = fit_stretch(fit, &stretch.line, cells.clone()) else { break };
         // The cells at the ends took no part in the fit, but they belong to the wall.
         let [first, last] = stretch.ends();
         stretch = Stretch::between_farthest(fitted.line, cells.clone().chain([first, last]))?;
@@ -87,11 +124,19 @@ fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option
         reach =
             (OUTLIER_DEVIATIONS * (squares / near.len() as f64).sqrt()).clamp(1.0_f64.min(scale.reach), scale.reach);
     }
-    near.clear();
-    let Stretch { line, start, end } = stretch;
-    let inside = |id: usize| (start..=end).contains(&line.along(&index.points()[id]));
-    index.near_line(&line, &line.at((start + end) / 2.0), scale.reach, f64::INFINITY, inside, &mut near);
-    (!near.is_empty()).then_some((stretch, near.len()))
+    Some(stretch)
+}
+
+/// The points within `reach` of a stretch, between its ends.
+fn points_along(index: &PointIndex, stretch: &Stretch, reach: f64) -> Vec<Point2> {
+    let mut found = Vec::new();
+    index.near_stretch(stretch, reach, |id| {
+        let point = index.points()[id];
+        if (stretch.start..=stretch.end).contains(&stretch.line.along(&point)) {
+            found.push(point);
+        }
+    });
+    found
 }
 
 fn segment(grid: &Grid<'_>, stretch: &Stretch, reliability: f64, inliers: usize) -> Segment {

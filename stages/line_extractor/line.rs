@@ -1,6 +1,7 @@
 //! Straight lines in the plane, in units of cells.
 
-use crate::geometry::Point2;
+use super::faces::Correction;
+use crate::geometry::{Point2, quarter_turn};
 use nalgebra::Vector2;
 
 /// A straight line: a point on it and its unit direction.
@@ -20,19 +21,21 @@ impl Line {
     /// The line with the least sum of squared distances to the points (total least squares). `None` for points that
     /// tell no direction.
     pub(super) fn least_squares(points: impl Iterator<Item = Point2> + Clone) -> Option<Self> {
-        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
-        for point in points.clone() {
-            sum += point.coords;
-            count += 1.0;
-        }
-        let centre = Point2::from(sum / f64::max(count, 1.0));
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        // Sums about one of the points keep their digits however far from the origin the points are.
+        let reference = points.clone().next()?;
+        let (mut x, mut y, mut xx, mut xy, mut yy, mut count) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for point in points {
-            let offset = point - centre;
+            let offset = point - reference;
+            x += offset.x;
+            y += offset.y;
             xx += offset.x * offset.x;
             xy += offset.x * offset.y;
             yy += offset.y * offset.y;
+            count += 1.0;
         }
+        let mean = Vector2::new(x, y) / count;
+        let (xx, xy, yy) = (xx - x * mean.x, xy - x * mean.y, yy - y * mean.y);
+        let centre = reference + mean;
         let (difference, sum) = (xx - yy, xx + yy);
         let elongation = difference.hypot(2.0 * xy);
         if !(elongation.is_finite() && elongation > 1e-9 * sum) {
@@ -52,9 +55,22 @@ impl Line {
         self.direction
     }
 
+    /// The line turned about its point at `along`, and moved across.
+    pub(super) fn corrected(&self, along: f64, correction: &Correction) -> Option<Self> {
+        let across = quarter_turn(&self.direction);
+        let direction = (self.direction + across * correction.slope).try_normalize(f64::MIN_POSITIVE)?;
+        let point = self.at(along) + across * correction.across;
+        direction.iter().all(|v| v.is_finite()).then_some(Self { point, direction })
+    }
+
+    /// How far to the left of the line a point is.
+    pub(super) fn across(&self, point: &Point2) -> f64 {
+        self.direction.perp(&(point - self.point))
+    }
+
     /// How far from the line a point is: equation 3 of Tsardoulias et al.
     pub(super) fn distance(&self, point: &Point2) -> f64 {
-        self.direction.perp(&(point - self.point)).abs()
+        self.across(point).abs()
     }
 
     /// The place along the line that is nearest to a point, as a signed distance from [`point`](Self::point).

@@ -31,8 +31,10 @@ pub enum Scoring {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// Total least squares over all occupied cells of the segment.
+    /// All faces of a wall at once, robustly: a wall may have been seen from both sides, and furniture stands at it.
     #[default]
+    Faces,
+    /// Total least squares over all occupied cells of the segment.
     LeastSquares,
     /// The line through the two farthest members (the paper).
     Ends,
@@ -48,7 +50,7 @@ pub struct LineExtractorParameters {
     pub sampling_radius: f64,
     /// When a line counts as a wall: `points` or `percentage` (the paper).
     pub scoring: Scoring,
-    /// How the final line of a segment is found: `least_squares` or `ends` (the paper).
+    /// How the final line of a segment is found: `faces`, `least_squares` or `ends` (the paper).
     pub fit: Fit,
     /// Of more occupied cells than these a random part is searched for lines (the set P); the lines found are then
     /// fitted to all cells.
@@ -87,14 +89,14 @@ impl Default for LineExtractorParameters {
             sampling: Sampling::Local,
             sampling_radius: 0.5,
             scoring: Scoring::Points,
-            fit: Fit::LeastSquares,
-            max_points: 15_000,
+            fit: Fit::Faces,
+            max_points: 10_000,
             inlier_distance: 0.08,
             min_points: 12,
             min_share: 0.15,
             stop_share: 0.05,
             candidates: 8,
-            patience: 40,
+            patience: 25,
             max_iterations: 20_000,
             max_gap: 0.6,
             merge_angle: 0.05,

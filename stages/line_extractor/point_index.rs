@@ -1,12 +1,14 @@
 //! Points in square buckets: which of them lie near a line, and near each other.
 
-use super::line::Line;
+use super::line::{Line, Stretch};
 use crate::geometry::Point2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
 /// How often a neighbour is drawn before the search for one is given up.
 const DRAWS: usize = 8;
+/// How many rows of buckets may lie within four sides of a point, both ways.
+const BANDS: usize = 9;
 
 /// Points of a plane that begins at (0, 0), sorted into square buckets.
 ///
@@ -30,17 +32,18 @@ impl PointIndex {
         let place = |value: f64, count: usize| ((value / side) as usize).min(count - 1);
         let bucket = |point: &Point2| place(point.y, rows) * columns + place(point.x, columns);
 
-        let mut starts = vec![0; columns * rows + 1];
-        for point in points {
-            starts[bucket(point) + 1] += 1;
+        // Points are counted two places on, so that the starts can serve as the places of the next points.
+        let mut starts = vec![0; columns * rows + 2];
+        let buckets: Vec<usize> = points.iter().map(bucket).collect();
+        for bucket in &buckets {
+            starts[bucket + 2] += 1;
         }
-        for index in 1..starts.len() {
+        for index in 2..starts.len() {
             starts[index] += starts[index - 1];
         }
-        let mut next = starts.clone();
         let mut sorted = vec![Point2::origin(); points.len()];
-        for point in points {
-            let place = &mut next[bucket(point)];
+        for (point, bucket) in points.iter().zip(buckets) {
+            let place = &mut starts[bucket + 1];
             sorted[*place] = *point;
             *place += 1;
         }
@@ -52,70 +55,54 @@ impl PointIndex {
         &self.points
     }
 
-    /// Appends to `found` the points within `reach` of the line for which `wanted` holds.
+    /// Hands the names of points within `reach` of the line to `visit`, which says whether they are wanted.
     ///
     /// The search begins at `from`, a point near the line, and goes along the line both ways, each until a stretch of
-    /// `max_gap` or more without such points; so what lies beyond a larger gap may be missing, and nothing else.
+    /// `max_gap` or more without points that are wanted; so what lies beyond a larger gap may be missing, and nothing
+    /// else.
     pub(super) fn near_line(
         &self,
         line: &Line,
         from: &Point2,
         reach: f64,
         max_gap: f64,
-        wanted: impl Fn(usize) -> bool,
-        found: &mut Vec<usize>,
+        mut visit: impl FnMut(usize) -> bool,
     ) {
-        let direction = line.direction();
-        // u is the axis that the line runs along, v the one across.
-        let steep = direction.y.abs() > direction.x.abs();
-        let (point, from) = (line.point(), if steep { from.y } else { from.x });
-        let (u, v, slope) = match steep {
-            true => (point.y, point.x, direction.x / direction.y),
-            false => (point.x, point.y, direction.y / direction.x),
-        };
-        let (u_count, v_count) = if steep { (self.rows, self.columns) } else { (self.columns, self.rows) };
-        let margin = reach * 1.0_f64.hypot(slope);
+        let strip = Strip::new(self, line, reach);
+        let middle = strip.slice(from);
+        let most_empty = max_gap / self.side;
+        let mut empty = 0.0;
+        for slice in middle..strip.slices {
+            empty = if strip.visit(slice, &mut visit) { 0.0 } else { empty + 1.0 };
+            if empty > most_empty {
+                break;
+            }
+        }
+        let mut empty = 0.0;
+        for slice in (0..middle).rev() {
+            empty = if strip.visit(slice, &mut visit) { 0.0 } else { empty + 1.0 };
+            if empty > most_empty {
+                break;
+            }
+        }
+    }
 
-        let mut scan = |u_bucket: usize| -> bool {
-            let first = v + (u_bucket as f64 * self.side - u) * slope;
-            let last = first + self.side * slope;
-            let (low, high) = (first.min(last) - margin, first.max(last) + margin);
-            if !(high >= 0.0 && low < v_count as f64 * self.side) {
-                return false;
-            }
-            let before = found.len();
-            let v_last = ((high / self.side) as usize).min(v_count - 1);
-            for v_bucket in (low / self.side) as usize..=v_last {
-                let bucket = match steep {
-                    true => u_bucket * self.columns + v_bucket,
-                    false => v_bucket * self.columns + u_bucket,
-                };
-                for id in self.starts[bucket]..self.starts[bucket + 1] {
-                    if line.distance(&self.points[id]) <= reach && wanted(id) {
-                        found.push(id);
-                    }
-                }
-            }
-            found.len() > before
-        };
-
-        let middle = ((from / self.side) as usize).min(u_count - 1);
-        let empty_limit = max_gap / self.side;
-        let mut walk = |buckets: &mut dyn Iterator<Item = usize>| {
-            let mut empty = 0.0;
-            for bucket in buckets {
-                empty = if scan(bucket) { 0.0 } else { empty + 1.0 };
-                if empty > empty_limit {
-                    break;
-                }
-            }
-        };
-        walk(&mut (middle..u_count));
-        walk(&mut (0..middle).rev());
+    /// Hands the names of all points within `reach` of the line of a stretch to `visit` that lie along the stretch, and of
+    /// some that lie beyond its ends.
+    pub(super) fn near_stretch(&self, stretch: &Stretch, reach: f64, mut visit: impl FnMut(usize)) {
+        let strip = Strip::new(self, &stretch.line, reach);
+        let beyond = |along: f64| strip.slice(&stretch.line.at(along));
+        let (a, b) = (beyond(stretch.start - reach), beyond(stretch.end + reach));
+        for slice in a.min(b)..=a.max(b) {
+            strip.visit(slice, &mut |id| {
+                visit(id);
+                true
+            });
+        }
     }
 
     /// Draws a point at `min_distance` to `max_distance` from the point `id` for which `wanted` holds. `None` if a few
-    /// draws find none. `max_distance` is at most the side of a bucket.
+    /// draws find none. `max_distance` is at most four times the side of a bucket.
     pub(super) fn draw_neighbour(
         &self,
         id: usize,
@@ -125,11 +112,12 @@ impl PointIndex {
         random: &mut impl Rng,
     ) -> Option<usize> {
         let point = self.points[id];
-        let bands = self.bands_around(&point);
+        let bands = self.bands_around(&point, max_distance);
         let count: usize = bands.iter().map(ExactSizeIterator::len).sum();
         if count == 0 {
             return None;
         }
+        let (least, most) = (min_distance * min_distance, max_distance * max_distance);
         (0..DRAWS).find_map(|_| {
             let mut drawn = random.random_range(0..count);
             let band = bands.iter().find(|band| {
@@ -138,22 +126,102 @@ impl PointIndex {
                 inside
             })?;
             let other = band.start + drawn;
-            let distance = (self.points[other] - point).norm();
-            (distance >= min_distance && distance <= max_distance && wanted(other)).then_some(other)
+            let distance = (self.points[other] - point).norm_squared();
+            (distance >= least && distance <= most && wanted(other)).then_some(other)
         })
     }
 
-    /// The points of the three by three buckets round a point: three runs, since a row's buckets follow each other.
-    fn bands_around(&self, point: &Point2) -> [Range<usize>; 3] {
-        let column = ((point.x / self.side) as usize).min(self.columns - 1);
-        let row = ((point.y / self.side) as usize).min(self.rows - 1);
-        let (left, right) = (column.saturating_sub(1), (column + 1).min(self.columns - 1));
-        [row.checked_sub(1), Some(row), Some(row + 1)].map(|row| match row {
-            Some(row) if row < self.rows => {
-                self.starts[row * self.columns + left]..self.starts[row * self.columns + right + 1]
-            }
+    /// The points of the buckets within `distance` of a point: a run for each row, since a row's buckets follow each
+    /// other.
+    fn bands_around(&self, point: &Point2, distance: f64) -> [Range<usize>; BANDS] {
+        let place = |value: f64, count: usize| ((value.max(0.0) / self.side) as usize).min(count - 1);
+        let (left, right) = (place(point.x - distance, self.columns), place(point.x + distance, self.columns));
+        let (first, last) = (place(point.y - distance, self.rows), place(point.y + distance, self.rows));
+        std::array::from_fn(|index| match first + index {
+            row if row <= last => self.starts[row * self.columns + left]..self.starts[row * self.columns + right + 1],
             _ => 0..0,
         })
+    }
+}
+
+/// The buckets that a strip of a plane runs through, cut into slices across its greater axis.
+struct Strip<'a> {
+    index: &'a PointIndex,
+    /// Whether the strip runs along y rather than x.
+    is_steep: bool,
+    /// Where the line crosses the lower border of the first slice, and how far it moves aside within a slice.
+    start: f64,
+    step: f64,
+    /// Half the width of the strip across its greater axis.
+    margin: f64,
+    /// The line in its normal form, and half the width of the strip.
+    normal: [f64; 3],
+    reach: f64,
+    /// The number of slices and of buckets of each.
+    slices: usize,
+    across: usize,
+}
+
+impl<'a> Strip<'a> {
+    fn new(index: &'a PointIndex, line: &Line, reach: f64) -> Self {
+        let (point, direction) = (line.point(), line.direction());
+        let is_steep = direction.y.abs() > direction.x.abs();
+        let (u, v, slope) = match is_steep {
+            true => (point.y, point.x, direction.x / direction.y),
+            false => (point.x, point.y, direction.y / direction.x),
+        };
+        let (slices, across) = if is_steep { (index.rows, index.columns) } else { (index.columns, index.rows) };
+        Self {
+            index,
+            is_steep,
+            start: v - u * slope,
+            step: index.side * slope,
+            margin: reach * 1.0_f64.hypot(slope),
+            normal: [-direction.y, direction.x, direction.y * point.x - direction.x * point.y],
+            reach,
+            slices,
+            across,
+        }
+    }
+
+    /// The slice of a point; the nearest one for points outside.
+    fn slice(&self, point: &Point2) -> usize {
+        let place = if self.is_steep { point.y } else { point.x };
+        ((place / self.index.side) as usize).min(self.slices - 1)
+    }
+
+    /// Hands the points of a slice to `visit`. Gives whether one was wanted.
+    fn visit(&self, slice: usize, visit: &mut impl FnMut(usize) -> bool) -> bool {
+        let (first, last) = (self.start + slice as f64 * self.step, self.start + (slice + 1) as f64 * self.step);
+        let (low, high) = (first.min(last) - self.margin, first.max(last) + self.margin);
+        let side = self.index.side;
+        if !(high >= 0.0 && low < self.across as f64 * side) {
+            return false;
+        }
+        let (low, high) = ((low / side) as usize, ((high / side) as usize).min(self.across - 1));
+        let starts = &self.index.starts;
+        let mut is_wanted = false;
+        if self.is_steep {
+            let row = slice * self.index.columns;
+            is_wanted |= self.visit_run(starts[row + low]..starts[row + high + 1], visit);
+        } else {
+            for row in low..=high {
+                let bucket = row * self.index.columns + slice;
+                is_wanted |= self.visit_run(starts[bucket]..starts[bucket + 1], visit);
+            }
+        }
+        is_wanted
+    }
+
+    fn visit_run(&self, run: Range<usize>, visit: &mut impl FnMut(usize) -> bool) -> bool {
+        let [x, y, offset] = self.normal;
+        let mut is_wanted = false;
+        for (id, point) in run.clone().zip(&self.index.points[run]) {
+            if (x * point.x + y * point.y + offset).abs() <= self.reach {
+                is_wanted |= visit(id);
+            }
+        }
+        is_wanted
     }
 }
 
@@ -178,7 +246,12 @@ mod tests {
             let (a, b) = (Point2::new(a.0, a.1), Point2::new(b.0, b.1));
             if let Some(line) = Line::through(&a, &b) {
                 let mut found = Vec::new();
-                index.near_line(&line, &a, reach, f64::INFINITY, |id| id % 3 != 0, &mut found);
+                index.near_line(&line, &a, reach, f64::INFINITY, |id| {
+                    if id % 3 != 0 {
+                        found.push(id);
+                    }
+                    id % 3 != 0
+                });
                 found.sort_unstable();
                 let expected: Vec<usize> = (0..index.points().len())
                     .filter(|&id| id % 3 != 0 && line.distance(&index.points()[id]) <= reach)
@@ -188,8 +261,30 @@ mod tests {
         }
 
         #[test]
-        fn a_drawn_neighbour_keeps_its_distance(points in points(), seed in 0u64..99) {
-            let index = PointIndex::new(&points, 50, 30, 8.0);
+        fn all_points_near_a_stretch_are_found(
+            points in points(), side in 1.0..20.0, reach in 0.1..5.0,
+            a in (-20.0..70.0, -20.0..50.0), b in (-20.0..70.0, -20.0..50.0),
+        ) {
+            let index = PointIndex::new(&points, 50, 30, side);
+            let (a, b) = (Point2::new(a.0, a.1), Point2::new(b.0, b.1));
+            if let Some(line) = Line::through(&a, &b) {
+                let (start, end) = (0.0, (b - a).norm());
+                let inside = |id: usize| (start..=end).contains(&line.along(&index.points()[id]));
+                let mut found = Vec::new();
+                index.near_stretch(&Stretch { line, start, end }, reach, |id| found.push(id));
+                prop_assert!(found.iter().all(|&id| line.distance(&index.points()[id]) <= reach + 1e-9));
+                found.retain(|&id| inside(id));
+                found.sort_unstable();
+                let expected: Vec<usize> = (0..index.points().len())
+                    .filter(|&id| inside(id) && line.distance(&index.points()[id]) <= reach)
+                    .collect();
+                prop_assert_eq!(found, expected);
+            }
+        }
+
+        #[test]
+        fn a_drawn_neighbour_keeps_its_distance(points in points(), seed in 0u64..99, side in 2.0..9.0) {
+            let index = PointIndex::new(&points, 50, 30, side);
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             for id in 0..index.points().len() {
                 if let Some(other) = index.draw_neighbour(id, 2.0, 8.0, |id| id % 2 == 0, &mut random) {
@@ -206,16 +301,18 @@ mod tests {
         let index = PointIndex::new(&points, 50, 30, 4.0);
         let line = Line::through(&points[0], &points[1]).unwrap();
         let mut found = Vec::new();
-        index.near_line(&line, &points[0], 1.0, 10.0, |_| true, &mut found);
+        index.near_line(&line, &points[0], 1.0, 10.0, |id| {
+            found.push(id);
+            true
+        });
         assert_eq!(found.len(), 5);
     }
 
     #[test]
     fn an_empty_plane_has_no_points() {
         let index = PointIndex::new(&[], 0, 0, f64::NAN);
-        let mut found = Vec::new();
         let line = Line::through(&Point2::new(0.0, 0.0), &Point2::new(1.0, 1.0)).unwrap();
-        index.near_line(&line, &Point2::new(9.0, 9.0), 1.0, 1.0, |_| true, &mut found);
-        assert!(found.is_empty());
+        index.near_line(&line, &Point2::new(9.0, 9.0), 1.0, 1.0, |_| panic!("a point"));
+        index.near_stretch(&Stretch { line, start: -5.0, end: 5.0 }, 1.0, |_| panic!("a point"));
     }
 }

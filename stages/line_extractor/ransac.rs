@@ -8,7 +8,7 @@ use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
 
 /// How often a line is fitted to its members, and these are counted again.
-const REFITS: usize = 2;
+const REFITS: usize = 1;
 
 /// Finds the walls among the points of the index, in the order they are found. No point belongs to two.
 pub(super) fn find_walls(
@@ -27,24 +27,28 @@ pub(super) fn find_walls(
 /// The points that no wall has taken.
 struct Pool {
     ids: Vec<usize>,
-    /// For every point its place in `ids`.
-    places: Vec<Option<usize>>,
+    /// For every point its place in `ids`, or [`TAKEN`].
+    places: Vec<usize>,
 }
+
+/// The place of a point that is not in the pool.
+const TAKEN: usize = usize::MAX;
 
 impl Pool {
     fn new(count: usize) -> Self {
-        Self { ids: (0..count).collect(), places: (0..count).map(Some).collect() }
+        Self { ids: (0..count).collect(), places: (0..count).collect() }
     }
 
     fn contains(&self, id: usize) -> bool {
-        self.places[id].is_some()
+        self.places[id] != TAKEN
     }
 
     fn remove(&mut self, id: usize) {
-        if let Some(place) = self.places[id].take() {
+        if self.contains(id) {
+            let place = std::mem::replace(&mut self.places[id], TAKEN);
             self.ids.swap_remove(place);
             if let Some(&moved) = self.ids.get(place) {
-                self.places[moved] = Some(place);
+                self.places[moved] = place;
             }
         }
     }
@@ -52,6 +56,15 @@ impl Pool {
 
 /// A line through two drawn points.
 struct Candidate {
+    line: Line,
+    /// One of the two points.
+    from: usize,
+    /// How many members the line has.
+    count: usize,
+}
+
+/// A line with its members.
+struct Found {
     line: Line,
     members: Vec<usize>,
 }
@@ -72,7 +85,7 @@ impl Search<'_> {
             && misses < self.parameters.patience
         {
             let found = match self.best_candidate(&pool, &mut iterations, random) {
-                Some(candidate) => self.unbroken_walls(&pool, candidate),
+                Some(candidate) => self.unbroken_walls(&pool, &candidate),
                 None => Vec::new(),
             };
             misses = if found.is_empty() { misses + 1 } else { 0 };
@@ -92,14 +105,13 @@ impl Search<'_> {
         let mut best: Option<Candidate> = None;
         while self.points_left(&pool) && iterations < self.parameters.max_iterations {
             if let Some(candidate) = self.best_candidate(&pool, &mut iterations, random)
-                && best.as_ref().is_none_or(|best| candidate.members.len() > best.members.len())
+                && best.as_ref().is_none_or(|best| candidate.count > best.count)
             {
                 best = Some(candidate);
             }
-            let taken =
-                best.take_if(|best| best.members.len() as f64 > enough || iterations >= self.parameters.max_iterations);
+            let taken = best.take_if(|best| best.count as f64 > enough || iterations >= self.parameters.max_iterations);
             if let Some(candidate) = taken {
-                let line = self.recounted(&pool, candidate);
+                let line = self.recounted(&pool, &candidate);
                 walls.extend(self.parts(&line));
                 line.members.iter().for_each(|&id| pool.remove(id));
             }
@@ -118,7 +130,7 @@ impl Search<'_> {
         let mut best: Option<Candidate> = None;
         for _ in 0..draws {
             if let Some(candidate) = self.draw(pool, random)
-                && best.as_ref().is_none_or(|best| candidate.members.len() > best.members.len())
+                && best.as_ref().is_none_or(|best| candidate.count > best.count)
             {
                 best = Some(candidate);
             }
@@ -137,46 +149,60 @@ impl Search<'_> {
         };
         let points = self.index.points();
         let line = Line::through(&points[first], &points[second])?;
-        Some(Candidate { members: self.members(pool, &line, first), line })
+        let mut count = 0;
+        self.visit_members(pool, &line, first, |_| count += 1);
+        Some(Candidate { line, from: first, count })
     }
 
-    /// The points left that lie near a line. Under `points` scoring only what is tied to `from` counts: the search
+    /// Visits the points left that lie near a line. Under `points` scoring only what is tied to `from` counts: the search
     /// ends at a gap.
-    fn members(&self, pool: &Pool, line: &Line, from: usize) -> Vec<usize> {
+    fn visit_members(&self, pool: &Pool, line: &Line, from: usize, mut visit: impl FnMut(usize)) {
         let max_gap = match self.parameters.scoring {
             Scoring::Points => self.scale.max_gap,
             Scoring::Percentage => f64::INFINITY,
         };
-        let mut members = Vec::new();
         let from = &self.index.points()[from];
-        self.index.near_line(line, from, self.scale.reach, max_gap, |id| pool.contains(id), &mut members);
+        self.index.near_line(line, from, self.scale.reach, max_gap, |id| {
+            let is_left = pool.contains(id);
+            if is_left {
+                visit(id);
+            }
+            is_left
+        });
+    }
+
+    fn members(&self, pool: &Pool, line: &Line, from: usize) -> Vec<usize> {
+        let mut members = Vec::new();
+        self.visit_members(pool, line, from, |id| members.push(id));
         members
     }
 
-    /// Fits the line to its members and counts these again (the recount of section 4.1.1).
-    fn recounted(&self, pool: &Pool, mut candidate: Candidate) -> Candidate {
+    /// The members of a line; then it is fitted to them, and they are counted again (the recount of section 4.1.1).
+    fn recounted(&self, pool: &Pool, candidate: &Candidate) -> Found {
+        let mut found = Found { line: candidate.line, members: self.members(pool, &candidate.line, candidate.from) };
         for _ in 0..REFITS {
             let points = self.index.points();
-            let Some(&from) = candidate.members.first() else { break };
-            let Candidate { line, members } = &candidate;
-            let fitted = fit_stretch(self.parameters.fit, line, members.iter().map(|&id| points[id]));
+            let Some(&from) = found.members.first() else { break };
+            let fitted = fit_stretch(self.parameters.fit, &found.line, found.members.iter().map(|&id| points[id]));
             let Some(fitted) = fitted else { break };
-            let members = self.members(pool, &fitted.line, from);
-            candidate = Candidate { line: fitted.line, members };
+            found = Found { line: fitted.line, members: self.members(pool, &fitted.line, from) };
         }
-        candidate
+        found
     }
 
     /// The parts of a line between its gaps.
-    fn parts(&self, candidate: &Candidate) -> Vec<Wall> {
+    fn parts(&self, found: &Found) -> Vec<Wall> {
         let points = self.index.points();
-        break_down(points, &candidate.members, &candidate.line, self.scale.max_gap)
+        break_down(points, &found.members, &found.line, self.scale.max_gap)
             .into_iter()
-            .filter_map(|members| Wall::of_members(points, members, &candidate.line, self.parameters.fit))
+            .filter_map(|members| Wall::of_members(points, members, &found.line, self.parameters.fit))
             .collect()
     }
 
-    fn unbroken_walls(&self, pool: &Pool, candidate: Candidate) -> Vec<Wall> {
+    fn unbroken_walls(&self, pool: &Pool, candidate: &Candidate) -> Vec<Wall> {
+        if candidate.count < self.parameters.min_points {
+            return Vec::new();
+        }
         let mut walls = self.parts(&self.recounted(pool, candidate));
         walls.retain(|wall| {
             wall.members.len() >= self.parameters.min_points && wall.stretch.length() >= self.scale.min_length

@@ -12,12 +12,17 @@ use nalgebra::Vector2;
 pub(super) fn reliability(grid: &Grid<'_>, stretch: &Stretch, reach: f64) -> f64 {
     let steps = (stretch.length().ceil() as usize).max(1);
     let across = Vector2::new(-stretch.line.direction().y, stretch.line.direction().x);
-    let half = (reach.min(grid.geometry.cell_count() as f64) / 0.5).floor() as i64;
+    let half = reach.min(grid.geometry.cell_count() as f64).ceil();
+    // Not more than a cell apart, and as far as the reach to both sides.
+    let spacing = reach / half;
+    let half = half as i64;
     let mut sum = 0.0;
     for step in 0..=steps {
         let middle = stretch.line.at(stretch.start + stretch.length() * step as f64 / steps as f64);
-        let greatest =
-            (-half..=half).map(|offset| value_at(grid, &(middle + across * (offset as f64 * 0.5)))).max().unwrap_or(0);
+        let greatest = (-half..=half)
+            .map(|offset| value_at(grid, &(middle + across * (offset as f64 * spacing))))
+            .max()
+            .unwrap_or(0);
         sum += f64::from(greatest.clamp(0, 100)) / 100.0;
     }
     sum / (steps + 1) as f64

@@ -18,7 +18,7 @@ pub(super) struct Scale {
     pub(super) min_length: f64,
     /// See [`LineExtractorParameters::merge_distance`].
     pub(super) merge_distance: f64,
-    /// The side of the buckets that the cells are sorted into.
+    /// The side of the buckets that the cells are sorted into: a quarter of the sampling radius.
     pub(super) bucket_side: f64,
 }
 
@@ -34,7 +34,7 @@ impl Scale {
             max_gap: cells(parameters.max_gap, 1.5),
             min_length: cells(parameters.min_length, 0.0),
             merge_distance: cells(parameters.merge_distance, 0.0),
-            bucket_side: sampling_radius,
+            bucket_side: sampling_radius / 4.0,
         }
     }
 }

@@ -24,7 +24,8 @@ impl Wall {
 /// The stretch of the line through points that lie near `line`.
 pub(super) fn fit_stretch(fit: Fit, line: &Line, points: impl Iterator<Item = Point2> + Clone) -> Option<Stretch> {
     let line = match fit {
-        Fit::LeastSquares => Line::least_squares(points.clone())?,
+        // Faces are told apart once the wall is whole.
+        Fit::Faces | Fit::LeastSquares => Line::least_squares(points.clone())?,
         Fit::Ends => {
             let along = |a: &Point2, b: &Point2| line.along(a).total_cmp(&line.along(b));
             let first = points.clone().min_by(along)?;

@@ -1,14 +1,12 @@
 //! The direction of a map's walls.
 
+use super::circular_mean::{circular_mean, scatter};
 use super::grouping::{bisector, group_directions};
 use super::parameters::{Mean, QuadrantClassifierParameters};
 use super::walls::{WallDirection, wall_directions};
 use crate::geometry::turn_difference;
 use gridweave_runtime::ros::Segment;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-
-/// How often walls are weighted anew by their distance from the mean.
-const REWEIGHTINGS: usize = 10;
 
 /// The direction that the walls of a map share.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,9 +25,9 @@ pub struct Direction {
 
 /// The direction of the walls of a map. Without walls it is not valid, and zero.
 pub fn map_direction(segments: &[Segment], parameters: &QuadrantClassifierParameters) -> Direction {
-    let walls = wall_directions(segments, parameters.weighting);
+    let walls = wall_directions(segments, parameters);
     let Some((angle, members)) = (match parameters.mean {
-        Mean::Circular => mean_round_mode(&walls, parameters.tolerance),
+        Mean::Circular => circular_mean(&walls, parameters.tolerance),
         Mean::Groups => mean_of_groups(&walls),
     }) else {
         return Direction::default();
@@ -45,67 +43,11 @@ pub fn map_direction(segments: &[Segment], parameters: &QuadrantClassifierParame
     let agreement = agreeing / length;
     Direction {
         angle: turn_difference(angle, 0.0, FRAC_PI_2),
-        deviation: deviation(&members, angle, parameters),
+        deviation: deviation(&members, angle, scatter(&walls, angle, parameters.tolerance), parameters.min_deviation),
         groups,
         agreement,
         valid: agreement >= parameters.min_agreement && agreeing >= parameters.min_wall_length,
     }
-}
-
-/// The weighted circular mean of the walls near the mode, and these walls with the weights they had in it.
-///
-/// Walls are weighted by Tukey's biweight of their distance from the mean, so that a furnishing at an angle has no say
-/// and none falls in or out at a border.
-fn mean_round_mode(walls: &[WallDirection], tolerance: f64) -> Option<(f64, Vec<WallDirection>)> {
-    let mut mean = mode(walls, tolerance)?;
-    let mut members = Vec::new();
-    for _ in 0..REWEIGHTINGS {
-        members = weighted_near(walls, mean, tolerance);
-        let (sine, cosine) = members.iter().fold((0.0, 0.0), |(sine, cosine), wall| {
-            let angle = 4.0 * turn_difference(wall.angle, mean, FRAC_PI_2);
-            (sine + wall.weight * angle.sin(), cosine + wall.weight * angle.cos())
-        });
-        mean += sine.atan2(cosine) / 4.0;
-    }
-    (!members.is_empty()).then_some((mean, members))
-}
-
-/// The walls within `limit` of a direction, up to quarter turns, with their weights reduced by the biweight.
-fn weighted_near(walls: &[WallDirection], direction: f64, limit: f64) -> Vec<WallDirection> {
-    walls
-        .iter()
-        .filter_map(|wall| {
-            let distance = turn_difference(wall.angle, direction, FRAC_PI_2) / limit;
-            let weight = wall.weight * (1.0 - distance * distance).powi(2);
-            (distance.abs() < 1.0 && weight > 0.0).then_some(WallDirection { weight, ..*wall })
-        })
-        .collect()
-}
-
-/// The middle of the window of twice `tolerance` that holds most weight, among angles up to quarter turns.
-fn mode(walls: &[WallDirection], tolerance: f64) -> Option<f64> {
-    let mut folded: Vec<(f64, f64)> =
-        walls.iter().map(|wall| (wall.angle.rem_euclid(FRAC_PI_2), wall.weight)).collect();
-    folded.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let count = folded.len();
-    folded.extend_from_within(..);
-    folded[count..].iter_mut().for_each(|(angle, _)| *angle += FRAC_PI_2);
-
-    let (mut end, mut weight, mut moment) = (0, 0.0, 0.0);
-    let mut best: Option<(f64, f64)> = None;
-    for start in 0..count {
-        while end < start + count && folded[end].0 <= folded[start].0 + 2.0 * tolerance {
-            weight += folded[end].1;
-            moment += folded[end].0 * folded[end].1;
-            end += 1;
-        }
-        if weight > 0.0 && best.is_none_or(|(most, _)| weight > most) {
-            best = Some((weight, moment / weight));
-        }
-        weight -= folded[start].1;
-        moment -= folded[start].0 * folded[start].1;
-    }
-    best.map(|(_, angle)| angle)
 }
 
 /// The paper's direction, turned from between the groups to the walls.
@@ -114,20 +56,22 @@ fn mean_of_groups(walls: &[WallDirection]) -> Option<(f64, Vec<WallDirection>)> 
     Some((bisector(groups) - FRAC_PI_4, walls.to_vec()))
 }
 
-/// The standard deviation of the weighted mean of the walls' directions: from how they scatter, from how well one
-/// wall's direction can be known, and from what all walls of a map may share.
-fn deviation(walls: &[WallDirection], mean: f64, parameters: &QuadrantClassifierParameters) -> f64 {
+/// The standard deviation of the weighted mean of the walls' directions: from how they scatter, from how well each
+/// wall's direction is known, and from what all walls of a map may share.
+///
+/// Walls that scatter by more than they are known by are those of a bent map. Neighbours are then turned together, and
+/// the error of their mean shrinks with their number by far less than that of walls that each err alone; so it is taken to
+/// be greater by the ratio of the two once more.
+fn deviation(walls: &[WallDirection], mean: f64, scatter: f64, min_deviation: f64) -> f64 {
     let weight: f64 = walls.iter().map(|wall| wall.weight).sum();
     let variance: f64 = walls
         .iter()
         .map(|wall| {
-            let scatter = turn_difference(wall.angle, mean, FRAC_PI_2);
-            // No direction is worse known than one that is anywhere in the quadrant.
-            let own = (parameters.end_deviation / wall.length).min(FRAC_PI_4);
-            (wall.weight / weight).powi(2) * (scatter.powi(2) + own.powi(2))
+            let offset = turn_difference(wall.angle, mean, FRAC_PI_2);
+            (wall.weight / weight).powi(2) * (offset.powi(2) + wall.deviation.powi(2))
         })
         .sum();
-    (variance + parameters.min_deviation.powi(2)).sqrt()
+    (variance * scatter.powi(2) + min_deviation.powi(2)).sqrt()
 }
 
 #[cfg(test)]

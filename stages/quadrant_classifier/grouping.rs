@@ -66,7 +66,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn walls(degrees_and_weights: &[(f64, f64)]) -> Vec<WallDirection> {
-        let wall = |&(angle, weight): &(f64, f64)| WallDirection { angle: angle.to_radians(), length: weight, weight };
+        let wall = |&(angle, weight): &(f64, f64)| WallDirection {
+            angle: angle.to_radians(),
+            length: weight,
+            deviation: 0.01,
+            weight,
+        };
         degrees_and_weights.iter().map(wall).collect()
     }
 

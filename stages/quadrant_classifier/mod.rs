@@ -7,6 +7,7 @@
 //!
 //! Not for buildings without right angles: there every rotation comes from the tags.
 
+mod circular_mean;
 mod direction;
 mod first_guess;
 mod grouping;

@@ -19,8 +19,10 @@ pub enum Mean {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
-    /// By length x reliability.
+    /// By reliability over the variance of its direction, which follows from its length: the mean of least variance.
     #[default]
+    Precision,
+    /// By length x reliability.
     Length,
     /// By length x (1 - reliability), as equation 4 is printed. The paper calls a reliability near 1 ideal, so this is
     /// likely to be a slip; a wall of reliability 1 counts nothing.
@@ -71,7 +73,8 @@ pub enum TranslationFrom {
 pub struct QuadrantClassifierParameters {
     /// How the directions of many walls become one: `circular` or `groups` (the paper).
     pub mean: Mean,
-    /// How much a wall counts: `length` (length x reliability) or `equation_4` (as printed in the paper).
+    /// How much a wall counts: `precision` (reliability over the variance of its direction), `length` (length x
+    /// reliability) or `equation_4` (as printed in the paper).
     pub weighting: Weighting,
     /// Where the rotation between two maps comes from: `directions`, `tags` (the paper's method 1) or `both`. Maps
     /// without a direction, or whose directions contradict the tags, are turned by the tags in any case.
@@ -89,8 +92,12 @@ pub struct QuadrantClassifierParameters {
     /// A map has a direction if at least this length of walls agrees with it, metres.
     pub min_wall_length: f64,
     /// How far the end of a wall may lie off the wall, metres, one standard deviation: about half a cell. It bounds how
-    /// well one wall tells a direction.
+    /// well a short wall tells a direction.
     pub end_deviation: f64,
+    /// Standard deviation of a wall's direction that no length removes, radians: walls are not quite straight, nor quite
+    /// at right angles. With `end_deviation` it tells how well each wall's direction is known; walls that lie far off by
+    /// that measure have no say in the `circular` mean.
+    pub wall_deviation: f64,
     /// Standard deviation of a map's direction that no number of walls removes, radians: maps bend, and corners are not
     /// square.
     pub min_deviation: f64,
@@ -123,7 +130,7 @@ impl Default for QuadrantClassifierParameters {
     fn default() -> Self {
         Self {
             mean: Mean::Circular,
-            weighting: Weighting::Length,
+            weighting: Weighting::Precision,
             rotation: RotationFrom::Directions,
             tag_rotation: TagRotationFrom::LeastSquares,
             translation: TranslationFrom::AllTags,
@@ -131,7 +138,8 @@ impl Default for QuadrantClassifierParameters {
             min_agreement: 0.35,
             min_wall_length: 2.0,
             end_deviation: 0.02,
-            min_deviation: 0.004,
+            wall_deviation: 0.002,
+            min_deviation: 0.002,
             tag_deviation: 0.03,
             max_tag_rotation_deviation: 0.2,
             contradiction_angle: 0.01,
@@ -164,6 +172,7 @@ impl Parameters for QuadrantClassifierParameters {
             require(not_below_zero(value), field, "must be a number of 0 m or more");
         }
         for (field, value) in [
+            ("wall_deviation", self.wall_deviation),
             ("min_deviation", self.min_deviation),
             ("contradiction_angle", self.contradiction_angle),
             ("max_confirming_angle", self.max_confirming_angle),
@@ -205,6 +214,7 @@ mod tests {
             min_agreement: 1.1,
             min_wall_length: -1.0,
             end_deviation: 0.0,
+            wall_deviation: -0.1,
             min_deviation: f64::NAN,
             tag_deviation: f64::INFINITY,
             max_tag_rotation_deviation: 1.0,
@@ -216,6 +226,6 @@ mod tests {
             resend_angle: f64::NAN,
             ..Default::default()
         };
-        assert_eq!(parameters.check().len(), 13);
+        assert_eq!(parameters.check().len(), 14);
     }
 }

@@ -1,7 +1,8 @@
 //! What the classifier needs of a wall: its direction, its length and how much it counts.
 
-use super::parameters::Weighting;
+use super::parameters::{QuadrantClassifierParameters, Weighting};
 use gridweave_runtime::ros::Segment;
+use std::f64::consts::FRAC_PI_4;
 
 /// The direction of one wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +11,8 @@ pub(super) struct WallDirection {
     pub(super) angle: f64,
     /// Metres.
     pub(super) length: f64,
+    /// Standard deviation of the angle, radians.
+    pub(super) deviation: f64,
     /// How much it counts.
     pub(super) weight: f64,
 }
@@ -18,18 +21,21 @@ pub(super) struct WallDirection {
 const MAX_LENGTH: f64 = 1e6;
 
 /// The walls' directions. Segments without length, or with values that are no numbers, are left out.
-pub(super) fn wall_directions(segments: &[Segment], weighting: Weighting) -> Vec<WallDirection> {
+pub(super) fn wall_directions(segments: &[Segment], parameters: &QuadrantClassifierParameters) -> Vec<WallDirection> {
     segments
         .iter()
         .filter_map(|segment| {
             let (dx, dy) = (segment.x2 - segment.x1, segment.y2 - segment.y1);
             let length = dx.hypot(dy);
-            let share = match weighting {
-                Weighting::Length => segment.reliability,
-                Weighting::Equation4 => 1.0 - segment.reliability,
+            let usable = length > 0.0 && length <= MAX_LENGTH && (0.0..=1.0).contains(&segment.reliability);
+            // No direction is worse known than one that is anywhere in the quadrant.
+            let deviation = (parameters.end_deviation / length).hypot(parameters.wall_deviation).min(FRAC_PI_4);
+            let weight = match parameters.weighting {
+                Weighting::Precision => segment.reliability / deviation.powi(2),
+                Weighting::Length => length * segment.reliability,
+                Weighting::Equation4 => length * (1.0 - segment.reliability),
             };
-            let usable = length > 0.0 && length <= MAX_LENGTH && (0.0..=1.0).contains(&share);
-            usable.then(|| WallDirection { angle: dy.atan2(dx), length, weight: length * share })
+            usable.then(|| WallDirection { angle: dy.atan2(dx), length, deviation, weight })
         })
         .collect()
 }
@@ -39,9 +45,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_two_weightings_are_length_with_reliability_and_equation_4_as_printed() {
+    fn walls_weigh_by_their_precision_or_their_length_or_equation_4_as_printed() {
         let segment = Segment { x1: 1.0, y1: 1.0, x2: 4.0, y2: 5.0, reliability: 0.9, inliers: 3 };
-        let weight = |weighting| wall_directions(&[segment], weighting)[0].weight;
+        let weight = |weighting| {
+            let parameters = QuadrantClassifierParameters { weighting, wall_deviation: 0.003, ..Default::default() };
+            wall_directions(&[segment], &parameters)[0].weight
+        };
+        assert!((weight(Weighting::Precision) - 0.9 / (0.004_f64.powi(2) + 0.003_f64.powi(2))).abs() < 1e-6);
         assert!((weight(Weighting::Length) - 4.5).abs() < 1e-12);
         assert!((weight(Weighting::Equation4) - 0.5).abs() < 1e-12);
     }
@@ -57,7 +67,7 @@ mod tests {
             Segment { reliability: f64::NAN, ..good },
             Segment { reliability: -1.0, ..good },
         ];
-        assert!(wall_directions(&bad, Weighting::Length).is_empty());
-        assert_eq!(wall_directions(&[good], Weighting::Length).len(), 1);
+        assert!(wall_directions(&bad, &QuadrantClassifierParameters::default()).is_empty());
+        assert_eq!(wall_directions(&[good], &QuadrantClassifierParameters::default()).len(), 1);
     }
 }

@@ -76,6 +76,8 @@ pub struct FloorPlan {
     pub corridors: Vec<Rectangle>,
     /// Walls, pillars and furniture.
     pub solids: Vec<Solid>,
+    /// How many of the solids, from the first on, are walls.
+    pub wall_count: usize,
 }
 
 /// A row of rooms on one side of a corridor.
@@ -91,7 +93,7 @@ impl FloorPlan {
     pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
         let BuildingSize { width, height, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);
-        let mut plan = Self { bounds, rooms: Vec::new(), corridors: Vec::new(), solids: Vec::new() };
+        let mut plan = Self { bounds, rooms: Vec::new(), corridors: Vec::new(), solids: Vec::new(), wall_count: 0 };
         for y in [0.0, height] {
             plan.wall_along_x(y, (0.0, width), &[]);
         }
@@ -125,6 +127,7 @@ impl FloorPlan {
         for (low, high) in crossings {
             plan.corridors.push(Rectangle::new(low, 0.0, high, height).expanded(-WALL / 2.0));
         }
+        plan.wall_count = plan.solids.len();
         plan.furnish(size.clutter, random);
         plan
     }

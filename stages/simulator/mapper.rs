@@ -42,6 +42,11 @@ impl Mapper {
             resolution,
             origin: pose(low.x * resolution, low.y * resolution, 0.0),
         };
+        Self::over(geometry)
+    }
+
+    /// An empty grid of the given cells.
+    pub(super) fn over(geometry: GridGeometry) -> Self {
         Self { geometry, log_odds: vec![0.0; geometry.cell_count()], ways: Vec::new(), ends: Vec::new() }
     }
 
@@ -127,6 +132,11 @@ impl Mapper {
         let rows = self.log_odds.chunks(width).skip(first_row).take(geometry.height);
         let cells = rows.flat_map(|row| row[first..=last].iter().map(|&value| percent(value))).collect();
         Some(SnapshotMap { geometry, cells })
+    }
+
+    /// The map so far, with the cells that are not known.
+    pub(super) fn whole(&self) -> SnapshotMap {
+        SnapshotMap { geometry: self.geometry, cells: self.log_odds.iter().map(|&value| percent(value)).collect() }
     }
 
     fn to_cells(&self, point: &Point2) -> Point2 {

@@ -9,8 +9,11 @@
 //! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
 //! `/robotN/tag_ranges` and `/tf`. Its report is the [`Truth`].
 //!
+//! [`draw_map`] makes a single map of a building whose direction is known exactly, without a drive.
+//!
 //! Nothing moves in these worlds but the robots, which do not see each other; floors are flat, and glass is not there.
 
+mod drawn_map;
 mod drive;
 mod floor_plan;
 mod free_space;
@@ -23,17 +26,20 @@ mod planner;
 mod ray_caster;
 mod robot;
 mod route;
+mod scanned_map;
 mod shape;
 mod stage;
 mod tags;
 mod truth;
 mod world;
 
+pub use drawn_map::{DrawnMapSettings, WallStyle, draw_map};
 pub use drive::TICK_SECONDS;
 pub use floor_plan::{Door, FloorPlan, Room};
 pub use mapper::SnapshotMap;
 pub use parameters::SimulatorParameters;
 pub use robot::RobotLog;
+pub use scanned_map::ScanSettings;
 pub use shape::{Rectangle, Solid};
 pub use stage::kind;
 pub use tags::{Tag, TagReading};

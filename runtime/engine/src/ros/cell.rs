@@ -13,16 +13,19 @@ const FREE_BELOW: i8 = 25;
 const MOST: i8 = 100;
 
 /// Whether a cell's value says anything.
+#[inline]
 pub fn is_known(value: i8) -> bool {
     (0..=MOST).contains(&value)
 }
 
 /// Whether a cell's value stands for an obstacle.
+#[inline]
 pub fn is_occupied(value: i8) -> bool {
     (OCCUPIED_FROM..=MOST).contains(&value)
 }
 
 /// Whether a cell's value stands for free space.
+#[inline]
 pub fn is_free(value: i8) -> bool {
     (0..FREE_BELOW).contains(&value)
 }
