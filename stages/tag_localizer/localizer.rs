@@ -44,6 +44,8 @@ struct Tag {
     groups: ReadingGroups,
     /// When, where and how far off the tag was heard last.
     last: (LogTime, Point2, f64),
+    /// Standard deviation of the most exact reading, metres.
+    least_stddev: f64,
     /// Whether readings have come since the last read-out.
     changed: bool,
     mode: Option<TagMode>,
@@ -138,11 +140,13 @@ impl TagLocalizer {
             first_place: position.place,
             groups: ReadingGroups::default(),
             last: (time, position.place, range),
+            least_stddev: stddev,
             changed: false,
             mode: None,
         });
         tag.groups.add(&Reading { position, range, stddev }, self.parameters.min_travel);
         tag.last = (time, position.place, range);
+        tag.least_stddev = tag.least_stddev.min(stddev);
         tag.changed = true;
         Ok(())
     }
@@ -191,7 +195,7 @@ impl Tag {
             *parameters;
         let product = RingProduct::new(self.groups.rings(pose_stddev), outlier_share, reach);
         let grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
-        let mut mode = read_out(&Posterior::new(&product, grid)?, readout, parameters.window_cells())?;
+        let mut mode = read_out(&Posterior::new(&product, grid)?, readout, parameters.window_cells(self.least_stddev))?;
         mode.covariance += self.groups.shared_covariance(pose_stddev);
         for axis in 0..2 {
             mode.covariance[(axis, axis)] += position_stddev * position_stddev;

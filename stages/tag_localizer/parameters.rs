@@ -30,6 +30,10 @@ pub struct TagLocalizerParameters {
     /// Width of the window or block whose share of the probability is the certainty, metres; rounded to whole cells. The
     /// paper has 0.06 m (3 px).
     pub window: f64,
+    /// The window is at least so many standard deviations of the tag's most exact reading wide. The paper's 0.06 m are
+    /// 1.2 of its 0.05 m; so the certainty says how far the place is the only one, whatever the noise, and the covariance
+    /// says how exact it is. 0 keeps `window` as it is.
+    pub window_deviations: f64,
     /// How far a tag can be heard, metres. Readings that say more are left out, and a tag is read out when it is out of
     /// reach. The paper has 3 m.
     pub reach: f64,
@@ -63,6 +67,7 @@ impl Default for TagLocalizerParameters {
             resolution: 0.02,
             readout: Readout::Window,
             window: 0.06,
+            window_deviations: 1.2,
             reach: 3.0,
             range_stddev: 0.05,
             pose_stddev: 0.02,
@@ -85,9 +90,10 @@ impl TagLocalizerParameters {
         (self.grid_size / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
     }
 
-    /// Cells along a side of the window.
-    pub fn window_cells(&self) -> usize {
-        (self.window / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
+    /// Cells along a side of the window of a tag whose most exact reading has this standard deviation, metres.
+    pub fn window_cells(&self, range_stddev: f64) -> usize {
+        let window = self.window.max(self.window_deviations * range_stddev).min(self.grid_size);
+        (window / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
     }
 }
 
@@ -118,6 +124,7 @@ impl Parameters for TagLocalizerParameters {
             "window",
             "must lie between `resolution` and `grid_size`",
         );
+        expect(not_negative(self.window_deviations), "window_deviations", "must not be below 0");
         expect(positive(self.range_stddev), "range_stddev", "must be above 0 m");
         expect(not_negative(self.pose_stddev), "pose_stddev", "must not be below 0 m");
         expect(not_negative(self.min_travel), "min_travel", "must not be below 0 m");
@@ -141,7 +148,8 @@ mod tests {
     #[test]
     fn the_paper_has_300_cells_and_a_window_of_3() {
         let paper = TagLocalizerParameters { grid_size: 6.0, ..Default::default() };
-        assert_eq!((paper.cells(), paper.window_cells()), (300, 3));
+        assert_eq!((paper.cells(), paper.window_cells(0.05)), (300, 3));
+        assert_eq!((paper.window_cells(0.0), paper.window_cells(0.5), paper.window_cells(1e9)), (3, 30, 300));
         assert_eq!(paper.check(), vec![]);
     }
 
@@ -151,6 +159,7 @@ mod tests {
             grid_size: f64::NAN,
             resolution: 0.0,
             window: -1.0,
+            window_deviations: f64::NAN,
             reach: f64::INFINITY,
             range_stddev: 0.0,
             pose_stddev: -0.1,
@@ -166,6 +175,7 @@ mod tests {
             "grid_size",
             "resolution",
             "window",
+            "window_deviations",
             "reach",
             "range_stddev",
             "pose_stddev",

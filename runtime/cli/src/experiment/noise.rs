@@ -37,8 +37,8 @@ pub(super) struct NoiseArgs {
 enum Property {
     /// Standard deviation of the tags' ranges.
     TagNoise,
-    /// The same, with a read-out window of the localizer that is as wide against the noise as the paper's.
-    TagNoiseWideWindow,
+    /// The same, with the paper's read-out window of 6 cm whatever the noise.
+    TagNoiseFixedWindow,
     /// Share of the readings that are lost.
     LostReadings,
     /// Share of the readings that come over a reflection.
@@ -63,10 +63,6 @@ struct Sweep {
     merge: fn(f64) -> Vec<String>,
 }
 
-/// Window of the tag localizer and noise of the readings in the paper, metres.
-const PAPER_WINDOW: f64 = 0.06;
-const PAPER_NOISE: f64 = 0.05;
-
 const NOISES: &[f64] = &[0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0];
 
 impl Property {
@@ -81,13 +77,13 @@ impl Property {
                 world: |value| vec![format!("tag_noise={value}")],
                 merge: nothing,
             },
-            Self::TagNoiseWideWindow => Sweep {
-                name: "tag_noise_wide_window",
-                title: "Noise of the tags' ranges, read-out window widened with it",
+            Self::TagNoiseFixedWindow => Sweep {
+                name: "tag_noise_fixed_window",
+                title: "Noise of the tags' ranges, read-out window of 6 cm",
                 axis: "standard deviation of a range, m",
                 values: NOISES,
                 world: |value| vec![format!("tag_noise={value}")],
-                merge: |value| vec![format!("tags.window={}", PAPER_WINDOW * value / PAPER_NOISE)],
+                merge: |_| vec!["tags.window_deviations=0".to_owned()],
             },
             Self::LostReadings => Sweep {
                 name: "lost_readings",

@@ -8,7 +8,6 @@ use gridweave_runtime::engine::{self, EngineKind, RunReport};
 use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// The pipeline that makes worlds.
@@ -32,8 +31,6 @@ pub(super) struct Merge {
     pub(super) evaluation: Evaluation,
     /// What each stage has done.
     pub(super) report: RunReport,
-    /// From the start of the run to its end.
-    pub(super) elapsed: Duration,
 }
 
 impl World {
@@ -72,14 +69,12 @@ impl World {
 
     /// Merges the world's log by a shipped pipeline, in one thread. `settings` are `STAGE.PARAMETER=VALUE`.
     pub(super) fn merge(&self, pipeline: &str, settings: &[String], registry: &Registry) -> Result<Merge> {
-        let start = Instant::now();
         let report = self.run(pipeline, settings, None, &self.output(), registry)?;
-        let elapsed = start.elapsed();
         let summary = Summary::new(&report);
         let path = self.folder.path().join("summary.json");
         std::fs::write(&path, summary.to_json()).with_context(|| format!("cannot write {}", path.display()))?;
         let evaluation = evaluate(&path, &self.truth)?;
-        Ok(Merge { summary, evaluation, report, elapsed })
+        Ok(Merge { summary, evaluation, report })
     }
 
     fn run(
