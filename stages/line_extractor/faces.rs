@@ -12,6 +12,8 @@ const BINS_A_CELL: f64 = 2.0;
 const MARGIN: usize = 5;
 /// A valley parts two faces if it is at most this share of the lower of the two peaks beside it.
 const VALLEY: f64 = 0.6;
+/// What holds less than this share of the cells of the greatest face is no face, but what stands at the wall.
+const LEAST_SHARE: f64 = 0.2;
 /// The least standard deviation of the cells of a face, in cells: a straight line of single cells has 0.3.
 const LEAST_DEVIATION: f64 = 0.4;
 /// Cells farther from their face than this many standard deviations do not count.
@@ -132,7 +134,7 @@ impl Profile {
         self.bins.iter().map(|count| count * count).sum()
     }
 
-    /// Cuts the profile at its valleys.
+    /// Cuts the profile at its valleys, and leaves out what is too small to be a face.
     fn faces(&self) -> Vec<Face> {
         let mut faces = Vec::new();
         // The greatest count since the last border, and the bin of the least count since then.
@@ -150,6 +152,8 @@ impl Profile {
             }
         }
         faces.push(Face { high: f64::INFINITY, ..self.face(start, self.bins.len()) });
+        let most = faces.iter().map(|face| face.members).fold(0.0, f64::max);
+        faces.retain(|face| face.members >= LEAST_SHARE * most);
         faces
     }
 
