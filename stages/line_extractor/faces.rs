@@ -14,8 +14,9 @@ const MARGIN: usize = 5;
 const VALLEY: f64 = 0.6;
 /// What holds less than this share of the cells of the greatest face is no face, but what stands at the wall.
 const LEAST_SHARE: f64 = 0.2;
-/// The least standard deviation of the cells of a face, in cells: a straight line of single cells has 0.3.
-const LEAST_DEVIATION: f64 = 0.4;
+/// The least standard deviation of the cells of a face, in cells. A straight line of single cells has 0.3, and the cells of
+/// walls that begin a cell beside it do not count.
+const LEAST_DEVIATION: f64 = 0.33;
 /// Cells farther from their face than this many standard deviations do not count.
 const OUTLIER_DEVIATIONS: f64 = 3.0;
 /// What weighting by the biweight takes from the variance of a normal distribution.

@@ -79,6 +79,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Grid, GridGeometry, Point2, pose};
     use crate::line_extractor::{LineExtractorParameters, extract_segments};
+    use crate::quadrant_classifier::Weighting;
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
@@ -88,18 +89,16 @@ mod tests {
         Segment { x1: 1.0, y1: 2.0, x2, y2, reliability: 0.9, inliers: 10 }
     }
 
-    fn modes() -> [QuadrantClassifierParameters; 4] {
-        let default = QuadrantClassifierParameters::default();
-        [
-            default.clone(),
-            QuadrantClassifierParameters { mean: Mean::Groups, ..default.clone() },
-            QuadrantClassifierParameters { weighting: super::super::Weighting::Equation4, ..default.clone() },
-            QuadrantClassifierParameters {
-                mean: Mean::Groups,
-                weighting: super::super::Weighting::Equation4,
-                ..default
-            },
-        ]
+    /// Circular mean and mean of the groups, each with the three ways to weigh walls.
+    fn modes() -> Vec<QuadrantClassifierParameters> {
+        let modes = [Weighting::Length, Weighting::Precision, Weighting::Equation4].map(|weighting| {
+            [Mean::Circular, Mean::Groups].map(|mean| QuadrantClassifierParameters {
+                mean,
+                weighting,
+                ..Default::default()
+            })
+        });
+        modes.concat()
     }
 
     fn error(direction: &Direction, degrees: f64) -> f64 {

@@ -19,11 +19,12 @@ pub enum Mean {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
-    /// By reliability over the variance of its direction, which follows from its length: the mean of least variance.
-    #[default]
-    Precision,
     /// By length x reliability.
+    #[default]
     Length,
+    /// By reliability over the variance of its direction, which falls with the square of its length: the mean of least
+    /// variance.
+    Precision,
     /// By length x (1 - reliability), as equation 4 is printed. The paper calls a reliability near 1 ideal, so this is
     /// likely to be a slip; a wall of reliability 1 counts nothing.
     #[serde(rename = "equation_4")]
@@ -73,8 +74,8 @@ pub enum TranslationFrom {
 pub struct QuadrantClassifierParameters {
     /// How the directions of many walls become one: `circular` or `groups` (the paper).
     pub mean: Mean,
-    /// How much a wall counts: `precision` (reliability over the variance of its direction), `length` (length x
-    /// reliability) or `equation_4` (as printed in the paper).
+    /// How much a wall counts: `length` (length x reliability), `precision` (reliability over the variance of its
+    /// direction, which is the most exact) or `equation_4` (as printed in the paper).
     pub weighting: Weighting,
     /// Where the rotation between two maps comes from: `directions`, `tags` (the paper's method 1) or `both`. Maps
     /// without a direction, or whose directions contradict the tags, are turned by the tags in any case.
@@ -130,7 +131,7 @@ impl Default for QuadrantClassifierParameters {
     fn default() -> Self {
         Self {
             mean: Mean::Circular,
-            weighting: Weighting::Precision,
+            weighting: Weighting::Length,
             rotation: RotationFrom::Directions,
             tag_rotation: TagRotationFrom::LeastSquares,
             translation: TranslationFrom::AllTags,

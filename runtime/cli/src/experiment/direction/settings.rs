@@ -25,9 +25,10 @@ impl Settings {
         vec![Self::shipped(), Self::paper(), Self::without_faces(), Self::by_length(), Self::without_both()]
     }
 
-    /// What the shipped pipelines use.
+    /// What the pipeline `tag_merge` uses: the defaults, and walls weighted by their precision.
     pub(super) fn shipped() -> Self {
-        Self { name: "shipped", is_ablation: false, lines: Default::default(), classifier: Default::default() }
+        let classifier = QuadrantClassifierParameters { weighting: Weighting::Precision, ..Default::default() };
+        Self { name: "shipped", is_ablation: false, lines: Default::default(), classifier }
     }
 
     /// The paper's values (section 4.1). It gives none for the size of the sub-sample, the limit of iterations, and the
@@ -77,6 +78,21 @@ impl Settings {
 mod tests {
     use super::*;
     use gridweave_runtime::stage::Parameters;
+
+    #[test]
+    fn what_is_measured_as_shipped_is_what_ships() {
+        let pipeline = include_str!("../../../../../pipelines/tag_merge.toml");
+        let section = |name: &str| {
+            let start = pipeline.split(&format!("[stages.{name}]")).nth(1).unwrap();
+            start.split("\n[").next().unwrap().to_owned()
+        };
+        assert!(section("quadrants").contains("\nweighting = \"precision\""));
+        let keys = |section: String| -> Vec<String> {
+            let keys = section.lines().filter_map(|line| line.split_once(" = ")).map(|(key, _)| key.to_owned());
+            keys.filter(|key| !["kind", "inputs", "weighting", "rotation"].contains(&key.as_str())).collect()
+        };
+        assert!(keys(section("lines")).is_empty() && keys(section("quadrants")).is_empty(), "other parameters ship");
+    }
 
     #[test]
     fn all_parameters_are_in_range_and_differ() {
