@@ -1,7 +1,7 @@
 //! Poses from all types that hold one.
 
 use super::route::PoseSource;
-use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
+use gridweave_runtime::ros::{Header, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
 use serde::Deserialize;
 use std::borrow::Cow;
 
@@ -42,7 +42,7 @@ pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<C
     }
 }
 
-/// An encoded [`PoseStamped`] with a covariance of zeros behind it, which makes it a [`PoseWithCovarianceStamped`]: the
+/// An encoded `PoseStamped` with a covariance of zeros behind it, which makes it a [`PoseWithCovarianceStamped`]: the
 /// one is the beginning of the other. There are tens of thousands of them in a log, and this is far quicker than to
 /// decode and encode each. `None` if the message is cut.
 fn with_unknown_covariance(bytes: &[u8]) -> Option<Vec<u8>> {
@@ -64,7 +64,7 @@ fn with_unknown_covariance(bytes: &[u8]) -> Option<Vec<u8>> {
 mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
-    use gridweave_runtime::ros::{Odometry, Point, Pose};
+    use gridweave_runtime::ros::{Odometry, Point, Pose, PoseStamped};
 
     #[test]
     fn a_pose_with_zeros_behind_it_is_a_pose_with_covariance() {
