@@ -25,6 +25,15 @@ pub struct GridSize {
     pub resolution: f64,
 }
 
+impl GridSize {
+    /// The middle of the cells from one column and row to before another, metres, map frame.
+    pub fn middle(&self, columns: (usize, usize), rows: (usize, usize)) -> Point2 {
+        let from_centre =
+            |(start, end): (usize, usize)| 0.5 * self.resolution * ((start + end) as f64 - self.cells as f64);
+        self.centre + Vector2::new(from_centre(columns), from_centre(rows))
+    }
+}
+
 /// A place with its share of the probability: a cell of the grid, or a part of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leaf {

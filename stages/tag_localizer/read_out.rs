@@ -16,6 +16,8 @@ pub struct TagMode {
     pub covariance: Matrix2<f64>,
     /// Share of the whole probability that lies in the window or block, 0 to 1.
     pub certainty: f64,
+    /// The middle of that window or block, metres, map frame.
+    pub window: Point2,
     /// Share of the whole probability that lies in the mode, 0 to 1.
     pub mass: f64,
 }
@@ -50,7 +52,8 @@ pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Optio
     for axis in 0..2 {
         covariance[(axis, axis)] = covariance[(axis, axis)].max(within);
     }
-    Some(TagMode { position, covariance, certainty: found.mass.min(1.0), mass: mass.min(1.0) })
+    let window = posterior.grid.middle(found.columns, found.rows);
+    Some(TagMode { position, covariance, certainty: found.mass.min(1.0), window, mass: mass.min(1.0) })
 }
 
 /// The mass of each cell in the box that holds all leaves.
@@ -203,6 +206,7 @@ mod tests {
         let mode = read_out(&posterior(tag, round_drive()), Readout::Window, 3).unwrap();
         assert!(mode.certainty > 0.95, "{mode:?}");
         assert!((mode.position - tag).norm() < 0.002, "{mode:?}");
+        assert!((mode.window - tag).amax() < 0.011, "half a cell at most: {mode:?}");
     }
 
     #[test]
@@ -224,6 +228,8 @@ mod tests {
         let certainty = |tag, readout| read_out(&posterior(tag, round_drive()), readout, 3).unwrap().certainty;
         assert!((certainty(border, Readout::Blocks) - 0.5).abs() < 0.03);
         assert!(certainty(middle, Readout::Blocks) > 0.95);
+        let block = read_out(&posterior(middle, round_drive()), Readout::Blocks, 3).unwrap().window;
+        assert!((block - Point2::new(0.03, 1.53)).norm() < 1e-9, "{block}");
         assert!(certainty(border, Readout::Window) > 0.9);
     }
 

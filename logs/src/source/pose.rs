@@ -42,7 +42,7 @@ pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<C
     }
 }
 
-/// An encoded [`PoseStamped`](gridweave_runtime::ros::PoseStamped) with a covariance of zeros behind it, which makes it a [`PoseWithCovarianceStamped`]: the
+/// An encoded `PoseStamped` with a covariance of zeros behind it, which makes it a [`PoseWithCovarianceStamped`]: the
 /// one is the beginning of the other. There are tens of thousands of them in a log, and this is far quicker than to
 /// decode and encode each. `None` if the message is cut.
 fn with_unknown_covariance(bytes: &[u8]) -> Option<Vec<u8>> {

@@ -26,13 +26,13 @@ impl Results {
 
     /// Writes a table as NAME.csv, without printing it.
     pub(super) fn data(&mut self, name: &str, table: &Table) -> Result<()> {
-        self.write(&format!("{name}.csv"), &table.to_csv())
+        self.file(&format!("{name}.csv"), table.to_csv().as_bytes())
     }
 
     /// Writes a plot as NAME.svg.
     pub(super) fn plot(&mut self, name: &str, plot: &Plot) -> Result<()> {
         let svg = plot.to_svg().with_context(|| format!("cannot draw the plot {name}"))?;
-        self.write(&format!("{name}.svg"), &svg)
+        self.file(&format!("{name}.svg"), svg.as_bytes())
     }
 
     /// Tells which files there are.
@@ -41,9 +41,10 @@ impl Results {
         println!("wrote {}", names.join(", "));
     }
 
-    fn write(&mut self, name: &str, text: &str) -> Result<()> {
+    /// Writes a file of any kind.
+    pub(super) fn file(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         let path = self.folder.join(name);
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
         self.written.push(path);
         Ok(())
     }
