@@ -114,9 +114,9 @@ impl RingProduct {
         let mut information = Matrix2::zeros();
         for block in &self.blocks {
             let exponents = block.exponents(place, 0.0);
-            for lane in 0..LANES {
+            for (lane, exponent) in exponents.into_iter().enumerate() {
                 let offset = Vector2::new(place.x - block.x[lane], place.y - block.y[lane]);
-                let inlier = block.inlier_share[lane] * exp(exponents[lane]);
+                let inlier = block.inlier_share[lane] * exp(exponent);
                 let share = if self.pure { 1.0 } else { inlier / (inlier + block.floor[lane]) };
                 let along = offset / offset.norm().max(f64::MIN_POSITIVE);
                 information += along * along.transpose() * (-2.0 * share * block.scale[lane]);

@@ -150,7 +150,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         ["right", "wrong", "refused", "right, 95 % interval", "error m, median", "95 %", "error deg, median", "95 %"];
     let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
     let mut data = Table::new([sweep.axis, "seed", "outcome", "error m", "error deg", "reason"]);
-    let (mut shares, mut bands): ([Vec<(f64, f64)>; 3], [Vec<(f64, f64, f64)>; 3]) = Default::default();
+    let mut shares: [Vec<(f64, f64)>; 3] = Default::default();
+    let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
         let trials = trials(sweep, value, args, registry)?;
         let outcomes = [Outcome::Right, Outcome::Wrong, Outcome::Refused];
