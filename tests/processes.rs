@@ -119,7 +119,7 @@ fn assert_failed(folder: &Path, run: u32, ended: &Ended, words: &[&str]) {
     // What a stage prints when it panics is allowed here.
     assert_eq!(ended.status, 1, "{ended:#?}");
     assert_eq!(processes(run), [], "processes are left");
-    assert_eq!(left_over(run), [PathBuf::new(); 0]);
+    assert_eq!(left_over(run), Vec::<PathBuf>::new());
     let (reason, messages) = outcome(folder);
     assert!(messages > 0);
     for word in words {
@@ -233,7 +233,7 @@ fn when_the_supervisor_is_killed_the_stages_close_the_log_and_clean_removes_the_
     let clean = start_program(&example("troubled_stages"), folder.path(), &["clean"], &[]).wait();
     // Another test may have cleaned in between.
     assert_eq!(clean.status, 0, "{clean:#?}");
-    assert_eq!(left_over(id), [PathBuf::new(); 0]);
+    assert_eq!(left_over(id), Vec::<PathBuf>::new());
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn clean_removes_what_is_left_of_dead_runs_and_touches_no_living_one() {
 
     let clean = start_program(&example("troubled_stages"), dead_folder.path(), &["clean"], &[]).wait();
     assert_eq!(clean.status, 0, "{clean:#?}");
-    assert_eq!(left_over(dead_id), [PathBuf::new(); 0]);
+    assert_eq!(left_over(dead_id), Vec::<PathBuf>::new());
     let ended = living.wait();
     assert_eq!(ended.status, 0, "{ended:#?}");
     assert_eq!((outcome(living_folder.path()).0.as_str(), left_over(living_id)), ("", vec![]));

@@ -1,6 +1,6 @@
 //! The command `gridweave` with stages that get into trouble when told to, for tests of runs of several processes.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 use gridweave_runtime::message::{LogTime, Message};
 use gridweave_runtime::ros::{Header, PoseStamped};

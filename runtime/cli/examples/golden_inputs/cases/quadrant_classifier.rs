@@ -113,6 +113,7 @@ fn common(log: &mut LogBuilder, seconds: f64, a: &str, b: &str, tags: &[CommonTa
         tags: tags.to_vec(),
         accepted: true,
         reason: "all tags in common agree".into(),
+        ..Default::default()
     };
     log.message(seconds, "/common_tags/common", &message);
 }
