@@ -84,16 +84,17 @@ fn messages_that_are_missing_and_surplus_are_told() {
             }
         });
     };
+    // Each comes on `pose`, and as it was logged on `other`.
     poses(&[1.0, 2.0, 3.0]);
     cases.bless();
     poses(&[1.0, 3.0, 4.0, 5.0]);
     cases.assert_fails(&[
-        "1 message is missing, 2 messages are surplus",
+        "2 messages are missing, 4 messages are surplus",
         "/robot1/pose at 1700000002.000000000\n      expected a message, got none",
         "/robot1/pose at 1700000005.000000000\n      expected no message, got one",
     ]);
     let json: serde_json::Value = serde_json::from_str(&cases.golden(&["--partial", "--json"]).stdout).unwrap();
-    assert_eq!((&json["cases"][0]["missing"], &json["cases"][0]["surplus"]), (&1.into(), &2.into()));
+    assert_eq!((&json["cases"][0]["missing"], &json["cases"][0]["surplus"]), (&2.into(), &4.into()));
     assert_eq!(json["cases"][0]["differences"][0]["log_time"], 1_700_000_002_000_000_000u64);
 }
 

@@ -4,7 +4,7 @@
 //! Stages that the pipeline file gives the same `process` share one. Each process ([`run_process`]) makes its stages and
 //! their links as the engine `threads` does, and tells the supervisor how they go.
 //!
-//! They speak in lines of JSON ([`words`]): the supervisor on the process's standard input, the process on its standard
+//! They speak in lines of JSON (`words.rs`): the supervisor on the process's standard input, the process on its standard
 //! output. So each learns of the other's death, in whatever way it died, from the end of the pipe:
 //!
 //! - A process that ends before its stages are done has failed. The supervisor then tells all others to stop and why,
