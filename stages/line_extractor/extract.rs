@@ -74,7 +74,8 @@ fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option
         Fit::Faces => fit_to_faces(index, wall.stretch, scale),
         Fit::LeastSquares | Fit::Ends => fit_to_cells(index, wall.stretch, fit, scale)?,
     };
-    let count = points_along(index, &stretch, scale.reach).len();
+    let mut count = 0;
+    visit_along(index, &stretch, scale.reach, |_| count += 1);
     (count > 0).then_some((stretch, count))
 }
 
@@ -87,13 +88,14 @@ fn inner(stretch: &Stretch, scale: &Scale) -> Stretch {
 
 /// Fits a stretch to the faces of its wall.
 fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stretch {
+    let mut cells = Vec::new();
     for _ in 0..FACE_FITS {
         let inner = inner(&stretch, scale);
         let middle = (inner.start + inner.end) / 2.0;
-        let cells: Vec<Offset> = points_along(index, &inner, scale.reach)
-            .iter()
-            .map(|point| Offset { along: inner.line.along(point) - middle, across: inner.line.across(point) })
-            .collect();
+        cells.clear();
+        visit_along(index, &inner, scale.reach, |point| {
+            cells.push(Offset { along: inner.line.along(&point) - middle, across: inner.line.across(&point) });
+        });
         let Some(correction) = fit_faces(&cells, inner.length() / 2.0, scale.reach) else { break };
         let Some(line) = inner.line.corrected(middle, &correction) else { break };
         let ends = stretch.ends();
@@ -110,8 +112,10 @@ fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stre
 /// Fits a stretch to all cells near it.
 fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scale) -> Option<Stretch> {
     let mut reach = scale.reach;
+    let mut near = Vec::new();
     for _ in 0..FINAL_FITS {
-        let near = points_along(index, &inner(&stretch, scale), reach);
+        near.clear();
+        visit_along(index, &inner(&stretch, scale), reach, |point| near.push(point));
         let cells = near.iter().copied();
         let Some(fitted) = fit_stretch(fit, &stretch.line, cells.clone()) else { break };
         // The cells at the ends took no part in the fit, but they belong to the wall.
@@ -127,16 +131,14 @@ fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scal
     Some(stretch)
 }
 
-/// The points within `reach` of a stretch, between its ends.
-fn points_along(index: &PointIndex, stretch: &Stretch, reach: f64) -> Vec<Point2> {
-    let mut found = Vec::new();
+/// Visits the points within `reach` of a stretch, between its ends.
+fn visit_along(index: &PointIndex, stretch: &Stretch, reach: f64, mut visit: impl FnMut(Point2)) {
     index.near_stretch(stretch, reach, |id| {
         let point = index.points()[id];
         if (stretch.start..=stretch.end).contains(&stretch.line.along(&point)) {
-            found.push(point);
+            visit(point);
         }
     });
-    found
 }
 
 fn segment(grid: &Grid<'_>, stretch: &Stretch, reliability: f64, inliers: usize) -> Segment {

@@ -41,7 +41,7 @@ pub(super) fn fit_stretch(fit: Fit, line: &Line, points: impl Iterator<Item = Po
 /// Members are sorted by their distance from one end. Each part is a list of members in that order.
 pub(super) fn break_down(points: &[Point2], members: &[usize], line: &Line, max_gap: f64) -> Vec<Vec<usize>> {
     let mut sorted: Vec<(f64, usize)> = members.iter().map(|&id| (line.along(&points[id]), id)).collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    sorted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     sorted.chunk_by(|a, b| b.0 - a.0 <= max_gap).map(|part| part.iter().map(|&(_, id)| id).collect()).collect()
 }
 
