@@ -1,6 +1,7 @@
 //! ICP: moves map b so that its walls lie on those of map a.
 
 use super::iteration::Iteration;
+use super::verify::stride;
 use super::{FirstGuess, IcpParameters, WallMap};
 use crate::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, Vector3};
@@ -45,7 +46,7 @@ pub struct Registration {
 /// of them to a wall goes on.
 pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
-    let stride = coarse_stride(b, parameters);
+    let stride = stride(b.walls.points().len(), parameters.coarse_points);
     let mut best: Option<(f64, Pose2)> = None;
     let mut iterations = 0;
     for start in starts(&mut iteration, first_guess, stride, parameters) {
@@ -89,12 +90,8 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
 /// Registers roughly, to within the cells of the maps: a sample of the points of map b, from the first guess only.
 pub(super) fn approach(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Pose2 {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
-    draw_near(&mut iteration, first_guess.transform_a_b, coarse_stride(b, parameters), parameters).0
-}
-
-/// One of so many points of map b makes a sample of the size that the parameters want.
-fn coarse_stride(b: &WallMap, parameters: &IcpParameters) -> usize {
-    b.walls.points().len().div_ceil(parameters.coarse_points.max(1)).max(1)
+    let stride = stride(b.walls.points().len(), parameters.coarse_points);
+    draw_near(&mut iteration, first_guess.transform_a_b, stride, parameters).0
 }
 
 /// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the

@@ -1,7 +1,8 @@
 //! Other places where two maps fit: what an alignment must be better than.
 
 use super::registration::approach;
-use super::{Agreement, FirstGuess, IcpParameters, MapView, compare};
+use super::verify::compare_sampled;
+use super::{Agreement, FirstGuess, IcpParameters, MapView};
 use crate::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2};
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -27,7 +28,7 @@ pub struct Rival {
 /// walls in common (`min_overlap`, `min_wall_length`).
 ///
 /// Map b is turned by quarter turns about `centre`, a place in frame a, and moved by up to `rival_reach`; each of these is
-/// registered and compared. In a building whose rooms are alike the maps fit at many places, and so their fitting at
+/// registered and compared, both by a sample of the points. In a building whose rooms are alike the maps fit at many places, and so their fitting at
 /// one says little. And if the maps have nothing to do with each other, the one place at which tags have laid them by
 /// chance is as good as any other: that it is by far the best of n has a probability of 1 / n at most.
 pub fn best_rival(
@@ -46,7 +47,7 @@ pub fn best_rival(
         if shift < SAME_PLACE && turn.abs() < SAME_TURN {
             continue;
         }
-        let agreement = compare(a, b, &rival_a_b, parameters);
+        let agreement = compare_sampled(a, b, &rival_a_b, parameters, parameters.coarse_points);
         let counts =
             agreement.overlap >= parameters.min_overlap && agreement.wall_on_wall >= parameters.min_wall_length;
         if counts && best.is_none_or(|best| agreement.wall_agreement() > best.agreement.wall_agreement()) {

@@ -262,6 +262,19 @@ fn maps_that_fit_far_from_a_sure_first_guess_are_refused() {
 }
 
 #[test]
+fn a_sample_of_the_points_tells_nearly_the_same() {
+    let (a, b) = office_maps();
+    for transform_a_b in [a.transform_to(&b), pose(1.5, 0.0, 0.0) * a.transform_to(&b)] {
+        let (a, b, parameters) = (a.view(), b.view(), IcpParameters::default());
+        let all = compare(&a, &b, &transform_a_b, &parameters);
+        let some = super::verify::compare_sampled(&a, &b, &transform_a_b, &parameters, 600);
+        assert!((all.wall_agreement() - some.wall_agreement()).abs() < 0.03, "{all:?} {some:?}");
+        assert!((all.overlap - some.overlap).abs() < 0.1 * all.overlap, "{all:?} {some:?}");
+        assert!((all.wall_on_wall - some.wall_on_wall).abs() < 0.1 * all.wall_on_wall, "{all:?} {some:?}");
+    }
+}
+
+#[test]
 fn the_acceptance_index_counts_free_space_too() {
     let (a, b) = office_maps();
     let off = pose(1.5, 0.0, 0.0) * a.transform_to(&b);

@@ -57,19 +57,32 @@ fn share(agree: f64, disagree: f64) -> f64 {
 
 /// Compares two maps at an alignment.
 pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, parameters: &IcpParameters) -> Agreement {
+    compare_sampled(a, b, transform_a_b, parameters, usize::MAX)
+}
+
+/// Compares two maps at an alignment by samples of at most so many points of the walls and of known space each.
+pub(super) fn compare_sampled(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    transform_a_b: &Pose2,
+    parameters: &IcpParameters,
+    most_points: usize,
+) -> Agreement {
     let coarser = a.grid.geometry.resolution.max(b.grid.geometry.resolution);
     let tolerance = parameters.wall_tolerance.max(LEAST_TOLERANCE * coarser);
-    let of_b = walls_on(a, b.walls, transform_a_b, tolerance);
-    let of_a = walls_on(b, a.walls, &transform_a_b.inverse(), tolerance);
+    let of_b = walls_on(a, b.walls, transform_a_b, tolerance, most_points);
+    let of_a = walls_on(b, a.walls, &transform_a_b.inverse(), tolerance, most_points);
     let (mut known, mut free) = (0usize, 0usize);
-    for sample in &b.walls.samples {
+    let stride = stride(b.walls.samples.len(), most_points);
+    let area = stride as f64 * b.walls.sample_area;
+    for sample in b.walls.samples.iter().step_by(stride) {
         let value = value_at(&a.grid, &(transform_a_b * sample.point));
         known += usize::from(is_known(value));
         free += usize::from(sample.free && is_free(value));
     }
     Agreement {
-        overlap: known as f64 * b.walls.sample_area,
-        free_on_free: free as f64 * b.walls.sample_area,
+        overlap: known as f64 * area,
+        free_on_free: free as f64 * area,
         wall_on_wall: (of_a.on_wall + of_b.on_wall) / 2.0,
         wall_on_free: (of_a.on_free + of_b.on_free) / 2.0,
         wall_width: (a.grid.geometry.resolution + b.grid.geometry.resolution) / 2.0,
@@ -82,9 +95,16 @@ struct WallLengths {
     on_free: f64,
 }
 
-fn walls_on(map: &MapView<'_>, other: &WallMap, transform_map_other: &Pose2, tolerance: f64) -> WallLengths {
+fn walls_on(
+    map: &MapView<'_>,
+    other: &WallMap,
+    transform_map_other: &Pose2,
+    tolerance: f64,
+    most_points: usize,
+) -> WallLengths {
     let (mut on_wall, mut on_free) = (0usize, 0usize);
-    for point in other.walls.points() {
+    let stride = stride(other.walls.points().len(), most_points);
+    for point in other.walls.points().iter().step_by(stride) {
         let point = transform_map_other * point;
         // The cell is cheaper to look at than the walls, and most walls of one map are unknown to the other.
         let value = value_at(&map.grid, &point);
@@ -97,7 +117,13 @@ fn walls_on(map: &MapView<'_>, other: &WallMap, transform_map_other: &Pose2, tol
             on_free += 1;
         }
     }
-    WallLengths { on_wall: on_wall as f64 * other.spacing, on_free: on_free as f64 * other.spacing }
+    let length = stride as f64 * other.spacing;
+    WallLengths { on_wall: on_wall as f64 * length, on_free: on_free as f64 * length }
+}
+
+/// Every how many-th of `count` points makes a sample of at most so many.
+pub(super) fn stride(count: usize, most_points: usize) -> usize {
+    count.div_ceil(most_points.max(1)).max(1)
 }
 
 fn value_at(grid: &Grid<'_>, point: &Point2) -> i8 {

@@ -353,7 +353,7 @@ mod tests {
 
     #[test]
     fn two_tags_near_each_other_are_refused() {
-        for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "lie so near"), ([(0.0, 0.0), (2.5, 0.5)], "by chance")] {
+        for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "lie so near"), ([(0.0, 0.0), (1.8, 0.5)], "by chance")] {
             let tags = tags(&pose(0.0, 0.0, 0.0), &places);
             refused(&tags, &tags, part);
         }

@@ -51,7 +51,7 @@ impl Default for TagFilterParameters {
             map_stddev: 0.05,
             min_agreement: 0.5,
             max_chance: 1e-3,
-            max_provisional_chance: 0.2,
+            max_provisional_chance: 0.3,
             max_yaw_stddev: 0.05,
             max_rival_share: 0.7,
             rival_distance: 0.5,

@@ -2,8 +2,10 @@
 #![allow(dead_code, unused_imports, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 mod log_builder;
+mod readings;
 
 pub use log_builder::{LogBuilder, TestMap};
+pub use readings::{change_readings, moved_reading, place_in_map_2};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

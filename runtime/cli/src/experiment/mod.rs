@@ -4,6 +4,7 @@
 //! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
 
 mod direction;
+mod few_tags;
 mod localization;
 mod methods;
 mod noise;
@@ -38,6 +39,8 @@ enum Experiment {
     Methods(methods::MethodsArgs),
     /// How certain a tag's place is, and how wrong, after how many readings (Tsardoulias et al., figure 4).
     Localization(localization::LocalizationArgs),
+    /// Merging with few common tags, and whether robots of two buildings are ever merged by chance.
+    FewTags(few_tags::FewTagsArgs),
     /// How often a merge succeeds as tags, odometry and overlap get worse.
     Noise(noise::NoiseArgs),
 }
@@ -49,6 +52,7 @@ pub(crate) fn experiment(args: &ExperimentArgs, registry: &Registry) -> Result<O
         Experiment::Direction(args) => direction::run(args, &mut results),
         Experiment::Methods(args) => methods::run(args, registry, &mut results),
         Experiment::Localization(args) => localization::run(args, &mut results),
+        Experiment::FewTags(args) => few_tags::run(args, registry, &mut results),
         Experiment::Noise(args) => noise::run(args, registry, &mut results),
     }?;
     results.say_where();
