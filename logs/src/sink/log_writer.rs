@@ -124,6 +124,14 @@ impl LogWriter {
         written.map(drop).map_err(|error| LogWriteError::from_mcap(&self.path, error))
     }
 
+    /// Writes all that has been handed over to the disk, so that it can be read whatever happens.
+    pub fn flush(&mut self) -> Result<(), LogWriteError> {
+        match self.open_bytes {
+            0 => Ok(()),
+            _ => self.close_chunk(),
+        }
+    }
+
     fn close_chunk(&mut self) -> Result<(), LogWriteError> {
         self.open_bytes = 0;
         self.writer.flush().map_err(|error| LogWriteError::from_mcap(&self.path, error))

@@ -2,6 +2,7 @@
 
 mod carry;
 mod count;
+mod live;
 mod pose;
 mod route;
 mod router;
@@ -10,6 +11,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+pub use live::live_kind;
 pub(crate) use route::{Classified, Role, classify};
 pub use stage::McapSource;
 
@@ -60,21 +62,26 @@ pub fn kind() -> StageKind {
     StageKind::source::<SourceParameters, _>(
         "mcap_source",
         "Reads MCAP logs and ROS 2 bags by log time, and tells maps, poses and tag readings of the robots apart",
-        vec![
-            OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, as they were logged"),
-            OutputPort::new(
-                "pose",
-                PortType::of::<PoseWithCovarianceStamped>(),
-                "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
-                 covariance, odometry, or tf",
-            ),
-            OutputPort::new("tags", PortType::of::<TagRange>(), "range readings of tags, as they were logged"),
-            OutputPort::new(
-                "other",
-                PortType::Any,
-                "all other messages, and those from which poses were made, as they were logged",
-            ),
-        ],
+        ports(),
         McapSource::new,
     )
+}
+
+/// The outputs of all sources of what robots send.
+fn ports() -> Vec<OutputPort> {
+    vec![
+        OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, as they were logged or sent"),
+        OutputPort::new(
+            "pose",
+            PortType::of::<PoseWithCovarianceStamped>(),
+            "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
+                 covariance, odometry, or tf",
+        ),
+        OutputPort::new("tags", PortType::of::<TagRange>(), "range readings of tags, as they were logged or sent"),
+        OutputPort::new(
+            "other",
+            PortType::Any,
+            "all other messages, and those from which poses were made, as they were logged or sent",
+        ),
+    ]
 }

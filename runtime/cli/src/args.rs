@@ -41,6 +41,14 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Run every stage alone on stored input, and compare what it sends with what is expected.
     Golden(GoldenArgs),
+    /// Play logs into a live pipeline, as the robots would send them.
+    Play(PlayArgs),
+    /// Record links of a run that is going on.
+    Record(RecordArgs),
+    /// Print the messages of a link of a run that is going on, as they pass.
+    Tap(TapArgs),
+    /// Show what the stages of a run that is going on do.
+    Top(TopArgs),
     /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
     Clean,
     /// Run one process of a pipeline on the engine `processes`, which starts it.
@@ -67,9 +75,10 @@ pub(crate) struct RunOptions {
     /// Draw the merged maps, each robot's walls in a colour of its own.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
-    /// What runs the stages: single, threads, threads-ipc, or processes. The result is the same.
-    #[arg(long, default_value_t = EngineKind::default())]
-    pub(crate) engine: EngineKind,
+    /// What runs the stages: single, threads (the default for a replay), threads-ipc, or processes (for a live pipeline).
+    /// The result is the same.
+    #[arg(long)]
+    pub(crate) engine: Option<EngineKind>,
     /// Seeds all randomness.
     #[arg(long)]
     pub(crate) seed: Option<u64>,
@@ -213,4 +222,85 @@ pub(crate) struct DemoArgs {
     /// What runs the stages: single, threads, threads-ipc, or processes.
     #[arg(long, default_value_t = EngineKind::default())]
     pub(crate) engine: EngineKind,
+}
+
+/// Which of the runs that are going on is meant.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct RunChoice {
+    /// Which run, if there are several: the name of its pipeline, or its own name as `top` shows it.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) run: Option<String>,
+    /// Wait for so many seconds until there is such a run.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
+    pub(crate) wait: f64,
+}
+
+/// What `gridweave play` is told.
+#[derive(Debug, Args)]
+pub(crate) struct PlayArgs {
+    /// The logs: MCAP files, and folders of ROS 2 bags. Several are merged by log time.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// How much faster than they were recorded; 0 is as fast as the pipeline takes them.
+    #[arg(long, default_value_t = 1.0)]
+    pub(crate) rate: f64,
+    /// Begin again at the end, with later log times, until interrupted.
+    #[arg(long = "loop")]
+    pub(crate) repeat: bool,
+    /// Seconds from the first message at which to begin. The last map of each robot before that is sent first.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    pub(crate) start: f64,
+    /// Seconds from the first message at which to end.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) end: Option<f64>,
+    /// The stage of the pipeline to send as, if it has several whose messages come from outside.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) stage: Option<String>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// What `gridweave record` is told.
+#[derive(Debug, Args)]
+pub(crate) struct RecordArgs {
+    /// The MCAP file to write.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Which links: STAGE.PORT, or STAGE for all its outputs; all links of the run if none is named.
+    #[arg(value_name = "LINK")]
+    pub(crate) links: Vec<String>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// What `gridweave tap` is told.
+#[derive(Debug, Args)]
+pub(crate) struct TapArgs {
+    /// The link: STAGE.PORT, or STAGE if it has one output only.
+    #[arg(value_name = "STAGE.PORT")]
+    pub(crate) link: String,
+    /// Print each message as a line of JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// End after so many messages.
+    #[arg(long, value_name = "N")]
+    pub(crate) count: Option<u64>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// What `gridweave top` is told.
+#[derive(Debug, Args)]
+pub(crate) struct TopArgs {
+    /// Measure for one interval, print that, and end.
+    #[arg(long)]
+    pub(crate) once: bool,
+    /// Print JSON, an object for each interval.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Seconds from one measurement to the next.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    pub(crate) interval: f64,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
 }

@@ -27,7 +27,7 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Outcome> {
         summary: Some(folder.join("summary.json")),
         map: Some(folder.join("merged.yaml")),
         picture: Some(folder.join("merged.png")),
-        engine: args.engine,
+        engine: Some(args.engine),
         ..Default::default()
     };
     let merged = folder.join("merged.mcap");

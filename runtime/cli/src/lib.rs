@@ -21,6 +21,7 @@ mod experiment;
 mod export;
 mod golden;
 mod info;
+mod live;
 mod pipelines;
 mod processes;
 mod progress;
@@ -86,6 +87,10 @@ fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
         Command::Simulate(args) => simulate::simulate(&args, registry),
         Command::Demo(args) => demo::demo(&args, registry),
         Command::Golden(args) => golden::golden(&args, registry),
+        Command::Play(args) => live::play(&args, registry),
+        Command::Record(args) => live::record(&args, registry),
+        Command::Tap(args) => live::tap(&args, registry),
+        Command::Top(args) => live::top(&args, registry),
         Command::Clean => processes::clean(),
         Command::Stage(args) => processes::stage(&args, registry),
         Command::Experiment(args) => experiment::experiment(&args, registry),

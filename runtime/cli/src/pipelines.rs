@@ -9,8 +9,9 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 6] = [
     ("cut", include_str!("../../../pipelines/cut.toml")),
+    ("live", include_str!("../../../pipelines/live.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
     ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),

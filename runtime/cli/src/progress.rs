@@ -2,6 +2,7 @@
 
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
+use gridweave_runtime::pipeline::Mode;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
@@ -16,16 +17,19 @@ const LINE_INTERVAL: Duration = Duration::from_secs(5);
 /// Set by the first interrupt of the user.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Lets a run end in order on SIGINT or SIGTERM: the output is closed and says that it is not complete. A second signal
-/// ends the program at once.
-pub(crate) fn stop_on_interrupt() -> &'static AtomicBool {
+/// What happens on an interrupt where a run ends early.
+pub(crate) const OUTPUT_IS_CLOSED: &str = "the output is being closed";
+
+/// Lets a program end in order on SIGINT or SIGTERM; `what_follows` tells the user how it does. A second signal ends it at
+/// once.
+pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBool {
     static HANDLER: AtomicBool = AtomicBool::new(false);
     if !HANDLER.swap(true, Ordering::Relaxed) {
-        let handler = ctrlc::set_handler(|| {
+        let handler = ctrlc::set_handler(move || {
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("interrupted: the output is being closed; a second signal ends the program at once");
+            eprintln!("interrupted: {what_follows}; a second signal ends the program at once");
         });
         if let Err(error) = handler {
             tracing::warn!("an interrupt will not close the output: {error}");
@@ -39,17 +43,23 @@ pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     last_line: Mutex<Instant>,
     start: AtomicU64,
+    mode: Mode,
     stop: &'static AtomicBool,
 }
 
 impl Progress {
-    /// Nothing is done yet. The run ends early when `stop` is set.
-    pub(crate) fn new(stop: &'static AtomicBool) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+    /// Nothing is done yet. The run ends when the user interrupts it.
+    pub(crate) fn new(mode: Mode) -> Self {
+        let stop = stop_on_interrupt(match mode {
+            Mode::Replay => OUTPUT_IS_CLOSED,
+            Mode::Live => "what is on its way is handled to its end",
+        });
+        // A live run has no end that it could come nearer to.
+        let bar = (mode == Mode::Replay && std::io::stderr().is_terminal()).then(|| {
             let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}");
             ProgressBar::new(STEPS as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
         });
-        Self { bar, last_line: Mutex::new(Instant::now()), start: AtomicU64::new(u64::MAX), stop }
+        Self { bar, last_line: Mutex::new(Instant::now()), start: AtomicU64::new(u64::MAX), mode, stop }
     }
 
     /// Takes the bar away.
@@ -74,6 +84,16 @@ impl Observer for Progress {
             *last_line = Instant::now();
             eprintln!("{:.0} %, {at}", share * 100.0);
         }
+    }
+
+    fn started(&self, prefix: &str) {
+        if self.mode == Mode::Live {
+            eprintln!("the live run {prefix} has started; an interrupt (ctrl-c) ends it");
+        }
+    }
+
+    fn restarting(&self, stage: &str, failure: &str, after: Duration) {
+        eprintln!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64());
     }
 
     fn should_stop(&self) -> bool {

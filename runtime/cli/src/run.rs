@@ -4,12 +4,12 @@ use crate::Outcome;
 use crate::args::{BadUse, MergeArgs, RunArgs, RunOptions};
 use crate::export::Exports;
 use crate::pipelines;
-use crate::progress::{self, Progress};
+use crate::progress::Progress;
 use crate::summary::Summary;
 use anyhow::{Context, Result};
 use gridweave_logs::sink::close_log;
-use gridweave_runtime::engine;
-use gridweave_runtime::pipeline::{Overrides, Pipeline};
+use gridweave_runtime::engine::{self, EngineKind};
+use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -76,9 +76,13 @@ impl Job<'_> {
             return Ok(None);
         };
         refuse_to_overwrite_inputs(&pipeline)?;
-        let progress = Progress::new(progress::stop_on_interrupt());
+        let progress = Progress::new(pipeline.mode);
         let start = SystemTime::now();
-        let report = engine::run(&pipeline, self.options.engine, &progress);
+        let by_mode = match pipeline.mode {
+            Mode::Replay => EngineKind::default(),
+            Mode::Live => EngineKind::Processes,
+        };
+        let report = engine::run(&pipeline, self.options.engine.unwrap_or(by_mode), &progress);
         progress.finish();
         if let Err(error) = &report {
             close_outputs(&pipeline, start, &error.to_string());

@@ -3,10 +3,10 @@
 use crate::Outcome;
 use crate::args::{BadUse, SimulateArgs};
 use crate::pipelines;
-use crate::progress::{self, Progress};
+use crate::progress::Progress;
 use anyhow::{Context, Result};
 use gridweave_runtime::engine::{self, EngineKind, RunReport};
-use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::pipeline::{Mode, Overrides};
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ pub(crate) fn write_log(
     let path = log.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", log.display())))?;
     overrides.set_for_kind("mcap_sink", "file", path);
     let Some(pipeline) = pipelines::load(Path::new("simulate"), &overrides, registry)? else { return Ok(None) };
-    let progress = Progress::new(progress::stop_on_interrupt());
+    let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();
     let report = report?;

@@ -7,7 +7,7 @@ use super::{sink, source};
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader::LogFile;
 use gridweave_runtime::engine::{self, EngineKind, Observer};
-use gridweave_runtime::pipeline::{DEFAULT_DEPTH, Pipeline, StageSpec, Wire};
+use gridweave_runtime::pipeline::{DEFAULT_DEPTH, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::stage::StageKind;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -75,6 +75,8 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         topics: case.stage.topics.clone(),
         depth: case.stage.depth,
         process: case.stage.name.clone(),
+        overflow: vec![Overflow::default(); kind.outputs.len()],
+        restart: Restart::default(),
     });
     if !kind.outputs.is_empty() {
         let wires = (0..kind.outputs.len()).map(|from_port| Wire { port: 0, from_stage: place, from_port });
@@ -84,6 +86,7 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         name: case.stage.name.clone(),
         reference: case.stage.reference.clone(),
         seed: case.stage.seed,
+        mode: Mode::Replay,
         batch: case.stage.batch,
         stall_timeout: None,
         memory_limit: None,
@@ -98,6 +101,7 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
 }
 
 fn helper(name: &str, kind: StageKind, inputs: Vec<Wire>) -> StageSpec {
+    let overflow = vec![Overflow::default(); kind.outputs.len()];
     let topics = kind.outputs.iter().map(|port| format!("/{}", port.name)).collect();
     StageSpec {
         name: name.to_owned(),
@@ -107,6 +111,8 @@ fn helper(name: &str, kind: StageKind, inputs: Vec<Wire>) -> StageSpec {
         topics,
         depth: DEFAULT_DEPTH,
         process: name.to_owned(),
+        overflow,
+        restart: Restart::default(),
     }
 }
 

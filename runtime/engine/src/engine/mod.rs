@@ -3,6 +3,8 @@
 //! Every engine gives each stage the same inputs in the same order, so every engine gives the same result.
 
 mod error;
+mod feed;
+mod live_stage;
 mod plan;
 pub mod processes;
 mod report;
@@ -11,17 +13,22 @@ mod runner;
 mod single;
 mod stage_thread;
 mod threads;
+mod watch;
 
 pub use error::{Failure, RunError};
+pub use feed::Feed;
+pub use processes::memory_of_process;
 pub use report::{RunReport, StageReport};
-pub use run_folder::{LeftOver, RunFolder, RunFolderError, clean};
+pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
+pub use watch::{WatchedLink, watch_stages};
 
 use crate::link::shared::RunNames;
 use crate::message::LogTime;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Mode, Pipeline};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// How the stages share the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,6 +76,12 @@ pub trait Observer: Sync {
     /// A source has done this share of its work (0 to 1) and stands at this log time. Called now and then.
     fn progress(&self, _stage: &str, _share: f64, _log_time: LogTime) {}
 
+    /// All processes of a run have been started, whose names begin so.
+    fn started(&self, _prefix: &str) {}
+
+    /// A stage of a live run has failed, and is started again after a while.
+    fn restarting(&self, _stage: &str, _failure: &str, _after: Duration) {}
+
     /// Whether the run should stop, as after an interrupt by the user.
     fn should_stop(&self) -> bool {
         false
@@ -85,8 +98,12 @@ impl Observer for AtomicBool {
     }
 }
 
-/// Runs a pipeline to its end.
+/// Runs a pipeline to its end: a replay to that of its logs, a live one until the observer asks for a stop.
 pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> Result<RunReport, RunError> {
+    if pipeline.mode == Mode::Live && engine != EngineKind::Processes {
+        let text = format!("it is live, and the engine `{engine}` is for replays: use `processes`");
+        return Err(RunError::of_run(Failure::Process(text)));
+    }
     match engine {
         EngineKind::Single => single::run(pipeline, observer),
         EngineKind::Threads => {

@@ -1,8 +1,10 @@
 //! How the links of a pipeline are numbered.
 
 use super::runner::readers;
+use crate::link::board::MAX_SENDERS;
+use crate::link::live::LinkShape;
 use crate::link::shared::{LinkError, RunNames, Waker};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Mode, Pipeline};
 use iceoryx2::node::Node;
 use iceoryx2::service::Service;
 use std::collections::BTreeMap;
@@ -12,7 +14,8 @@ pub(super) struct Plan {
     readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
     /// For each stage, the number of its readers over all ports.
     pub(super) stage_readers: Vec<usize>,
-    /// For each stage, how many may wake it: its readers, those it reads, and the run.
+    /// For each stage, how many may wake it: its readers, those it reads, the run, and programs that send from outside
+    /// of a live one.
     pub(super) peers: Vec<usize>,
 }
 
@@ -23,7 +26,9 @@ impl Plan {
         for (&(stage, _), list) in &readers {
             stage_readers[stage] += list.len();
         }
-        let peers = pipeline.stages.iter().zip(&stage_readers).map(|(spec, readers)| spec.inputs.len() + readers + 1);
+        let outside = if pipeline.mode == Mode::Live { MAX_SENDERS } else { 0 };
+        let peers = pipeline.stages.iter().zip(&stage_readers);
+        let peers = peers.map(|(spec, readers)| spec.inputs.len() + readers + 1 + outside);
         Self { peers: peers.collect(), readers, stage_readers }
     }
 
@@ -47,8 +52,25 @@ impl Plan {
         before + self.readers(stage, port).iter().position(|other| *other == reader).unwrap_or_default()
     }
 
+    /// What all ends of the live link must agree on that is an output port of a stage.
+    pub(super) fn shape<'a>(&self, pipeline: &'a Pipeline, stage: usize, port: usize) -> LinkShape<'a> {
+        let spec = &pipeline.stages[stage];
+        LinkShape {
+            stage: &spec.name,
+            port: spec.kind.outputs[port].name,
+            readers: self.readers(stage, port).len(),
+            depth: self.port_depth(pipeline, stage, port),
+            overflow: spec.overflow.get(port).copied().unwrap_or_default(),
+        }
+    }
+
     pub(super) fn port_depth(&self, pipeline: &Pipeline, stage: usize, port: usize) -> usize {
         let depths = self.readers(stage, port).iter().map(|(reader, _)| pipeline.stages[*reader].depth);
         depths.max().unwrap_or(1)
     }
+}
+
+/// What each stage has on the board of the run: (wires, output ports).
+pub(super) fn board_shape(pipeline: &Pipeline) -> Vec<(usize, usize)> {
+    pipeline.stages.iter().map(|stage| (stage.inputs.len(), stage.kind.outputs.len())).collect()
 }

@@ -22,6 +22,10 @@ pub struct StageReport {
     pub messages_in: u64,
     /// Messages it has sent.
     pub messages_out: u64,
+    /// Messages that a live pipeline has dropped because the stage had no room for them.
+    pub dropped: u64,
+    /// How often a live pipeline has started it again after a failure. What else stands here is since the last time.
+    pub restarts: u64,
     /// How long it worked, without waiting for others.
     pub busy: Duration,
     /// What was wrong with its input and how often.

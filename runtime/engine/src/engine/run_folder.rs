@@ -5,10 +5,14 @@
 //! lives. The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has locked
 //! is left over, and so is all that bears its prefix in `/dev/shm`.
 
+use super::plan::board_shape;
+use crate::link::board::Board;
 use crate::link::shared::RunNames;
+use crate::pipeline::Pipeline;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
@@ -74,6 +78,11 @@ impl RunFolder {
         &self.path
     }
 
+    /// What the run's services and files begin with.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
     /// Where the pipeline of the run stands.
     pub fn pipeline(&self) -> PathBuf {
         self.path.join(PIPELINE)
@@ -90,10 +99,71 @@ impl RunFolder {
         fs::write(&path, text).map_err(failed("write", &path))
     }
 
+    /// Makes the board of the run.
+    pub(super) fn create_board(&self, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
+        let path = board_path(&self.prefix);
+        Board::create(&path, &board_shape(pipeline)).map_err(failed("make the board of the run", &path))
+    }
+
+    /// The board of the run.
+    pub(super) fn board(&self, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
+        open_board(&self.prefix, pipeline)
+    }
+
     /// Removes all that the run has left. Only for the last process of a run.
     pub fn remove(self) -> Result<(), RunFolderError> {
         remove(&self.path, &self.prefix).map_err(failed("remove the folder", &self.path))
     }
+}
+
+/// The board of the run with the given prefix.
+pub(super) fn open_board(prefix: &str, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
+    let path = board_path(prefix);
+    Board::open(&path, &board_shape(pipeline)).map_err(failed("open the board of the run", &path))
+}
+
+/// The board lies in shared memory, and goes with the rest of the run that lies there.
+fn board_path(prefix: &str) -> PathBuf {
+    Path::new(SHARED_MEMORY).join(format!("{prefix}board"))
+}
+
+/// A run of processes that is going on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunningRun {
+    /// What its services and files begin with.
+    pub prefix: String,
+    /// Its folder.
+    pub folder: PathBuf,
+}
+
+impl RunningRun {
+    /// The names of its services.
+    pub fn names(&self) -> RunNames {
+        RunNames::shared(self.prefix.clone(), self.folder.to_string_lossy())
+    }
+
+    /// Where its pipeline stands.
+    pub fn pipeline(&self) -> PathBuf {
+        self.folder.join(PIPELINE)
+    }
+
+    /// Whether it still goes on.
+    pub fn is_running(&self) -> bool {
+        is_locked(&self.folder).unwrap_or(false)
+    }
+}
+
+/// The runs of this user on the engine `processes` that are going on, by prefix.
+pub fn running_runs() -> Vec<RunningRun> {
+    let entries = fs::read_dir(parent()).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    folders.sort();
+    let run = |folder: PathBuf| {
+        let prefix = folder.file_name()?.to_str()?.to_owned();
+        let run = RunningRun { prefix, folder };
+        (!run.prefix.starts_with(UNFINISHED) && run.pipeline().exists() && run.is_running()).then_some(run)
+    };
+    folders.into_iter().filter_map(run).collect()
 }
 
 /// What is left of one run of which no process lives.
@@ -139,10 +209,15 @@ fn is_left_over(folder: &Path, unfinished: bool) -> bool {
         let age = age.and_then(|modified| SystemTime::now().duration_since(modified).ok());
         return age.is_some_and(|age| age > GIVEN_UP);
     }
-    match File::open(folder.join(LOCK)) {
-        Ok(lock) => !matches!(lock.try_lock(), Err(TryLockError::WouldBlock)),
+    match is_locked(folder) {
+        Ok(locked) => !locked,
         Err(error) => error.kind() == io::ErrorKind::NotFound && folder.is_dir(),
     }
+}
+
+/// Whether a process keeps the folder of a run locked.
+fn is_locked(folder: &Path) -> io::Result<bool> {
+    Ok(matches!(File::open(folder.join(LOCK))?.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 fn remove(folder: &Path, prefix: &str) -> io::Result<()> {

@@ -1,6 +1,7 @@
 //! One running stage, whatever its links are.
 
 use super::{Failure, StageReport};
+use crate::link::board::{StageBoard, StageNumber};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
 use crate::pipeline::Pipeline;
@@ -36,6 +37,11 @@ impl Runner {
         matches!(self.node, Node::Source(_))
     }
 
+    /// Whether the messages of the stage come from outside of the run.
+    pub(super) fn is_external(&self) -> bool {
+        matches!(self.node, Node::External)
+    }
+
     /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
     pub(super) fn advance(&mut self) -> Result<bool, Failure> {
         let Node::Source(source) = &mut self.node else { return Ok(false) };
@@ -47,11 +53,31 @@ impl Runner {
         more
     }
 
+    /// Shows on the board what the stage has done. Of the time it worked, `waited` was spent waiting for others.
+    pub(super) fn show(&self, waited: Duration, board: &StageBoard) {
+        board.set(StageNumber::MessagesIn, self.report.messages_in);
+        board.set(StageNumber::Busy, self.report.busy.saturating_sub(waited).as_nanos() as u64);
+        board.set(StageNumber::Warnings, self.warnings());
+        for (port, output) in self.outputs.iter().enumerate() {
+            board.set_sent(port, output.messages());
+        }
+    }
+
+    /// The log time that the stage has come to.
+    pub(super) fn log_time(&self) -> LogTime {
+        self.log_time
+    }
+
+    /// How often the stage has warned.
+    pub(super) fn warnings(&self) -> u64 {
+        self.report.warnings.values().sum()
+    }
+
     /// How much of its work a source has done.
     pub(super) fn progress(&self) -> Result<Option<f64>, Failure> {
         match &self.node {
             Node::Source(source) => guarded(|| Ok(source.progress())),
-            Node::Stage(_) => Ok(None),
+            Node::Stage(_) | Node::External => Ok(None),
         }
     }
 
@@ -59,12 +85,17 @@ impl Runner {
     pub(super) fn handle_next(&mut self, queues: &mut [InputQueue]) -> Result<Option<usize>, Failure> {
         let Some(wire) = next_input(queues) else { return Ok(None) };
         let Some(message) = queues[wire].pop() else { return Ok(None) };
+        self.take(wire, message).map(|()| Some(wire))
+    }
+
+    /// Hands a message to the stage that has come on a wire.
+    pub(super) fn take(&mut self, wire: usize, message: Message) -> Result<(), Failure> {
         let start = Instant::now();
         let result = self.handle(wire, &message);
         // The message is dropped within the measured time, as giving its memory back is work of this stage.
         drop(message);
         self.report.busy += start.elapsed();
-        result.map(|()| Some(wire))
+        result
     }
 
     fn handle(&mut self, wire: usize, message: &Message) -> Result<(), Failure> {
@@ -107,6 +138,7 @@ impl Runner {
         self.report.result = guarded(|| match &self.node {
             Node::Stage(stage) => Ok(stage.report()),
             Node::Source(source) => Ok(source.report()),
+            Node::External => Ok(None),
         })?;
         guarded(|| {
             drop(self.node);

@@ -3,6 +3,7 @@
 use super::plan::Plan;
 use super::runner::Runner;
 use super::{Failure, StageReport};
+use crate::link::board::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::link::shared::{Activity, LinkError, LinkReceiver, LinkSender, RunNames, SenderEnd, SharedOutputs, Wake};
 use crate::link::{InputQueue, latest, lower_bound};
 use crate::message::LogTime;
@@ -17,6 +18,8 @@ use std::sync::mpsc::Sender;
 pub(super) enum Event {
     /// A source has done a share of its work.
     Progress { stage: usize, share: f64, log_time: LogTime },
+    /// A live run is to come to its end.
+    Drain,
     /// The run is to be stopped.
     Stop { reason: String },
     /// The stage is done, or has failed.
@@ -38,6 +41,8 @@ pub(super) struct StageThread<'a, S: Service> {
     stage: usize,
     /// After so many samples, the readers are told how far the stage is.
     flush_interval: usize,
+    /// What the stage shows of itself, in a run of processes.
+    board: Option<StageBoard>,
     events: &'a Sender<Event>,
 }
 
@@ -63,6 +68,10 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     /// Drops the stage, and then acknowledges the end of its inputs: it holds nothing of them any more.
     fn close(self) -> Result<StageReport, Failure> {
         let waited = self.outputs.borrow().waited();
+        self.show();
+        if let Some(board) = &self.board {
+            board.set_state(StageState::Ended);
+        }
         let report = self.runner.into_report(waited)?;
         drop(self.queues);
         self.receivers.iter().try_for_each(LinkReceiver::acknowledge)?;
@@ -76,9 +85,15 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         names: &RunNames,
         stage: usize,
         activity: Activity,
+        board: Option<StageBoard>,
         events: &'a Sender<Event>,
     ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
+        if let Some(board) = &board {
+            board.set(StageNumber::Process, u64::from(std::process::id()));
+            board.set(StageNumber::Started, monotonic_nanoseconds());
+            board.set_state(StageState::Running);
+        }
         let node = names.node::<S>()?;
         let wake = Wake::new(&node, names, &spec.name, plan.stage_readers[stage], plan.peers[stage], activity)?;
         let mut receivers = Vec::new();
@@ -130,7 +145,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         drop(working);
         let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         let flush_interval = (spec.depth / 2).max(1);
-        Ok(Self { runner, queues, receivers, outputs, wake, stage, flush_interval, events })
+        Ok(Self { runner, queues, receivers, outputs, wake, stage, flush_interval, board, events })
     }
 
     fn drive_source(&mut self) -> Result<(), Failure> {
@@ -148,6 +163,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 self.wake.poll()?;
                 let reached = self.outputs.borrow().reached();
                 self.outputs.borrow_mut().flush(reached)?;
+                self.show();
                 if let Some(share) = self.runner.progress()? {
                     tell(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
                 }
@@ -176,6 +192,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                     self.wake.poll()?;
                     self.receive()?;
                     self.flush()?;
+                    self.show();
                 }
             }
             if self.queues.iter().all(InputQueue::is_done) {
@@ -189,7 +206,17 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
                 receiver.relieve(queue)?;
             }
+            self.show();
             self.wake.sleep_for_input()?;
+        }
+    }
+
+    /// Shows on the board how far the stage is.
+    fn show(&self) {
+        let Some(board) = &self.board else { return };
+        self.runner.show(self.outputs.borrow().waited(), board);
+        for (wire, queue) in self.queues.iter().enumerate() {
+            board.set_wire(wire, WireNumber::Waiting, queue.len() as u64);
         }
     }
 

@@ -33,7 +33,7 @@ pub(super) fn run<S: Service + 'static>(
         for stage in 0..pipeline.stages.len() {
             let (sender, names, plan, stop_reason) = (sender.clone(), names, &plan, &stop_reason);
             scope.spawn(move || {
-                match StageThread::<S>::connect(pipeline, plan, names, stage, Activity::default(), &sender) {
+                match StageThread::<S>::connect(pipeline, plan, names, stage, Activity::default(), None, &sender) {
                     Ok(thread) => thread.run(stop_reason),
                     Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
                 }
@@ -64,6 +64,7 @@ fn supervise<S: Service>(
     loop {
         match events.recv_timeout(STOP_INTERVAL) {
             Ok(Event::Progress { stage, share, log_time }) => observer.progress(&name(stage), share, log_time),
+            Ok(Event::Drain) => {}
             Ok(Event::Stop { reason }) => stop(&mut first_error, RunError::of_run(Failure::Process(reason))),
             Ok(Event::Ended { stage, result: Ok(report) }) => reports[stage] = report,
             Ok(Event::Ended { result: Err(Failure::Link(LinkError::Stopped)), .. }) => {}

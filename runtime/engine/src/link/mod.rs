@@ -11,12 +11,16 @@
 //! [`direct`] carries messages between stages of one thread, [`shared`] over iceoryx2 between threads or processes.
 //! [`InputQueue`] and [`next_input`] are what both have in common: the order in which a stage gets its inputs.
 
+pub mod board;
 pub mod direct;
+mod histogram;
 mod input_queue;
+pub mod live;
 mod order;
 mod sequence;
 pub mod shared;
 
+pub use histogram::Histogram;
 pub use input_queue::InputQueue;
 pub use order::{latest, lower_bound, next_input};
 pub(crate) use sequence::Sequence;

@@ -17,6 +17,8 @@ impl MessageFlags {
     pub const END: Self = Self(4);
     /// The bytes are a [`Channel`](super::Channel): the next messages with the same `channel` were logged there.
     pub const CHANNEL: Self = Self(8);
+    /// The message was sent before, and is sent again for a reader that has come since.
+    pub const REPEATED: Self = Self(16);
 
     /// Whether all bits of `other` are set.
     pub fn contains(self, other: Self) -> bool {

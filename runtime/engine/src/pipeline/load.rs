@@ -57,7 +57,7 @@ impl Pipeline {
         overrides.apply(&mut stages, &mut problems);
 
         let drafts: Vec<Draft<'_>> =
-            stages.iter().map(|stage| read_stage(stage, settings.depth, registry, &mut problems)).collect();
+            stages.iter().map(|stage| read_stage(stage, &settings, registry, &mut problems)).collect();
         let wiring = Wiring::new(&drafts, registry, &mut problems);
         check_used(&drafts, &wiring, &mut problems);
         check_distinct(&drafts, |stage, port| wiring.is_read(stage, port), &mut problems);
@@ -140,11 +140,13 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
             topics: draft.topics.into_iter().map(|topic| topic.template).collect(),
             depth: draft.depth,
             process: draft.process.to_owned(),
+            overflow: draft.overflow,
+            restart: draft.restart,
         };
         stages.push((place[index], spec));
     }
     stages.sort_by_key(|(place, _)| *place);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, reference, seed, batch, stall_timeout, memory_limit, robots, .. } = settings;
-    Pipeline { name, reference, seed, batch, stall_timeout, memory_limit, robots, stages }
+    let Settings { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, .. } = settings;
+    Pipeline { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, stages }
 }

@@ -17,7 +17,7 @@
 //!
 //! [stages.log]
 //! kind = "mcap_source"
-//! files = ["a.mcap"]              # any key but `kind`, `inputs`, `topics`, `depth` and `process` is a parameter
+//! files = ["a.mcap"]              # any key that this page does not name is a parameter
 //!
 //! [stages.lines]
 //! kind = "line_extractor"
@@ -30,6 +30,21 @@
 //! inputs = { in = ["log.*", "lines"] }    # by port; `*` is all outputs
 //! ```
 //!
+//! A pipeline with `mode = "live"` in `[pipeline]` takes messages as they arrive, until the user ends it. Its stages may
+//! say more:
+//!
+//! ```toml
+//! [stages.robots]
+//! kind = "live_source"
+//! overflow = { pose = "drop_oldest" }     # what an output does that a reader has no room for; "wait" if left out
+//!
+//! [stages.lines]
+//! kind = "line_extractor"
+//! inputs = ["robots.map"]
+//! overflow = "drop_oldest"                # of all outputs
+//! restart = "on_failure"                  # start it again when it fails; "never" ends the run, and is the default
+//! ```
+//!
 //! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
 //! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
 
@@ -38,6 +53,7 @@ mod diagnostic;
 mod document;
 mod drawing;
 mod kinds;
+mod live;
 mod load;
 mod nearest;
 mod order;
@@ -59,6 +75,7 @@ mod write;
 
 pub use diagnostic::PipelineErrors;
 pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
+pub use live::{Mode, Overflow, Restart};
 pub use nearest::{quoted_list, suggest};
 pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
@@ -74,6 +91,8 @@ use std::time::Duration;
 pub struct Pipeline {
     /// Its name.
     pub name: String,
+    /// Whether it replays logs or runs live.
+    pub mode: Mode,
     /// The robot whose map frame is the world; the first by name if none is given.
     pub reference: Option<String>,
     /// Seeds all randomness.
@@ -110,6 +129,11 @@ pub struct StageSpec {
     pub depth: usize,
     /// The process that it runs in, on the engine `processes`. Stages that name the same one share it.
     pub process: String,
+    /// For every output port of the kind: what becomes of a message for which a reader has no room. A live pipeline
+    /// only: a replay waits.
+    pub overflow: Vec<Overflow>,
+    /// What becomes of the run when the stage fails. A live pipeline only.
+    pub restart: Restart,
 }
 
 /// What feeds one input of a stage.

@@ -7,7 +7,7 @@ use super::parameter_schema::{ParameterInfo, parameters_of};
 use crate::stage::StageKind;
 
 /// The keys of a stage that are no parameters.
-pub(super) const RESERVED_KEYS: [&str; 5] = ["kind", "inputs", "topics", "depth", "process"];
+pub(super) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth", "process", "overflow", "restart"];
 
 /// Reads the parameters of a stage of `kind` whose name stands at `stage_at`. Wrong ones are reported and left out.
 pub(super) fn read_parameters(

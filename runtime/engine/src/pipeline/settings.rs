@@ -2,6 +2,7 @@
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
+use super::live::{Mode, read_word};
 use super::nearest::{did_you_mean, quoted_list};
 use super::overrides::Overrides;
 use crate::message::FixedText;
@@ -21,6 +22,7 @@ const DEFAULT_STALL_TIMEOUT: Duration = Duration::from_secs(300);
 #[derive(Debug)]
 pub(super) struct Settings {
     pub(super) name: String,
+    pub(super) mode: Mode,
     pub(super) reference: Option<String>,
     pub(super) seed: u64,
     pub(super) depth: usize,
@@ -37,6 +39,7 @@ impl Settings {
         let stall_timeout = Some(DEFAULT_STALL_TIMEOUT);
         Self {
             name: name.into(),
+            mode: Mode::default(),
             reference: None,
             seed: 0,
             depth: DEFAULT_DEPTH,
@@ -49,7 +52,8 @@ impl Settings {
 
     /// Takes in the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 7] = ["name", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
+        const KEYS: [&str; 8] =
+            ["name", "mode", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
                 "name" => match text(key, item, problems) {
@@ -57,6 +61,7 @@ impl Settings {
                     Some(name) => self.name = name.to_owned(),
                     None => {}
                 },
+                "mode" => self.mode = read_word(key, item, problems).unwrap_or_default(),
                 "reference" => {
                     if let Some(robot) = text(key, item, problems) {
                         check_reference(robot, &item.at, problems);

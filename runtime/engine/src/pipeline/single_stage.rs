@@ -69,7 +69,7 @@ impl SingleStage {
         };
         let name = stage_name(kind.and_then(|kind| kind.item.as_str()).unwrap_or("stage"));
         let entry = Entry { key: name.clone(), key_at: item.at.clone(), item: item.clone() };
-        let draft = read_stage(&entry, settings.depth, registry, &mut problems);
+        let draft = read_stage(&entry, &settings, registry, &mut problems);
         if let Some(inputs) = draft.inputs {
             let problem =
                 Diagnostic::new("a stage by itself names no other stages").at(&inputs.at, "expected no inputs");

@@ -2,9 +2,10 @@
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
+use super::live::{Mode, Overflow, Restart, check_is_live, read_overflow, read_word};
 use super::nearest::suggest;
 use super::parameters::{RESERVED_KEYS, read_parameters};
-use super::settings::{depth, text};
+use super::settings::{Settings, depth, text};
 use super::topics::read_topics;
 use crate::stage::{Registry, StageKind};
 
@@ -28,6 +29,9 @@ pub(super) struct Draft<'a> {
     pub(super) depth: usize,
     /// The process it is placed in.
     pub(super) process: &'a str,
+    /// For every output port of the kind.
+    pub(super) overflow: Vec<Overflow>,
+    pub(super) restart: Restart,
 }
 
 /// The topic of an output port, and where it was given.
@@ -37,10 +41,10 @@ pub(super) struct Topic {
     pub(super) at: Location,
 }
 
-/// Reads a stage. `pipeline_depth` is its depth if it does not say.
+/// Reads a stage of a pipeline with the given settings.
 pub(super) fn read_stage<'a>(
     stage: &'a Entry,
-    pipeline_depth: usize,
+    settings: &Settings,
     registry: &'a Registry,
     problems: &mut Problems,
 ) -> Draft<'a> {
@@ -52,8 +56,10 @@ pub(super) fn read_stage<'a>(
         parameters: toml::Table::new(),
         inputs: None,
         topics: Vec::new(),
-        depth: pipeline_depth,
+        depth: settings.depth,
         process: &stage.key,
+        overflow: Vec::new(),
+        restart: Restart::default(),
     };
     let Value::Table(entries) = &stage.item.value else {
         let label = format!("expected a table, found {}", stage.item.describe());
@@ -64,19 +70,34 @@ pub(super) fn read_stage<'a>(
     let find = |key: &str| entries.iter().find(|entry| entry.key == key);
     draft.kind = read_kind(stage, find("kind"), registry, problems);
     draft.inputs = find("inputs").map(|entry| &entry.item);
-    draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(pipeline_depth);
+    draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(settings.depth);
     if let Some(entry) = find("process")
         && let Some(process) = text("process", &entry.item, problems)
     {
         check_name("process", process, &entry.item.at, problems);
         draft.process = process;
     }
+    for key in ["overflow", "restart"] {
+        check_is_live(settings.mode, find(key), problems);
+    }
+    draft.restart = find("restart").and_then(|entry| read_word("restart", &entry.item, problems)).unwrap_or_default();
     if let Some(kind) = draft.kind {
+        check_mode(stage, kind, settings.mode, problems);
+        draft.overflow = read_overflow(kind, find("overflow").map(|entry| &entry.item), problems);
         let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
         draft.parameters = read_parameters(kind, &given, &stage.key_at, problems);
         draft.topics = read_topics(stage, kind, find("topics").map(|entry| &entry.item), problems);
     }
     draft
+}
+
+/// A kind whose messages come from outside of the run has nobody to wait for in a replay.
+fn check_mode(stage: &Entry, kind: &StageKind, mode: Mode, problems: &mut Problems) {
+    if kind.is_external() && mode == Mode::Replay {
+        let problem = Diagnostic::new(format!("`{}` is for live pipelines", kind.name));
+        let help = "read logs with a `mcap_source`, or write `mode = \"live\"` in [pipeline] to run live";
+        problems.push(problem.at(&stage.key_at, "this pipeline is a replay").help(help.to_owned()));
+    }
 }
 
 fn check_name(what: &str, name: &str, at: &Location, problems: &mut Problems) {

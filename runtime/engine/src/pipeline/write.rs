@@ -1,6 +1,7 @@
 //! A pipeline as a file in which nothing is left to defaults, overrides or the order of inputs.
 
-use super::Pipeline;
+use super::live::Word;
+use super::{Mode, Pipeline};
 use crate::stage::RobotTopics;
 use toml::{Table, Value};
 
@@ -11,6 +12,7 @@ impl Pipeline {
         let seed = i64::try_from(self.seed).map_or_else(|_| Value::from(self.seed.to_string()), Value::from);
         let mut pipeline = Table::from_iter([
             ("name".to_owned(), Value::from(self.name.as_str())),
+            ("mode".into(), self.mode.word().into()),
             ("seed".into(), seed),
             ("batch".into(), self.batch.into()),
             ("stall_timeout".into(), self.stall_timeout.map_or(0.0, |timeout| timeout.as_secs_f64()).into()),
@@ -37,6 +39,12 @@ impl Pipeline {
         table.insert("kind".into(), stage.kind.name.into());
         table.insert("depth".into(), Value::Integer(i64::try_from(stage.depth).unwrap_or(i64::MAX)));
         table.insert("process".into(), stage.process.as_str().into());
+        if self.mode == Mode::Live {
+            table.insert("restart".into(), stage.restart.word().into());
+            let overflow = stage.kind.outputs.iter().zip(&stage.overflow);
+            let overflow = Table::from_iter(overflow.map(|(port, it)| (port.name.to_owned(), it.word().into())));
+            table.insert("overflow".into(), overflow.into());
+        }
         let mut inputs = Table::new();
         for wire in &stage.inputs {
             let from = &self.stages[wire.from_stage];

@@ -100,6 +100,8 @@ pub enum Node {
     Stage(Box<dyn Stage>),
     /// It has none.
     Source(Box<dyn Source>),
+    /// It has none, and its messages come from outside of the run.
+    External,
 }
 
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
@@ -116,6 +118,7 @@ pub struct StageKind {
     pub inputs: Vec<InputPort>,
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
+    external: bool,
     schema: Schema,
     check: Arc<CheckFn>,
     make: Arc<MakeFn>,
@@ -155,6 +158,17 @@ impl StageKind {
         })
     }
 
+    /// A kind of source whose messages come from outside of a live run: from programs that send on its outputs.
+    pub fn external<P: Parameters>(name: &'static str, summary: &'static str, outputs: Vec<OutputPort>) -> Self {
+        let kind = Self::with::<P>(name, summary, Vec::new(), outputs, |_, _| Ok(Node::External));
+        Self { external: true, ..kind }
+    }
+
+    /// Whether its messages come from outside of the run.
+    pub fn is_external(&self) -> bool {
+        self.external
+    }
+
     fn with<P: Parameters>(
         name: &'static str,
         summary: &'static str,
@@ -167,6 +181,7 @@ impl StageKind {
             summary,
             inputs,
             outputs,
+            external: false,
             schema: schemars::schema_for!(P),
             check: Arc::new(|table| Ok(P::deserialize(table.clone())?.check())),
             make: Arc::new(move |table, context| {

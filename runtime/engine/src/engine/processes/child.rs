@@ -1,18 +1,21 @@
 //! One process of a run: its stages in threads, and its words with the supervisor.
 
 use super::words::{Said, Told, say};
+use crate::engine::live_stage::LiveStage;
 use crate::engine::plan::Plan;
 use crate::engine::run_folder::RunFolder;
 use crate::engine::stage_thread::{Event, StageThread, tell};
 use crate::engine::{Failure, RunError};
+use crate::link::board::StageBoard;
 use crate::link::shared::{Activity, LinkError, WakeEvents, Waker};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Mode, Pipeline};
 use crate::stage::Registry;
 use iceoryx2::service::ipc::Service;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -38,7 +41,10 @@ pub fn run_process(
         return Err(format!("the pipeline {} has no process `{process}`", pipeline.name));
     }
     let supervisor = Supervisor { output: &mut io::stdout(), told: Instant::now() };
-    Process { pipeline: &pipeline, folder: &folder, stages: &stages }.run(supervisor);
+    let board = folder.board(&pipeline).map_err(|error| error.to_string())?;
+    let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
+    let drain = Arc::new(AtomicBool::new(false));
+    Process { pipeline: &pipeline, folder: &folder, stages: &stages, boards: &boards, drain }.run(supervisor);
     Ok(())
 }
 
@@ -72,6 +78,10 @@ struct Process<'a> {
     folder: &'a RunFolder,
     /// The indexes of its stages.
     stages: &'a [usize],
+    /// What each stage of the run shows of itself.
+    boards: &'a [StageBoard],
+    /// Set when a live run is to come to its end.
+    drain: Arc<AtomicBool>,
 }
 
 impl Process<'_> {
@@ -95,13 +105,22 @@ impl Process<'_> {
         thread::scope(|scope| {
             for (&stage, activity) in self.stages.iter().zip(&activities) {
                 let (sender, names, plan, stop_reason) = (sender.clone(), &names, &plan, &stop_reason);
-                let pipeline = self.pipeline;
+                let (pipeline, boards, drain) = (self.pipeline, self.boards, Arc::clone(&self.drain));
+                let activity = activity.clone();
                 scope.spawn(move || {
-                    let connected =
-                        StageThread::<Service>::connect(pipeline, plan, names, stage, activity.clone(), &sender);
-                    match connected {
-                        Ok(thread) => thread.run(stop_reason),
-                        Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
+                    let connected = match pipeline.mode {
+                        Mode::Replay => {
+                            let board = Some(boards[stage].clone());
+                            StageThread::<Service>::connect(pipeline, plan, names, stage, activity, board, &sender)
+                                .map(|thread| thread.run(stop_reason))
+                        }
+                        Mode::Live => LiveStage::<Service>::connect(
+                            pipeline, plan, names, stage, boards, activity, drain, &sender,
+                        )
+                        .map(|thread| thread.run(stop_reason)),
+                    };
+                    if let Err(failure) = connected {
+                        tell(&sender, Event::Ended { stage, result: Err(failure) });
                     }
                 });
             }
@@ -133,6 +152,11 @@ impl Process<'_> {
                         Err(Failure::Link(LinkError::Stopped)) => Said::Stopped { stage: self.name(stage) },
                         Err(failure) => Said::Failed { stage: self.name(stage), failure },
                     })
+                }
+                Ok(Event::Drain) => {
+                    self.drain.store(true, Ordering::Relaxed);
+                    wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::DATA)));
+                    None
                 }
                 Ok(Event::Stop { reason }) => {
                     stop_reason.get_or_init(|| reason);
@@ -174,11 +198,12 @@ fn listen(events: Sender<Event>) {
     thread::spawn(move || {
         for line in io::stdin().lock().lines() {
             let Ok(line) = line else { break };
-            let reason = match serde_json::from_str(&line) {
-                Ok(Told::Stop { reason }) => reason,
-                Err(error) => format!("the supervisor says what cannot be understood: {error}"),
+            let event = match serde_json::from_str(&line) {
+                Ok(Told::Stop { reason }) => Event::Stop { reason },
+                Ok(Told::Drain) => Event::Drain,
+                Err(error) => Event::Stop { reason: format!("the supervisor says what cannot be understood: {error}") },
             };
-            tell(&events, Event::Stop { reason });
+            tell(&events, event);
         }
         tell(&events, Event::Stop { reason: RunError::of_run(Failure::Orphaned).to_string() });
     });

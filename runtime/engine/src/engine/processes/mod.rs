@@ -12,12 +12,18 @@
 //! - When the supervisor is gone, the processes stop by themselves.
 //!
 //! In both cases a sink closes its output and says in it why it is not complete.
+//!
+//! A live run goes on without a process that has failed if its stages say `restart = "on_failure"`: the supervisor removes
+//! what the process has left in shared memory and starts it again after a while. A live run ends when the observer asks
+//! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end.
 
+mod backoff;
 mod child;
 mod supervisor;
 mod words;
 
 pub use child::run_process;
+pub use supervisor::memory_of_process;
 
 use super::{Observer, RunError, RunReport};
 use crate::pipeline::Pipeline;

@@ -1,11 +1,14 @@
 //! The supervisor: starts the processes of a run, hears how they go, stops them, and removes what they leave.
 
 use super::Launch;
+use super::backoff::Backoff;
 use super::words::{Said, Told, say};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::shared::LinkError;
-use crate::pipeline::Pipeline;
+use crate::link::board::{StageBoard, StageNumber};
+use crate::link::shared::{LinkError, RunNames};
+use crate::pipeline::{Mode, Pipeline, Restart};
+use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -21,6 +24,9 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// A process that dies takes the links of others with it, and their complaints may come before the news of its death.
 /// So long the supervisor waits for a better reason.
 const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// So long may a live run take to handle what is on its way when it is to end.
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// What happens to a process.
 enum Event {
@@ -43,10 +49,26 @@ struct Process {
     name: String,
     child: Child,
     stdin: Option<ChildStdin>,
+    /// The indexes of its stages.
+    stages: Vec<usize>,
     /// The stages that have not ended.
     running: Vec<String>,
     heard: Instant,
     ended: bool,
+    /// Whether it is started again when it fails.
+    restarts: bool,
+    backoff: Backoff,
+    /// Why it has failed, if it was able to say so.
+    failure: Option<(String, Failure)>,
+    /// When it is to be started again.
+    start_at: Option<Instant>,
+}
+
+impl Process {
+    /// Whether anything is to be expected of it.
+    fn is_over(&self) -> bool {
+        self.ended && self.start_at.is_none()
+    }
 }
 
 /// A run that has failed.
@@ -60,18 +82,23 @@ struct Stopping {
 pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
     let of_run = |error| RunError::of_run(Failure::from(error));
     let folder = RunFolder::create().map_err(of_run)?;
+    let board = folder.create_board(pipeline).map_err(of_run)?;
     folder.write_pipeline(&pipeline.to_toml()).map_err(of_run)?;
     let (sender, receiver) = channel();
     let mut supervisor = Supervisor {
         pipeline,
         observer,
+        launch,
+        folder: &folder,
+        boards: (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect(),
+        events: sender,
         processes: Vec::new(),
+        draining: None,
         reports: BTreeMap::new(),
         stopping: None,
         readers: Vec::new(),
     };
-    supervisor.start_all(launch, &folder, &sender);
-    drop(sender);
+    supervisor.start_all();
     supervisor.wait_for_all(&receiver);
     let result = supervisor.result();
     let removed = folder.remove().map_err(of_run);
@@ -81,57 +108,83 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
 struct Supervisor<'a> {
     pipeline: &'a Pipeline,
     observer: &'a dyn Observer,
+    launch: &'a Launch,
+    folder: &'a RunFolder,
+    boards: Vec<StageBoard>,
+    events: Sender<Event>,
     processes: Vec<Process>,
+    /// Since when a live run comes to its end.
+    draining: Option<Instant>,
     reports: BTreeMap<String, StageReport>,
     stopping: Option<Stopping>,
     readers: Vec<thread::JoinHandle<()>>,
 }
 
 impl Supervisor<'_> {
-    fn start_all(&mut self, launch: &Launch, folder: &RunFolder, events: &Sender<Event>) {
+    fn start_all(&mut self) {
         for name in self.pipeline.processes() {
             let stages = self.pipeline.stages_of(&name);
-            let running: Vec<String> = stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect();
-            let child = Command::new(&launch.program)
-                .args(&launch.arguments)
-                .arg(folder.path())
-                .arg(&name)
-                .stdin(Stdio::piped())
-                .stdout(Stdio::piped())
-                // An interrupt from the terminal is the supervisor's: it tells the others.
-                .process_group(0)
-                .spawn();
-            match child {
-                Ok(mut child) => {
-                    let process = self.processes.len();
-                    if let Some(stdout) = child.stdout.take() {
-                        let events = events.clone();
-                        self.readers.push(thread::spawn(move || listen(process, stdout, &events)));
-                    }
-                    let stdin = child.stdin.take();
-                    let heard = Instant::now();
-                    self.processes.push(Process { name, child, stdin, running, heard, ended: false });
+            let started = self.start(&name, self.processes.len());
+            let (child, stdin) = match started {
+                Ok(started) => started,
+                Err(failure) => {
+                    let stage = stages.first().map_or(name, |&stage| self.pipeline.stages[stage].name.clone());
+                    return self.fail(RunError::of_stage(&stage, failure));
                 }
-                Err(error) => {
-                    let text = format!("cannot start {}: {error}", launch.program.display());
-                    let stage = running.first().cloned().unwrap_or(name);
-                    return self.fail(RunError::of_stage(&stage, Failure::Process(text)));
-                }
-            }
+            };
+            let is_restarted = |stage: &usize| self.pipeline.stages[*stage].restart == Restart::OnFailure;
+            self.processes.push(Process {
+                child,
+                stdin,
+                running: stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect(),
+                heard: Instant::now(),
+                ended: false,
+                restarts: self.pipeline.mode == Mode::Live && stages.iter().all(is_restarted),
+                backoff: Backoff::new(),
+                failure: None,
+                start_at: None,
+                name,
+                stages,
+            });
         }
+        self.observer.started(self.folder.prefix());
+    }
+
+    /// Starts the process called `name`, whose number is `process`, and listens to it.
+    fn start(&mut self, name: &str, process: usize) -> Result<(Child, Option<ChildStdin>), Failure> {
+        let mut child = Command::new(&self.launch.program)
+            .args(&self.launch.arguments)
+            .arg(self.folder.path())
+            .arg(name)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            // An interrupt from the terminal is the supervisor's: it tells the others.
+            .process_group(0)
+            .spawn()
+            .map_err(|error| Failure::Process(format!("cannot start {}: {error}", self.launch.program.display())))?;
+        if let Some(stdout) = child.stdout.take() {
+            let events = self.events.clone();
+            self.readers.push(thread::spawn(move || listen(process, stdout, &events)));
+        }
+        let stdin = child.stdin.take();
+        Ok((child, stdin))
     }
 
     /// Waits until every process has ended. When one fails, stops the others.
     fn wait_for_all(&mut self, events: &Receiver<Event>) {
-        while self.processes.iter().any(|process| !process.ended) {
+        while !self.processes.iter().all(Process::is_over) {
             match events.recv_timeout(STOP_INTERVAL) {
                 Ok(event) => self.note(event),
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
             }
             if self.stopping.is_none() && self.observer.should_stop() {
-                self.fail(RunError::of_run(Failure::Interrupted));
+                match self.pipeline.mode {
+                    Mode::Replay => self.fail(RunError::of_run(Failure::Interrupted)),
+                    Mode::Live => self.drain(),
+                }
             }
             self.look_at_processes();
+            self.start_again();
             self.stop();
         }
     }
@@ -143,21 +196,106 @@ impl Supervisor<'_> {
                 self.processes[process].heard = Instant::now();
                 self.note_words(process, words);
             }
-            Event::Silent { process } => {
-                let process = &mut self.processes[process];
-                // Nobody closes standard output and goes on; if one did, it would be killed by the stop.
-                let status = process.child.wait();
-                process.ended = true;
-                if let Some(stage) = process.running.first() {
-                    let how = status.map_or_else(|error| error.to_string(), describe);
-                    let together = match process.running.as_slice() {
-                        [_, others @ ..] if !others.is_empty() => format!(" (it ran {} as well)", others.join(", ")),
-                        _ => String::new(),
-                    };
-                    let error = RunError::of_stage(&stage.clone(), Failure::Ended(how + &together));
-                    self.fail(error);
-                }
+            Event::Silent { process } => self.note_end(process),
+        }
+    }
+
+    /// A process has ended, or is about to.
+    fn note_end(&mut self, place: usize) {
+        let process = &mut self.processes[place];
+        // Nobody closes standard output and goes on; if one did, it would be killed by the stop.
+        let status = process.child.wait();
+        process.ended = true;
+        let lost = || {
+            let (stage, others) = process.running.split_first()?;
+            let how = status.map_or_else(|error| error.to_string(), describe);
+            let together = match others {
+                [] => String::new(),
+                others => format!(" (it ran {} as well)", others.join(", ")),
+            };
+            Some((stage.clone(), Failure::Ended(how + &together)))
+        };
+        let Some((stage, failure)) = process.failure.take().or_else(lost) else { return };
+        match self.is_restarted(place) {
+            true => self.start_later(place, &stage, &failure),
+            false => self.fail(RunError::of_stage(&stage, failure)),
+        }
+    }
+
+    /// Whether a process that fails is started again.
+    fn is_restarted(&self, place: usize) -> bool {
+        self.processes[place].restarts && self.stopping.is_none() && self.draining.is_none()
+    }
+
+    /// A process of which a stage has failed, or that has to be ended: it is started again, or the run fails.
+    fn note_failure(&mut self, place: usize, stage: String, failure: Failure, is_deaf: bool) {
+        let is_restarted = self.is_restarted(place);
+        let process = &mut self.processes[place];
+        if is_restarted || is_deaf {
+            let _ = process.child.kill();
+        }
+        match is_restarted {
+            true => drop(process.failure.get_or_insert((stage, failure))),
+            false => self.fail(RunError::of_stage(&stage, failure)),
+        }
+    }
+
+    /// Removes what a process has left, and has it started again after a while.
+    fn start_later(&mut self, place: usize, stage: &str, failure: &Failure) {
+        let process = &mut self.processes[place];
+        let wait = process.backoff.fail();
+        process.start_at = Some(Instant::now() + wait);
+        for &stage in &process.stages {
+            self.boards[stage].clear();
+            self.boards[stage].add(StageNumber::Restarts, 1);
+        }
+        remove_dead_nodes(&self.folder.names());
+        self.observer.restarting(stage, &failure.to_string(), wait);
+    }
+
+    /// Starts the processes whose time has come.
+    fn start_again(&mut self) {
+        for place in 0..self.processes.len() {
+            let process = &mut self.processes[place];
+            if self.stopping.is_some() {
+                process.start_at = None;
             }
+            if process.start_at.is_none_or(|start| start > Instant::now() && self.draining.is_none()) {
+                continue;
+            }
+            process.start_at = None;
+            let name = process.name.clone();
+            // What was in use when it died may be free by now.
+            remove_dead_nodes(&self.folder.names());
+            match self.start(&name, place) {
+                Ok((child, stdin)) => {
+                    let process = &mut self.processes[place];
+                    (process.child, process.stdin) = (child, stdin);
+                    (process.heard, process.ended) = (Instant::now(), false);
+                    process.running =
+                        process.stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect();
+                    process.backoff.start();
+                    if self.draining.is_some() {
+                        tell(process, &Told::Drain);
+                    }
+                }
+                Err(failure) => self.fail(RunError::of_stage(&name, failure)),
+            }
+        }
+    }
+
+    /// Brings a live run to its end.
+    fn drain(&mut self) {
+        match self.draining {
+            None => {
+                self.draining = Some(Instant::now());
+                self.processes
+                    .iter_mut()
+                    .filter(|process| !process.ended)
+                    .for_each(|process| tell(process, &Told::Drain));
+            }
+            Some(since) if since.elapsed() > DRAIN_TIMEOUT => self.fail(RunError::of_run(Failure::Interrupted)),
+            Some(_) => {}
         }
     }
 
@@ -173,11 +311,9 @@ impl Supervisor<'_> {
             Said::Stopped { stage } => ended(&stage),
             Said::Failed { stage, failure } => {
                 ended(&stage);
-                if matches!(failure, Failure::Hung { .. }) {
-                    // It hears nothing any more.
-                    let _ = self.processes[process].child.kill();
-                }
-                self.fail(RunError::of_stage(&stage, failure));
+                // One that hangs hears nothing any more.
+                let is_deaf = matches!(failure, Failure::Hung { .. });
+                self.note_failure(process, stage, failure, is_deaf);
             }
         }
     }
@@ -194,15 +330,16 @@ impl Supervisor<'_> {
                 return Some(Failure::Hung { seconds: longest.as_secs_f64() });
             }
             let limit = memory_limit?;
-            let taken = memory_of(process.child.id()).filter(|taken| *taken > limit)?;
+            let taken = memory_of_process(process.child.id()).filter(|taken| *taken > limit)?;
             Some(Failure::Memory { taken, limit })
         };
-        let living = self.processes.iter_mut().filter(|process| !process.ended);
-        let troubled = living.filter_map(|process| Some((trouble(process)?, process))).next();
-        if let Some((failure, process)) = troubled {
-            let _ = process.child.kill();
+        let living =
+            self.processes.iter().enumerate().filter(|(_, process)| !process.ended && process.failure.is_none());
+        let troubled = living.filter_map(|(place, process)| Some((place, trouble(process)?))).next();
+        if let Some((place, failure)) = troubled {
+            let process = &self.processes[place];
             let stage = process.running.first().unwrap_or(&process.name).clone();
-            self.fail(RunError::of_stage(&stage, failure));
+            self.note_failure(place, stage, failure, true);
         }
     }
 
@@ -226,10 +363,7 @@ impl Supervisor<'_> {
             stopping.told = true;
             stopping.since = Instant::now();
             let words = Told::Stop { reason: stopping.error.to_string() };
-            for process in self.processes.iter_mut().filter(|process| !process.ended) {
-                // One that cannot be told has died, which is heard in another way.
-                let _ = process.stdin.as_mut().map(|stdin| say(stdin, &words));
-            }
+            self.processes.iter_mut().filter(|process| !process.ended).for_each(|process| tell(process, &words));
         }
         if stopping.told && stopping.since.elapsed() > STOP_TIMEOUT {
             for process in self.processes.iter_mut().filter(|process| !process.ended) {
@@ -250,6 +384,19 @@ impl Supervisor<'_> {
     }
 }
 
+/// Tells a process something. One that cannot be told has died, which is heard in another way.
+fn tell(process: &mut Process, words: &Told) {
+    let _ = process.stdin.as_mut().map(|stdin| say(stdin, words));
+}
+
+/// Removes what killed processes of a run hold in shared memory, so that others can take their place. Should it fail, the
+/// process that takes the place says what is in its way.
+fn remove_dead_nodes(names: &RunNames) {
+    if let Ok(node) = names.node::<ipc::Service>() {
+        node.try_cleanup_dead_nodes();
+    }
+}
+
 /// Hears what a process says until it is silent.
 fn listen(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
     for line in BufReader::new(stdout).lines() {
@@ -264,7 +411,7 @@ fn listen(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
 }
 
 /// The memory that a process has for itself alone, bytes: that of its links is not counted.
-fn memory_of(process: u32) -> Option<u64> {
+pub fn memory_of_process(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let kilobytes = |name: &str| {
         let line = status.lines().find_map(|line| line.strip_prefix(name))?;

@@ -43,6 +43,8 @@ pub(super) enum Said {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "told", rename_all = "snake_case")]
 pub(super) enum Told {
+    /// Come to the end of a live run: sources send no more, and what is on its way is handled.
+    Drain,
     /// The run has failed: stop, and leave what was made in a state that can be used.
     Stop {
         /// Why.

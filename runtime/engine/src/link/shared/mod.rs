@@ -1,6 +1,6 @@
 //! Links over iceoryx2, generic over its service variant: `local` between threads, `ipc` between processes.
 //!
-//! # The protocol, version 1
+//! # The protocol, version 2
 //!
 //! All names stand below the run's prefix. A link is a publish-subscribe service `PREFIX/link/STAGE/PORT` with one
 //! publisher and the output's readers as subscribers. Its payload is `[u8]`, aligned to 8, its user header a
@@ -24,6 +24,7 @@
 
 mod activity;
 mod error;
+mod held;
 mod names;
 mod outputs;
 mod receiver;
@@ -33,9 +34,11 @@ mod wake;
 
 pub use activity::Activity;
 pub use error::LinkError;
+pub(crate) use held::HeldSamples;
 pub use names::RunNames;
 pub use outputs::SharedOutputs;
 pub use receiver::{LinkReceiver, SenderEnd};
+pub(crate) use sample::unpack;
 pub use sample::{PROTOCOL_VERSION, SampleHeader};
 pub use sender::LinkSender;
 pub use wake::{Wake, WakeEvents, Waker};

@@ -27,6 +27,11 @@ impl RunNames {
         Self { prefix: prefix.into(), root: Some(root.into()) }
     }
 
+    /// Whether other processes can see the services.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.root.is_some()
+    }
+
     /// The iceoryx2 node of one thread or process of the run.
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));

@@ -1,20 +1,17 @@
 //! The reading end of a link.
 
+use super::held::HeldSamples;
 use super::sample::unpack;
 use super::sender::{HELD_SAMPLES, link_service};
 use super::{LinkError, RunNames, SampleHeader, WakeEvents, Waker};
 use crate::link::InputQueue;
-use crate::message::Storage;
 use iceoryx2::node::Node;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::sample::Sample;
 use iceoryx2::service::Service;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::cell::Cell;
 use std::collections::VecDeque;
-use std::rc::Rc;
 
 /// One wire of a stage over shared memory.
 pub struct LinkReceiver<S: Service> {
@@ -32,25 +29,7 @@ pub struct LinkReceiver<S: Service> {
     waiting: VecDeque<usize>,
     /// The credit that the sender has and may still spend.
     granted: usize,
-    held: Rc<Cell<usize>>,
-}
-
-/// A sample that a message borrows from.
-struct Held<S: Service> {
-    sample: Sample<S, [u8], SampleHeader>,
-    held: Rc<Cell<usize>>,
-}
-
-impl<S: Service> Storage for Held<S> {
-    fn bytes(&self) -> &[u8] {
-        self.sample.payload()
-    }
-}
-
-impl<S: Service> Drop for Held<S> {
-    fn drop(&mut self) {
-        self.held.set(self.held.get() - 1);
-    }
+    held: HeldSamples,
 }
 
 /// The sending end of a wire, as its reader knows it.
@@ -82,8 +61,11 @@ impl<S: Service + 'static> LinkReceiver<S> {
     ) -> Result<Self, LinkError> {
         let name = format!("{}.{}", sender.stage, sender.port);
         let service = link_service(node, names, sender.stage, sender.port, sender.port_readers, sender.port_depth)?;
-        let subscriber =
-            service.subscriber_builder().create().map_err(|e| LinkError::shared(format!("subscribe to {name}"))(&e))?;
+        let subscriber = service
+            .subscriber_builder()
+            .buffer_size(2 * sender.port_depth)
+            .create()
+            .map_err(|e| LinkError::shared(format!("subscribe to {name}"))(&e))?;
         Ok(Self {
             service,
             subscriber,
@@ -96,7 +78,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
             connected: false,
             waiting: VecDeque::new(),
             granted: 0,
-            held: Rc::new(Cell::new(0)),
+            held: HeldSamples::default(),
         })
     }
 
@@ -115,13 +97,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
             self.granted = self.granted.saturating_sub(1);
             let header = *sample.user_header();
-            let storage: Rc<dyn Storage> = match self.held.get() < self.depth + HELD_SAMPLES - 2 {
-                true => {
-                    self.held.set(self.held.get() + 1);
-                    Rc::new(Held { sample, held: Rc::clone(&self.held) })
-                }
-                false => Rc::new(sample.payload().to_vec()),
-            };
+            let storage = self.held.hold(sample, self.depth + HELD_SAMPLES - 2);
             let before = queue.len();
             unpack(&header, storage, &self.name, |message| queue.push(message.on_wire(self.wire)))?;
             self.waiting.push_back(queue.len() - before);

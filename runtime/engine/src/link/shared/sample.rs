@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use std::rc::Rc;
 
 /// The version of the link protocol. A reader refuses samples of another one.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
 
 /// Where each message of a batch begins.
 const RECORD_ALIGNMENT: usize = 8;
@@ -16,13 +16,17 @@ const RECORD_ALIGNMENT: usize = 8;
 /// With `count` 1 the payload is the bytes of `message`. With more, `message` is the header of the first, and the
 /// payload is for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
-#[type_name("gridweave_sample_header_1")]
+#[type_name("gridweave_sample_header_2")]
 #[repr(C)]
 pub struct SampleHeader {
     /// [`PROTOCOL_VERSION`].
     pub version: u32,
     /// The number of messages.
     pub count: u32,
+    /// When it was sent, nanoseconds on the monotonic clock of the machine; 0 in a replay.
+    pub sent_at: u64,
+    /// Who numbers the messages of a live link, of which several programs may send; 0 in a replay.
+    pub origin: u64,
     /// The header of the only message, or of the first.
     pub message: MessageHeader,
 }
@@ -58,7 +62,7 @@ impl Batch {
     /// The header and the payload of a sample that holds it. A single message goes without its header in the payload.
     pub(crate) fn sample(&self) -> (SampleHeader, &[u8]) {
         let message = self.first.unwrap_or_default();
-        let header = SampleHeader { version: PROTOCOL_VERSION, count: self.count, message };
+        let header = SampleHeader { version: PROTOCOL_VERSION, count: self.count, message, ..Default::default() };
         match self.count {
             1 => (header, &self.bytes[MessageHeader::SIZE..MessageHeader::SIZE + message.length as usize]),
             _ => (header, &self.bytes),
@@ -158,7 +162,7 @@ mod tests {
     fn a_sample_of_another_version_is_refused() {
         let batch = batch(&[b"1"]);
         let (header, payload) = batch.sample();
-        let error = unpacked(&SampleHeader { version: 2, ..header }, payload).unwrap_err().to_string();
-        assert!(error.contains("version 2"), "{error}");
+        let error = unpacked(&SampleHeader { version: 1, ..header }, payload).unwrap_err().to_string();
+        assert!(error.contains("version 1"), "{error}");
     }
 }

@@ -3,6 +3,7 @@
 use super::sample::Batch;
 use super::{LinkError, PROTOCOL_VERSION, RunNames, SampleHeader, Wake, WakeEvents, Waker};
 use crate::link::Sequence;
+use crate::link::live::{MAX_OBSERVERS, OBSERVER_BUFFER};
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use iceoryx2::node::Node;
 use iceoryx2::port::publisher::Publisher;
@@ -157,7 +158,8 @@ impl<S: Service> LinkSender<S> {
     }
 
     fn sent(&mut self, reached: usize) -> Result<(), LinkError> {
-        if reached != self.readers.len() {
+        // Those that look on get it as well, if they have room.
+        if reached < self.readers.len() {
             return Err(LinkError::Lost { link: self.name.clone(), reached, readers: self.readers.len() });
         }
         for (reader, waker) in &self.readers {
@@ -173,7 +175,7 @@ impl<S: Service> LinkSender<S> {
 }
 
 fn single(message: MessageHeader) -> SampleHeader {
-    SampleHeader { version: PROTOCOL_VERSION, count: 1, message }
+    SampleHeader { version: PROTOCOL_VERSION, count: 1, message, ..Default::default() }
 }
 
 /// The service of a link, the same for its sender and its readers.
@@ -186,17 +188,19 @@ pub(super) fn link_service<S: Service>(
     depth: usize,
 ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
     let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {stage}.{port}"))(cause);
+    // Nobody sees a link from outside that does not leave the process.
+    let observers = if names.is_shared() { MAX_OBSERVERS } else { 0 };
     node.service_builder(&names.link(stage, port)?)
         .publish_subscribe::<[u8]>()
         .user_header::<SampleHeader>()
         .payload_alignment(Alignment::new(8).ok_or_else(|| failed(&"alignment"))?)
         .enable_safe_overflow(false)
         .history_size(0)
-        .subscriber_max_buffer_size(2 * depth)
+        .subscriber_max_buffer_size(if names.is_shared() { (2 * depth).max(OBSERVER_BUFFER) } else { 2 * depth })
         .subscriber_max_borrowed_samples(depth + HELD_SAMPLES)
         .max_publishers(1)
-        .max_subscribers(readers.max(1))
-        .max_nodes(readers + 2)
+        .max_subscribers(readers.max(1) + observers)
+        .max_nodes(readers + 2 + observers)
         .open_or_create()
         .map_err(|e| failed(&e))
 }

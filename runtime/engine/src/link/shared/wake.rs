@@ -96,6 +96,11 @@ impl<S: Service> Wake<S> {
         *credit = credit.saturating_sub(1);
     }
 
+    /// Whether readers of a live link have come since this was last asked. They say so by the event that gives credit.
+    pub(crate) fn take_greetings(&self) -> bool {
+        self.credits.borrow_mut().iter_mut().fold(false, |any, credit| std::mem::take(credit) > 0 || any)
+    }
+
     /// Whether a reader has acknowledged the end of the stream.
     pub(crate) fn has_acknowledged(&self, reader: usize) -> bool {
         self.acknowledged.borrow()[reader]
@@ -124,14 +129,24 @@ impl<S: Service> Wake<S> {
 
     /// Sleeps until something happens, and takes it in.
     pub(crate) fn sleep(&self) -> Result<(), LinkError> {
+        self.sleep_for(LONGEST_SLEEP)
+    }
+
+    /// Sleeps until something happens, but not longer than this, and takes it in.
+    pub(crate) fn sleep_for(&self, longest: Duration) -> Result<(), LinkError> {
         let is_working = self.activity.is_working();
         self.activity.wait();
-        let waited = self.listener.timed_wait(|event| self.note(event.id.as_value(), event.count), LONGEST_SLEEP);
+        let waited = self.listener.timed_wait(|event| self.note(event.id.as_value(), event.count), longest);
         if is_working {
             self.activity.work();
         }
         waited.map_err(|e| failed(&e))?;
         self.check()
+    }
+
+    /// Whether an input may have something that has not been looked at.
+    pub(crate) fn has_news(&self) -> bool {
+        self.data.get()
     }
 
     /// Whether the stage works or waits. It is at work while this value lives and it does not sleep here.

@@ -1,0 +1,56 @@
+//! How long a process that fails waits before it is started again.
+
+use std::time::{Duration, Instant};
+
+/// The first wait.
+const FIRST: Duration = Duration::from_millis(500);
+/// The longest wait.
+const LONGEST: Duration = Duration::from_secs(30);
+/// A process that has run for so long without a failure begins with the first wait again.
+const HEALTHY: Duration = Duration::from_secs(60);
+
+/// Waits that double with each failure in a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Backoff {
+    next: Duration,
+    started: Instant,
+}
+
+impl Backoff {
+    pub(super) fn new() -> Self {
+        Self { next: FIRST, started: Instant::now() }
+    }
+
+    /// The process has been started.
+    pub(super) fn start(&mut self) {
+        self.started = Instant::now();
+    }
+
+    /// The process has failed: how long to wait.
+    pub(super) fn fail(&mut self) -> Duration {
+        self.wait_after(self.started.elapsed())
+    }
+
+    fn wait_after(&mut self, ran: Duration) -> Duration {
+        if ran > HEALTHY {
+            self.next = FIRST;
+        }
+        let wait = self.next;
+        self.next = (2 * wait).min(LONGEST);
+        wait
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waits_double_up_to_the_longest_and_begin_anew_after_a_healthy_time() {
+        let mut backoff = Backoff::new();
+        let short = Duration::from_secs(1);
+        let waits: Vec<f64> = (0..8).map(|_| backoff.wait_after(short).as_secs_f64()).collect();
+        assert_eq!(waits, [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0]);
+        assert_eq!(backoff.wait_after(2 * HEALTHY), FIRST);
+    }
+}

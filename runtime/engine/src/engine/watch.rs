@@ -1,0 +1,88 @@
+//! Looking on at a run that is going on.
+
+use super::plan::Plan;
+use super::run_folder::{RunningRun, open_board};
+use super::{Failure, RunError};
+use crate::link::board::StageBoard;
+use crate::link::live::Observer;
+use crate::link::shared::{SampleHeader, WakeEvents, Waker};
+use crate::message::Message;
+use crate::pipeline::{Mode, Pipeline};
+use iceoryx2::node::Node;
+use iceoryx2::service::ipc::Service;
+use std::collections::BTreeMap;
+
+/// A link of a run, as a program sees it that looks on. It changes nothing in the run: where it is too slow, it misses
+/// messages.
+pub struct WatchedLink {
+    observer: Observer<Service>,
+    /// For each sender the number of its next message.
+    next: BTreeMap<u64, u64>,
+    missed: u64,
+    _owner: Option<Waker<Service>>,
+    _node: Node<Service>,
+}
+
+impl WatchedLink {
+    /// Looks on at an output port of a stage of a run of the given pipeline. A live link sends the last message of each
+    /// topic again for it.
+    ///
+    /// # Errors
+    /// Nothing in the run reads the port, the run has gone, or too many look on.
+    pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
+        let spec = &pipeline.stages[stage];
+        let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
+        let plan = Plan::new(pipeline);
+        let name = spec.kind.outputs[port].name;
+        if plan.readers(stage, port).is_empty() {
+            let text = format!("nothing reads its output `{name}`, which therefore is no link");
+            return Err(of_stage(Failure::Process(text)));
+        }
+        let names = run.names();
+        let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
+        let observer = Observer::new(&node, &names, &spec.name, name).map_err(|error| of_stage(error.into()))?;
+        let owner = match pipeline.mode {
+            Mode::Replay => None,
+            Mode::Live => {
+                let owner = plan.waker(&node, &names, pipeline, stage).map_err(|error| of_stage(error.into()))?;
+                // An owner that is not there has nothing to repeat.
+                let _ = owner.wake(WakeEvents::new(plan.stage_readers[stage]).credit(0));
+                Some(owner)
+            }
+        };
+        Ok(Self { observer, next: BTreeMap::new(), missed: 0, _owner: owner, _node: node })
+    }
+
+    /// Takes the messages that have passed since the last call: each once, with the header of its sample.
+    pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), RunError> {
+        let (next, missed) = (&mut self.next, &mut self.missed);
+        let taken = self.observer.take(|sample, message| {
+            let sequence = message.header().sequence;
+            let is_repeated = message.header().flags.contains(crate::message::MessageFlags::REPEATED);
+            match next.get_mut(&sample.origin) {
+                // Sent again for another reader.
+                Some(next) if sequence < *next => return,
+                Some(next) => {
+                    *missed += if is_repeated { 0 } else { sequence - *next };
+                    *next = sequence + 1;
+                }
+                // What is repeated comes in the order of the numbers, and does not tell where the stream stands.
+                None if is_repeated => {}
+                None => drop(next.insert(sample.origin, sequence + 1)),
+            }
+            take(sample, message);
+        });
+        taken.map_err(RunError::of_run)
+    }
+
+    /// How many messages it was too slow for.
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+}
+
+/// What each stage of a run shows of itself, in the order of the pipeline.
+pub fn watch_stages(run: &RunningRun, pipeline: &Pipeline) -> Result<Vec<StageBoard>, RunError> {
+    let board = open_board(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
+    Ok((0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect())
+}

@@ -1,0 +1,74 @@
+//! How long things took: counts by time, of a size that does not grow.
+
+/// The number of buckets.
+pub(super) const BUCKETS: usize = 96;
+/// So many buckets double the time.
+const PER_OCTAVE: f64 = 4.0;
+/// The times of the first bucket are below this, nanoseconds.
+const FIRST: f64 = 1_000.0;
+
+/// Counts of times, four buckets to a doubling, from a microsecond to some ten seconds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Histogram {
+    counts: [u64; BUCKETS],
+}
+
+impl Histogram {
+    /// The bucket of a time.
+    pub fn bucket(nanoseconds: u64) -> usize {
+        let octaves = (nanoseconds.max(1) as f64 / FIRST).log2();
+        ((octaves * PER_OCTAVE).floor().max(-1.0) as i64 + 1).clamp(0, BUCKETS as i64 - 1) as usize
+    }
+
+    /// Counts by bucket.
+    pub fn from_counts(counts: [u64; BUCKETS]) -> Self {
+        Self { counts }
+    }
+
+    /// How many times were counted.
+    pub fn count(&self) -> u64 {
+        self.counts.iter().sum()
+    }
+
+    /// The time that this share (0 to 1) of all does not exceed, seconds: the end of the bucket in which it lies. None if
+    /// there are no times.
+    pub fn quantile(&self, share: f64) -> Option<f64> {
+        let rank = ((self.count() as f64 * share).ceil() as u64).max(1);
+        let mut before = 0;
+        let bucket = self.counts.iter().position(|count| {
+            before += count;
+            before >= rank
+        })?;
+        Some(FIRST * 1e-9 * (bucket as f64 / PER_OCTAVE).exp2())
+    }
+
+    /// What was counted since an earlier state of the same histogram.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self { counts: std::array::from_fn(|bucket| self.counts[bucket].saturating_sub(earlier.counts[bucket])) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantile_is_at_most_a_bucket_too_high() {
+        let mut counts = [0; BUCKETS];
+        (1..=1000u64).for_each(|time| counts[Histogram::bucket(time * 10_000)] += 1);
+        let histogram = Histogram::from_counts(counts);
+        for (share, exact) in [(0.5, 5e-3), (0.95, 9.5e-3), (0.99, 9.9e-3), (0.001, 1e-5)] {
+            let found = histogram.quantile(share).unwrap();
+            assert!(found >= exact && found <= exact * 1.2, "{share}: {found} for {exact}");
+        }
+        assert_eq!(histogram.since(&histogram).quantile(0.5), None);
+    }
+
+    #[test]
+    fn any_time_has_a_bucket() {
+        assert_eq!((Histogram::bucket(0), Histogram::bucket(999)), (0, 0));
+        assert_eq!(Histogram::bucket(1_000), 1);
+        assert_eq!(Histogram::bucket(u64::MAX), BUCKETS - 1);
+    }
+}
