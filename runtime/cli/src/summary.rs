@@ -30,6 +30,11 @@ impl Summary {
             if !stage.warnings.is_empty() {
                 entry["warnings"] = json!(stage.warnings);
             }
+            for (name, count) in [("dropped", stage.dropped), ("restarts", stage.restarts)] {
+                if count > 0 {
+                    entry[name] = json!(count);
+                }
+            }
             stages.insert(stage.name.clone(), entry);
         }
         value.insert("stages".into(), stages.into());
@@ -86,6 +91,15 @@ impl Summary {
         for (stage, what, count) in self.warnings() {
             let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
             writeln!(out, "warning: {stage}: {what} ({times})")?;
+        }
+        // Only a live run has any of these.
+        for (stage, entry) in self.object("stages") {
+            if let Some(count) = entry.get("dropped") {
+                writeln!(out, "dropped: {stage}: {count} messages, for which it had no room or while it was away")?;
+            }
+            if let Some(count) = entry.get("restarts") {
+                writeln!(out, "restarted: {stage}: {count} times after a failure")?;
+            }
         }
         let mut table = Table::new(["stage", "messages in", "out", "busy ms"]);
         for (name, stage) in self.object("stages") {

@@ -24,13 +24,25 @@ pub(super) struct Kept<S: Service> {
     messages: BTreeMap<Topic, (SampleHeader, Rc<dyn Storage>)>,
     /// For each sender the number of its next message.
     next: BTreeMap<u64, u64>,
+    is_first: bool,
 }
 
 impl<S: Service + 'static> Kept<S> {
-    pub(super) fn new(service: &PortFactory<S, [u8], SampleHeader>, link: &str) -> Result<Self, LinkError> {
+    /// Nothing is kept yet. `is_first` says that the owner was not started again: all that was sent is still to come.
+    pub(super) fn new(
+        service: &PortFactory<S, [u8], SampleHeader>,
+        link: &str,
+        is_first: bool,
+    ) -> Result<Self, LinkError> {
         let subscriber = service.subscriber_builder().buffer_size(KEEPER_BUFFER).create();
         let subscriber = subscriber.map_err(|e| LinkError::shared(format!("keep the last messages of {link}"))(&e))?;
-        Ok(Self { subscriber, held: HeldSamples::default(), messages: BTreeMap::new(), next: BTreeMap::new() })
+        Ok(Self {
+            subscriber,
+            held: HeldSamples::default(),
+            messages: BTreeMap::new(),
+            next: BTreeMap::new(),
+            is_first,
+        })
     }
 
     /// Takes in what was sent since the last call. Gives how many messages these were.
@@ -48,7 +60,8 @@ impl<S: Service + 'static> Kept<S> {
                 continue;
             }
             // Others may send faster than this is called: what was missed is counted as well.
-            let next = self.next.insert(header.origin, message.sequence + 1).unwrap_or(0);
+            let first = if self.is_first { 0 } else { message.sequence };
+            let next = self.next.insert(header.origin, message.sequence + 1).unwrap_or(first);
             count += message.sequence.saturating_sub(next) + u64::from(!is_channel);
             let topic = (!is_channel, message.channel, message.topic);
             if self.messages.len() < MAX_TOPICS || self.messages.contains_key(&topic) {

@@ -125,7 +125,8 @@ impl<S: Service + 'static> LiveSender<S> {
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
-        let kept = owner.is_none().then(|| Kept::new(&service, &name)).transpose()?;
+        let kept =
+            owner.is_none().then(|| Kept::new(&service, &name, board.get(StageNumber::Restarts) == 0)).transpose()?;
         let publisher = service
             .publisher_builder()
             .initial_max_slice_len(4096)
