@@ -177,8 +177,6 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
     fn drive_stage(&mut self) -> Result<(), Failure> {
         loop {
             self.wake.look_at_inputs()?;
-            self.receivers.iter_mut().try_for_each(LiveReceiver::connect)?;
-            self.repeat_for_new_readers()?;
             while let Some(wire) = self.next_wire()? {
                 self.handle(wire)?;
                 self.wake.poll()?;
@@ -186,6 +184,8 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
                     break;
                 }
             }
+            self.receivers.iter_mut().try_for_each(LiveReceiver::connect)?;
+            self.repeat_for_new_readers()?;
             if self.receivers.iter().all(LiveReceiver::is_done) {
                 let time = self.receivers.iter().map(LiveReceiver::end_time).max().unwrap_or_default();
                 self.begin_work();
