@@ -134,8 +134,7 @@ fn pipeline(settings: &str, load: &str) -> Value {
     );
     let pipeline = Pipeline::parse("bench", &text, &registry(), &Overrides::default()).unwrap();
     let report = run(&pipeline, &Launch::this_program().unwrap(), &()).unwrap();
-    let result = report.results("reader").next().unwrap().1.clone();
-    result
+    report.results("reader").next().unwrap().1.clone()
 }
 
 fn service(node: &Node<ipc::Service>, name: &str, depth: usize) -> Bare {
