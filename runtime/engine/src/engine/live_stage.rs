@@ -19,6 +19,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+/// A source looks so often whether its readers are connected.
+const CONNECT_INTERVAL: Duration = Duration::from_millis(2);
 /// A stage at its end looks so often whether its readers are still there.
 const ACKNOWLEDGE_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -146,6 +148,7 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
     }
 
     fn drive_source(&mut self) -> Result<(), Failure> {
+        self.wait_for_readers()?;
         while !self.drain.load(Ordering::Relaxed) {
             self.begin_work();
             let working = self.wake.working();
@@ -159,6 +162,14 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
             self.repeat_for_new_readers()?;
         }
         self.end(self.runner.log_time())
+    }
+
+    /// Waits until every reader is connected, so that none misses the first messages.
+    fn wait_for_readers(&self) -> Result<(), Failure> {
+        while !self.drain.load(Ordering::Relaxed) && !self.senders.iter().all(|sender| sender.borrow().is_connected()) {
+            self.wake.sleep_for(CONNECT_INTERVAL)?;
+        }
+        Ok(())
     }
 
     /// A source whose messages come from outside keeps the last of them for readers that come late.
