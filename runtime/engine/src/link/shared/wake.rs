@@ -98,7 +98,10 @@ impl<S: Service> Wake<S> {
 
     /// Whether readers of a live link have come since this was last asked. They say so by the event that gives credit.
     pub(crate) fn take_greetings(&self) -> bool {
-        self.credits.borrow_mut().iter_mut().fold(false, |any, credit| std::mem::take(credit) > 0 || any)
+        let mut credits = self.credits.borrow_mut();
+        let any = credits.iter().any(|credit| *credit > 0);
+        credits.fill(Default::default());
+        any
     }
 
     /// Whether a reader has acknowledged the end of the stream.
