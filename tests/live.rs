@@ -305,6 +305,109 @@ fn a_killed_stage_with_two_inputs_comes_back_and_gets_the_maps_again() {
 }
 
 #[test]
+fn a_stage_that_is_killed_again_and_again_under_load_comes_back_and_what_it_missed_is_counted() {
+    let run = Run::start(&TROUBLED.replace("pause = 1000", "pause = 50"), &[]);
+    for restarts in 1..=3 {
+        let before = run.number("middle", "messages_in");
+        wait_until("messages", || run.number("middle", "messages_in") > before + 100);
+        run.kill("middle");
+        wait_until("restart", || run.number("middle", "restarts") == restarts);
+    }
+    let before = run.number("middle", "messages_in");
+    wait_until("messages", || run.number("middle", "messages_in") > before + 100);
+    let done = run.interrupt();
+    done.assert_done();
+    let [sent] = done.numbers("source", ["messages_out"]);
+    let [given, dropped, restarts] = done.numbers("middle", ["messages_in", "dropped", "restarts"]);
+    assert!(restarts == 3 && dropped > 0, "{:#?}", done.ended);
+    // The last one is repeated after each restart, and what a process had taken off the link dies with it.
+    assert!((sent..sent + 100).contains(&(given + dropped)), "{sent} were sent, {given} given, {dropped} dropped");
+    let written: usize = done.output().values().map(Vec::len).sum();
+    let [out] = done.numbers("middle", ["messages_out"]);
+    assert!(
+        out.abs_diff(written as u64) <= 3 && out.abs_diff(given) <= 3,
+        "{given} given, {out} sent, {written} written"
+    );
+}
+
+#[test]
+fn a_stage_that_hangs_is_started_again() {
+    let text = TROUBLED.replace("depth = 16", "depth = 16\nstall_timeout = 1.0");
+    let run = Run::start(&text, &["--set", "middle.what=hang", "--set", "middle.at=50"]);
+    wait_until("restart", || run.number("middle", "restarts") >= 1);
+    wait_until("more output", || run.number("output", "messages_in") > 49);
+    let ended = run.interrupt().ended;
+    assert!(
+        ended.stderr.contains("stage `middle` hangs") && ended.stderr.contains("started again in 0.5 s"),
+        "{ended:#?}"
+    );
+}
+
+#[test]
+fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
+    let run = Run::start(TROUBLED, &[]);
+    for turn in 0..7 {
+        let tap = run.command(&["tap", "middle", "--json"]);
+        let (file, path) = (format!("{turn}.mcap"), run.path(&format!("{turn}.mcap")));
+        let recorder = run.command(&["record", "-o", &file, "middle"]);
+        wait_until("recording", || path.exists());
+        [&tap, &recorder].into_iter().for_each(|program| signal(program.id(), "KILL"));
+        tap.wait();
+        recorder.wait();
+    }
+    run.command(&["tap", "middle", "--count", "3"]).wait().assert(0, &["poses"]);
+    run.interrupt().assert_done();
+}
+
+#[test]
+fn players_that_are_killed_leave_room_for_others_and_the_run_goes_on() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    for _ in 0..11 {
+        let before = run.number("output", "messages_in");
+        let player = run.command(&["play", LOG, "--rate", "20"]);
+        wait_until("messages", || run.number("output", "messages_in") > before);
+        signal(player.id(), "KILL");
+        player.wait();
+    }
+    let before = run.number("output", "messages_in");
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
+    assert_eq!(run.number("output", "messages_in"), before + 7857);
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+}
+
+#[test]
+fn a_halted_tap_does_not_hold_up_a_live_run_with_large_messages() {
+    let settings = ["source.count=1500", "source.size=50000", "middle.size=50000"];
+    let run = Run::start(TROUBLED, &settings.map(|setting| ["--set", setting]).concat());
+    let taps = ["source", "middle"].map(|link| run.command(&["tap", link, "--json"]));
+    wait_until("messages", || run.number("output", "messages_in") > 100);
+    taps.iter().for_each(|tap| signal(tap.id(), "STOP"));
+    let done = run.wait();
+    done.assert_done();
+    for stage in ["middle", "output"] {
+        assert_eq!(done.numbers(stage, ["messages_in", "dropped"]), [1500, 0], "{stage}");
+    }
+    taps.iter().for_each(|tap| signal(tap.id(), "CONT"));
+    taps.into_iter().for_each(|tap| tap.wait().assert(0, &[]));
+}
+
+#[test]
+fn a_run_can_be_ended_while_robots_send() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let players = [(); 2].map(|()| run.command(&["play", LOG, "--rate", "0", "--loop"]));
+    wait_until("messages", || run.number("output", "messages_in") > 5000);
+    let done = run.interrupt();
+    done.assert_done();
+    players.into_iter().for_each(|player| player.wait().assert(1, &["the run ended before the log did"]));
+    let [given] = done.numbers("output", ["messages_in"]);
+    assert_eq!(done.output().values().map(Vec::len).sum::<usize>() as u64, given);
+}
+
+#[test]
 fn a_killed_stage_that_is_not_to_be_started_again_ends_the_run_with_its_name() {
     let run = Run::start("live", &[]);
     run.simulate();
