@@ -321,7 +321,7 @@ fn a_stage_that_is_killed_again_and_again_under_load_comes_back_and_what_it_miss
     let [given, dropped, restarts] = done.numbers("middle", ["messages_in", "dropped", "restarts"]);
     assert!(restarts == 3 && dropped > 0, "{:#?}", done.ended);
     // The last one is repeated after each restart, and what a process had taken off the link dies with it.
-    assert!((sent..sent + 100).contains(&(given + dropped)), "{sent} were sent, {given} given, {dropped} dropped");
+    assert!((sent - 3..=sent + 3).contains(&(given + dropped)), "{sent} were sent, {given} given, {dropped} dropped");
     let written: usize = done.output().values().map(Vec::len).sum();
     let [out] = done.numbers("middle", ["messages_out"]);
     assert!(
@@ -355,7 +355,7 @@ fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
         tap.wait();
         recorder.wait();
     }
-    run.command(&["tap", "middle", "--count", "3"]).wait().assert(0, &["poses"]);
+    run.command(&["tap", "middle", "--count", "3"]).wait().assert(0, &["/robot1/middle/out"]);
     run.interrupt().assert_done();
 }
 

@@ -142,6 +142,12 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
             (0..self.board.wires()).map(|wire| self.board.get_wire(wire, crate::link::board::WireNumber::Dropped));
         report.dropped = dropped.sum();
         report.restarts = self.board.get(StageNumber::Restarts);
+        if report.restarts > 0 {
+            // With what the processes before this one have done.
+            report.messages_in = self.board.get(StageNumber::MessagesIn);
+            report.messages_out = self.board.all_sent();
+            report.busy = Duration::from_nanos(self.board.get(StageNumber::Busy));
+        }
         self.board.set_state(StageState::Ended);
         self.receivers.iter().for_each(LiveReceiver::acknowledge);
         Ok(report)
