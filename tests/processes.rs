@@ -7,10 +7,7 @@ mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::thread;
-use std::time::{Duration, Instant};
-use support::{Ended, Running, example, start_program};
+use support::{Ended, Running, example, left_over, outcome, processes, signal, start_program, wait_until};
 use tempfile::TempDir;
 
 /// A source, a diamond of two stages, one that joins them with the source itself, and a log. It takes some seconds.
@@ -58,59 +55,9 @@ fn start(folder: &Path, engine: &str, settings: &[&str]) -> Running {
     start_program(&example("troubled_stages"), folder, &args, &[])
 }
 
-/// The folder of a run's files.
-fn run_folder(run: u32) -> PathBuf {
-    use std::os::unix::fs::MetadataExt;
-    let user = fs::metadata("/proc/self").unwrap().uid();
-    PathBuf::from(format!("/tmp/gridweave-{user}/gw{run}_0_"))
-}
-
-/// What a run has left in shared memory and in its folder.
-fn left_over(run: u32) -> Vec<PathBuf> {
-    let is_of_run = |path: &PathBuf| path.to_string_lossy().contains(&format!("/gw{run}_"));
-    let shared = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path()).filter(is_of_run);
-    shared.chain(Some(run_folder(run)).filter(|folder| folder.exists())).collect()
-}
-
-/// The processes of a run, by name.
-fn processes(run: u32) -> Vec<(u32, String)> {
-    let folder = run_folder(run).to_string_lossy().into_owned();
-    let of_process = |id: u32| {
-        let line = fs::read(format!("/proc/{id}/cmdline")).ok()?;
-        let words: Vec<String> =
-            line.split(|byte| *byte == 0).map(|word| String::from_utf8_lossy(word).into()).collect();
-        let place = words.iter().position(|word| *word == folder)?;
-        Some((id, words.get(place + 1)?.clone()))
-    };
-    let ids = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
-    ids.filter_map(of_process).collect()
-}
-
-fn signal(process: u32, signal: &str) {
-    assert!(Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).status().unwrap().success());
-}
-
 /// Waits until some messages have come to the output.
 fn wait_for_output(folder: &Path) {
     wait_until("some output", || fs::metadata(folder.join(OUTPUT)).is_ok_and(|file| file.len() > 20_000));
-}
-
-#[track_caller]
-fn wait_until(what: &str, condition: impl Fn() -> bool) {
-    let start = Instant::now();
-    while !condition() {
-        assert!(start.elapsed() < Duration::from_secs(60), "no {what}");
-        thread::sleep(Duration::from_millis(2));
-    }
-}
-
-/// What the log says of its end, and how many messages it holds.
-fn outcome(folder: &Path) -> (String, usize) {
-    let bytes = fs::read(folder.join(OUTPUT)).unwrap();
-    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count();
-    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let record = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
-    (record.metadata.get("reason").cloned().unwrap_or_default(), messages)
 }
 
 /// A run has failed, and everything that must be so then is so.
@@ -120,7 +67,7 @@ fn assert_failed(folder: &Path, run: u32, ended: &Ended, words: &[&str]) {
     assert_eq!(ended.status, 1, "{ended:#?}");
     assert_eq!(processes(run), [], "processes are left");
     assert_eq!(left_over(run), Vec::<PathBuf>::new());
-    let (reason, messages) = outcome(folder);
+    let (reason, messages) = outcome(&folder.join(OUTPUT));
     assert!(messages > 0);
     for word in words {
         assert!(ended.stderr.contains(word), "no `{word}` in {ended:#?}");
@@ -227,7 +174,7 @@ fn when_the_supervisor_is_killed_the_stages_close_the_log_and_clean_removes_the_
     signal(id, "KILL");
     run.wait();
     wait_until("end of the processes", || processes(id).is_empty());
-    let (reason, messages) = outcome(folder.path());
+    let (reason, messages) = outcome(&folder.path().join(OUTPUT));
     assert!(reason.contains("lost its supervisor") && messages > 0, "{reason}");
 
     let clean = start_program(&example("troubled_stages"), folder.path(), &["clean"], &[]).wait();
@@ -255,7 +202,7 @@ fn clean_removes_what_is_left_of_dead_runs_and_touches_no_living_one() {
     assert_eq!(left_over(dead_id), Vec::<PathBuf>::new());
     let ended = living.wait();
     assert_eq!(ended.status, 0, "{ended:#?}");
-    assert_eq!((outcome(living_folder.path()).0.as_str(), left_over(living_id)), ("", vec![]));
+    assert_eq!((outcome(&living_folder.path().join(OUTPUT)).0.as_str(), left_over(living_id)), ("", vec![]));
 }
 
 #[test]

@@ -3,9 +3,11 @@
 
 mod log_builder;
 mod readings;
+mod run_files;
 
 pub use log_builder::{LogBuilder, TestMap};
 pub use readings::{change_readings, moved_reading, place_in_map_2};
+pub use run_files::{left_over, outcome, processes, run_folder, run_name, signal, wait_until};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -53,8 +55,8 @@ pub fn gridweave_with(folder: &Path, args: &[&str], variables: &[(&str, &str)]) 
 pub struct Running {
     child: Child,
     command: String,
-    stdout: JoinHandle<String>,
-    stderr: JoinHandle<String>,
+    stdout: Option<JoinHandle<String>>,
+    stderr: Option<JoinHandle<String>>,
 }
 
 /// Starts `gridweave` in `folder`.
@@ -81,11 +83,11 @@ pub fn start_program(program: &Path, folder: &Path, args: &[&str], variables: &[
         .spawn()
         .unwrap();
     let read = |mut pipe: Box<dyn Read + Send>| {
-        std::thread::spawn(move || {
+        Some(std::thread::spawn(move || {
             let mut bytes = Vec::new();
             pipe.read_to_end(&mut bytes).unwrap();
             String::from_utf8_lossy(&bytes).into_owned()
-        })
+        }))
     };
     let stdout = read(Box::new(child.stdout.take().unwrap()));
     let stderr = read(Box::new(child.stderr.take().unwrap()));
@@ -112,8 +114,24 @@ impl Running {
                 None => std::thread::sleep(Duration::from_millis(5)),
             }
         };
-        let (stdout, stderr) = (self.stdout.join().unwrap(), self.stderr.join().unwrap());
+        let [stdout, stderr] =
+            [&mut self.stdout, &mut self.stderr].map(|output| output.take().unwrap().join().unwrap());
         Ended { status: status.code().unwrap_or(-1), stdout, stderr }
+    }
+}
+
+impl Drop for Running {
+    /// What a test that fails has started does not go on after it.
+    fn drop(&mut self) {
+        if !matches!(self.child.try_wait(), Ok(None)) {
+            return;
+        }
+        signal(self.id(), "TERM");
+        let start = Instant::now();
+        while matches!(self.child.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(15) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let _ = self.child.kill();
     }
 }
 

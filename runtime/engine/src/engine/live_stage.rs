@@ -19,6 +19,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+/// A source looks so often whether its readers are connected.
+const CONNECT_INTERVAL: Duration = Duration::from_millis(2);
 /// A stage at its end looks so often whether its readers are still there.
 const ACKNOWLEDGE_INTERVAL: Duration = Duration::from_millis(50);
 
@@ -140,12 +142,19 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
             (0..self.board.wires()).map(|wire| self.board.get_wire(wire, crate::link::board::WireNumber::Dropped));
         report.dropped = dropped.sum();
         report.restarts = self.board.get(StageNumber::Restarts);
+        if report.restarts > 0 {
+            // With what the processes before this one have done.
+            report.messages_in = self.board.get(StageNumber::MessagesIn);
+            report.messages_out = self.board.all_sent();
+            report.busy = Duration::from_nanos(self.board.get(StageNumber::Busy));
+        }
         self.board.set_state(StageState::Ended);
         self.receivers.iter().for_each(LiveReceiver::acknowledge);
         Ok(report)
     }
 
     fn drive_source(&mut self) -> Result<(), Failure> {
+        self.wait_for_readers()?;
         while !self.drain.load(Ordering::Relaxed) {
             self.begin_work();
             let working = self.wake.working();
@@ -159,6 +168,14 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
             self.repeat_for_new_readers()?;
         }
         self.end(self.runner.log_time())
+    }
+
+    /// Waits until every reader is connected, so that none misses the first messages.
+    fn wait_for_readers(&self) -> Result<(), Failure> {
+        while !self.drain.load(Ordering::Relaxed) && !self.senders.iter().all(|sender| sender.borrow().is_connected()) {
+            self.wake.sleep_for(CONNECT_INTERVAL)?;
+        }
+        Ok(())
     }
 
     /// A source whose messages come from outside keeps the last of them for readers that come late.

@@ -11,6 +11,13 @@ use crate::pipeline::{Mode, Pipeline};
 use iceoryx2::node::Node;
 use iceoryx2::service::ipc::Service;
 use std::collections::BTreeMap;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// So long the stages of a run may take to make their links.
+const LINK_TIMEOUT: Duration = Duration::from_secs(10);
+/// So often it is looked for a link that is not there yet.
+const LOOK_INTERVAL: Duration = Duration::from_millis(10);
 
 /// A link of a run, as a program sees it that looks on. It changes nothing in the run: where it is too slow, it misses
 /// messages.
@@ -28,7 +35,7 @@ impl WatchedLink {
     /// topic again for it.
     ///
     /// # Errors
-    /// Nothing in the run reads the port, the run has gone, or too many look on.
+    /// Nothing in the run reads the port, the run has gone or does not make the link, or too many look on.
     pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
@@ -40,7 +47,17 @@ impl WatchedLink {
         }
         let names = run.names();
         let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
-        let observer = Observer::new(&node, &names, &spec.name, name).map_err(|error| of_stage(error.into()))?;
+        let start = Instant::now();
+        let observer = loop {
+            match Observer::new(&node, &names, &spec.name, name).map_err(|error| of_stage(error.into()))? {
+                Some(observer) => break observer,
+                None if start.elapsed() < LINK_TIMEOUT && run.is_running() => thread::sleep(LOOK_INTERVAL),
+                None => {
+                    let text = format!("its output `{name}` cannot be looked on at: it is not there");
+                    return Err(of_stage(Failure::Process(text)));
+                }
+            }
+        };
         let owner = match pipeline.mode {
             Mode::Replay => None,
             Mode::Live => {

@@ -5,7 +5,7 @@ use super::backoff::Backoff;
 use super::words::{Said, Told, say};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::board::{StageBoard, StageNumber};
+use crate::link::board::{StageBoard, StageNumber, StageState};
 use crate::link::shared::{LinkError, RunNames};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
@@ -83,6 +83,9 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
     let of_run = |error| RunError::of_run(Failure::from(error));
     let folder = RunFolder::create().map_err(of_run)?;
     let board = folder.create_board(pipeline).map_err(of_run)?;
+    let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
+    // Senders wait for the stages that are still to come.
+    boards.iter().for_each(|board| board.set_state(StageState::Starting));
     folder.write_pipeline(&pipeline.to_toml()).map_err(of_run)?;
     let (sender, receiver) = channel();
     let mut supervisor = Supervisor {
@@ -90,7 +93,7 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
         observer,
         launch,
         folder: &folder,
-        boards: (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect(),
+        boards,
         events: sender,
         processes: Vec::new(),
         draining: None,

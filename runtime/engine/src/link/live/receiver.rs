@@ -18,31 +18,40 @@ use std::collections::BTreeMap;
 /// What has come from one sender.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
+    /// Whether all that it has sent was meant for this reader: not if that was started again.
+    is_for_all: bool,
     /// The number of the first message that was not repeated.
     first: u64,
     /// Which number comes next.
     next: u64,
-    /// The number of the last repeated message.
+    /// The number of the last repeated message, and how many there were.
     repeated: Option<u64>,
-}
-
-impl Default for Heard {
-    fn default() -> Self {
-        Self { first: u64::MAX, next: 0, repeated: None }
-    }
+    repeats: u64,
 }
 
 impl Heard {
-    /// Notes a message. Gives whether it has not come before, and how many before it are missing.
-    fn note(&mut self, sequence: u64, is_repeated: bool) -> (bool, u64) {
+    fn new(is_for_all: bool) -> Self {
+        Self { is_for_all, first: u64::MAX, next: 0, repeated: None, repeats: 0 }
+    }
+
+    /// Notes a message. Gives whether it has not come before, and how many more are missing: less than 0 if it is one
+    /// that was missing.
+    fn note(&mut self, sequence: u64, is_repeated: bool) -> (bool, i64) {
+        let is_begun = self.first != u64::MAX;
         if is_repeated {
             let is_new = sequence < self.first && self.repeated.is_none_or(|last| sequence > last);
             if is_new {
                 self.repeated = Some(sequence);
+                self.repeats += 1;
             }
-            return (is_new, 0);
+            return (is_new, -i64::from(is_new && is_begun && self.is_for_all));
         }
-        let missing = if self.first == u64::MAX { 0 } else { sequence.saturating_sub(self.next) };
+        let missing = match (is_begun, self.is_for_all) {
+            (true, _) => sequence.saturating_sub(self.next),
+            (false, true) => sequence.saturating_sub(self.repeats),
+            (false, false) => 0,
+        };
+        let missing = i64::try_from(missing).unwrap_or(i64::MAX);
         self.first = self.first.min(sequence);
         self.next = sequence + 1;
         (true, missing)
@@ -195,7 +204,8 @@ impl<S: Service + 'static> LiveReceiver<S> {
             if flags.contains(MessageFlags::END) {
                 self.ended = Some(header.message.log_time);
             }
-            let heard = self.heard.entry(header.origin).or_default();
+            let is_for_all = self.board.get(StageNumber::Restarts) == 0;
+            let heard = self.heard.entry(header.origin).or_insert_with(|| Heard::new(is_for_all));
             let (is_new, missing) = heard.note(header.message.sequence, flags.contains(MessageFlags::REPEATED));
             let slot = self.slots.iter().position(|slot| *slot == header.origin);
             if let Some(slot) = slot.filter(|_| heard.first != u64::MAX) {
@@ -207,8 +217,9 @@ impl<S: Service + 'static> LiveReceiver<S> {
                 self.board.set_wire(self.wire, WireNumber::OwnerWaits, 0);
                 let _ = self.owner.wake(WakeEvents::DATA);
             }
-            if missing > 0 {
-                self.board.add_wire(self.wire, WireNumber::Dropped, missing);
+            if missing != 0 {
+                let dropped = self.board.get_wire(self.wire, WireNumber::Dropped).saturating_add_signed(missing);
+                self.board.set_wire(self.wire, WireNumber::Dropped, dropped);
             }
             let is_data = flags.contains(MessageFlags::DATA);
             if !is_new || !(is_data || flags.contains(MessageFlags::CHANNEL)) {
@@ -261,7 +272,7 @@ mod tests {
 
     #[test]
     fn what_was_had_already_is_left_out_and_what_is_missing_counted() {
-        let mut heard = Heard::default();
+        let mut heard = Heard::new(false);
         assert_eq!(heard.note(5, false), (true, 0), "what came before the reader is not missing");
         assert_eq!(heard.note(6, false), (true, 0));
         assert_eq!(heard.note(9, false), (true, 2));
@@ -274,8 +285,18 @@ mod tests {
 
     #[test]
     fn repeated_messages_may_come_first() {
-        let mut heard = Heard::default();
+        let mut heard = Heard::new(false);
         assert_eq!([3, 7, 3].map(|sequence| heard.note(sequence, true).0), [true, true, false]);
         assert_eq!(heard.note(8, false), (true, 0));
+    }
+
+    #[test]
+    fn a_reader_that_was_there_from_the_beginning_misses_the_first_messages_as_well() {
+        let mut heard = Heard::new(true);
+        assert_eq!(heard.note(1, true), (true, 0));
+        assert_eq!(heard.note(4, false), (true, 3), "0, 2 and 3");
+        assert_eq!(heard.note(3, true), (true, -1), "it came after all");
+        assert_eq!(heard.note(3, true), (false, 0));
+        assert_eq!(heard.note(6, false), (true, 1));
     }
 }

@@ -8,6 +8,7 @@ use iceoryx2::node::Node;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::Alignment;
 use iceoryx2::service::Service;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as E;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::rc::Rc;
 
@@ -73,22 +74,28 @@ pub struct Observer<S: Service> {
 }
 
 impl<S: Service + 'static> Observer<S> {
-    /// Looks on at the link `STAGE.PORT` of a run.
+    /// Looks on at the link `STAGE.PORT` of a run; none if the link is not there, or not yet.
     ///
     /// # Errors
-    /// The link is not there yet, or too many look on.
-    pub fn new(node: &Node<S>, names: &RunNames, stage: &str, port: &str) -> Result<Self, LinkError> {
+    /// Too many look on.
+    pub fn new(node: &Node<S>, names: &RunNames, stage: &str, port: &str) -> Result<Option<Self>, LinkError> {
         let name = format!("{stage}.{port}");
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("look on at {name}"))(cause);
         let service = node
             .service_builder(&names.link(stage, port)?)
             .publish_subscribe::<[u8]>()
             .user_header::<SampleHeader>()
-            .open()
-            .map_err(|e| failed(&e))?;
+            .open();
+        let service = match service {
+            // It may be in the making.
+            Err(E::DoesNotExist | E::ServiceInCorruptedState | E::HangsInCreation | E::IsMarkedForDestruction) => {
+                return Ok(None);
+            }
+            other => other.map_err(|e| failed(&e))?,
+        };
         let buffer = OBSERVER_BUFFER.min(service_buffer(&service));
         let subscriber = service.subscriber_builder().buffer_size(buffer).create().map_err(|e| failed(&e))?;
-        Ok(Self { subscriber, name })
+        Ok(Some(Self { subscriber, name }))
     }
 
     /// Takes the messages that have passed since the last call, with the header of the sample that each came in. Marks of
