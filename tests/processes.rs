@@ -223,6 +223,14 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
         let settings: Vec<&str> = base.iter().chain(extra).copied().collect();
         assert!(output("processes", &settings) == expected, "{extra:?}");
     }
+    // A source that sends nothing must not hold up what it could come before, and changes nothing.
+    let silent = "[stages.silent]\nkind = \"troubled_source\"\n\n[stages.join]";
+    let text = DIAMOND
+        .replace("[stages.join]", silent)
+        .replace("\"other\", \"source\"]", "\"other\", \"source\", \"silent\"]");
+    assert_ne!(text, DIAMOND);
+    fs::write(folder.path().join("diamond.toml"), text).unwrap();
+    assert!(output("processes", &base) == expected, "a silent source");
     for (depth, placement) in [("depth = 1", "process = \"one\""), ("depth = 2", "process = \"b\"")] {
         let text = DIAMOND
             .replace("depth = 4", depth)

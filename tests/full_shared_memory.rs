@@ -1,0 +1,51 @@
+//! When there is no room left in shared memory, a run of processes ends with the stage's name and the cause.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use std::fs;
+use std::process::Command;
+use support::{example, outcome, processes, run_folder, start_program};
+use tempfile::TempDir;
+
+/// Poses with long names of frames: a megabyte each.
+const LARGE: &str = r#"
+[pipeline]
+name = "large"
+batch = false
+
+[stages.source]
+kind = "troubled_source"
+count = 200
+size = 1_000_000
+
+[stages.output]
+kind = "mcap_sink"
+inputs = ["source"]
+"#;
+
+/// Mounts a small file system at /dev/shm, for this program and those it starts only, and then does what it is told.
+const SMALL_SHARED_MEMORY: &str = "mount -t tmpfs -o size=4m tmpfs /dev/shm && exec \"$0\" \"$@\"";
+
+#[test]
+fn a_run_without_room_in_shared_memory_says_so_and_closes_its_log() {
+    let own = ["--user", "--map-root-user", "--mount"];
+    if !Command::new("unshare").args(own).arg("true").status().is_ok_and(|status| status.success()) {
+        eprintln!("skipped: this machine does not let a program have a /dev/shm of its own");
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("large.toml"), LARGE).unwrap();
+    let program = example("troubled_stages");
+    let run = ["run", "large.toml", "-o", "out.mcap", "--engine", "processes"];
+    let args = [&own, &["sh", "-c", SMALL_SHARED_MEMORY, program.to_str().unwrap()][..], &run].concat();
+    let run = start_program("unshare".as_ref(), folder.path(), &args, &[]);
+    let id = run.id();
+    let ended = run.wait();
+    ended.assert(1, &["stage `source`", "/dev/shm"]);
+    assert_eq!(processes(id), []);
+    assert!(!run_folder(id).exists());
+    let (reason, _) = outcome(&folder.path().join("out.mcap"));
+    assert!(reason.contains("/dev/shm"), "{reason}");
+}
