@@ -18,7 +18,7 @@ impl Run {
         let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
         match kind().make(toml::Table::new(), &context).unwrap() {
             Node::Stage(stage) => Self { stage, outputs: CollectedOutputs::new(&kind()) },
-            Node::Source(_) => panic!("a stage was expected"),
+            Node::Source(_) | Node::External => panic!("a stage was expected"),
         }
     }
 

@@ -8,7 +8,7 @@ use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
 fn stage(parameters: &str) -> Box<dyn Stage> {
     match kind().make(toml::from_str(parameters).unwrap(), &Context::default()).unwrap() {
         Node::Stage(stage) => stage,
-        Node::Source(_) => panic!("a stage was expected"),
+        Node::Source(_) | Node::External => panic!("a stage was expected"),
     }
 }
 

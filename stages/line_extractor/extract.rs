@@ -19,8 +19,10 @@ use rand_chacha::ChaCha8Rng;
 const FINAL_FITS: usize = 3;
 /// How often a segment is fitted to its faces, at most, and when it is good enough: its ends have moved by less than this,
 /// in cells.
-const FACE_FITS: usize = 3;
-const ENOUGH: f64 = 0.5;
+const FACE_FITS: usize = 4;
+const ENOUGH: f64 = 0.25;
+/// Where the surroundings of a wall are cut off, it is left out of the fit if at least this share of the wall is left.
+const LEAST_INSIDE: f64 = 0.5;
 /// The last fits leave out cells farther from the line than this many standard deviations: what stands at a wall.
 const OUTLIER_DEVIATIONS: f64 = 2.5;
 
@@ -79,18 +81,24 @@ fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option
     (count > 0).then_some((stretch, count))
 }
 
-/// The part of a stretch that tells its direction. Where walls meet, cells of the other wall lie on one side of this one
-/// and would turn it.
-fn inner(stretch: &Stretch, scale: &Scale) -> Stretch {
+/// The part of a stretch that tells its direction.
+///
+/// Where walls meet, cells of the other wall lie on one side of this one and would turn it. And where a thick wall leaves
+/// the grid, a wedge of it is left, whose middle runs along half way between the wall and the border: it would turn the
+/// wall towards the border.
+fn inner(index: &PointIndex, stretch: &Stretch, scale: &Scale) -> Stretch {
     let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
-    Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin }
+    let inner = Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin };
+    // A wall along a border of the grid has no other part.
+    let inside = inner.inside(&index.size(), scale.reach);
+    inside.filter(|part| part.length() >= LEAST_INSIDE * inner.length()).unwrap_or(inner)
 }
 
 /// Fits a stretch to the faces of its wall.
 fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stretch {
     let mut cells = Vec::new();
     for _ in 0..FACE_FITS {
-        let inner = inner(&stretch, scale);
+        let inner = inner(index, &stretch, scale);
         let middle = (inner.start + inner.end) / 2.0;
         cells.clear();
         visit_along(index, &inner, scale.reach, |point| {
@@ -115,7 +123,7 @@ fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scal
     let mut near = Vec::new();
     for _ in 0..FINAL_FITS {
         near.clear();
-        visit_along(index, &inner(&stretch, scale), reach, |point| near.push(point));
+        visit_along(index, &inner(index, &stretch, scale), reach, |point| near.push(point));
         let cells = near.iter().copied();
         let Some(fitted) = fit_stretch(fit, &stretch.line, cells.clone()) else { break };
         // The cells at the ends took no part in the fit, but they belong to the wall.
@@ -181,6 +189,17 @@ mod tests {
         (geometry, cells)
     }
 
+    /// A solid wall of 7.5 cells across a grid of 700 x 600 cells of 0.02 m, through a place in cells.
+    fn thick_wall(angle: f64, through: [f64; 2]) -> (GridGeometry, Vec<i8>) {
+        let (width, height) = (700, 600);
+        let across = |cell: usize| {
+            let (x, y) = ((cell % width) as f64 + 0.5 - through[0], (cell / width) as f64 + 0.5 - through[1]);
+            y * angle.cos() - x * angle.sin()
+        };
+        let cells = (0..width * height).map(|cell| if across(cell).abs() <= 3.75 { 100 } else { 0 }).collect();
+        (GridGeometry { width, height, resolution: 0.02, origin: pose(0.0, 0.0, 0.0) }, cells)
+    }
+
     fn length(segment: &Segment) -> f64 {
         (segment.x2 - segment.x1).hypot(segment.y2 - segment.y1)
     }
@@ -218,6 +237,23 @@ mod tests {
         assert_eq!(some.len(), 4);
         assert!((length(&all[0]) - length(&some[0])).abs() < 0.3);
         assert!(some[0].inliers > 140, "they are fitted to all cells");
+    }
+
+    #[test]
+    fn a_thick_wall_is_not_turned_where_the_border_of_the_grid_cuts_it() {
+        // In the middle of the grid; leaving it above, in a long wedge; leaving it to the right.
+        for through in [[350.0, 300.0], [500.0, 595.0], [695.0, 400.0]] {
+            for degrees in [2.0, 4.0, 10.0, 30.0, 77.0, 86.0_f64] {
+                let (geometry, cells) = thick_wall(degrees.to_radians(), through);
+                let grid = Grid::new(geometry, &cells).unwrap();
+                for seed in 0..5 {
+                    let wall = extract_segments(&grid, &LineExtractorParameters::default(), seed)[0];
+                    let angle = (wall.y2 - wall.y1).atan2(wall.x2 - wall.x1);
+                    let error = turn_difference(angle, degrees.to_radians(), PI).to_degrees();
+                    assert!(error.abs() < 0.03, "{through:?} {degrees} {error}");
+                }
+            }
+        }
     }
 
     #[test]

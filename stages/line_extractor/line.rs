@@ -104,6 +104,25 @@ impl Stretch {
         (start <= end).then_some(Self { line, start, end })
     }
 
+    /// The part along which all that is within `reach` of the line lies in the plane from (0, 0) to `size`. `None` if
+    /// there is no such part.
+    pub(super) fn inside(&self, size: &Vector2<f64>, reach: f64) -> Option<Self> {
+        let (point, direction) = (self.line.point.coords, self.line.direction);
+        let margin = quarter_turn(&direction).abs() * reach;
+        if margin.x > size.x / 2.0 || margin.y > size.y / 2.0 {
+            return None;
+        }
+        let (mut start, mut end) = (self.start, self.end);
+        for axis in 0..2 {
+            // Where the line passes the two borders. A line along them passes them infinitely far away.
+            let low = (margin[axis] - point[axis]) / direction[axis];
+            let high = (size[axis] - margin[axis] - point[axis]) / direction[axis];
+            start = start.max(low.min(high));
+            end = end.min(low.max(high));
+        }
+        (start < end).then_some(Self { line: self.line, start, end })
+    }
+
     /// The length of the stretch.
     pub(super) fn length(&self) -> f64 {
         self.end - self.start
@@ -178,5 +197,23 @@ mod tests {
         assert_eq!(stretch.distance(&Point2::new(12.0, 5.0)), 5.0);
         assert_eq!(stretch.distance(&Point2::new(5.0, 3.0)), 2.0);
         assert_eq!(Stretch::between_farthest(line, std::iter::empty()), None);
+    }
+
+    #[test]
+    fn a_stretch_is_inside_where_its_surroundings_are() {
+        let size = Vector2::new(40.0, 30.0);
+        let inside = |from: [f64; 2], to: [f64; 2], reach| {
+            let line = Line::through(&from.into(), &to.into()).unwrap();
+            let stretch = Stretch::between_farthest(line, [from, to].map(Point2::from).into_iter()).unwrap();
+            stretch.inside(&size, reach).map(|part| part.ends())
+        };
+        assert_eq!(inside([5.0, 9.0], [30.0, 9.0], 3.0), Some([[5.0, 9.0].into(), [30.0, 9.0].into()]));
+        assert_eq!(inside([0.0, 9.0], [50.0, 9.0], 3.0).unwrap()[1], Point2::new(40.0, 9.0));
+        assert_eq!(inside([5.0, 2.0], [30.0, 2.0], 3.0), None);
+        assert_eq!(inside([38.0, 20.0], [38.0, 2.0], 3.0), None);
+        assert_eq!(inside([0.0, 15.0], [40.0, 16.0], 25.0), None);
+        // A line at 45 degrees that leaves the plane at (30, 30): the border beside it is passed a reach earlier.
+        let end = inside([10.0, 10.0], [30.0, 30.0], 2.0_f64.sqrt()).unwrap()[1];
+        assert!((end - Point2::new(29.0, 29.0)).norm() < 1e-9, "{end}");
     }
 }

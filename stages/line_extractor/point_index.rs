@@ -2,6 +2,7 @@
 
 use super::line::{Line, Stretch};
 use crate::geometry::Point2;
+use nalgebra::Vector2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
@@ -15,6 +16,8 @@ const BANDS: usize = 9;
 /// A point is named by its place in [`points`](Self::points), which is sorted by bucket.
 #[derive(Clone, Debug)]
 pub(super) struct PointIndex {
+    /// The extent of the plane.
+    size: Vector2<f64>,
     side: f64,
     columns: usize,
     rows: usize,
@@ -47,7 +50,12 @@ impl PointIndex {
             sorted[*place] = *point;
             *place += 1;
         }
-        Self { side, columns, rows, starts, points: sorted }
+        Self { size: Vector2::new(width as f64, height as f64), side, columns, rows, starts, points: sorted }
+    }
+
+    /// The extent of the plane, which begins at (0, 0).
+    pub(super) fn size(&self) -> Vector2<f64> {
+        self.size
     }
 
     /// The points, sorted by bucket.

@@ -11,7 +11,7 @@
 
 use gridweave_runtime::engine::{EngineKind, run};
 use gridweave_runtime::message::{LogTime, Message};
-use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};
+use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid, RosMessage};
 use gridweave_runtime::stage::{
     Context, InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
@@ -116,16 +116,19 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
     let spec = |name: &str, kind: StageKind, inputs: Vec<Wire>| StageSpec {
         name: name.into(),
         topics: kind.outputs.iter().map(|_| "/out".into()).collect(),
+        overflow: kind.outputs.iter().map(|_| Overflow::default()).collect(),
         kind,
         parameters: format!("size = {size}").parse().unwrap(),
         inputs,
         depth: 2,
         process: name.into(),
+        restart: Restart::default(),
     };
     let stages =
         vec![spec("writer", source, vec![]), spec("reader", sink, vec![Wire { port: 0, from_stage: 0, from_port: 0 }])];
     let pipeline = Pipeline {
         name: "hop".into(),
+        mode: Mode::Replay,
         reference: None,
         seed: 0,
         batch: false,

@@ -33,7 +33,7 @@ fn make(file: &Path, more: &str) -> Result<Box<dyn Stage>, StageError> {
     parameters.insert("file".into(), file.to_str().unwrap().into());
     match kind().make(parameters, &context())? {
         Node::Stage(stage) => Ok(stage),
-        Node::Source(_) => panic!("a sink has inputs"),
+        Node::Source(_) | Node::External => panic!("a sink has inputs"),
     }
 }
 

@@ -50,10 +50,12 @@ pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
     }
 }
 
-/// The kinds of the registry of which there is no case.
+/// The kinds of the registry of which there is no case, but for those that only let messages in from outside of a live
+/// run.
 pub(super) fn kinds_without_a_case(registry: &Registry, cases: &[CaseFolder]) -> Vec<String> {
     let with: BTreeSet<&str> = cases.iter().map(|case| case.kind.as_str()).collect();
-    registry.kinds().map(|kind| kind.name).filter(|kind| !with.contains(kind)).map(str::to_owned).collect()
+    let kinds = registry.kinds().filter(|kind| !kind.is_external());
+    kinds.map(|kind| kind.name).filter(|kind| !with.contains(kind)).map(str::to_owned).collect()
 }
 
 /// The folders in a folder, by name. Files, and what is hidden, do not count.

@@ -194,8 +194,6 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
     fn drive_stage(&mut self) -> Result<(), Failure> {
         loop {
             self.wake.look_at_inputs()?;
-            self.receivers.iter_mut().try_for_each(LiveReceiver::connect)?;
-            self.repeat_for_new_readers()?;
             while let Some(wire) = self.next_wire()? {
                 self.handle(wire)?;
                 self.wake.poll()?;
@@ -203,6 +201,8 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
                     break;
                 }
             }
+            self.receivers.iter_mut().try_for_each(LiveReceiver::connect)?;
+            self.repeat_for_new_readers()?;
             if self.receivers.iter().all(LiveReceiver::is_done) {
                 let time = self.receivers.iter().map(LiveReceiver::end_time).max().unwrap_or_default();
                 self.begin_work();

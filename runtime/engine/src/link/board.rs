@@ -23,7 +23,7 @@ pub const NOTHING_HEARD: u64 = u64::MAX;
 /// Numbers of a stage that are there once.
 const STAGE_WORDS: usize = 8;
 /// Numbers of a wire that are there once.
-const WIRE_WORDS: usize = 3;
+const WIRE_WORDS: usize = 4;
 /// All numbers of a wire: with two for each sender.
 const ALL_WIRE_WORDS: usize = WIRE_WORDS + 2 * MAX_SENDERS;
 
@@ -79,6 +79,8 @@ pub enum WireNumber {
     Dropped = 1,
     /// Messages that were taken off the link and wait in the stage.
     Waiting = 2,
+    /// 1 while the owner of the link waits for room, and is to be woken.
+    OwnerWaits = 3,
 }
 
 /// Where the numbers of a stage begin.
@@ -265,6 +267,7 @@ impl StageBoard {
         self.set(StageNumber::WorkingSince, 0);
         for wire in 0..self.place.wires {
             self.set_wire(wire, WireNumber::Waiting, 0);
+            self.set_wire(wire, WireNumber::OwnerWaits, 0);
             (0..MAX_SENDERS).for_each(|slot| self.set_origin(wire, slot, 0, 0));
         }
     }

@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
-use gridweave_runtime::pipeline::{Pipeline, StageSpec, Wire};
+use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
     Context, InputPort, Output, OutputPort, Parameters, PortType, Registry, Source, Stage, StageError, StageKind,
@@ -281,6 +281,7 @@ impl PipelineBuilder {
         let inputs = inputs.collect();
         let topics = kind.outputs.iter().map(|output| format!("/{name}/{}", output.name)).collect();
         let parameters = parameters.parse().unwrap();
+        let overflow = kind.outputs.iter().map(|_| Overflow::default()).collect();
         self.stages.push(StageSpec {
             name: name.into(),
             kind,
@@ -289,6 +290,8 @@ impl PipelineBuilder {
             topics,
             depth: 1,
             process: name.into(),
+            overflow,
+            restart: Restart::default(),
         });
     }
 
@@ -297,6 +300,7 @@ impl PipelineBuilder {
         stages.iter_mut().for_each(|stage| stage.depth = depth);
         Pipeline {
             name: "test".into(),
+            mode: Mode::Replay,
             reference: None,
             seed: 1,
             batch: depth > 2,

@@ -10,7 +10,8 @@
 //!    whose messages come from outside; all senders of a link are alike but for rules 4 and 5.
 //! 2. A reader notes on the [board](super::board) which senders it is connected to, and which number it expects next of
 //!    each. On a link that waits, a sender sends while every reader is connected and less than its depth behind; a reader
-//!    whose process is gone is not waited for. A sender that waits looks every millisecond.
+//!    whose process is gone is not waited for. An owner that waits says so on the board, and the reader wakes it when half
+//!    of the room is free; other senders look every millisecond.
 //! 3. On a link that drops the oldest, iceoryx2 drops it. A reader sees this from the numbers, and counts it.
 //! 4. The owner keeps the last message of each topic. A reader that comes greets the owner, by the event that gives
 //!    credit in a replay; the owner sends what it keeps again, marked as repeated, and with the number and the origin

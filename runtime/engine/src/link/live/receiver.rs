@@ -85,6 +85,9 @@ pub struct LiveReceiver<S: Service> {
     slots: [u64; MAX_SENDERS],
     heard: BTreeMap<u64, Heard>,
     head: Option<Arrived>,
+    /// How many samples were taken since the owner was last woken for room.
+    taken: usize,
+    depth: usize,
     ended: Option<LogTime>,
     done: bool,
     held: HeldSamples,
@@ -129,6 +132,8 @@ impl<S: Service + 'static> LiveReceiver<S> {
             slots: [0; MAX_SENDERS],
             heard: BTreeMap::new(),
             head: None,
+            taken: 0,
+            depth,
             ended: None,
             done: false,
             held: HeldSamples::default(),
@@ -209,6 +214,12 @@ impl<S: Service + 'static> LiveReceiver<S> {
             let slot = self.slots.iter().position(|slot| *slot == header.origin);
             if let Some(slot) = slot.filter(|_| heard.first != u64::MAX) {
                 self.board.set_next(self.wire, slot, heard.next);
+            }
+            self.taken += 1;
+            if 2 * self.taken >= self.depth && self.board.get_wire(self.wire, WireNumber::OwnerWaits) != 0 {
+                self.taken = 0;
+                self.board.set_wire(self.wire, WireNumber::OwnerWaits, 0);
+                let _ = self.owner.wake(WakeEvents::DATA);
             }
             if missing != 0 {
                 let dropped = self.board.get_wire(self.wire, WireNumber::Dropped).saturating_add_signed(missing);

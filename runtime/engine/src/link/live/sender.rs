@@ -2,7 +2,7 @@
 
 use super::kept::Kept;
 use super::service::LinkShape;
-use crate::link::board::{NOTHING_HEARD, StageBoard, StageNumber, StageState, monotonic_nanoseconds};
+use crate::link::board::{NOTHING_HEARD, StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::link::shared::{LinkError, PROTOCOL_VERSION, RunNames, SampleHeader, Wake, WakeEvents, Waker};
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use crate::pipeline::Overflow;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// A sender that waits for room looks so often.
+/// A sender that waits for room looks so often. The owner of a link is woken before.
 const LOOK_INTERVAL: Duration = Duration::from_millis(1);
 
 /// A reader of a link, as its senders know it.
@@ -167,9 +167,8 @@ impl<S: Service + 'static> LiveSender<S> {
         *sample.user_header_mut() = self.header(message, self.origin);
         sample.send().map_err(|e| self.failed(&e))?;
         self.sequence += 1;
-        self.look_at_all()?;
         self.wake_readers();
-        Ok(())
+        Ok(self.look_at_all()?)
     }
 
     /// Waits until every reader that is there is connected and has room, if the link waits.
@@ -182,6 +181,7 @@ impl<S: Service + 'static> LiveSender<S> {
                 let expected = seen.expected(reader, self.origin, self.sequence);
                 seen.room_until = expected.map_or(0, |expected| expected + reader.depth as u64);
                 if self.sequence >= seen.room_until {
+                    reader.board.set_wire(reader.wire, WireNumber::OwnerWaits, u64::from(self.owner.is_none()));
                     let start = Instant::now();
                     self.pause.pause()?;
                     self.waited += start.elapsed();

@@ -98,10 +98,8 @@ impl<S: Service> Wake<S> {
 
     /// Whether readers of a live link have come since this was last asked. They say so by the event that gives credit.
     pub(crate) fn take_greetings(&self) -> bool {
-        let mut credits = self.credits.borrow_mut();
-        let any = credits.iter().any(|credit| *credit > 0);
-        credits.fill(Default::default());
-        any
+        let greetings: u64 = self.credits.borrow_mut().iter_mut().map(std::mem::take).sum();
+        greetings > 0
     }
 
     /// Whether a reader has acknowledged the end of the stream.

@@ -1,0 +1,261 @@
+//! What one hop between two processes costs, by the size of the message, and how many small messages pass in a second.
+//!
+//!     cargo bench -p gridweave-runtime --bench processes
+//!
+//! A hop is from the moment that the sender has written the last byte to the moment that the reader is given the message,
+//! its wake-up included. The reference is bare iceoryx2 between two processes in the same run: the same payload, a listener.
+
+// A bench that cannot go on has nothing better to do than to stop.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use gridweave_runtime::engine::processes::{Launch, run, run_process};
+use gridweave_runtime::link::board::monotonic_nanoseconds;
+use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::pipeline::{Overrides, Pipeline};
+use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid, RosMessage};
+use gridweave_runtime::stage::{
+    Context, InputPort, Output, OutputPort, Parameters, PortType, Registry, Source, Stage, StageError, StageKind,
+};
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::*;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const SIZES: [usize; 4] = [64, 64 << 10, 1 << 20, 16 << 20];
+const HOPS: u64 = 300;
+/// Between hops, so that the reader has gone to sleep.
+const PAUSE: Duration = Duration::from_millis(2);
+const SMALL: usize = 64;
+const MANY: u64 = 300_000;
+const DEPTH: usize = 64;
+
+/// When a message was written stands in its last bytes.
+fn stamp(bytes: &mut [u8]) {
+    let end = bytes.len() - 8;
+    bytes[end..].copy_from_slice(&monotonic_nanoseconds().to_le_bytes());
+}
+
+/// When each message was written and read, nanoseconds.
+#[derive(Default)]
+struct Times {
+    first: u64,
+    last: u64,
+    hops: Vec<u64>,
+}
+
+impl Times {
+    fn note(&mut self, bytes: &[u8]) {
+        let now = monotonic_nanoseconds();
+        let written = u64::from_le_bytes(bytes[bytes.len() - 8..].try_into().unwrap());
+        if self.first == 0 {
+            self.first = written;
+        }
+        self.last = now;
+        self.hops.push(now.saturating_sub(written));
+    }
+
+    fn report(&self) -> Value {
+        let mut hops = self.hops.clone();
+        hops.sort_unstable();
+        let at = |share: f64| hops[((hops.len() - 1) as f64 * share) as usize] as f64 * 1e-3;
+        let rate = hops.len() as f64 / ((self.last - self.first) as f64 * 1e-9);
+        json!({ "count": hops.len(), "p50": at(0.5), "p99": at(0.99), "rate": rate })
+    }
+}
+
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(default)]
+struct Load {
+    size: usize,
+    count: u64,
+    pause: bool,
+}
+
+impl Parameters for Load {}
+
+struct Writer(Load, u64);
+
+impl Source for Writer {
+    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+        let Self(load, sent) = self;
+        if load.pause {
+            std::thread::sleep(PAUSE);
+        }
+        output.set_log_time(LogTime(*sent));
+        if load.pause {
+            let info = MapMetaData { width: load.size as u32, height: 1, ..Default::default() };
+            output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
+                cells.fill(1);
+                stamp(bytemuck::cast_slice_mut(cells));
+                Ok(())
+            })?;
+        } else {
+            let mut bytes = [1; SMALL];
+            stamp(&mut bytes);
+            output.send_bytes(0, "", &bytes)?;
+        }
+        *sent += 1;
+        Ok(*sent < load.count)
+    }
+}
+
+struct Reader(Times);
+
+impl Stage for Reader {
+    fn receive(&mut self, _: usize, message: &Message, _: &mut Output<'_>) -> Result<(), StageError> {
+        self.0.note(message.bytes());
+        Ok(())
+    }
+
+    fn report(&self) -> Option<Value> {
+        Some(self.0.report())
+    }
+}
+
+fn registry() -> Registry {
+    let grid = PortType::Ros(OccupancyGrid::NAME);
+    let writer = |load: Load, _: &Context| Ok(Writer(load, 0));
+    let reader = |_: Load, _: &Context| Ok(Reader(Times::default()));
+    Registry::new([
+        StageKind::source("writer", "", vec![OutputPort::new("out", grid, "")], writer),
+        StageKind::stage("reader", "", vec![InputPort::one("in", grid, "")], vec![], reader),
+    ])
+}
+
+/// What the reader of a pipeline of two processes reports.
+fn pipeline(settings: &str, load: &str) -> Value {
+    let text = format!(
+        "[pipeline]\n{settings}\n[stages.a]\nkind = \"writer\"\n{load}\n[stages.b]\nkind = \"reader\"\ninputs = [\"a\"]\n"
+    );
+    let pipeline = Pipeline::parse("bench", &text, &registry(), &Overrides::default()).unwrap();
+    let report = run(&pipeline, &Launch::this_program().unwrap(), &()).unwrap();
+    report.results("reader").next().unwrap().1.clone()
+}
+
+fn service(node: &Node<ipc::Service>, name: &str, depth: usize) -> Bare {
+    let of = |what: &str| format!("bench/{name}/{what}");
+    let data = node
+        .service_builder(&of("data").as_str().try_into().unwrap())
+        .publish_subscribe::<[u8]>()
+        .enable_safe_overflow(false)
+        .subscriber_max_buffer_size(depth)
+        .open_or_create()
+        .unwrap();
+    let events = node.service_builder(&of("event").as_str().try_into().unwrap()).event().open_or_create().unwrap();
+    Bare { data, events }
+}
+
+struct Bare {
+    data: iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, [u8], ()>,
+    events: iceoryx2::service::port_factory::event::PortFactory<ipc::Service>,
+}
+
+/// Bare iceoryx2: the process that reads. It prints a line when it is ready, and then its report.
+fn bare_reader(name: &str, depth: usize, count: u64) {
+    let node = NodeBuilder::new().create::<ipc::Service>().unwrap();
+    let bare = service(&node, name, depth);
+    let listener = bare.events.listener_builder().create().unwrap();
+    let subscriber = bare.data.subscriber_builder().create().unwrap();
+    subscriber.update_connections().unwrap();
+    println!("ready");
+    let mut times = Times::default();
+    while (times.hops.len() as u64) < count {
+        listener.timed_wait(|_| {}, Duration::from_secs(1)).unwrap();
+        while let Some(sample) = subscriber.receive().unwrap() {
+            times.note(sample.payload());
+        }
+    }
+    println!("{}", times.report());
+}
+
+/// Bare iceoryx2 between this process, which sends, and another.
+fn bare(size: usize, depth: usize, count: u64, pause: bool) -> Value {
+    let name = format!("{}_{size}_{count}", std::process::id());
+    let node = NodeBuilder::new().create::<ipc::Service>().unwrap();
+    let bare = service(&node, &name, depth);
+    let publisher = bare
+        .data
+        .publisher_builder()
+        .initial_max_slice_len(size)
+        .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
+        .create()
+        .unwrap();
+    let notifier = bare.events.notifier_builder().create().unwrap();
+    let mut reader = Command::new(std::env::current_exe().unwrap())
+        .args(["bare", &name, &depth.to_string(), &count.to_string()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(reader.stdout.take().unwrap()).lines();
+    assert_eq!(lines.next().unwrap().unwrap(), "ready");
+    for _ in 0..count {
+        if pause {
+            std::thread::sleep(PAUSE);
+        }
+        let mut sample = publisher.loan_slice(size).unwrap();
+        sample.payload_mut().fill(1);
+        stamp(sample.payload_mut());
+        sample.send().unwrap();
+        notifier.notify().unwrap();
+    }
+    let report = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
+    reader.wait().unwrap();
+    report
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments[1..] {
+        ["stage", folder, process] => {
+            let load = |path: &Path, registry: &Registry| {
+                Pipeline::load(path, registry, &Overrides::default()).map_err(|errors| errors.render(false))
+            };
+            run_process(Path::new(folder), process, &registry(), load).unwrap();
+        }
+        ["bare", name, depth, count] => bare_reader(name, depth.parse().unwrap(), count.parse().unwrap()),
+        _ => bench(),
+    }
+}
+
+fn bench() {
+    let number = |report: &Value, name: &str| report[name].as_f64().unwrap();
+    println!("| message | bare iceoryx2, us (p99) | replay, us (p99) | ratio | live, us (p99) | ratio |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for size in SIZES {
+        let load = format!("size = {size}\ncount = {HOPS}\npause = true");
+        let bare = bare(size, 2, HOPS, true);
+        let replay = pipeline("batch = false\ndepth = 2", &load);
+        let live = pipeline("mode = \"live\"\ndepth = 2", &load);
+        let cell = |report: &Value| format!("{:.1} ({:.0})", number(report, "p50"), number(report, "p99"));
+        let ratio = |report: &Value| format!("{:.2}", number(report, "p50") / number(&bare, "p50"));
+        println!(
+            "| {size} B | {} | {} | {} | {} | {} |",
+            cell(&bare),
+            cell(&replay),
+            ratio(&replay),
+            cell(&live),
+            ratio(&live)
+        );
+    }
+    println!("\n| {SMALL} B, depth {DEPTH} | messages/s | x bare |");
+    println!("| --- | --- | --- |");
+    let load = format!("size = {SMALL}\ncount = {MANY}");
+    let reference = bare(SMALL, DEPTH, MANY, false);
+    let rows = [
+        ("bare iceoryx2", reference.clone()),
+        ("replay, in batches", pipeline(&format!("depth = {DEPTH}"), &load)),
+        ("replay, one by one", pipeline(&format!("depth = {DEPTH}\nbatch = false"), &load)),
+        ("live", pipeline(&format!("mode = \"live\"\ndepth = {DEPTH}"), &load)),
+    ];
+    for (name, report) in rows {
+        assert_eq!(number(&report, "count"), MANY as f64, "{name}");
+        let rate = number(&report, "rate");
+        println!("| {name} | {rate:.0} | {:.2} |", rate / number(&reference, "rate"));
+    }
+}
