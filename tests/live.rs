@@ -408,6 +408,120 @@ fn a_run_can_be_ended_while_robots_send() {
 }
 
 #[test]
+fn when_the_stage_dies_that_robots_send_as_nothing_is_lost() {
+    let run = Run::start("live", &[]);
+    let (log, truth) = run.simulate();
+    let player = run.command(&["play", LOG, "--rate", "40"]);
+    wait_until("map of each robot", || run.number("lines", "messages_in") >= 2);
+    run.kill("robots");
+    player.wait().assert(0, &["played 7857 messages"]);
+    wait_until("restart", || run.number("robots", "restarts") == 1);
+    let done = run.interrupt();
+    done.assert_done();
+    done.assert_right(&truth);
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+    assert_eq!(counts(&read(&log)), counts(&done.output()));
+}
+
+#[test]
+fn all_stages_that_may_be_started_again_can_die_at_once() {
+    let run = Run::start("live", &[]);
+    let (log, truth) = run.simulate();
+    let player = run.command(&["play", LOG, "--rate", "40"]);
+    wait_until("map of each robot", || run.number("lines", "messages_in") >= 2);
+    let stages = ["common_tags", "lines", "quadrants", "icp", "frames", "fuser"];
+    stages.into_iter().for_each(|stage| run.kill(stage));
+    player.wait().assert(0, &["played 7857 messages"]);
+    for stage in stages {
+        wait_until("restart", || run.number(stage, "restarts") == 1);
+    }
+    wait_until("last map of each robot", || run.number("lines", "messages_in") >= 4);
+    let done = run.interrupt();
+    done.assert_done();
+    done.assert_right(&truth);
+    assert_eq!(counts(&read(&log)), counts(&done.output()));
+}
+
+#[test]
+fn a_run_can_be_ended_while_a_stage_waits_to_be_started_again() {
+    let run = Run::start(TROUBLED, &[]);
+    wait_until("messages", || run.number("output", "messages_in") > 50);
+    run.kill("middle");
+    wait_until("end of the process", || !processes(run.id()).iter().any(|(_, name)| name == "middle"));
+    let done = run.interrupt();
+    done.assert_done();
+    let [sent] = done.numbers("source", ["messages_out"]);
+    let [given, dropped, restarts] = done.numbers("middle", ["messages_in", "dropped", "restarts"]);
+    assert_eq!(restarts, 1);
+    assert!((sent - 1..=sent + 1).contains(&(given + dropped)), "{sent} were sent, {given} given, {dropped} dropped");
+}
+
+#[test]
+fn the_stages_of_one_process_are_started_again_together() {
+    let text = TROUBLED.replace("inputs = [\"source\"]", "inputs = [\"source\"]\nprocess = \"both\"").replace(
+        "[stages.output]",
+        "[stages.next]\nkind = \"troubled_stage\"\ninputs = [\"middle\"]\nprocess = \"both\"\nrestart = \"on_failure\"\n\n[stages.output]",
+    );
+    let run = Run::start(
+        &text.replace("kind = \"mcap_sink\"\ninputs = [\"middle\"]", "kind = \"mcap_sink\"\ninputs = [\"next\"]"),
+        &[],
+    );
+    wait_until("messages", || run.number("output", "messages_in") > 50);
+    run.kill("both");
+    wait_until("restart", || run.number("next", "restarts") == 1);
+    let before = run.number("output", "messages_in");
+    wait_until("more messages", || run.number("output", "messages_in") > before + 50);
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(["middle", "next"].map(|stage| done.numbers(stage, ["restarts"])), [[1], [1]]);
+}
+
+#[test]
+fn a_stage_that_fills_the_memory_is_started_again() {
+    let text = TROUBLED.replace("depth = 16", "depth = 16\nmemory_limit = 300_000_000");
+    let run = Run::start(&text, &["--set", "middle.what=eat", "--set", "middle.at=50"]);
+    wait_until("restart", || run.number("middle", "restarts") >= 1);
+    wait_until("more output", || run.number("output", "messages_in") > 49);
+    let ended = run.interrupt().ended;
+    assert!(ended.stderr.contains("memory_limit") && ended.stderr.contains("started again in 0.5 s"), "{ended:#?}");
+}
+
+#[test]
+fn a_tap_that_comes_late_gets_the_last_message_of_each_topic() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
+    let tap = run.command(&["tap", "robots.map", "--json", "--count", "2"]).wait();
+    tap.assert(0, &[]);
+    let mut maps: Vec<(String, u64)> = tap
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap())
+        .map(|line| (line["topic"].as_str().unwrap().to_owned(), line["log_time"].as_u64().unwrap()))
+        .collect();
+    maps.sort();
+    let done = run.interrupt();
+    done.assert_done();
+    let output = done.output();
+    let last = ["/robot1/map", "/robot2/map"].map(|topic| (topic.to_owned(), output[topic].last().unwrap().0));
+    assert_eq!(maps, last);
+}
+
+#[test]
+fn of_several_runs_of_one_name_one_must_be_chosen() {
+    let text = TROUBLED.replace("name = \"troubled\"", "name = \"twins\"");
+    let runs = [Run::start(&text, &[]), Run::start(&text, &[])];
+    for run in &runs {
+        wait_until("messages", || run.number("output", "messages_in") > 0);
+    }
+    let args = ["tap", "source", "--run", "twins"];
+    let tap = start_program(&example("troubled_stages"), runs[0].folder.path(), &args, &[]).wait();
+    let names = runs.each_ref().map(|run| format!("twins ({})", run_name(run.id())));
+    tap.assert(2, &["several runs are going on", &names[0], &names[1], "choose one with --run"]);
+    runs.into_iter().for_each(|run| run.interrupt().assert_done());
+}
+
+#[test]
 fn a_killed_stage_that_is_not_to_be_started_again_ends_the_run_with_its_name() {
     let run = Run::start("live", &[]);
     run.simulate();

@@ -197,6 +197,10 @@ impl<S: Service + 'static> LiveReceiver<S> {
                 // The owner's last word may come before what others have sent. A reader that was started again after it
                 // does not hear it.
                 self.done = self.ended.is_some() || self.owner_board.state() == StageState::Ended;
+                if self.done && !self.greeted {
+                    self.greeted = true;
+                    self.count_lost();
+                }
                 break;
             };
             let header = *sample.user_header();
