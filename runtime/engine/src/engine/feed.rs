@@ -1,19 +1,15 @@
 //! Sending into a live run from outside of it.
 
-use super::live_stage::live_sender;
+use super::live_links::{LiveLinks, SharedSender};
 use super::plan::Plan;
 use super::run_folder::{RunningRun, open_board};
 use super::{Failure, RunError};
 use crate::link::board::StageBoard;
 use crate::link::live::{LiveSender, Pause};
-use crate::link::shared::LinkError;
-use crate::message::MessageHeader;
 use crate::pipeline::{Mode, Pipeline};
-use crate::stage::{OutputSink, StageError};
+use crate::stage::OutputSink;
 use iceoryx2::node::Node;
 use iceoryx2::service::ipc::Service;
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -24,27 +20,10 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(2);
 
 /// A program that sends on the outputs of a stage of a live run whose messages come from outside.
 pub struct Feed {
-    senders: Vec<Option<Rc<RefCell<LiveSender<Service>>>>>,
+    senders: Vec<Option<SharedSender<Service>>>,
     run: RunningRun,
     stop: Arc<AtomicBool>,
     _node: Node<Service>,
-}
-
-/// An output of a stage, as a program outside of the run sends on it.
-struct FedOutput(Rc<RefCell<LiveSender<Service>>>);
-
-impl OutputSink for FedOutput {
-    fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
-        self.0.borrow_mut().send(header, bytes)
-    }
-
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
-        self.0.borrow_mut().send_in_place(header, write)
-    }
 }
 
 impl Feed {
@@ -65,23 +44,14 @@ impl Feed {
         let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
         let (names, plan) = (run.names(), Plan::new(pipeline));
         let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
-        let sender = |port: usize| -> Result<_, LinkError> {
-            if plan.readers(stage, port).is_empty() {
-                return Ok(None);
-            }
-            let owner = Some(plan.waker(&node, &names, pipeline, stage)?);
-            let pause = Pause::Program(Arc::clone(&stop));
-            let sender = live_sender(pipeline, &plan, &names, &node, &boards, (stage, port), pause, owner)?;
-            Ok(Some(Rc::new(RefCell::new(sender))))
-        };
-        let senders = (0..spec.kind.outputs.len()).map(sender).collect::<Result<Vec<_>, LinkError>>();
+        let links = LiveLinks { pipeline, plan: &plan, names: &names, boards: &boards };
+        let senders = links.senders(&node, stage, &Pause::Program(Arc::clone(&stop)), false);
         Ok(Self { senders: senders.map_err(|error| of_stage(error.into()))?, run: run.clone(), stop, _node: node })
     }
 
     /// The output port with the given index; none if nothing reads it.
     pub fn output(&self, port: usize) -> Option<Box<dyn OutputSink>> {
-        let sender = self.senders.get(port)?.as_ref()?;
-        Some(Box::new(FedOutput(Rc::clone(sender))))
+        Some(self.senders.get(port)?.as_ref()?.sink())
     }
 
     /// Waits until every reader is connected, so that none misses the first messages. `false` if it takes too long.
@@ -97,7 +67,7 @@ impl Feed {
 
     fn wait(&self, longest: Duration, is_ready: impl Fn(&mut LiveSender<Service>) -> bool) -> bool {
         let start = Instant::now();
-        while !self.senders.iter().flatten().all(|sender| is_ready(&mut sender.borrow_mut())) {
+        while !self.senders.iter().flatten().all(|sender| is_ready(&mut sender.get())) {
             if start.elapsed() > longest || self.stop.load(Ordering::Relaxed) || !self.run.is_running() {
                 return false;
             }

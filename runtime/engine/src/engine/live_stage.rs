@@ -1,18 +1,14 @@
 //! One stage of a live pipeline with its links: takes messages as they arrive.
 
-use super::plan::Plan;
+use super::live_links::{LiveLinks, SharedSender};
 use super::runner::Runner;
 use super::stage_thread::{Event, tell};
 use super::{Failure, StageReport};
-use crate::link::board::{StageBoard, StageNumber, StageState, monotonic_nanoseconds};
-use crate::link::live::{LiveReader, LiveReceiver, LiveSender, Pause};
-use crate::link::shared::{Activity, LinkError, RunNames, Wake, Waker};
-use crate::message::{LogTime, MessageFlags, MessageHeader};
-use crate::pipeline::Pipeline;
-use crate::stage::{OutputSink, StageError};
-use iceoryx2::node::Node;
+use crate::link::board::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
+use crate::link::live::{LiveReceiver, Pause};
+use crate::link::shared::{Activity, LinkError, Wake};
+use crate::message::{LogTime, MessageFlags};
 use iceoryx2::service::Service;
-use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -28,7 +24,7 @@ const ACKNOWLEDGE_INTERVAL: Duration = Duration::from_millis(50);
 pub(super) struct LiveStage<'a, S: Service> {
     runner: Runner,
     receivers: Vec<LiveReceiver<S>>,
-    senders: Vec<Rc<RefCell<LiveSender<S>>>>,
+    senders: Vec<SharedSender<S>>,
     wake: Rc<Wake<S>>,
     board: StageBoard,
     /// Set when the run is to come to its end: sources send no more.
@@ -37,77 +33,32 @@ pub(super) struct LiveStage<'a, S: Service> {
     events: &'a Sender<Event>,
 }
 
-/// A sender that its stage and the end of the run share.
-struct SharedSender<S: Service>(Rc<RefCell<LiveSender<S>>>);
-
-impl<S: Service + 'static> OutputSink for SharedSender<S> {
-    fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
-        self.0.borrow_mut().send(header, bytes)
-    }
-
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
-        self.0.borrow_mut().send_in_place(header, write)
-    }
-}
-
 impl<'a, S: Service + 'static> LiveStage<'a, S> {
     /// Makes the ends of all links of the stage, and the stage.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn connect(
-        pipeline: &Pipeline,
-        plan: &Plan,
-        names: &RunNames,
+        links: &LiveLinks<'_>,
         stage: usize,
-        boards: &[StageBoard],
         activity: Activity,
         drain: Arc<AtomicBool>,
         events: &'a Sender<Event>,
     ) -> Result<Self, Failure> {
-        let spec = &pipeline.stages[stage];
+        let LiveLinks { pipeline, plan, names, boards } = *links;
         let board = boards[stage].clone();
         board.set(StageNumber::Started, monotonic_nanoseconds());
         board.set(StageNumber::Process, u64::from(std::process::id()));
         board.set_state(StageState::Starting);
         let node = names.node::<S>()?;
-        let wake = Wake::new(&node, names, &spec.name, plan.stage_readers[stage], plan.peers[stage], activity)?;
-        let receivers = spec.inputs.iter().enumerate().map(|(wire, input)| {
-            let (from, port) = (input.from_stage, input.from_port);
-            LiveReceiver::new(
-                &node,
-                names,
-                &plan.shape(pipeline, from, port),
-                wire,
-                spec.depth,
-                board.clone(),
-                (boards[from].clone(), port),
-                plan.waker(&node, names, pipeline, from)?,
-                plan.reader_number(from, port, (stage, wire)),
-                plan.stage_readers[from],
-            )
-        });
-        let receivers = receivers.collect::<Result<Vec<_>, LinkError>>()?;
-        let mut senders = Vec::new();
-        let mut sinks: Vec<Option<Box<dyn OutputSink>>> = Vec::new();
-        for port in 0..spec.kind.outputs.len() {
-            if plan.readers(stage, port).is_empty() {
-                sinks.push(None);
-                continue;
-            }
-            let pause = Pause::Stage(Rc::clone(&wake));
-            let sender = live_sender(pipeline, plan, names, &node, boards, (stage, port), pause, None)?;
-            let sender = Rc::new(RefCell::new(sender));
-            sinks.push(Some(Box::new(SharedSender(Rc::clone(&sender)))));
-            senders.push(sender);
-        }
-        let sent = Runner::outputs(pipeline, stage, |port| sinks.get_mut(port).and_then(Option::take));
+        let name = &pipeline.stages[stage].name;
+        let wake = Wake::new(&node, names, name, plan.stage_readers[stage], plan.peers[stage], activity)?;
+        let receivers = links.receivers(&node, stage)?;
+        let senders = links.senders(&node, stage, &Pause::Stage(Rc::clone(&wake)), true)?;
+        let sink = |port: usize| Some(senders.get(port)?.as_ref()?.sink());
+        let sent = Runner::outputs(pipeline, stage, sink);
         let working = wake.working();
         let runner = Runner::new(pipeline, stage, sent)?;
         drop(working);
         board.set_state(StageState::Running);
+        let senders = senders.into_iter().flatten().collect();
         Ok(Self { runner, receivers, senders, wake, board, drain, stage, events })
     }
 
@@ -132,14 +83,13 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
 
     /// Drops the stage, and then acknowledges the end of its inputs.
     fn close(self) -> Result<StageReport, Failure> {
-        let waited = self.senders.iter().map(|sender| sender.borrow().waited()).sum();
+        let waited = self.senders.iter().map(|sender| sender.get().waited()).sum();
         let is_external = self.runner.is_external();
         let mut report = self.runner.into_report(waited)?;
         if is_external {
             report.messages_out = self.board.all_sent();
         }
-        let dropped =
-            (0..self.board.wires()).map(|wire| self.board.get_wire(wire, crate::link::board::WireNumber::Dropped));
+        let dropped = (0..self.board.wires()).map(|wire| self.board.get_wire(wire, WireNumber::Dropped));
         report.dropped = dropped.sum();
         report.restarts = self.board.get(StageNumber::Restarts);
         if report.restarts > 0 {
@@ -172,7 +122,7 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
 
     /// Waits until every reader is connected, so that none misses the first messages.
     fn wait_for_readers(&self) -> Result<(), Failure> {
-        while !self.drain.load(Ordering::Relaxed) && !self.senders.iter().all(|sender| sender.borrow().is_connected()) {
+        while !self.drain.load(Ordering::Relaxed) && !self.senders.iter().all(|sender| sender.get().is_connected()) {
             self.wake.sleep_for(CONNECT_INTERVAL)?;
         }
         Ok(())
@@ -182,7 +132,7 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
     fn drive_external(&mut self) -> Result<(), Failure> {
         loop {
             self.wake.look_at_inputs()?;
-            self.senders.iter().try_for_each(|sender| sender.borrow_mut().look_at_all())?;
+            self.senders.iter().try_for_each(|sender| sender.get().look_at_all())?;
             self.repeat_for_new_readers()?;
             if self.drain.load(Ordering::Relaxed) {
                 return self.end(LogTime::MIN);
@@ -257,47 +207,19 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
 
     fn repeat_for_new_readers(&self) -> Result<(), LinkError> {
         match self.wake.take_greetings() {
-            true => self.senders.iter().try_for_each(|sender| sender.borrow_mut().repeat()),
+            true => self.senders.iter().try_for_each(|sender| sender.get().repeat()),
             false => Ok(()),
         }
     }
 
     /// Ends all links, and waits until every reader that is there has acknowledged it.
     fn end(&mut self, time: LogTime) -> Result<(), Failure> {
-        self.senders.iter().try_for_each(|sender| sender.borrow_mut().end(time))?;
-        let acknowledged = |sender: &Rc<RefCell<LiveSender<S>>>| {
-            sender.borrow().present_readers().all(|reader| self.wake.has_acknowledged(reader))
-        };
+        self.senders.iter().try_for_each(|sender| sender.get().end(time))?;
+        let acknowledged =
+            |sender: &SharedSender<S>| sender.get().present_readers().all(|reader| self.wake.has_acknowledged(reader));
         while !self.senders.iter().all(acknowledged) {
             self.wake.sleep_for(ACKNOWLEDGE_INTERVAL)?;
         }
         Ok(())
     }
-}
-
-/// A sender of the link that is an output port of a stage: its owner or, if it is told how to wake that, a program outside
-/// of the run.
-#[allow(clippy::too_many_arguments)]
-pub(super) fn live_sender<S: Service + 'static>(
-    pipeline: &Pipeline,
-    plan: &Plan,
-    names: &RunNames,
-    node: &Node<S>,
-    boards: &[StageBoard],
-    (stage, port): (usize, usize),
-    pause: Pause<S>,
-    owner: Option<Waker<S>>,
-) -> Result<LiveSender<S>, LinkError> {
-    let readers = plan.readers(stage, port).iter().map(|&(reader, wire)| {
-        Ok(LiveReader {
-            waker: plan.waker(node, names, pipeline, reader)?,
-            board: boards[reader].clone(),
-            wire,
-            depth: pipeline.stages[reader].depth,
-            number: plan.reader_number(stage, port, (reader, wire)),
-        })
-    });
-    let readers = readers.collect::<Result<Vec<_>, LinkError>>()?;
-    let shape = plan.shape(pipeline, stage, port);
-    LiveSender::new(node, names, &shape, readers, pause, boards[stage].clone(), port, owner)
 }

@@ -4,6 +4,7 @@
 
 mod error;
 mod feed;
+mod live_links;
 mod live_stage;
 mod plan;
 pub mod processes;

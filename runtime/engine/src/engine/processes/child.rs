@@ -1,6 +1,7 @@
 //! One process of a run: its stages in threads, and its words with the supervisor.
 
 use super::words::{Said, Told, say};
+use crate::engine::live_links::LiveLinks;
 use crate::engine::live_stage::LiveStage;
 use crate::engine::plan::Plan;
 use crate::engine::run_folder::RunFolder;
@@ -114,10 +115,11 @@ impl Process<'_> {
                             StageThread::<Service>::connect(pipeline, plan, names, stage, activity, board, &sender)
                                 .map(|thread| thread.run(stop_reason))
                         }
-                        Mode::Live => LiveStage::<Service>::connect(
-                            pipeline, plan, names, stage, boards, activity, drain, &sender,
-                        )
-                        .map(|thread| thread.run(stop_reason)),
+                        Mode::Live => {
+                            let links = LiveLinks { pipeline, plan, names, boards };
+                            LiveStage::<Service>::connect(&links, stage, activity, drain, &sender)
+                                .map(|thread| thread.run(stop_reason))
+                        }
                     };
                     if let Err(failure) = connected {
                         tell(&sender, Event::Ended { stage, result: Err(failure) });

@@ -23,7 +23,7 @@ mod receiver;
 mod sender;
 mod service;
 
-pub use receiver::LiveReceiver;
+pub use receiver::{LiveReceiver, ReaderEnd};
 pub use sender::{LiveReader, LiveSender, Pause};
-pub use service::{LinkShape, Observer};
+pub use service::{LinkShape, Observer, PortBoard};
 pub(crate) use service::{MAX_OBSERVERS, OBSERVER_BUFFER};

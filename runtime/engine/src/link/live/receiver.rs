@@ -1,7 +1,7 @@
 //! The reading end of a live link.
 
 use super::sender::origin;
-use super::service::{HELD_SAMPLES, LinkShape, REPEAT_ROOM};
+use super::service::{HELD_SAMPLES, LinkShape, PortBoard, REPEAT_ROOM};
 use crate::link::board::{MAX_SENDERS, NOTHING_HEARD, StageBoard, StageNumber, StageState, WireNumber};
 use crate::link::shared::{HeldSamples, LinkError, RunNames, SampleHeader, WakeEvents, Waker, unpack};
 use crate::message::{LogTime, Message, MessageFlags};
@@ -66,20 +66,29 @@ pub(crate) struct Arrived {
     pub(crate) message: Message,
 }
 
+/// The reader of a link: one wire of a stage.
+pub struct ReaderEnd {
+    /// Where the stage notes how far it is.
+    pub board: StageBoard,
+    /// Which of its wires this is.
+    pub wire: usize,
+    /// How far it may be behind.
+    pub depth: usize,
+    /// Its number among all readers of the stage that owns the link.
+    pub number: usize,
+    /// How many these are.
+    pub owner_readers: usize,
+}
+
 /// One wire of a stage over a live link.
 pub struct LiveReceiver<S: Service> {
     service: PortFactory<S, [u8], SampleHeader>,
     subscriber: Subscriber<S, [u8], SampleHeader>,
     name: String,
-    wire: usize,
-    board: StageBoard,
-    /// That of the owner, and the port of the link there.
-    owner_board: StageBoard,
-    port: usize,
-    /// How to wake the owner, this reader's number there, and the meaning of events.
-    owner: Waker<S>,
-    number: usize,
-    events: WakeEvents,
+    reader: ReaderEnd,
+    owner: PortBoard,
+    /// How to wake the owner.
+    waker: Waker<S>,
     greeted: bool,
     /// For each slot of the board the sender that it is given to, 0 for none.
     slots: [u64; MAX_SENDERS],
@@ -87,33 +96,26 @@ pub struct LiveReceiver<S: Service> {
     head: Option<Arrived>,
     /// How many samples were taken since the owner was last woken for room.
     taken: usize,
-    depth: usize,
     ended: Option<LogTime>,
     done: bool,
     held: HeldSamples,
 }
 
 impl<S: Service + 'static> LiveReceiver<S> {
-    /// The wire with number `wire` of the stage of `board`, which may be `depth` behind. `number` is that of this reader
-    /// among the owner's `owner_readers`.
-    #[allow(clippy::too_many_arguments)]
+    /// The reading end of a link that is the output port `owner`, whose stage is woken by `waker`.
     pub fn new(
         node: &Node<S>,
         names: &RunNames,
         shape: &LinkShape<'_>,
-        wire: usize,
-        depth: usize,
-        board: StageBoard,
-        (owner_board, port): (StageBoard, usize),
-        owner: Waker<S>,
-        number: usize,
-        owner_readers: usize,
+        reader: ReaderEnd,
+        owner: PortBoard,
+        waker: Waker<S>,
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
         let room = match shape.overflow {
-            Overflow::Wait => depth + REPEAT_ROOM,
-            Overflow::DropOldest => depth,
+            Overflow::Wait => reader.depth + REPEAT_ROOM,
+            Overflow::DropOldest => reader.depth,
         };
         let subscriber = service.subscriber_builder().buffer_size(room).create();
         let subscriber = subscriber.map_err(|e| LinkError::shared(format!("subscribe to {name}"))(&e))?;
@@ -121,19 +123,14 @@ impl<S: Service + 'static> LiveReceiver<S> {
             service,
             subscriber,
             name,
-            wire,
-            board,
-            owner_board,
-            port,
+            reader,
             owner,
-            number,
-            events: WakeEvents::new(owner_readers),
+            waker,
             greeted: false,
             slots: [0; MAX_SENDERS],
             heard: BTreeMap::new(),
             head: None,
             taken: 0,
-            depth,
             ended: None,
             done: false,
             held: HeldSamples::default(),
@@ -161,7 +158,7 @@ impl<S: Service + 'static> LiveReceiver<S> {
             // What a sender that has gone had sent may still wait: its numbers are kept.
             if *sender != 0 && !present.contains(sender) {
                 *sender = 0;
-                self.board.set_origin(self.wire, slot, 0, 0);
+                self.reader.board.set_origin(self.reader.wire, slot, 0, 0);
             }
         }
         for sender in present[..count].iter().filter(|sender| **sender != 0) {
@@ -169,24 +166,25 @@ impl<S: Service + 'static> LiveReceiver<S> {
             if let Some(slot) = free.filter(|_| !self.slots.contains(sender)) {
                 self.slots[slot] = *sender;
                 let next = self.heard.get(sender).map_or(NOTHING_HEARD, |heard| heard.next);
-                self.board.set_origin(self.wire, slot, *sender, next);
+                self.reader.board.set_origin(self.reader.wire, slot, *sender, next);
             }
         }
         if !self.greeted && count > 0 {
             self.greeted = true;
             self.count_lost();
             // An owner that is not there has nothing to repeat.
-            let _ = self.owner.wake(self.events.credit(self.number));
+            let _ = self.waker.wake(self.events().credit(self.reader.number));
         }
         Ok(())
     }
 
     /// Counts as dropped what was sent while a stage was away that was started again.
     fn count_lost(&self) {
-        let had = [WireNumber::Taken, WireNumber::Dropped].map(|number| self.board.get_wire(self.wire, number));
-        let lost = self.owner_board.sent(self.port).saturating_sub(had.iter().sum());
-        if self.board.get(StageNumber::Restarts) > 0 {
-            self.board.add_wire(self.wire, WireNumber::Dropped, lost);
+        let had =
+            [WireNumber::Taken, WireNumber::Dropped].map(|number| self.reader.board.get_wire(self.reader.wire, number));
+        let lost = self.owner.board.sent(self.owner.port).saturating_sub(had.iter().sum());
+        if self.reader.board.get(StageNumber::Restarts) > 0 {
+            self.reader.board.add_wire(self.reader.wire, WireNumber::Dropped, lost);
         }
     }
 
@@ -196,7 +194,7 @@ impl<S: Service + 'static> LiveReceiver<S> {
             let Some(sample) = self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? else {
                 // The owner's last word may come before what others have sent. A reader that was started again after it
                 // does not hear it.
-                self.done = self.ended.is_some() || self.owner_board.state() == StageState::Ended;
+                self.done = self.ended.is_some() || self.owner.board.state() == StageState::Ended;
                 if self.done && !self.greeted {
                     self.greeted = true;
                     self.count_lost();
@@ -208,44 +206,47 @@ impl<S: Service + 'static> LiveReceiver<S> {
             if flags.contains(MessageFlags::END) {
                 self.ended = Some(header.message.log_time);
             }
-            let is_for_all = self.board.get(StageNumber::Restarts) == 0;
+            let is_for_all = self.reader.board.get(StageNumber::Restarts) == 0;
             let heard = self.heard.entry(header.origin).or_insert_with(|| Heard::new(is_for_all));
             let (is_new, missing) = heard.note(header.message.sequence, flags.contains(MessageFlags::REPEATED));
             let slot = self.slots.iter().position(|slot| *slot == header.origin);
             if let Some(slot) = slot.filter(|_| heard.first != u64::MAX) {
-                self.board.set_next(self.wire, slot, heard.next);
+                self.reader.board.set_next(self.reader.wire, slot, heard.next);
             }
             self.taken += 1;
-            if 2 * self.taken >= self.depth && self.board.get_wire(self.wire, WireNumber::OwnerWaits) != 0 {
+            if 2 * self.taken >= self.reader.depth
+                && self.reader.board.get_wire(self.reader.wire, WireNumber::OwnerWaits) != 0
+            {
                 self.taken = 0;
-                self.board.set_wire(self.wire, WireNumber::OwnerWaits, 0);
-                let _ = self.owner.wake(WakeEvents::DATA);
+                self.reader.board.set_wire(self.reader.wire, WireNumber::OwnerWaits, 0);
+                let _ = self.waker.wake(WakeEvents::DATA);
             }
             if missing != 0 {
-                let dropped = self.board.get_wire(self.wire, WireNumber::Dropped).saturating_add_signed(missing);
-                self.board.set_wire(self.wire, WireNumber::Dropped, dropped);
+                let dropped =
+                    self.reader.board.get_wire(self.reader.wire, WireNumber::Dropped).saturating_add_signed(missing);
+                self.reader.board.set_wire(self.reader.wire, WireNumber::Dropped, dropped);
             }
             let is_data = flags.contains(MessageFlags::DATA);
             if !is_new || !(is_data || flags.contains(MessageFlags::CHANNEL)) {
                 continue;
             }
             if is_data {
-                self.board.add_wire(self.wire, WireNumber::Taken, 1);
+                self.reader.board.add_wire(self.reader.wire, WireNumber::Taken, 1);
             }
             let storage = self.held.hold(sample, HELD_SAMPLES - 2);
             let mut arrived = None;
             unpack(&header, storage, &self.name, |message| {
-                arrived = Some(Arrived { sent_at: header.sent_at, message: message.on_wire(self.wire) });
+                arrived = Some(Arrived { sent_at: header.sent_at, message: message.on_wire(self.reader.wire) });
             })?;
             self.head = arrived;
-            self.board.set_wire(self.wire, WireNumber::Waiting, 1);
+            self.reader.board.set_wire(self.reader.wire, WireNumber::Waiting, 1);
         }
         Ok(self.head.as_ref())
     }
 
     /// Takes the message whose turn it is.
     pub(crate) fn take(&mut self) -> Option<Arrived> {
-        self.board.set_wire(self.wire, WireNumber::Waiting, 0);
+        self.reader.board.set_wire(self.reader.wire, WireNumber::Waiting, 0);
         self.head.take()
     }
 
@@ -262,7 +263,12 @@ impl<S: Service + 'static> LiveReceiver<S> {
     /// Acknowledges the end of the stream.
     pub(crate) fn acknowledge(&self) {
         // An owner that has gone needs no word.
-        let _ = self.owner.wake(self.events.acknowledged(self.number));
+        let _ = self.waker.wake(self.events().acknowledged(self.reader.number));
+    }
+
+    /// The meaning of the owner's events.
+    fn events(&self) -> WakeEvents {
+        WakeEvents::new(self.reader.owner_readers)
     }
 
     fn failed(&self, doing: &str, cause: &dyn std::fmt::Debug) -> LinkError {

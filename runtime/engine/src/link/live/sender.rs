@@ -1,7 +1,7 @@
 //! The sending end of a live link.
 
 use super::kept::Kept;
-use super::service::LinkShape;
+use super::service::{LinkShape, PortBoard};
 use crate::link::board::{NOTHING_HEARD, StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::link::shared::{LinkError, PROTOCOL_VERSION, RunNames, SampleHeader, Wake, WakeEvents, Waker};
 use crate::message::{LogTime, MessageFlags, MessageHeader};
@@ -101,32 +101,31 @@ pub struct LiveSender<S: Service> {
     owner: Option<Waker<S>>,
     /// The last messages, if this is the owner.
     kept: Option<Kept<S>>,
-    /// Where the owner counts, and its port there.
-    board: StageBoard,
-    port: usize,
+    /// Where the owner counts.
+    port: PortBoard,
     origin: u64,
     sequence: u64,
     waited: Duration,
 }
 
 impl<S: Service + 'static> LiveSender<S> {
-    /// A sender of the link that belongs to the stage of `board`, whose output port has the number `port`: of that
-    /// stage, or of another program, which is told how to wake the stage.
-    #[allow(clippy::too_many_arguments)]
+    /// A sender of the link that is an output port: of its stage, or of another program, which is told how to wake the stage,
+    /// the `owner`.
     pub fn new(
         node: &Node<S>,
         names: &RunNames,
         shape: &LinkShape<'_>,
         readers: Vec<LiveReader<S>>,
         pause: Pause<S>,
-        board: StageBoard,
-        port: usize,
+        port: PortBoard,
         owner: Option<Waker<S>>,
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
-        let kept =
-            owner.is_none().then(|| Kept::new(&service, &name, board.get(StageNumber::Restarts) == 0)).transpose()?;
+        let kept = owner
+            .is_none()
+            .then(|| Kept::new(&service, &name, port.board.get(StageNumber::Restarts) == 0))
+            .transpose()?;
         let publisher = service
             .publisher_builder()
             .initial_max_slice_len(4096)
@@ -147,7 +146,6 @@ impl<S: Service + 'static> LiveSender<S> {
             pause,
             owner,
             kept,
-            board,
             port,
             sequence: 0,
             waited: Duration::ZERO,
@@ -216,7 +214,7 @@ impl<S: Service + 'static> LiveSender<S> {
     pub fn look_at_all(&mut self) -> Result<(), LinkError> {
         if let Some(kept) = &mut self.kept {
             let count = kept.update(&self.name)?;
-            self.board.add_sent(self.port, count);
+            self.port.board.add_sent(self.port.port, count);
         }
         Ok(())
     }

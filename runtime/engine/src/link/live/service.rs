@@ -1,6 +1,6 @@
 //! The service of a link, as those who look on, and live links, open it.
 
-use crate::link::board::MAX_SENDERS;
+use crate::link::board::{MAX_SENDERS, StageBoard};
 use crate::link::shared::{LinkError, RunNames, SampleHeader};
 use crate::message::{Message, MessageFlags};
 use crate::pipeline::Overflow;
@@ -36,6 +36,14 @@ pub struct LinkShape<'a> {
     pub depth: usize,
     /// What becomes of a message for which there is no room.
     pub overflow: Overflow,
+}
+
+/// An output port on the board.
+pub struct PortBoard {
+    /// That of the stage.
+    pub board: StageBoard,
+    /// The port.
+    pub port: usize,
 }
 
 impl LinkShape<'_> {
