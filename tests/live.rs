@@ -548,10 +548,11 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
     done.ended.assert(1, &["stage `middle` failed: cannot start: it was told so"]);
 }
 
-/// Numbers of a slow stage: messages sent to it, given to it, and dropped.
+/// Numbers of a stage that is slow, at its start as well: messages sent to it, given to it, and dropped.
 fn slow_stage(overflow: &str, count: u64) -> [u64; 3] {
     let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000", "pause = 100");
-    let run = Run::start(&text, &["--set", &format!("source.count={count}"), "--set", "middle.pause=3000"]);
+    let settings = [&format!("source.count={count}"), "middle.pause=3000", "middle.start_pause=500000"];
+    let run = Run::start(&text, &settings.map(|setting| ["--set", setting]).concat());
     let done = run.wait();
     done.assert_done();
     let [sent] = done.numbers("source", ["messages_out"]);
