@@ -643,6 +643,42 @@ fn a_recording_holds_what_the_log_of_the_run_holds() {
 }
 
 #[test]
+fn a_recorder_does_not_overwrite_the_log_that_the_run_writes() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
+    run.command(&["record", "-o", OUTPUT]).wait().assert(1, &["out.mcap is being written by another program"]);
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(outcome(&done.path(OUTPUT)).1, 7857);
+}
+
+#[test]
+fn eight_players_and_four_taps_of_each_link_can_be_there_at_once() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let links = ["robots.map", "robots.pose", "robots.tags"];
+    let taps: Vec<Running> = links.iter().flat_map(|link| [*link; 4]).map(|link| run.command(&["tap", link])).collect();
+    let players: Vec<Running> =
+        (0..8).map(|_| run.command(&["play", LOG, "--rate", "20", "--start", "60", "--end", "100"])).collect();
+    let counts: Vec<String> = players
+        .into_iter()
+        .map(|player| player.wait())
+        .map(|ended| {
+            ended.assert(0, &["played"]);
+            ended.stdout
+        })
+        .collect();
+    assert!(counts.iter().all(|count| *count == counts[0]), "{counts:?}");
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+    let played = format!("played {} messages", outcome(&done.path(OUTPUT)).1 / 8);
+    assert!(counts[0].starts_with(&played), "{played}: {counts:?}");
+    taps.into_iter().for_each(|tap| tap.wait().assert(0, &[]));
+}
+
+#[test]
 fn of_a_killed_recorder_all_but_the_last_moment_can_be_read() {
     let run = Run::start(RECEIVE, &[]);
     run.simulate();
