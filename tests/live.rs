@@ -548,10 +548,11 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
     done.ended.assert(1, &["stage `middle` failed: cannot start: it was told so"]);
 }
 
-/// Numbers of a slow stage: messages sent to it, given to it, and dropped.
+/// Numbers of a stage that is slow, at its start as well: messages sent to it, given to it, and dropped.
 fn slow_stage(overflow: &str, count: u64) -> [u64; 3] {
     let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000", "pause = 100");
-    let run = Run::start(&text, &["--set", &format!("source.count={count}"), "--set", "middle.pause=3000"]);
+    let settings = [&format!("source.count={count}"), "middle.pause=3000", "middle.start_pause=500000"];
+    let run = Run::start(&text, &settings.map(|setting| ["--set", setting]).concat());
     let done = run.wait();
     done.assert_done();
     let [sent] = done.numbers("source", ["messages_out"]);
@@ -639,6 +640,42 @@ fn a_recording_holds_what_the_log_of_the_run_holds() {
         let sizes = (messages.len(), output[topic].len());
         assert!(*messages == output[topic], "{topic}: {sizes:?}");
     }
+}
+
+#[test]
+fn a_recorder_does_not_overwrite_the_log_that_the_run_writes() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
+    run.command(&["record", "-o", OUTPUT]).wait().assert(1, &["out.mcap is being written by another program"]);
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(outcome(&done.path(OUTPUT)).1, 7857);
+}
+
+#[test]
+fn eight_players_and_four_taps_of_each_link_can_be_there_at_once() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let links = ["robots.map", "robots.pose", "robots.tags"];
+    let taps: Vec<Running> = links.iter().flat_map(|link| [*link; 4]).map(|link| run.command(&["tap", link])).collect();
+    let players: Vec<Running> =
+        (0..8).map(|_| run.command(&["play", LOG, "--rate", "20", "--start", "60", "--end", "100"])).collect();
+    let counts: Vec<String> = players
+        .into_iter()
+        .map(|player| player.wait())
+        .map(|ended| {
+            ended.assert(0, &["played"]);
+            ended.stdout
+        })
+        .collect();
+    assert!(counts.iter().all(|count| *count == counts[0]), "{counts:?}");
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+    let played = format!("played {} messages", outcome(&done.path(OUTPUT)).1 / 8);
+    assert!(counts[0].starts_with(&played), "{played}: {counts:?}");
+    taps.into_iter().for_each(|tap| tap.wait().assert(0, &[]));
 }
 
 #[test]

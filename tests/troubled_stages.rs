@@ -26,6 +26,8 @@ struct Trouble {
     at: u64,
     /// fail, panic, hang, abort, eat, print, nothing_passes.
     what: String,
+    /// How long it takes to start, microseconds.
+    start_pause: u64,
     /// Fail before the first message.
     at_start: bool,
     /// Bytes of each message beside the pose.
@@ -70,6 +72,7 @@ impl Trouble {
     }
 
     fn start(self) -> Result<Self, StageError> {
+        std::thread::sleep(Duration::from_micros(self.start_pause));
         match self.at_start {
             true => Err(StageError::new("start", "it was told so")),
             false => Ok(self),

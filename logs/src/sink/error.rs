@@ -16,6 +16,9 @@ pub enum LogWriteError {
     /// The user has no right to write there.
     #[error("{0} may not be written; change its permissions, or name a file elsewhere")]
     Denied(PathBuf),
+    /// Another program writes to it.
+    #[error("{0} is being written by another program; name another file")]
+    InUse(PathBuf),
     /// There is no room.
     #[error("there is no room left for {0}; make room on its disk, or name a file elsewhere")]
     NoRoom(PathBuf),

@@ -6,7 +6,7 @@ use gridweave_runtime::message::Channel;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{WriteOptions, Writer};
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind};
 use std::path::{Path, PathBuf};
 
@@ -60,8 +60,13 @@ impl LogWriter {
         match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => Err(LogWriteError::IsFolder(path.to_owned())),
             Ok(metadata) if metadata.is_file() => {
-                let opened = OpenOptions::new().write(true).open(path);
-                opened.map(drop).map_err(|error| LogWriteError::from_io(path, error))
+                let file = OpenOptions::new().write(true).open(path);
+                let file = file.map_err(|error| LogWriteError::from_io(path, error))?;
+                match file.try_lock_shared() {
+                    Err(TryLockError::WouldBlock) => Err(LogWriteError::InUse(path.to_owned())),
+                    // Not every file system knows locks.
+                    _ => Ok(()),
+                }
             }
             Err(error) if error.kind() != ErrorKind::NotFound => Err(LogWriteError::from_io(path, error)),
             _ => Ok(()),
@@ -139,12 +144,18 @@ impl LogWriter {
 }
 
 /// An empty file. A file that has the name is taken away, not emptied: a program that has it mapped, be it a viewer or
-/// the source of this very run, keeps what it reads.
+/// the source of this very run, keeps what it reads. It is locked, so that no other program takes it away while it is
+/// written.
 fn create_anew(path: &Path) -> io::Result<File> {
     if fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file()) {
         fs::remove_file(path)?;
     }
-    File::create(path)
+    let file = File::create(path)?;
+    if file.metadata()?.is_file() {
+        // Not every file system knows locks.
+        let _ = file.lock();
+    }
+    Ok(file)
 }
 
 fn write_options(options: LogOptions) -> WriteOptions {

@@ -153,7 +153,8 @@ impl Player<'_> {
                     break;
                 }
             }
-            for (warning, count) in &warnings {
+            // Another turn has the same to warn of.
+            for (warning, count) in warnings.iter().filter(|_| !pace.borrow().is_repeated()) {
                 tracing::warn!("{count} times: {warning}");
             }
             if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_next_turn() {
@@ -206,6 +207,11 @@ impl Pace {
             true => Err(StageError::new("play on", "the player was stopped, or the run has ended")),
             false => Ok(()),
         }
+    }
+
+    /// Whether the logs have been played before.
+    fn is_repeated(&self) -> bool {
+        self.later > 0
     }
 
     /// The logs are to be played again, later. `false` if there was nothing to play.

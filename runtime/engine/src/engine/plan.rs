@@ -2,7 +2,7 @@
 
 use super::runner::readers;
 use crate::link::board::MAX_SENDERS;
-use crate::link::live::LinkShape;
+use crate::link::live::{LinkShape, MAX_OBSERVERS};
 use crate::link::shared::{LinkError, RunNames, Waker};
 use crate::pipeline::{Mode, Pipeline};
 use iceoryx2::node::Node;
@@ -14,8 +14,8 @@ pub(super) struct Plan {
     readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
     /// For each stage, the number of its readers over all ports.
     pub(super) stage_readers: Vec<usize>,
-    /// For each stage, how many may wake it: its readers, those it reads, the run, and programs that send from outside
-    /// of a live one.
+    /// For each stage, how many may wake it: its readers, those it reads, the run, and programs that send into a live one
+    /// from outside or look on at it, each over every link.
     pub(super) peers: Vec<usize>,
 }
 
@@ -26,9 +26,14 @@ impl Plan {
         for (&(stage, _), list) in &readers {
             stage_readers[stage] += list.len();
         }
-        let outside = if pipeline.mode == Mode::Live { MAX_SENDERS } else { 0 };
+        let outside = |inputs: usize, outputs: usize| match pipeline.mode {
+            Mode::Replay => 0,
+            Mode::Live => inputs * MAX_SENDERS + outputs * (MAX_SENDERS + MAX_OBSERVERS),
+        };
         let peers = pipeline.stages.iter().zip(&stage_readers);
-        let peers = peers.map(|(spec, readers)| spec.inputs.len() + readers + 1 + outside);
+        let peers = peers.map(|(spec, readers)| {
+            spec.inputs.len() + readers + 1 + outside(spec.inputs.len(), spec.kind.outputs.len())
+        });
         Self { peers: peers.collect(), readers, stage_readers }
     }
 
