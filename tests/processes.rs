@@ -7,38 +7,8 @@ mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{Ended, Running, example, left_over, outcome, processes, signal, start_program, wait_until};
+use support::{DIAMOND, Ended, Running, example, left_over, outcome, processes, signal, start_program, wait_until};
 use tempfile::TempDir;
-
-/// A source, a diamond of two stages, one that joins them with the source itself, and a log. It takes some seconds.
-const DIAMOND: &str = r#"
-[pipeline]
-name = "diamond"
-depth = 4
-stall_timeout = 2.0
-memory_limit = 300_000_000
-
-[stages.source]
-kind = "troubled_source"
-count = 40_000
-pause = 100
-
-[stages.middle]
-kind = "troubled_stage"
-inputs = ["source"]
-
-[stages.other]
-kind = "troubled_stage"
-inputs = ["source"]
-
-[stages.join]
-kind = "troubled_stage"
-inputs = { in = ["middle", "other", "source"] }
-
-[stages.output]
-kind = "mcap_sink"
-inputs = ["join"]
-"#;
 
 const OUTPUT: &str = "out.mcap";
 

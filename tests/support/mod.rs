@@ -1,13 +1,15 @@
 //! Running the command, and logs to run it on.
 #![allow(dead_code, unused_imports, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
+mod live_run;
 mod log_builder;
 mod readings;
 mod run_files;
 
+pub use live_run::{Done, LOG, OUTPUT, POSES, RECEIVE, Run, SUMMARY, TROUBLED, Topics, counts, read};
 pub use log_builder::{LogBuilder, TestMap};
 pub use readings::{change_readings, moved_reading, place_in_map_2};
-pub use run_files::{left_over, outcome, processes, run_folder, run_name, signal, wait_until};
+pub use run_files::{DIAMOND, left_over, outcome, processes, run_folder, run_name, signal, wait_until};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

@@ -6,6 +6,36 @@ use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
+/// A source, a diamond of two stages, one that joins them with the source itself, and a log. It takes some seconds.
+pub const DIAMOND: &str = r#"
+[pipeline]
+name = "diamond"
+depth = 4
+stall_timeout = 2.0
+memory_limit = 300_000_000
+
+[stages.source]
+kind = "troubled_source"
+count = 40_000
+pause = 100
+
+[stages.middle]
+kind = "troubled_stage"
+inputs = ["source"]
+
+[stages.other]
+kind = "troubled_stage"
+inputs = ["source"]
+
+[stages.join]
+kind = "troubled_stage"
+inputs = { in = ["middle", "other", "source"] }
+
+[stages.output]
+kind = "mcap_sink"
+inputs = ["join"]
+"#;
+
 /// The name of the run of the supervisor with this process number.
 pub fn run_name(run: u32) -> String {
     format!("gw{run}_0_")

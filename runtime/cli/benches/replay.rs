@@ -23,7 +23,9 @@ fn main() {
     };
     println!(
         "| log | messages | copy, s | {} |",
-        ENGINES.map(|engine| format!("{engine}, s (x copy), MB")).join(" | ")
+        ENGINES
+            .map(|engine| format!("{engine}, s (x copy){}", if is_one_process(engine) { ", MB" } else { "" }))
+            .join(" | ")
     );
     println!("| --- | --- | --- |{}", " --- |".repeat(ENGINES.len()));
     for log in logs {
@@ -37,12 +39,18 @@ fn main() {
                 let runs: Vec<(f64, u64)> = (0..RUNS).map(|_| merge(&log, &output, engine)).collect();
                 let memory = runs.iter().map(|(_, memory)| *memory).max().unwrap_or_default();
                 let seconds = median(runs.into_iter().map(|(seconds, _)| seconds).collect());
-                format!("{seconds:.2} ({:.1}), {}", seconds / copy, memory / 1024)
+                let memory = if is_one_process(engine) { format!(", {}", memory / 1024) } else { String::new() };
+                format!("{seconds:.2} ({:.1}){memory}", seconds / copy)
             })
             .collect();
         let name = log.file_stem().unwrap().to_string_lossy();
         println!("| {name} | {messages} | {copy:.3} | {} |", cells.join(" | "));
     }
+}
+
+/// Whether the memory of the program that is started is all that there is.
+fn is_one_process(engine: &str) -> bool {
+    engine != "processes"
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -30,7 +30,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Outcome> {
     if !(args.rate.is_finite() && args.rate >= 0.0) {
         return Err(BadUse("--rate must be 0 or more".to_owned()).into());
     }
-    let player = Player { args, registry, context: Context::default() };
+    let player = Player { args, registry, context: Context { stage: "play".to_owned(), ..Default::default() } };
     // Logs that cannot be read are known before there is a run to play into.
     player.source()?;
     let running = find_run(&args.run, registry)?;
@@ -214,9 +214,10 @@ impl Pace {
         self.later > 0
     }
 
-    /// The logs are to be played again, later. `false` if there was nothing to play.
+    /// The logs are to be played again, later. `false` if there was nothing to play, or no more than
+    /// one moment.
     fn begin_next_turn(&mut self) -> bool {
-        let Some((first, last)) = self.span else { return false };
+        let Some((first, last)) = self.span.filter(|(first, last)| last > first) else { return false };
         self.later += last.0 - first.0 + TURN_GAP;
         true
     }

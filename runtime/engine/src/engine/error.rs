@@ -61,6 +61,9 @@ pub enum Failure {
     /// Its process could not be started or watched.
     #[error("cannot run in processes: {0}")]
     Process(String),
+    /// What a program outside of the run wants of it cannot be.
+    #[error("{0}")]
+    Outside(String),
     /// Its process has ended before the stage was done.
     #[error("lost its process, which {0}")]
     Ended(String),

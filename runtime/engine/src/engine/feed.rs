@@ -35,9 +35,8 @@ impl Feed {
     pub fn join(run: &RunningRun, pipeline: &Pipeline, stage: usize, stop: Arc<AtomicBool>) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         if pipeline.mode != Mode::Live || !spec.kind.is_external() {
-            let text =
-                format!("nobody can send on its outputs, as it is a `{}` that makes them itself", spec.kind.name);
-            return Err(RunError::of_stage(&spec.name, Failure::Process(text)));
+            let text = format!("takes no messages from outside, as it is a `{}`", spec.kind.name);
+            return Err(RunError::of_stage(&spec.name, Failure::Outside(text)));
         }
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
         let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;

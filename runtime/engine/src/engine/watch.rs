@@ -42,8 +42,8 @@ impl WatchedLink {
         let plan = Plan::new(pipeline);
         let name = spec.kind.outputs[port].name;
         if plan.readers(stage, port).is_empty() {
-            let text = format!("nothing reads its output `{name}`, which therefore is no link");
-            return Err(of_stage(Failure::Process(text)));
+            let text = format!("has an output `{name}` that nothing reads, and so it is no link");
+            return Err(of_stage(Failure::Outside(text)));
         }
         let names = run.names();
         let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
@@ -53,8 +53,8 @@ impl WatchedLink {
                 Some(observer) => break observer,
                 None if start.elapsed() < LINK_TIMEOUT && run.is_running() => thread::sleep(LOOK_INTERVAL),
                 None => {
-                    let text = format!("its output `{name}` cannot be looked on at: it is not there");
-                    return Err(of_stage(Failure::Process(text)));
+                    let text = format!("has not made its output `{name}` within {} s", LINK_TIMEOUT.as_secs());
+                    return Err(of_stage(Failure::Outside(text)));
                 }
             }
         };

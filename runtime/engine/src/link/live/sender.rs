@@ -2,13 +2,15 @@
 
 use super::kept::Kept;
 use super::service::{LinkShape, PortBoard};
-use crate::link::board::{NOTHING_HEARD, StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
+use crate::link::board::{
+    MAX_SENDERS, NOTHING_HEARD, StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds,
+};
 use crate::link::shared::{LinkError, PROTOCOL_VERSION, RunNames, SampleHeader, Wake, WakeEvents, Waker};
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use crate::pipeline::Overflow;
 use crate::stage::{OutputSink, StageError};
 use iceoryx2::node::Node;
-use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::Service;
 use std::rc::Rc;
@@ -133,7 +135,12 @@ impl<S: Service + 'static> LiveSender<S> {
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(|e| LinkError::shared(format!("publish {name}"))(&e))?;
+            .map_err(|e| match e {
+                PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                    LinkError::Crowded { doing: "send on".into(), link: name.clone(), most: MAX_SENDERS - 1 }
+                }
+                other => LinkError::shared(format!("publish {name}"))(&other),
+            })?;
         readers.iter().map(|reader| &reader.waker).for_each(|waker| drop(waker.wake(WakeEvents::DATA)));
         let seen = vec![Seen::default(); readers.len()];
         Ok(Self {

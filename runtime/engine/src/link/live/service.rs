@@ -5,7 +5,7 @@ use crate::link::shared::{LinkError, RunNames, SampleHeader};
 use crate::message::{Message, MessageFlags};
 use crate::pipeline::Overflow;
 use iceoryx2::node::Node;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::Alignment;
 use iceoryx2::service::Service;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as E;
@@ -102,7 +102,12 @@ impl<S: Service + 'static> Observer<S> {
             other => other.map_err(|e| failed(&e))?,
         };
         let buffer = OBSERVER_BUFFER.min(service_buffer(&service));
-        let subscriber = service.subscriber_builder().buffer_size(buffer).create().map_err(|e| failed(&e))?;
+        let subscriber = service.subscriber_builder().buffer_size(buffer).create().map_err(|e| match e {
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                LinkError::Crowded { doing: "look on at".into(), link: name.clone(), most: MAX_OBSERVERS }
+            }
+            other => failed(&other),
+        })?;
         Ok(Some(Self { subscriber, name }))
     }
 

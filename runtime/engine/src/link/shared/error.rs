@@ -33,6 +33,16 @@ pub enum LinkError {
         /// Readers there are.
         readers: usize,
     },
+    /// As many programs as can send on a link, or look on at it, do so already.
+    #[error("cannot {doing} {link}: {most} programs do so already, and no more can; end one of them")]
+    Crowded {
+        /// What was being done.
+        doing: String,
+        /// The link.
+        link: String,
+        /// How many can.
+        most: usize,
+    },
     /// The run is being stopped because something else has failed.
     #[error("the run is being stopped")]
     Stopped,
