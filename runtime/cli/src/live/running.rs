@@ -42,7 +42,7 @@ pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Runnin
             (0, _) if start.elapsed().as_secs_f64() < choice.wait => thread::sleep(LOOK_INTERVAL),
             (0, _) => match (&choice.run, going_on.is_empty()) {
                 (Some(name), false) => bail!("no run called {name} is going on; there are {going_on}"),
-                _ => bail!("no run of processes is going on: start one with `gridweave run pipelines/live.toml`"),
+                _ => bail!("no run of processes is going on: start one with `gridweave run live`"),
             },
             _ => return Err(BadUse(format!("several runs are going on: {going_on}; choose one with --run")).into()),
         }
