@@ -81,11 +81,11 @@ impl WatchedLink {
                 Some(next) if sequence < *next => return,
                 Some(next) => {
                     *missed += if is_repeated { 0 } else { sequence - *next };
-                    *next = sequence + 1;
+                    *next = sequence.saturating_add(1);
                 }
                 // What is repeated comes in the order of the numbers, and does not tell where the stream stands.
                 None if is_repeated => {}
-                None => drop(next.insert(sample.origin, sequence + 1)),
+                None => drop(next.insert(sample.origin, sequence.saturating_add(1))),
             }
             take(sample, message);
         });

@@ -61,7 +61,7 @@ impl<S: Service + 'static> Kept<S> {
             }
             // Others may send faster than this is called: what was missed is counted as well.
             let first = if self.is_first { 0 } else { message.sequence };
-            let next = self.next.insert(header.origin, message.sequence + 1).unwrap_or(first);
+            let next = self.next.insert(header.origin, message.sequence.saturating_add(1)).unwrap_or(first);
             count += message.sequence.saturating_sub(next) + u64::from(!is_channel);
             let topic = (!is_channel, message.channel, message.topic);
             if self.messages.len() < MAX_TOPICS || self.messages.contains_key(&topic) {

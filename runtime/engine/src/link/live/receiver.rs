@@ -53,7 +53,7 @@ impl Heard {
         };
         let missing = i64::try_from(missing).unwrap_or(i64::MAX);
         self.first = self.first.min(sequence);
-        self.next = sequence + 1;
+        self.next = sequence.saturating_add(1);
         (true, missing)
     }
 }

@@ -12,6 +12,7 @@ use crate::stage::{OutputSink, StageError};
 use iceoryx2::node::Node;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::Service;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -159,21 +160,25 @@ impl<S: Service + 'static> LiveSender<S> {
         })
     }
 
-    /// Sends one message whose bytes `write` fills in place; before, they are zero.
-    fn send_with<E: From<LinkError>>(
+    /// Sends one message whose bytes lie in `sample`. There must be room.
+    fn send_sample(
         &mut self,
         mut message: MessageHeader,
-        write: impl FnOnce(&mut [u8]) -> Result<(), E>,
-    ) -> Result<(), E> {
-        self.wait_for_room()?;
+        mut sample: SampleMut<S, [u8], SampleHeader>,
+    ) -> Result<(), LinkError> {
         message.sequence = self.sequence;
-        let mut sample = self.publisher.loan_slice(message.length as usize).map_err(|e| self.failed(&e))?;
-        write(sample.payload_mut())?;
         *sample.user_header_mut() = self.header(message, self.origin);
         sample.send().map_err(|e| self.failed(&e))?;
         self.sequence += 1;
         self.wake_readers();
-        Ok(self.look_at_all()?)
+        self.look_at_all()
+    }
+
+    /// Sends one message, copying its bytes once.
+    fn send_bytes(&mut self, message: MessageHeader, bytes: &[u8]) -> Result<(), LinkError> {
+        self.wait_for_room()?;
+        let sample = self.publisher.loan_slice_uninit(bytes.len()).map_err(|e| self.failed(&e))?;
+        self.send_sample(message, sample.write_from_slice(bytes))
     }
 
     /// Waits until every reader that is there is connected and has room, if the link waits.
@@ -184,7 +189,7 @@ impl<S: Service + 'static> LiveSender<S> {
         for (reader, seen) in self.readers.iter().zip(&mut self.seen) {
             while self.sequence >= seen.room_until && reader.is_there() {
                 let expected = seen.expected(reader, self.origin, self.sequence);
-                seen.room_until = expected.map_or(0, |expected| expected + reader.depth as u64);
+                seen.room_until = expected.map_or(0, |expected| expected.saturating_add(reader.depth as u64));
                 if self.sequence >= seen.room_until {
                     reader.board.set_wire(reader.wire, WireNumber::OwnerWaits, u64::from(self.owner.is_none()));
                     let start = Instant::now();
@@ -206,7 +211,8 @@ impl<S: Service + 'static> LiveSender<S> {
         self.look_at_all()?;
         let Some(kept) = &self.kept else { return Ok(()) };
         for (header, bytes) in kept.messages() {
-            let bytes = &bytes.bytes()[..header.message.length as usize];
+            // A program of another may say a length that its sample does not have.
+            let Some(bytes) = bytes.bytes().get(..header.message.length as usize) else { continue };
             let sample = self.publisher.loan_slice_uninit(bytes.len()).map_err(|e| self.failed(&e))?;
             let mut sample = sample.write_from_slice(bytes);
             let flags = MessageFlags(header.message.flags.0 | MessageFlags::REPEATED.0);
@@ -228,7 +234,7 @@ impl<S: Service + 'static> LiveSender<S> {
 
     /// Says that the stream has ended, having come to the given log time.
     pub fn end(&mut self, log_time: LogTime) -> Result<(), LinkError> {
-        self.send_with(MessageHeader { flags: MessageFlags::END, log_time, ..Default::default() }, |_| Ok(()))
+        self.send_bytes(MessageHeader { flags: MessageFlags::END, log_time, ..Default::default() }, &[])
     }
 
     /// The numbers, among all readers of the stage, of those that are there.
@@ -267,10 +273,7 @@ impl<S: Service + 'static> LiveSender<S> {
 
 impl<S: Service + 'static> OutputSink for LiveSender<S> {
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
-        self.send_with(header, |place| {
-            place.copy_from_slice(bytes);
-            Ok(())
-        })
+        Ok(self.send_bytes(header, bytes)?)
     }
 
     fn send_in_place(
@@ -278,7 +281,10 @@ impl<S: Service + 'static> OutputSink for LiveSender<S> {
         header: MessageHeader,
         write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
     ) -> Result<(), StageError> {
-        self.send_with(header, write)
+        self.wait_for_room()?;
+        let mut sample = self.publisher.loan_slice(header.length as usize).map_err(|e| self.failed(&e))?;
+        write(sample.payload_mut())?;
+        Ok(self.send_sample(header, sample)?)
     }
 }
 
