@@ -1,6 +1,8 @@
 //! Live runs in folders of their own, and what they have found.
 
-use super::{Ended, Running, example, left_over, outcome, processes, run_name, signal, simulate, start_program};
+use super::{
+    Ended, Running, example, left_over, outcome, processes, run_name, signal, simulate, start_program, wait_until,
+};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -133,7 +135,9 @@ impl Run {
     pub fn wait(self) -> Done {
         let id = self.id();
         let ended = self.run.wait();
-        assert_eq!((processes(id), left_over(id)), (vec![], vec![]), "{ended:#?}");
+        assert_eq!(processes(id), [], "{ended:#?}");
+        // Programs outside of the run that are still there end a moment later.
+        wait_until("end of all that is left", || left_over(id).is_empty());
         Done { ended, folder: self.folder }
     }
 }

@@ -24,6 +24,13 @@ impl Running {
     }
 }
 
+impl Drop for Running {
+    /// A program that is still there when the run ends must not leave anything after it.
+    fn drop(&mut self) {
+        self.run.remove_traces();
+    }
+}
+
 /// The run that is meant, of those of this user that are going on.
 pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Running> {
     if !(choice.wait.is_finite() && choice.wait >= 0.0) {

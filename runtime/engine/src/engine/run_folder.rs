@@ -147,6 +147,15 @@ impl RunningRun {
         self.folder.join(PIPELINE)
     }
 
+    /// Removes what a program outside of the run may have left in shared memory that was still there when the run ended.
+    /// Does nothing while the run goes on.
+    pub fn remove_traces(&self) {
+        if !self.is_running() {
+            // What cannot be removed harms nobody but takes memory, until the machine is started again.
+            let _ = remove(&self.folder, &self.prefix);
+        }
+    }
+
     /// Whether it still goes on.
     pub fn is_running(&self) -> bool {
         is_locked(&self.folder).unwrap_or(false)
