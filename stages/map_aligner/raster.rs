@@ -1,0 +1,180 @@
+//! A map in wider cells, cropped to what is known.
+
+use crate::geometry::{Cell, Grid, Point2, is_free, is_known, is_occupied};
+use nalgebra::{UnitComplex, Vector2};
+
+/// What a cell of a raster holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Content {
+    /// Nothing is known of it.
+    #[default]
+    Unknown,
+    /// It is known, and free.
+    Free,
+    /// It lies beside a wall, and may be one by a shift of one cell.
+    BesideWall,
+    /// There is a wall in it.
+    Wall,
+}
+
+impl Content {
+    /// Whether it is wall once walls are dilated by one cell.
+    pub fn is_near_wall(self) -> bool {
+        matches!(self, Self::Wall | Self::BesideWall)
+    }
+}
+
+/// A map in square cells whose sides run along the axes of its frame, cropped to what is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Raster {
+    /// Where the outer corner of cell (0, 0) lies, metres.
+    pub corner: Vector2<f64>,
+    /// The side of a cell, metres.
+    pub cell: f64,
+    /// Cells along x.
+    pub width: usize,
+    /// Cells along y.
+    pub height: usize,
+    /// Row by row.
+    pub cells: Vec<Content>,
+    /// The centre of every occupied cell of the map itself, in the frame of the raster, metres.
+    walls: Vec<Point2>,
+}
+
+impl Raster {
+    /// The raster of a grid, in the frame of the map. `None` if it would be longer than `max_extent` metres.
+    ///
+    /// A cell is wall if any cell of the grid in it is occupied, and free if any other is free. `cell` must be so wide
+    /// that every cell in the midst of the grid gets one.
+    pub fn new(grid: &Grid<'_>, cell: f64, max_extent: f64) -> Option<Self> {
+        let (mut bounds, mut walls) = (Bounds::default(), Vec::new());
+        for_each_known(grid, |point, value| {
+            bounds.add(&point);
+            if is_occupied(value) {
+                walls.push(point);
+            }
+        });
+        let mut raster = Self::unknown(&bounds, cell, max_extent)?;
+        for_each_known(grid, |point, value| {
+            if let (true, Some(index)) = (is_free(value), raster.index(&point)) {
+                raster.cells[index] = Content::Free;
+            }
+        });
+        raster.draw_walls(walls);
+        Some(raster)
+    }
+
+    /// The same map turned about the origin of its frame.
+    pub fn turned(&self, angle: f64) -> Self {
+        let turn = UnitComplex::new(angle);
+        let mut bounds = Bounds::default();
+        self.rim().for_each(|point| bounds.add(&(turn * point)));
+        let mut turned = Self::unknown(&bounds, self.cell, f64::INFINITY).unwrap_or_default();
+        let along_x = turn.inverse() * Vector2::new(self.cell, 0.0);
+        for row in 0..turned.height {
+            let mut point = turn.inverse() * turned.centre(0, row);
+            for cell in &mut turned.cells[row * turned.width..(row + 1) * turned.width] {
+                if self.at(&point) == Content::Free {
+                    *cell = Content::Free;
+                }
+                point += along_x;
+            }
+        }
+        turned.draw_walls(self.walls.iter().map(|wall| turn * wall).collect());
+        turned
+    }
+
+    /// The centre of a cell, metres.
+    pub fn centre(&self, column: usize, row: usize) -> Point2 {
+        Point2::from(self.corner + Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * self.cell)
+    }
+
+    /// What is at a point.
+    pub fn at(&self, point: &Point2) -> Content {
+        self.index(point).map_or(Content::Unknown, |index| self.cells[index])
+    }
+
+    /// The centres of the cells with walls, row by row.
+    pub fn wall_cells(&self) -> impl Iterator<Item = Point2> {
+        let walls = self.cells.iter().enumerate().filter(|(_, content)| **content == Content::Wall);
+        walls.map(|(index, _)| self.centre(index % self.width, index / self.width))
+    }
+
+    fn unknown(bounds: &Bounds, cell: f64, max_extent: f64) -> Option<Self> {
+        let Some((least, most)) = bounds.0 else {
+            return Some(Self { cell, ..Self::default() });
+        };
+        let size = most - least;
+        if !(size.x <= max_extent && size.y <= max_extent) {
+            return None;
+        }
+        // A rim of two cells, into which walls can be dilated.
+        let corner = least - Vector2::repeat(1.5 * cell);
+        let (width, height) = ((size.x / cell) as usize + 4, (size.y / cell) as usize + 4);
+        Some(Self { corner, cell, width, height, cells: vec![Content::Unknown; width * height], walls: Vec::new() })
+    }
+
+    fn index(&self, point: &Point2) -> Option<usize> {
+        let place = (point.coords - self.corner) / self.cell;
+        if !(place.x >= 0.0 && place.y >= 0.0) {
+            return None;
+        }
+        let (column, row) = (place.x as usize, place.y as usize);
+        (column < self.width && row < self.height).then(|| row * self.width + column)
+    }
+
+    /// Puts the walls into the cells, and marks those beside them.
+    fn draw_walls(&mut self, walls: Vec<Point2>) {
+        let with_walls: Vec<usize> = walls.iter().filter_map(|wall| self.index(wall)).collect();
+        for &index in &with_walls {
+            self.cells[index] = Content::Wall;
+        }
+        for index in with_walls {
+            let (column, row) = (index % self.width, index / self.width);
+            for row in row.saturating_sub(1)..=(row + 1).min(self.height - 1) {
+                for column in column.saturating_sub(1)..=(column + 1).min(self.width - 1) {
+                    let cell = &mut self.cells[row * self.width + column];
+                    if *cell != Content::Wall {
+                        *cell = Content::BesideWall;
+                    }
+                }
+            }
+        }
+        self.walls = walls;
+    }
+
+    /// The first and the last known cell of each row, which bound the map however it is turned.
+    fn rim(&self) -> impl Iterator<Item = Point2> {
+        let is_known = |content: &Content| *content != Content::Unknown;
+        self.cells.chunks(self.width.max(1)).enumerate().flat_map(move |(row, cells)| {
+            let ends = [cells.iter().position(is_known), cells.iter().rposition(is_known)];
+            ends.into_iter().flatten().map(move |column| self.centre(column, row))
+        })
+    }
+}
+
+impl Default for Raster {
+    fn default() -> Self {
+        Self { corner: Vector2::zeros(), cell: 1.0, width: 0, height: 0, cells: Vec::new(), walls: Vec::new() }
+    }
+}
+
+/// The least box that holds some points, if there are any.
+#[derive(Default)]
+struct Bounds(Option<(Vector2<f64>, Vector2<f64>)>);
+
+impl Bounds {
+    fn add(&mut self, point: &Point2) {
+        let (least, most) = self.0.unwrap_or((point.coords, point.coords));
+        self.0 = Some((least.inf(&point.coords), most.sup(&point.coords)));
+    }
+}
+
+/// Goes through the known cells of a grid: the centre in the map frame, and the value.
+fn for_each_known(grid: &Grid<'_>, mut visit: impl FnMut(Point2, i8)) {
+    for (row, cells) in grid.cells.chunks(grid.geometry.width.max(1)).enumerate() {
+        for (column, &value) in cells.iter().enumerate().filter(|(_, value)| is_known(**value)) {
+            visit(grid.geometry.centre(Cell { column, row }), value);
+        }
+    }
+}

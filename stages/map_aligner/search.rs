@@ -1,0 +1,105 @@
+//! The search over all places.
+
+use super::MapAlignerParameters;
+use super::correlation::{BestShift, Correlator, Workspace};
+use super::raster::Raster;
+use crate::geometry::{Point2, Pose2, pose, turn_difference};
+use nalgebra::Vector2;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// A place of map b on map a.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// `T_a_b`.
+    pub transform_a_b: Pose2,
+    /// The number of cells of dilated wall that meet, less those that contradict each other.
+    pub score: f64,
+}
+
+/// What the search has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchResult {
+    /// The best place.
+    pub best: Peak,
+    /// The best place elsewhere.
+    pub runner_up: Peak,
+    /// The middle of the walls in common at the best place, in frame a, metres.
+    pub centre: Point2,
+    /// The length of wall on which the maps agree there, metres.
+    pub wall_in_common: f64,
+}
+
+impl SearchResult {
+    /// What the runner-up scores of the best, 0 to 1.
+    pub fn runner_up_share(&self) -> f64 {
+        (self.runner_up.score / self.best.score).clamp(0.0, 1.0)
+    }
+
+    /// How far the middle of the walls in common lies at the runner-up from where it lies at the best place, metres, and
+    /// by how much map b is turned, radians.
+    pub fn runner_up_change(&self) -> (f64, f64) {
+        let change = self.runner_up.transform_a_b * self.best.transform_a_b.inverse();
+        ((change * self.centre - self.centre).norm(), change.rotation.angle())
+    }
+}
+
+/// Tries every place of map `b` on map `a`. `None` where walls of both maps meet nowhere without being contradicted by as
+/// much.
+pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Option<SearchResult> {
+    let count = parameters.rotations();
+    let angles: Vec<f64> = (0..count).map(|number| TAU * number as f64 / count as f64).collect();
+    // However it is turned, it is no longer than its diagonal.
+    let most = (b.width as f64).hypot(b.height as f64).ceil() as usize + 4;
+    let correlator = Correlator::new(a, most, most, parameters.free_space_penalty);
+    let scored = |workspace: &mut Workspace, angle: f64, excluded: &dyn Fn(Vector2<f64>) -> Option<(Vector2<f64>, f64)>| {
+        let turned = b.turned(angle);
+        correlator.correlate(&turned, workspace);
+        let offset = a.corner - turned.corner;
+        let BestShift { shift, score } = correlator.best(workspace, excluded(offset));
+        let translation = offset + shift * a.cell;
+        Peak { transform_a_b: pose(translation.x, translation.y, angle), score }
+    };
+    let workspace = || correlator.workspace();
+    let peaks: Vec<Peak> =
+        angles.par_iter().map_init(workspace, |workspace, angle| scored(workspace, *angle, &|_| None)).collect();
+
+    let best = best_of(&peaks)?;
+    if !(best.score > 0.0) {
+        return None;
+    }
+    let (centre, wall_in_common) = common_walls(a, b, &best.transform_a_b)?;
+
+    // At a rotation near the best one the place itself is left out.
+    let centre_b = best.transform_a_b.inverse() * centre;
+    let turn = |peak: &Peak| turn_difference(peak.transform_a_b.rotation.angle(), best.transform_a_b.rotation.angle(), TAU);
+    let is_elsewhere = |peak: &Peak| turn(peak).abs() > parameters.apart_yaw;
+    let others = peaks.par_iter().zip(&angles).map_init(workspace, |workspace, (peak, angle)| {
+        if is_elsewhere(peak) {
+            return *peak;
+        }
+        scored(workspace, *angle, &|offset| {
+            let place = centre - peak.transform_a_b.rotation * centre_b - offset;
+            Some((place / a.cell, parameters.apart / a.cell))
+        })
+    });
+    let others: Vec<Peak> = others.collect();
+    Some(SearchResult { best, runner_up: best_of(&others)?, centre, wall_in_common })
+}
+
+/// The highest of some peaks; of equals the first.
+fn best_of(peaks: &[Peak]) -> Option<Peak> {
+    peaks.iter().copied().reduce(|best, peak| if peak.score > best.score { peak } else { best })
+}
+
+/// The middle of the walls of b that lie on those of a, in frame a, and their length, metres.
+fn common_walls(a: &Raster, b: &Raster, transform_a_b: &Pose2) -> Option<(Point2, f64)> {
+    let (mut sum, mut count) = (Vector2::zeros(), 0usize);
+    for wall in b.wall_cells().map(|wall| transform_a_b * wall) {
+        if a.at(&wall).is_near_wall() {
+            sum += wall.coords;
+            count += 1;
+        }
+    }
+    (count > 0).then(|| (Point2::from(sum / count as f64), count as f64 * a.cell))
+}
