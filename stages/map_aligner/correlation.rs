@@ -232,7 +232,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn raster(width: usize, height: usize, cells: Vec<Content>) -> Raster {
-        Raster { width, height, cells, ..Raster::default() }
+        let mut raster = Raster::default();
+        (raster.width, raster.height, raster.cells) = (width, height, cells);
+        raster
     }
 
     fn content() -> impl Strategy<Value = Content> {
@@ -248,7 +250,9 @@ mod tests {
     /// The score of one shift by the definition.
     fn counted(a: &Raster, b: &Raster, x: i64, y: i64, penalty: f64) -> f64 {
         let at = |raster: &Raster, column: i64, row: i64| match (usize::try_from(column), usize::try_from(row)) {
-            (Ok(column), Ok(row)) if column < raster.width && row < raster.height => raster.cells[row * raster.width + column],
+            (Ok(column), Ok(row)) if column < raster.width && row < raster.height => {
+                raster.cells[row * raster.width + column]
+            }
             _ => Content::Unknown,
         };
         let mut score = 0.0;

@@ -3,6 +3,9 @@
 use crate::geometry::{Cell, Grid, Point2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
+/// Cells round what is known, into which walls can be dilated.
+const RIM: f64 = 2.0;
+
 /// What a cell of a raster holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Content {
@@ -54,7 +57,10 @@ impl Raster {
                 walls.push(point);
             }
         });
-        let mut raster = Self::unknown(&bounds, cell, max_extent)?;
+        if bounds.0.is_some_and(|(least, most)| (most - least).max() > max_extent) {
+            return None;
+        }
+        let mut raster = Self::unknown(&bounds, cell);
         for_each_known(grid, |point, value| {
             if let (true, Some(index)) = (is_free(value), raster.index(&point)) {
                 raster.cells[index] = Content::Free;
@@ -64,12 +70,16 @@ impl Raster {
         Some(raster)
     }
 
+    /// The most cells along x and along y that the map takes, turned by any of some angles.
+    pub fn size_turned(&self, angles: &[f64]) -> (usize, usize) {
+        let sizes = angles.iter().filter_map(|angle| self.bounds_turned(*angle).size(self.cell));
+        sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)))
+    }
+
     /// The same map turned about the origin of its frame.
     pub fn turned(&self, angle: f64) -> Self {
         let turn = UnitComplex::new(angle);
-        let mut bounds = Bounds::default();
-        self.rim().for_each(|point| bounds.add(&(turn * point)));
-        let mut turned = Self::unknown(&bounds, self.cell, f64::INFINITY).unwrap_or_default();
+        let mut turned = Self::unknown(&self.bounds_turned(angle), self.cell);
         let along_x = turn.inverse() * Vector2::new(self.cell, 0.0);
         for row in 0..turned.height {
             let mut point = turn.inverse() * turned.centre(0, row);
@@ -100,18 +110,12 @@ impl Raster {
         walls.map(|(index, _)| self.centre(index % self.width, index / self.width))
     }
 
-    fn unknown(bounds: &Bounds, cell: f64, max_extent: f64) -> Option<Self> {
-        let Some((least, most)) = bounds.0 else {
-            return Some(Self { cell, ..Self::default() });
+    fn unknown(bounds: &Bounds, cell: f64) -> Self {
+        let (Some((least, _)), Some((width, height))) = (bounds.0, bounds.size(cell)) else {
+            return Self { cell, ..Self::default() };
         };
-        let size = most - least;
-        if !(size.x <= max_extent && size.y <= max_extent) {
-            return None;
-        }
-        // A rim of two cells, into which walls can be dilated.
-        let corner = least - Vector2::repeat(1.5 * cell);
-        let (width, height) = ((size.x / cell) as usize + 4, (size.y / cell) as usize + 4);
-        Some(Self { corner, cell, width, height, cells: vec![Content::Unknown; width * height], walls: Vec::new() })
+        let corner = least - Vector2::repeat((RIM - 0.5) * cell);
+        Self { corner, cell, width, height, cells: vec![Content::Unknown; width * height], walls: Vec::new() }
     }
 
     fn index(&self, point: &Point2) -> Option<usize> {
@@ -143,6 +147,12 @@ impl Raster {
         self.walls = walls;
     }
 
+    fn bounds_turned(&self, angle: f64) -> Bounds {
+        let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
+        self.rim().for_each(|point| bounds.add(&(turn * point)));
+        bounds
+    }
+
     /// The first and the last known cell of each row, which bound the map however it is turned.
     fn rim(&self) -> impl Iterator<Item = Point2> {
         let is_known = |content: &Content| *content != Content::Unknown;
@@ -167,6 +177,13 @@ impl Bounds {
     fn add(&mut self, point: &Point2) {
         let (least, most) = self.0.unwrap_or((point.coords, point.coords));
         self.0 = Some((least.inf(&point.coords), most.sup(&point.coords)));
+    }
+
+    /// The cells along x and y that it takes, with a rim.
+    fn size(&self, cell: f64) -> Option<(usize, usize)> {
+        let (least, most) = self.0?;
+        let cells = (most - least) / cell;
+        Some((cells.x as usize + 2 * RIM as usize, cells.y as usize + 2 * RIM as usize))
     }
 }
 

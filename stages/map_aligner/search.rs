@@ -6,7 +6,11 @@ use super::raster::Raster;
 use crate::geometry::{Point2, Pose2, pose, turn_difference};
 use nalgebra::Vector2;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+/// The length of wall in a cell that holds some, in sides of the cell: the mean over all directions in which a straight wall may run (Cauchy and
+/// Crofton).
+const WALL_PER_CELL: f64 = FRAC_PI_4;
 
 /// A place of map b on map a.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,17 +53,17 @@ impl SearchResult {
 pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Option<SearchResult> {
     let count = parameters.rotations();
     let angles: Vec<f64> = (0..count).map(|number| TAU * number as f64 / count as f64).collect();
-    // However it is turned, it is no longer than its diagonal.
-    let most = (b.width as f64).hypot(b.height as f64).ceil() as usize + 4;
-    let correlator = Correlator::new(a, most, most, parameters.free_space_penalty);
-    let scored = |workspace: &mut Workspace, angle: f64, excluded: &dyn Fn(Vector2<f64>) -> Option<(Vector2<f64>, f64)>| {
-        let turned = b.turned(angle);
-        correlator.correlate(&turned, workspace);
-        let offset = a.corner - turned.corner;
-        let BestShift { shift, score } = correlator.best(workspace, excluded(offset));
-        let translation = offset + shift * a.cell;
-        Peak { transform_a_b: pose(translation.x, translation.y, angle), score }
-    };
+    let (width, height) = b.size_turned(&angles);
+    let correlator = Correlator::new(a, width, height, parameters.free_space_penalty);
+    let scored =
+        |workspace: &mut Workspace, angle: f64, excluded: &dyn Fn(Vector2<f64>) -> Option<(Vector2<f64>, f64)>| {
+            let turned = b.turned(angle);
+            correlator.correlate(&turned, workspace);
+            let offset = a.corner - turned.corner;
+            let BestShift { shift, score } = correlator.best(workspace, excluded(offset));
+            let translation = offset + shift * a.cell;
+            Peak { transform_a_b: pose(translation.x, translation.y, angle), score }
+        };
     let workspace = || correlator.workspace();
     let peaks: Vec<Peak> =
         angles.par_iter().map_init(workspace, |workspace, angle| scored(workspace, *angle, &|_| None)).collect();
@@ -72,7 +76,8 @@ pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Opti
 
     // At a rotation near the best one the place itself is left out.
     let centre_b = best.transform_a_b.inverse() * centre;
-    let turn = |peak: &Peak| turn_difference(peak.transform_a_b.rotation.angle(), best.transform_a_b.rotation.angle(), TAU);
+    let turn =
+        |peak: &Peak| turn_difference(peak.transform_a_b.rotation.angle(), best.transform_a_b.rotation.angle(), TAU);
     let is_elsewhere = |peak: &Peak| turn(peak).abs() > parameters.apart_yaw;
     let others = peaks.par_iter().zip(&angles).map_init(workspace, |workspace, (peak, angle)| {
         if is_elsewhere(peak) {
@@ -92,7 +97,7 @@ fn best_of(peaks: &[Peak]) -> Option<Peak> {
     peaks.iter().copied().reduce(|best, peak| if peak.score > best.score { peak } else { best })
 }
 
-/// The middle of the walls of b that lie on those of a, in frame a, and their length, metres.
+/// The middle of the walls of b that lie on those of a, or beside them, in frame a, and about their length, metres.
 fn common_walls(a: &Raster, b: &Raster, transform_a_b: &Pose2) -> Option<(Point2, f64)> {
     let (mut sum, mut count) = (Vector2::zeros(), 0usize);
     for wall in b.wall_cells().map(|wall| transform_a_b * wall) {
@@ -101,5 +106,5 @@ fn common_walls(a: &Raster, b: &Raster, transform_a_b: &Pose2) -> Option<(Point2
             count += 1;
         }
     }
-    (count > 0).then(|| (Point2::from(sum / count as f64), count as f64 * a.cell))
+    (count > 0).then(|| (Point2::from(sum / count as f64), count as f64 * a.cell * WALL_PER_CELL))
 }
