@@ -18,8 +18,10 @@ pub struct MapAlignment {
     pub covariance: Matrix3<f64>,
     /// By how much the place stands out: 1 less what the best other place scores of it, 0 to 1.
     pub margin: f64,
-    /// The length of wall on which the maps agree, metres.
+    /// About the length of wall on which the maps agree, metres.
     pub wall_in_common: f64,
+    /// The share of the walls of map b that meet walls, and not free space, of map a, 0 to 1.
+    pub wall_agreement: f64,
     /// How far the best other place is, metres, and how much the map is turned there, radians.
     pub runner_up_change: (f64, f64),
 }
@@ -78,6 +80,7 @@ pub fn align_maps(
         covariance: covariance(&transform_a_b, &found.centre, fine_a.cell, parameters),
         margin: 1.0 - share,
         wall_in_common: found.wall_in_common,
+        wall_agreement: found.wall_agreement,
         runner_up_change: (shift, turn),
     })
 }

@@ -21,9 +21,11 @@ pub struct MapAlignerParameters {
     /// Another place differs from the best by more than this in the middle of the walls in common, metres, or by
     /// `apart_yaw`.
     pub apart: f64,
-    /// The guess is refused as ambiguous if another place scores more than this share of the best, 0 to 1.
+    /// The guess is refused as ambiguous if another place scores more than this share of the best, 0 to 1. In maps of six
+    /// buildings that were drawn from laser scans and of 36 simulated ones, other places have 0.22 to 0.63 in pairs that belong together,
+    /// and 0.58 to 1.0 in pairs that do not.
     pub max_runner_up: f64,
-    /// The least length of wall on which the maps must agree, metres.
+    /// The least length of wall on which the maps must agree, about, metres. `icp_refiner` measures it exactly, and asks for more.
     pub min_wall_length: f64,
     /// The side of a cell in the second, finer search round the best place, metres; never less than 1.5 cells of the coarser
     /// map. It is also the standard deviation of the position that is sent.
@@ -83,7 +85,7 @@ impl Parameters for MapAlignerParameters {
                 errors.push(ParameterError::new(field, format!("must lie between {least} and {most}, not {value}")));
             }
         }
-        // At one place per thousandth of the extent or finer, tables of cells no longer fit in memory.
+        // Beyond that, tables of all places do not fit in memory.
         if self.max_extent / self.cell.min(self.fine_cell) > 2e4 {
             errors.push(ParameterError::new("max_extent", "must be at most 20000 cells"));
         }

@@ -2,7 +2,7 @@
 
 use super::MapAlignerParameters;
 use super::correlation::{BestShift, Correlator, Workspace};
-use super::raster::Raster;
+use super::raster::{Content, Raster};
 use crate::geometry::{Point2, Pose2, pose, turn_difference};
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -30,8 +30,10 @@ pub struct SearchResult {
     pub runner_up: Peak,
     /// The middle of the walls in common at the best place, in frame a, metres.
     pub centre: Point2,
-    /// The length of wall on which the maps agree there, metres.
+    /// About the length of the walls of map b that meet walls of map a there, metres.
     pub wall_in_common: f64,
+    /// The share of these in the walls of map b that meet anything known, 0 to 1.
+    pub wall_agreement: f64,
 }
 
 impl SearchResult {
@@ -72,7 +74,7 @@ pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Opti
     if !(best.score > 0.0) {
         return None;
     }
-    let (centre, wall_in_common) = common_walls(a, b, &best.transform_a_b)?;
+    let CommonWalls { centre, length, agreement } = common_walls(a, b, &best.transform_a_b)?;
 
     // At a rotation near the best one the place itself is left out.
     let centre_b = best.transform_a_b.inverse() * centre;
@@ -89,7 +91,8 @@ pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Opti
         })
     });
     let others: Vec<Peak> = others.collect();
-    Some(SearchResult { best, runner_up: best_of(&others)?, centre, wall_in_common })
+    let runner_up = best_of(&others)?;
+    Some(SearchResult { best, runner_up, centre, wall_in_common: length, wall_agreement: agreement })
 }
 
 /// The highest of some peaks; of equals the first.
@@ -97,14 +100,31 @@ fn best_of(peaks: &[Peak]) -> Option<Peak> {
     peaks.iter().copied().reduce(|best, peak| if peak.score > best.score { peak } else { best })
 }
 
-/// The middle of the walls of b that lie on those of a, or beside them, in frame a, and about their length, metres.
-fn common_walls(a: &Raster, b: &Raster, transform_a_b: &Pose2) -> Option<(Point2, f64)> {
-    let (mut sum, mut count) = (Vector2::zeros(), 0usize);
+/// The walls of map b that meet walls of map a, to within a cell.
+struct CommonWalls {
+    /// Their middle, in frame a.
+    centre: Point2,
+    /// About their length, metres.
+    length: f64,
+    /// Their share in the walls of map b that meet anything known, 0 to 1.
+    agreement: f64,
+}
+
+fn common_walls(a: &Raster, b: &Raster, transform_a_b: &Pose2) -> Option<CommonWalls> {
+    let (mut sum, mut on_wall, mut on_free) = (Vector2::zeros(), 0.0, 0.0);
     for wall in b.wall_cells().map(|wall| transform_a_b * wall) {
-        if a.at(&wall).is_near_wall() {
-            sum += wall.coords;
-            count += 1;
+        match a.at(&wall) {
+            Content::Wall | Content::BesideWall => {
+                sum += wall.coords;
+                on_wall += 1.0;
+            }
+            Content::Free => on_free += 1.0,
+            Content::Unknown => {}
         }
     }
-    (count > 0).then(|| (Point2::from(sum / count as f64), count as f64 * a.cell * WALL_PER_CELL))
+    (on_wall > 0.0).then(|| CommonWalls {
+        centre: Point2::from(sum / on_wall),
+        length: on_wall * a.cell * WALL_PER_CELL,
+        agreement: on_wall / (on_wall + on_free),
+    })
 }

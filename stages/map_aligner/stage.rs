@@ -46,7 +46,7 @@ impl MapAligner {
             Ok(found) => {
                 alignment.set_transform_a_b(&found.transform_a_b);
                 alignment.covariance = row_by_row(&found.covariance);
-                alignment.score = found.margin;
+                alignment.score = found.wall_agreement;
                 alignment.reason = found.reason();
                 alignment.accepted = true;
                 alignment.provisional = self.parameters.provisional;

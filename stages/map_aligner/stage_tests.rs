@@ -67,6 +67,7 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     assert_eq!((first[0].a.as_str(), first[0].b.as_str()), ("robot1", "robot2"));
     assert_eq!((first[0].method.as_str(), first[0].header.frame_id.as_str()), ("maps", "robot1/map"));
     assert!(first[0].accepted && first[0].provisional, "{}", first[0].reason);
+    assert!((0.9..=1.0).contains(&first[0].score), "{}", first[0].score);
     assert!(first[0].reason.contains("m of walls in common"), "{}", first[0].reason);
     let (metres, radians) = apart(&first[0].transform_a_b(), &a.transform_to(&b), &b);
     assert!(metres < 0.15 && radians < 0.015, "{metres} m, {radians} rad");
