@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 /// Scores translations of map b on map a, which stays.
 ///
-/// A translation's score is the number of cells in which dilated walls of both maps meet, less `penalty` times the number in
-/// which a dilated wall of one meets free space of the other. Each of these sums is a cross-correlation, and so a product of
-/// spectra (the convolution theorem).
+/// A translation's score is the number of cells in which dilated walls of both maps meet, less `penalty` times the
+/// number in which a dilated wall of one meets free space of the other. Each of these sums is a cross-correlation, and
+/// so a product of spectra (the convolution theorem).
 pub struct Correlator {
     transform: Transform2,
     /// Spectrum of a's walls less `penalty` times a's free space: what a wall of b meets.
@@ -73,8 +73,8 @@ impl Correlator {
         self.transform.inverse(workspace);
     }
 
-    /// The best translation of those just scored, farther from `excluded` than `radius`, all in cells. Of equals the first by
-    /// row, then by column.
+    /// The best translation of those just scored, of equals the first by row, then by column. With `excluded`, a place
+    /// and a radius in cells, only what is farther away counts.
     pub(super) fn best(&self, workspace: &Workspace, excluded: Option<(Vector2<f64>, f64)>) -> BestShift {
         let Transform2 { width, height, .. } = self.transform;
         // A shift below zero has wrapped round.
@@ -187,9 +187,9 @@ impl Transform2 {
             for (column, value) in lines.row.iter_mut().enumerate() {
                 *value = product[column * self.height + row] * scale;
             }
-            // These are real but for rounding, as the plane is.
+            // These are real but for rounding, as the plane is and its width is even.
             lines.row[0].im = 0.0;
-            if let (0, Some(last)) = (self.width % 2, lines.row.last_mut()) {
+            if let Some(last) = lines.row.last_mut() {
                 last.im = 0.0;
             }
             let done = self.rows_back.process_with_scratch(&mut lines.row, values, &mut lines.real_scratch);
@@ -217,13 +217,13 @@ fn fast_size(least: usize) -> usize {
     let is_fast = |size: &usize| {
         let mut rest = *size;
         for factor in [2, 3, 5] {
-            while rest % factor == 0 {
+            while rest.is_multiple_of(factor) {
                 rest /= factor;
             }
         }
         rest == 1
     };
-    (least.max(2)..).find(|size| size % 2 == 0 && is_fast(size)).unwrap_or(least)
+    (least.max(2)..).find(|size| size.is_multiple_of(2) && is_fast(size)).unwrap_or(least)
 }
 
 #[cfg(test)]

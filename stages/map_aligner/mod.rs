@@ -1,10 +1,10 @@
 //! Finds how two maps lie to each other from the maps alone, without tags and without a first guess.
 //!
-//! A search over all rotations and translations by correlation, as in Olson, "Real-time correlative scan matching" (ICRA
-//! 2009), of maps in place of scans; for each rotation the score of every translation comes at once from the convolution
-//! theorem. Walls on walls count for a place, and walls of one map on known free space of the other against it, which
-//! is what tells right from wrong: Birk and Carpin, "Merging occupancy grid maps from multiple robots" (Proceedings of
-//! the IEEE 2006), judge by the same.
+//! A search over all rotations and translations by correlation, as in Olson, "Real-time correlative scan matching"
+//! (ICRA 2009), of maps in place of scans; for each rotation the score of every translation comes at once from the
+//! convolution theorem. Walls on walls count for a place, and walls of one map on known free space of the other against
+//! it, which is what tells right from wrong: Birk and Carpin, "Merging occupancy grid maps from multiple robots"
+//! (Proceedings of the IEEE 2006), judge by the same.
 //!
 //! - [`Raster`]: a map in wider cells, cropped to what is known, turned by any angle.
 //! - [`Correlator`]: the score of every translation of one raster on another.
@@ -42,8 +42,8 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "map_aligner",
         "Finds how the maps of each pair of robots lie to each other from the maps alone: every rotation and every \
-         translation is tried, and a place is taken where walls lie on walls, and no other place is nearly as good. What it \
-         sends is a first guess, marked as provisional, which icp_refiner makes exact and verifies.",
+         translation is tried, and a place is taken where walls lie on walls, and no other place is nearly as good. It \
+         sends a first guess, marked as provisional, which icp_refiner makes exact and verifies.",
         vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps.")],
         vec![OutputPort::new(
             "alignment",

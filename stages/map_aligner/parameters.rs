@@ -13,8 +13,8 @@ pub struct MapAlignerParameters {
     pub cell: f64,
     /// The rotations that are tried lie at most this far apart, radians.
     pub rotation_step: f64,
-    /// How much a cell of wall that lies on known free space of the other map counts against a place, where a cell of wall on
-    /// wall counts 1 for it.
+    /// How much a cell of wall that lies on known free space of the other map counts against a place, where a cell of
+    /// wall on wall counts 1 for it.
     pub free_space_penalty: f64,
     /// Another place differs from the best by a rotation of more than this, radians, or by `apart`.
     pub apart_yaw: f64,
@@ -22,21 +22,23 @@ pub struct MapAlignerParameters {
     /// `apart_yaw`.
     pub apart: f64,
     /// The guess is refused as ambiguous if another place scores more than this share of the best, 0 to 1. In maps of six
-    /// buildings that were drawn from laser scans and of 36 simulated ones, other places have 0.22 to 0.63 in pairs that belong together,
-    /// and 0.58 to 1.0 in pairs that do not.
+    /// buildings that were drawn from laser scans and of 36 simulated ones, other places have 0.22 to 0.63 in pairs that
+    /// belong together, and 0.58 to 1.0 in pairs that do not.
     pub max_runner_up: f64,
-    /// The least length of wall on which the maps must agree, about, metres. `icp_refiner` measures it exactly, and asks for more.
+    /// About the least length of wall on which the maps must agree, metres. `icp_refiner` measures it exactly, and asks
+    /// for more.
     pub min_wall_length: f64,
-    /// The side of a cell in the second, finer search round the best place, metres; never less than 1.5 cells of the coarser
-    /// map. It is also the standard deviation of the position that is sent.
+    /// The side of a cell in the second, finer search round the best place, metres; never less than 1.5 cells of the
+    /// coarser map. It is also the standard deviation of the position that is sent.
     pub fine_cell: f64,
     /// The rotations of the finer search lie this far apart, radians. It is also the standard deviation of the rotation
     /// that is sent.
     pub fine_rotation_step: f64,
-    /// Whether the guess is marked as provisional: then `icp_refiner` must confirm it by more than it asks of a guess that
-    /// rests on tags.
+    /// Whether the guess is marked as provisional: then `icp_refiner` must confirm it by more than it asks of a guess
+    /// that rests on tags.
     pub provisional: bool,
-    /// A map whose known part is longer than this in x or in y is not aligned, metres: time and memory grow with the square.
+    /// A map whose known part is longer than this in x or in y is not aligned, metres: time and memory grow with the
+    /// square.
     pub max_extent: f64,
 }
 

@@ -8,8 +8,8 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
-/// The length of wall in a cell that holds some, in sides of the cell: the mean over all directions in which a straight wall may run (Cauchy and
-/// Crofton).
+/// The length of wall in a cell that holds some, in sides of the cell: the mean over all directions in which a straight
+/// wall may run (Cauchy and Crofton).
 const WALL_PER_CELL: f64 = FRAC_PI_4;
 
 /// A place of map b on map a.
@@ -50,8 +50,8 @@ impl SearchResult {
     }
 }
 
-/// Tries every place of map `b` on map `a`. `None` where walls of both maps meet nowhere without being contradicted by as
-/// much.
+/// Tries every place of map `b` on map `a`. `None` where walls of both maps meet nowhere without being contradicted by
+/// as much.
 pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Option<SearchResult> {
     let count = parameters.rotations();
     let angles: Vec<f64> = (0..count).map(|number| TAU * number as f64 / count as f64).collect();
@@ -70,10 +70,7 @@ pub fn search(a: &Raster, b: &Raster, parameters: &MapAlignerParameters) -> Opti
     let peaks: Vec<Peak> =
         angles.par_iter().map_init(workspace, |workspace, angle| scored(workspace, *angle, &|_| None)).collect();
 
-    let best = best_of(&peaks)?;
-    if !(best.score > 0.0) {
-        return None;
-    }
+    let best = best_of(&peaks).filter(|best| best.score > 0.0)?;
     let CommonWalls { centre, length, agreement } = common_walls(a, b, &best.transform_a_b)?;
 
     // At a rotation near the best one the place itself is left out.
