@@ -195,3 +195,57 @@ fn for_each_known(grid: &Grid<'_>, mut visit: impl FnMut(Point2, i8)) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{GridGeometry, UNKNOWN, pose};
+    use proptest::prelude::*;
+
+    /// A map of 6 x 4 m with a straight wall through its middle, along x, and an unknown margin.
+    fn map() -> (GridGeometry, Vec<i8>) {
+        let geometry = GridGeometry { width: 160, height: 120, resolution: 0.05, origin: pose(-4.0, -3.0, 0.0) };
+        let value = |index: usize| match (index % 160, index / 160) {
+            (20..140, 60) => 100,
+            (20..140, 20..100) => 0,
+            _ => UNKNOWN,
+        };
+        (geometry, (0..160 * 120).map(value).collect())
+    }
+
+    fn area(raster: &Raster, counts: impl Fn(Content) -> bool) -> f64 {
+        raster.cells.iter().filter(|content| counts(**content)).count() as f64 * raster.cell * raster.cell
+    }
+
+    #[test]
+    fn a_raster_is_cropped_to_what_is_known() {
+        let (geometry, cells) = map();
+        let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
+        assert!(raster.width <= 35 && raster.height <= 25, "{} x {}", raster.width, raster.height);
+        assert!((area(&raster, Content::is_near_wall) - 6.4 * 0.6).abs() < 0.3);
+        assert_eq!(raster.at(&Point2::new(1.0, 0.03)), Content::Wall);
+        assert_eq!(raster.at(&Point2::new(1.0, 1.0)), Content::Free);
+        assert_eq!(raster.at(&Point2::new(1.0, 9.0)), Content::Unknown);
+        assert!(Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 5.0).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn a_turn_leaves_no_holes(angle in -7.0..7.0) {
+            let (geometry, cells) = map();
+            let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
+            let turned = raster.turned(angle);
+            let turn = UnitComplex::new(angle);
+            for step in -140..140 {
+                let along = f64::from(step) * 0.02;
+                prop_assert!(turned.at(&(turn * Point2::new(along, 0.03))).is_near_wall());
+                prop_assert_eq!(turned.at(&(turn * Point2::new(along, 1.0))), Content::Free);
+                prop_assert_eq!(turned.at(&(turn * Point2::new(along, -1.5))), Content::Free);
+            }
+            let free = |raster: &Raster| area(raster, |content| content == Content::Free);
+            prop_assert!((free(&turned) - free(&raster)).abs() < 2.5, "{} {}", free(&turned), free(&raster));
+            let (width, height) = raster.size_turned(&[angle]);
+            prop_assert_eq!((width, height), (turned.width, turned.height));
+        }
+    }
+}
