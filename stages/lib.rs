@@ -8,6 +8,7 @@ pub mod geometry;
 pub mod grid_fuser;
 pub mod icp_refiner;
 pub mod line_extractor;
+pub mod map_aligner;
 pub mod quadrant_classifier;
 pub mod simulator;
 pub mod tag_filter;
@@ -22,6 +23,7 @@ pub fn kinds() -> Vec<StageKind> {
         grid_fuser::kind(),
         icp_refiner::kind(),
         line_extractor::kind(),
+        map_aligner::kind(),
         quadrant_classifier::kind(),
         simulator::kind(),
         tag_filter::kind(),

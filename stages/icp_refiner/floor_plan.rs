@@ -8,45 +8,45 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 const HALF_WALL: f64 = 0.06;
 
 /// Straight walls in the frame of the world.
-pub(super) struct FloorPlan {
+pub(crate) struct FloorPlan {
     walls: Vec<(Point2, Point2)>,
 }
 
 /// What a robot sees of the world: the rectangle between two corners, metres.
 #[derive(Clone, Copy)]
-pub(super) struct Seen {
-    pub(super) low: Point2,
-    pub(super) high: Point2,
+pub(crate) struct Seen {
+    pub(crate) low: Point2,
+    pub(crate) high: Point2,
 }
 
 /// Where a map's frame lies, and how the map is drawn.
 #[derive(Clone, Copy)]
-pub(super) struct Drawing {
-    pub(super) transform_world_map: Pose2,
-    pub(super) resolution: f64,
+pub(crate) struct Drawing {
+    pub(crate) transform_world_map: Pose2,
+    pub(crate) resolution: f64,
     /// Yaw of the grid in the map's frame.
-    pub(super) grid_yaw: f64,
+    pub(crate) grid_yaw: f64,
 }
 
 /// A drawn map.
-pub(super) struct DrawnMap {
-    pub(super) geometry: GridGeometry,
-    pub(super) cells: Vec<i8>,
-    pub(super) walls: WallMap,
-    pub(super) transform_world_map: Pose2,
+pub(crate) struct DrawnMap {
+    pub(crate) geometry: GridGeometry,
+    pub(crate) cells: Vec<i8>,
+    pub(crate) walls: WallMap,
+    pub(crate) transform_world_map: Pose2,
 }
 
-pub(super) fn seen(x1: f64, y1: f64, x2: f64, y2: f64) -> Seen {
+pub(crate) fn seen(x1: f64, y1: f64, x2: f64, y2: f64) -> Seen {
     Seen { low: Point2::new(x1, y1), high: Point2::new(x2, y2) }
 }
 
 impl FloorPlan {
-    pub(super) fn new(walls: &[[f64; 4]]) -> Self {
+    pub(crate) fn new(walls: &[[f64; 4]]) -> Self {
         Self { walls: walls.iter().map(|[x1, y1, x2, y2]| (Point2::new(*x1, *y1), Point2::new(*x2, *y2))).collect() }
     }
 
     /// An office of 20 x 12 m: a corridor, rooms of all sizes with doors, and one slanted wall.
-    pub(super) fn office() -> Self {
+    pub(crate) fn office() -> Self {
         Self::new(&[
             [0.0, 0.0, 20.0, 0.0],
             [20.0, 0.0, 20.0, 12.0],
@@ -71,7 +71,7 @@ impl FloorPlan {
     }
 
     /// Another office of the same size.
-    pub(super) fn another_office() -> Self {
+    pub(crate) fn another_office() -> Self {
         Self::new(&[
             [0.0, 0.0, 20.0, 0.0],
             [20.0, 0.0, 20.0, 12.0],
@@ -88,18 +88,18 @@ impl FloorPlan {
     }
 
     /// A straight corridor without an end, 2 m wide.
-    pub(super) fn corridor() -> Self {
+    pub(crate) fn corridor() -> Self {
         Self::new(&[[-100.0, -1.0, 100.0, -1.0], [-100.0, 1.0, 100.0, 1.0]])
     }
 
     /// The plan as a mirror along the x axis shows it, at the height of its middle.
-    pub(super) fn mirrored(&self, middle: f64) -> Self {
+    pub(crate) fn mirrored(&self, middle: f64) -> Self {
         let mirror = |point: &Point2| Point2::new(point.x, 2.0 * middle - point.y);
         Self { walls: self.walls.iter().map(|(p, q)| (mirror(p), mirror(q))).collect() }
     }
 
     /// The map of a robot that has seen a part of the plan.
-    pub(super) fn draw(&self, part: Seen, drawing: Drawing) -> DrawnMap {
+    pub(crate) fn draw(&self, part: Seen, drawing: Drawing) -> DrawnMap {
         let Drawing { transform_world_map, resolution, grid_yaw } = drawing;
         let turn = nalgebra::UnitComplex::new(grid_yaw);
         // The smallest grid of that yaw that holds what was seen.
@@ -136,22 +136,22 @@ impl FloorPlan {
 }
 
 impl DrawnMap {
-    pub(super) fn view(&self) -> MapView<'_> {
+    pub(crate) fn view(&self) -> MapView<'_> {
         MapView { grid: Grid::new(self.geometry, &self.cells).unwrap(), walls: &self.walls }
     }
 
     /// `T_self_other`, as it was drawn.
-    pub(super) fn transform_to(&self, other: &Self) -> Pose2 {
+    pub(crate) fn transform_to(&self, other: &Self) -> Pose2 {
         self.transform_world_map.inverse() * other.transform_world_map
     }
 }
 
-pub(super) fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
+pub(crate) fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
     Drawing { transform_world_map: crate::geometry::pose(x, y, yaw), resolution: 0.05, grid_yaw: 0.0 }
 }
 
 /// A first guess that is off by a shift and a turn about the origin of map b, and says that it is not better than that.
-pub(super) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
+pub(crate) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
     let mut transform_a_b = transform_a_b;
     transform_a_b.translation.vector += Vector2::new(x, y);
@@ -160,7 +160,7 @@ pub(super) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGues
 }
 
 /// How far two transforms lie apart: metres in the plan's middle, and radians.
-pub(super) fn apart(one: &Pose2, other: &Pose2, map_b: &DrawnMap) -> (f64, f64) {
+pub(crate) fn apart(one: &Pose2, other: &Pose2, map_b: &DrawnMap) -> (f64, f64) {
     let middle = map_b.transform_world_map.inverse() * Point2::new(10.0, 6.0);
     ((one * middle - other * middle).norm(), one.rotation.angle_to(&other.rotation).abs())
 }

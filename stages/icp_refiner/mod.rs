@@ -20,7 +20,7 @@ mod verify;
 mod wall_map;
 
 #[cfg(test)]
-mod floor_plan;
+pub(crate) mod floor_plan;
 #[cfg(test)]
 mod stage_tests;
 #[cfg(test)]

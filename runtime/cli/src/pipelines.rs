@@ -9,9 +9,10 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 6] = [
+const SHIPPED: [(&str, &str); 7] = [
     ("cut", include_str!("../../../pipelines/cut.toml")),
     ("live", include_str!("../../../pipelines/live.toml")),
+    ("map_merge", include_str!("../../../pipelines/map_merge.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
     ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),
     ("tag_merge", include_str!("../../../pipelines/tag_merge.toml")),

@@ -22,8 +22,9 @@ pub(crate) struct Cut {
 }
 
 /// All cuts.
-pub(crate) const CUTS: [Cut; 7] = [
+pub(crate) const CUTS: [Cut; 8] = [
     Cut { kind: "line_extractor", name: "simulated", topics: &["/{robot}/map"], seconds: f64::INFINITY },
+    Cut { kind: "map_aligner", name: "simulated", topics: &["/{robot}/map"], seconds: f64::INFINITY },
     Cut { kind: "tag_localizer", name: "simulated", topics: &["/robot1/pose", "/robot1/tag_ranges"], seconds: 30.0 },
     Cut { kind: "tag_filter", name: "simulated", topics: &["/{robot}/tags/estimates"], seconds: f64::INFINITY },
     Cut {

@@ -11,6 +11,7 @@ mod grid_fuser;
 mod icp_refiner;
 mod line_extractor;
 mod logs;
+mod map_aligner;
 mod quadrant_classifier;
 mod tag_filter;
 mod tag_localizer;
@@ -50,6 +51,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         icp_refiner::cases(),
         line_extractor::cases(),
         logs::cases(),
+        map_aligner::cases(),
         quadrant_classifier::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),

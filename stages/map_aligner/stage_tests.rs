@@ -1,0 +1,133 @@
+//! The stage from outside: messages in, messages out.
+
+use super::tests::angular_office;
+use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
+use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid, encode};
+use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
+
+/// The stage, and what it sends.
+struct Bench {
+    stage: Box<dyn Stage>,
+    outputs: CollectedOutputs,
+    time: u64,
+}
+
+impl Bench {
+    fn new(parameters: &str) -> Self {
+        let kind = super::kind();
+        let made = kind.make(parameters.parse().unwrap(), &Context::default());
+        let Ok(Node::Stage(stage)) = made else { panic!("no stage") };
+        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
+    }
+
+    fn give(&mut self, robot: &str, bytes: Vec<u8>) -> Vec<Alignment> {
+        self.time += 1;
+        let log_time = LogTime(self.time * 1_000_000_000);
+        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
+        let message = Message::from_vec(header, bytes);
+        self.stage.receive(0, &message, &mut self.outputs.output(log_time)).unwrap();
+        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+    }
+
+    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
+        let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
+        let info = MapMetaData {
+            resolution: map.geometry.resolution as f32,
+            width: map.geometry.width as u32,
+            height: map.geometry.height as u32,
+            origin: map.geometry.origin.into(),
+            ..Default::default()
+        };
+        let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
+        self.give(robot, encode(&OccupancyGrid { header, info, data: &data }).unwrap())
+    }
+
+    fn searches(&self) -> u64 {
+        self.stage.report().unwrap()["searches"].as_u64().unwrap()
+    }
+}
+
+/// West, east, and more of the east.
+fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
+    let office = angular_office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 18.0, 12.2), drawing(12.0, 6.0, -2.1));
+    let more_of_b = office.draw(seen(3.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b, more_of_b)
+}
+
+#[test]
+fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
+    let (a, b, more_of_b) = maps();
+    let mut bench = Bench::new("");
+    assert_eq!(bench.give_map("robot2", &b), []);
+    let first = bench.give_map("robot1", &a);
+    assert_eq!(first.len(), 1);
+    assert_eq!((first[0].a.as_str(), first[0].b.as_str()), ("robot1", "robot2"));
+    assert_eq!((first[0].method.as_str(), first[0].header.frame_id.as_str()), ("maps", "robot1/map"));
+    assert!(first[0].accepted && first[0].provisional, "{}", first[0].reason);
+    assert!((0.9..=1.0).contains(&first[0].score), "{}", first[0].score);
+    assert!(first[0].reason.contains("m of walls in common"), "{}", first[0].reason);
+    let (metres, radians) = apart(&first[0].transform_a_b(), &a.transform_to(&b), &b);
+    assert!(metres < 0.15 && radians < 0.015, "{metres} m, {radians} rad");
+
+    assert_eq!(bench.give_map("robot1", &a), [], "the same map again");
+    assert_eq!(bench.searches(), 1);
+    let second = bench.give_map("robot2", &more_of_b);
+    assert_eq!(second.len(), 1);
+    assert_eq!(bench.searches(), 2);
+}
+
+#[test]
+fn every_pair_of_robots_is_aligned_and_what_is_refused_says_why() {
+    let (a, b, _) = maps();
+    let other = FloorPlan::another_office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(1.0, 1.0, 1.0));
+    let mut bench = Bench::new("");
+    bench.give_map("robot1", &a);
+    assert_eq!(bench.give_map("robot3", &b).len(), 1);
+    let sent = bench.give_map("robot2", &other);
+    let pairs: Vec<(&str, &str, bool)> =
+        sent.iter().map(|one| (one.a.as_str(), one.b.as_str(), one.accepted)).collect();
+    assert_eq!(pairs, [("robot1", "robot2", false), ("robot2", "robot3", false)]);
+    assert!(sent.iter().all(|one| one.reason.contains("several places")), "{sent:?}");
+}
+
+#[test]
+fn the_parameters_decide() {
+    let (a, b, _) = maps();
+    for (parameters, accepted, provisional) in [
+        ("provisional = false", true, false),
+        ("max_runner_up = 0.0", false, false),
+        ("min_wall_length = 1000.0", false, false),
+        ("max_extent = 10.0", false, false),
+    ] {
+        let mut bench = Bench::new(parameters);
+        bench.give_map("robot1", &a);
+        let sent = bench.give_map("robot2", &b);
+        assert_eq!(
+            (sent[0].accepted, sent[0].provisional),
+            (accepted, provisional),
+            "{parameters}: {}",
+            sent[0].reason
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_left_out_with_a_warning() {
+    let (a, b, _) = maps();
+    let mut bench = Bench::new("");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    assert_eq!(bench.give("robot2", vec![0, 1, 0, 0, 9]), []);
+    assert_eq!(bench.outputs.warnings().len(), 1);
+    assert_eq!(bench.give_map("robot2", &b), [], "the map before it is still the last");
+}
+
+#[test]
+fn parameters_that_cannot_be_are_refused() {
+    for parameters in ["cell = 0.0", "rotation_step = nan", "max_runner_up = 1.5", "max_extent = 9000.0"] {
+        assert!(super::kind().make(parameters.parse().unwrap(), &Context::default()).is_err(), "{parameters}");
+    }
+}

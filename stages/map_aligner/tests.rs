@@ -1,0 +1,217 @@
+//! Maps of known places, aligned.
+
+use super::align::NamedMap;
+use super::{MapAlignerParameters, MapAlignment, Refusal, align_maps};
+use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use crate::icp_refiner::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+fn align_grids(a: Grid<'_>, b: Grid<'_>, parameters: &MapAlignerParameters) -> Result<MapAlignment, Refusal> {
+    align_maps(&NamedMap { robot: "robot1", grid: a }, &NamedMap { robot: "robot2", grid: b }, parameters)
+}
+
+fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, Refusal> {
+    align_grids(a.view().grid, b.view().grid, &MapAlignerParameters::default())
+}
+
+#[track_caller]
+fn assert_right(a: &DrawnMap, b: &DrawnMap) {
+    let found = align(a, b).unwrap();
+    let truth = a.transform_to(b);
+    let (metres, radians) = apart(&found.transform_a_b, &truth, b);
+    assert!(metres < 0.15 && radians.to_degrees() < 0.8, "{metres} m, {} degrees: {found:?}", radians.to_degrees());
+
+    // The covariance says as much, wherever the origins of the frames are.
+    let offset = found.transform_a_b.translation.vector - truth.translation.vector;
+    let turn = truth.rotation.angle_to(&found.transform_a_b.rotation);
+    let error = Vector3::new(offset.x, offset.y, turn);
+    let deviations = error.dot(&(found.covariance.try_inverse().unwrap() * error)).sqrt();
+    assert!(deviations < 3.0, "{deviations} standard deviations");
+}
+
+/// A place of 20 x 12 m that looks the same from nowhere else: an L, rooms of all sizes, and slanted walls.
+pub(super) fn angular_office() -> FloorPlan {
+    FloorPlan::new(&[
+        [0.0, 0.0, 20.0, 0.0],
+        [20.0, 0.0, 20.0, 8.0],
+        [20.0, 8.0, 11.0, 8.0],
+        [11.0, 8.0, 11.0, 12.0],
+        [11.0, 12.0, 0.0, 12.0],
+        [0.0, 12.0, 0.0, 0.0],
+        [0.0, 3.4, 3.0, 3.4],
+        [4.2, 3.4, 9.0, 3.4],
+        [5.5, 0.0, 5.5, 3.4],
+        [9.0, 1.2, 9.0, 6.1],
+        [9.0, 6.1, 13.0, 4.5],
+        [14.2, 4.0, 17.0, 2.9],
+        [14.5, 8.0, 14.5, 5.6],
+        [17.0, 0.0, 17.0, 2.9],
+        [2.6, 5.8, 2.6, 12.0],
+        [2.6, 7.9, 6.0, 7.9],
+        [7.1, 7.9, 8.3, 9.9],
+        [12.0, 1.3, 13.5, 2.2],
+    ])
+}
+
+fn all() -> crate::icp_refiner::floor_plan::Seen {
+    seen(-0.2, -0.2, 20.2, 12.2)
+}
+
+/// A grid of one value.
+fn filled(width: usize, height: usize, value: i8) -> (GridGeometry, Vec<i8>) {
+    let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(1.0, 2.0, 0.3) };
+    (geometry, vec![value; width * height])
+}
+
+#[test]
+fn a_map_lies_on_itself_as_it_is() {
+    let map = angular_office().draw(all(), drawing(3.0, 2.0, 0.0));
+    assert_right(&map, &map);
+}
+
+#[test]
+fn maps_that_share_a_part_are_aligned_at_any_angle() {
+    let office = angular_office();
+    let a = office.draw(seen(-0.2, -0.2, 15.0, 12.2), drawing(3.0, 2.0, 0.4));
+    for yaw in [0.0, 0.61, 1.571, 2.345, -2.9, -0.777] {
+        let b = office.draw(seen(4.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, yaw));
+        assert_right(&a, &b);
+    }
+}
+
+#[test]
+fn frames_far_away_turned_grids_and_other_resolutions_change_nothing() {
+    let office = angular_office();
+    let a = office.draw(all(), Drawing { grid_yaw: 0.9, resolution: 0.1, ..drawing(-300.0, 90.0, 2.0) });
+    let b = office.draw(all(), Drawing { grid_yaw: -2.0, resolution: 0.04, ..drawing(70.0, 500.0, -1.3) });
+    assert_right(&a, &b);
+}
+
+#[test]
+fn the_other_order_gives_the_inverse() {
+    let office = angular_office();
+    let a = office.draw(seen(-0.2, -0.2, 15.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(4.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let (forth, back) = (align(&a, &b).unwrap(), align(&b, &a).unwrap());
+    let (metres, radians) = apart(&forth.transform_a_b, &back.transform_a_b.inverse(), &b);
+    assert!(metres < 0.15 && radians.to_degrees() < 0.8, "{metres} m, {} degrees", radians.to_degrees());
+}
+
+#[test]
+fn a_room_that_looks_the_same_after_half_a_turn_is_ambiguous() {
+    let walls = [[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]];
+    let hall = FloorPlan::new(&walls);
+    let (a, b) = (hall.draw(all(), drawing(3.0, 2.0, 0.4)), hall.draw(all(), drawing(12.0, 6.0, -2.1)));
+    let Err(Refusal::Ambiguous { share, turn, .. }) = align(&a, &b) else { panic!("{:?}", align(&a, &b)) };
+    assert!(share > 0.9 && turn.abs() > 178.0, "{share} {turn}");
+}
+
+#[test]
+fn a_round_hall_and_a_corridor_are_ambiguous() {
+    let corners: Vec<Point2> =
+        (0..=36).map(|i| pose(10.0, 6.0, TAU * f64::from(i) / 36.0) * Point2::new(5.5, 0.0)).collect();
+    let round: Vec<[f64; 4]> = corners.windows(2).map(|ends| [ends[0].x, ends[0].y, ends[1].x, ends[1].y]).collect();
+    for place in [FloorPlan::new(&round), FloorPlan::corridor()] {
+        let part = seen(-0.2, -1.2, 20.2, 12.2);
+        let (a, b) = (place.draw(part, drawing(3.0, 2.0, 0.4)), place.draw(part, drawing(12.0, 6.0, -2.1)));
+        assert!(matches!(align(&a, &b), Err(Refusal::Ambiguous { .. })), "{:?}", align(&a, &b));
+    }
+}
+
+#[test]
+fn a_curved_wall_with_a_mark_is_aligned() {
+    let corners: Vec<Point2> =
+        (0..=36).map(|i| pose(10.0, 6.0, TAU * f64::from(i) / 40.0) * Point2::new(5.5, 0.0)).collect();
+    let mut walls: Vec<[f64; 4]> =
+        corners.windows(2).map(|ends| [ends[0].x, ends[0].y, ends[1].x, ends[1].y]).collect();
+    walls.extend([
+        [10.0, 6.0, 14.0, 6.5],
+        [8.0, 3.0, 8.0, 8.0],
+        [6.0, 7.0, 8.0, 8.0],
+        [11.0, 8.0, 13.0, 9.5],
+        [10.0, 2.0, 11.5, 4.0],
+    ]);
+    let place = FloorPlan::new(&walls);
+    let (a, b) = (place.draw(all(), drawing(3.0, 2.0, 0.4)), place.draw(all(), drawing(12.0, 6.0, -2.1)));
+    assert_right(&a, &b);
+}
+
+#[test]
+fn maps_of_other_buildings_and_mirrored_ones_are_refused() {
+    let office = FloorPlan::office();
+    let a = office.draw(all(), drawing(3.0, 2.0, 0.4));
+    for other in [FloorPlan::another_office(), office.mirrored(6.0)] {
+        let b = other.draw(all(), drawing(12.0, 6.0, -2.1));
+        let refusal = align(&a, &b).unwrap_err();
+        assert!(matches!(refusal, Refusal::Ambiguous { .. }), "{refusal}");
+    }
+}
+
+#[test]
+fn maps_with_a_corner_in_common_have_too_little() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 4.0, 4.0), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(-0.2, -0.2, 5.0, 5.2), drawing(12.0, 6.0, -2.1));
+    let refusal = align(&a, &b).unwrap_err();
+    assert!(matches!(refusal, Refusal::TooLittleInCommon { .. }), "{refusal}");
+    assert!(refusal.to_string().contains("too little in common"));
+}
+
+#[test]
+fn maps_without_walls_or_without_anything_known_are_refused() {
+    let office = FloorPlan::office().draw(all(), drawing(3.0, 2.0, 0.4));
+    for (width, height, value) in [(0, 0, 0), (80, 60, UNKNOWN), (80, 60, 0)] {
+        let (geometry, cells) = filled(width, height, value);
+        let empty = Grid::new(geometry, &cells).unwrap();
+        for (a, b, robot) in [(empty, office.view().grid, "robot1"), (office.view().grid, empty, "robot2")] {
+            let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
+            assert_eq!(refusal, Refusal::NoWalls { robot: robot.into() });
+        }
+    }
+}
+
+#[test]
+fn a_map_of_one_point_is_refused() {
+    let office = FloorPlan::office().draw(all(), drawing(3.0, 2.0, 0.4));
+    for around in [UNKNOWN, 0] {
+        let (geometry, mut cells) = filled(80, 60, around);
+        cells[30 * 80 + 40] = 100;
+        let point = Grid::new(geometry, &cells).unwrap();
+        for (a, b) in [(point, office.view().grid), (office.view().grid, point), (point, point)] {
+            let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
+            assert!(matches!(refusal, Refusal::TooLittleInCommon { .. } | Refusal::NoFit), "{refusal}");
+        }
+    }
+}
+
+#[test]
+fn a_map_that_is_too_long_is_refused_and_unknown_cells_do_not_count() {
+    let office = FloorPlan::office().draw(all(), drawing(3.0, 2.0, 0.4));
+    let parameters = MapAlignerParameters { max_extent: 30.0, ..Default::default() };
+    let (geometry, mut cells) = filled(1000, 20, UNKNOWN);
+    cells[..10].fill(100);
+    let aligned = |cells: &[i8]| align_grids(office.view().grid, Grid::new(geometry, cells).unwrap(), &parameters);
+    assert!(matches!(aligned(&cells), Err(Refusal::TooLittleInCommon { .. } | Refusal::NoFit)));
+    cells[999] = 0;
+    assert_eq!(aligned(&cells), Err(Refusal::TooLarge { robot: "robot2".into(), most: 30.0 }));
+}
+
+#[test]
+fn an_unknown_margin_changes_nothing() {
+    let office = angular_office();
+    let a = office.draw(seen(-0.2, -0.2, 15.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(4.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let (width, height) = (b.geometry.width + 500, b.geometry.height + 300);
+    let mut cells = vec![UNKNOWN; width * height];
+    for (row, values) in b.cells.chunks(b.geometry.width).enumerate() {
+        let start = (row + 200) * width + 100;
+        cells[start..start + values.len()].copy_from_slice(values);
+    }
+    let shift = Pose2::translation(-100.0 * b.geometry.resolution, -200.0 * b.geometry.resolution);
+    let geometry = GridGeometry { width, height, origin: b.geometry.origin * shift, ..b.geometry };
+    let wide = align_grids(a.view().grid, Grid::new(geometry, &cells).unwrap(), &MapAlignerParameters::default());
+    let (wide, narrow) = (wide.unwrap(), align(&a, &b).unwrap());
+    assert!((wide.transform_a_b.to_homogeneous() - narrow.transform_a_b.to_homogeneous()).norm() < 1e-9);
+    assert!((wide.margin - narrow.margin).abs() < 1e-9);
+}
