@@ -9,7 +9,7 @@ use super::histogram::{BUCKETS, Histogram};
 use memmap2::MmapRaw;
 use rustix::time::{ClockId, clock_gettime};
 use std::fs::File;
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -100,9 +100,10 @@ pub struct Board {
 impl Board {
     /// Makes the file of a board for stages of which each has so many (wires, output ports).
     pub fn create(path: &Path, stages: &[(usize, usize)]) -> io::Result<Arc<Self>> {
-        let file = File::options().read(true).write(true).create_new(true).open(path)?;
+        let mut file = File::options().read(true).write(true).create_new(true).open(path)?;
         let (places, words) = places(stages);
-        file.set_len((words * size_of::<u64>()) as u64)?;
+        // Written, and not only made as long: where there is no room, that is an error here, and later a signal.
+        file.write_all(&vec![0; words * size_of::<u64>()])?;
         Ok(Arc::new(Self { memory: MmapRaw::map_raw(&file)?, places }))
     }
 

@@ -19,11 +19,13 @@
 
 mod backoff;
 mod child;
+mod event;
 mod supervisor;
+mod system;
 mod words;
 
 pub use child::run_process;
-pub use supervisor::memory_of_process;
+pub use system::memory_of_process;
 
 use super::{Observer, RunError, RunReport};
 use crate::pipeline::Pipeline;

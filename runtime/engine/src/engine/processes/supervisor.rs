@@ -2,6 +2,8 @@
 
 use super::Launch;
 use super::backoff::Backoff;
+use super::event::{Event, listen};
+use super::system::{describe, memory_of_process};
 use super::words::{Said, Told, say};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
@@ -10,9 +12,8 @@ use crate::link::shared::{LinkError, RunNames};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader};
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -27,22 +28,6 @@ const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// So long may a live run take to handle what is on its way when it is to end.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// What happens to a process.
-enum Event {
-    Said {
-        process: usize,
-        words: Said,
-    },
-    /// It printed something that is no word for the supervisor.
-    Printed {
-        line: String,
-    },
-    /// Its output has ended: it has died, or is about to.
-    Silent {
-        process: usize,
-    },
-}
 
 /// A process, as the supervisor knows it.
 struct Process {
@@ -82,6 +67,18 @@ struct Stopping {
 pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
     let of_run = |error| RunError::of_run(Failure::from(error));
     let folder = RunFolder::create().map_err(of_run)?;
+    let result = run_in(&folder, pipeline, launch, observer);
+    let removed = folder.remove().map_err(of_run);
+    result.and_then(|report| removed.map(|()| report))
+}
+
+fn run_in(
+    folder: &RunFolder,
+    pipeline: &Pipeline,
+    launch: &Launch,
+    observer: &dyn Observer,
+) -> Result<RunReport, RunError> {
+    let of_run = |error| RunError::of_run(Failure::from(error));
     let board = folder.create_board(pipeline).map_err(of_run)?;
     let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
     // Senders wait for the stages that are still to come.
@@ -92,7 +89,7 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
         pipeline,
         observer,
         launch,
-        folder: &folder,
+        folder,
         boards,
         events: sender,
         processes: Vec::new(),
@@ -103,9 +100,7 @@ pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer)
     };
     supervisor.start_all();
     supervisor.wait_for_all(&receiver);
-    let result = supervisor.result();
-    let removed = folder.remove().map_err(of_run);
-    result.and_then(|report| removed.map(|()| report))
+    supervisor.result()
 }
 
 struct Supervisor<'a> {
@@ -397,50 +392,5 @@ fn tell(process: &mut Process, words: &Told) {
 fn remove_dead_nodes(names: &RunNames) {
     if let Ok(node) = names.node::<ipc::Service>() {
         node.try_cleanup_dead_nodes();
-    }
-}
-
-/// Hears what a process says until it is silent.
-fn listen(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
-    for line in BufReader::new(stdout).lines() {
-        let Ok(line) = line else { break };
-        let event = match serde_json::from_str(&line) {
-            Ok(words) => Event::Said { process, words },
-            Err(_) => Event::Printed { line },
-        };
-        let _ = events.send(event);
-    }
-    let _ = events.send(Event::Silent { process });
-}
-
-/// The memory that a process has for itself alone, bytes: that of its links is not counted.
-pub fn memory_of_process(process: u32) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let kilobytes = |name: &str| {
-        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
-        line.trim_start_matches(':').split_whitespace().next()?.parse::<u64>().ok()
-    };
-    Some(1024 * (kilobytes("RssAnon")? + kilobytes("VmSwap").unwrap_or(0)))
-}
-
-/// How a process ended, to follow "which".
-fn describe(status: ExitStatus) -> String {
-    match (status.signal(), status.code()) {
-        (Some(signal), _) => {
-            let (name, hint) = match signal {
-                4 => (" (SIGILL)", ""),
-                6 => (" (SIGABRT)", "; it gave up, as programs do that get no memory"),
-                7 => (" (SIGBUS)", "; is /dev/shm full?"),
-                8 => (" (SIGFPE)", ""),
-                9 => (" (SIGKILL)", "; the system does so when memory runs out"),
-                11 => (" (SIGSEGV)", ""),
-                15 => (" (SIGTERM)", ""),
-                25 => (" (SIGXFSZ)", "; a file has become larger than it may"),
-                _ => ("", ""),
-            };
-            format!("was ended by signal {signal}{name}{hint}")
-        }
-        (None, Some(code)) => format!("ended with status {code}; what it said stands above"),
-        (None, None) => "ended".to_owned(),
     }
 }
