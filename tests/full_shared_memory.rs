@@ -9,7 +9,8 @@ use std::process::Command;
 use support::{Ended, example, outcome, processes, run_folder, start_program};
 use tempfile::TempDir;
 
-/// Poses with long names of frames: a megabyte each.
+/// Poses with long names of frames, a megabyte each. The sink takes all in order, and so keeps them in shared
+/// memory when the stage hangs.
 const LARGE: &str = r#"
 [pipeline]
 name = "large"
@@ -19,10 +20,17 @@ batch = false
 kind = "troubled_source"
 count = 200
 size = 1_000_000
+pause = 500_000
+
+[stages.hangs]
+kind = "troubled_stage"
+inputs = ["source"]
+what = "hang"
+at = 2
 
 [stages.output]
 kind = "mcap_sink"
-inputs = ["source"]
+inputs = ["source", "hangs"]
 "#;
 
 /// Mounts a small file system at /dev/shm, for this program and those it starts only, and then does what it is told.
