@@ -9,9 +9,10 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 7] = [
+const SHIPPED: [(&str, &str); 8] = [
     ("cut", include_str!("../../../pipelines/cut.toml")),
     ("live", include_str!("../../../pipelines/live.toml")),
+    ("map_file_merge", include_str!("../../../pipelines/map_file_merge.toml")),
     ("map_merge", include_str!("../../../pipelines/map_merge.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
     ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),
