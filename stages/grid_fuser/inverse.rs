@@ -2,28 +2,35 @@
 
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
-use super::{KnownArea, PlacedGrid};
+use super::{Fused, KnownArea, PlacedGrid};
 use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-/// Writes the fused map of `maps` to `cells`, the rows of `geometry`, which lies along the world's axes.
+/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`, which lies along the world's
+/// axes.
 ///
 /// Every cell takes what each map says of the cell that its centre falls in. Rows are independent of each other and
 /// made in parallel.
-pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, cells: &mut [i8]) {
+pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
     let lookups: Vec<Lookup<'_>> = maps.iter().map(|(map, area)| Lookup::new(map, area, geometry)).collect();
-    cells.par_chunks_mut(geometry.width.max(1)).enumerate().for_each(|(row, cells)| {
+    let width = geometry.width.max(1);
+    let rows = fused.cells.par_chunks_mut(width).zip(fused.conflicts.par_chunks_mut(width));
+    rows.enumerate().for_each(|(row, (cells, conflicts))| {
         let rows: Vec<LookupRow<'_>> = lookups.iter().map(|lookup| lookup.row(row, cells.len())).collect();
-        for (stretch, cells) in cells.chunks_mut(TILE).enumerate() {
+        for (stretch, (cells, conflicts)) in cells.chunks_mut(TILE).zip(conflicts.chunks_mut(TILE)).enumerate() {
             let mut evidence = [Evidence::NONE; TILE];
-            let mut is_known = false;
+            let mut known_to = 0;
             for row in &rows {
-                is_known |= row.add_stretch(stretch * TILE, &mut evidence[..cells.len()], table);
+                known_to += usize::from(row.add_stretch(stretch * TILE, &mut evidence[..cells.len()], table));
             }
-            match is_known {
-                true => cells.iter_mut().zip(evidence).for_each(|(cell, evidence)| *cell = table.value(evidence)),
-                false => cells.fill(UNKNOWN),
+            match known_to {
+                0 => cells.fill(UNKNOWN),
+                _ => cells.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence)),
+            }
+            match known_to {
+                0 | 1 => conflicts.fill(UNKNOWN),
+                _ => conflicts.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence)),
             }
         }
     });
@@ -138,8 +145,10 @@ mod tests {
         let resolution = maps.iter().map(|(map, _)| map.grid.geometry.resolution).fold(f64::INFINITY, f64::min);
         let lattice = Lattice { anchor, resolution, max_extent: 100.0, max_cells: 1_000_000 };
         let geometry = lay_out(&maps, &lattice).geometry.unwrap();
-        let mut cells = vec![0; geometry.cell_count()];
-        fuse(&maps, &geometry, &EvidenceTable::new(0.1192, 0.971), &mut cells);
+        let (mut cells, mut conflicts) = (vec![0; geometry.cell_count()], vec![0; geometry.cell_count()]);
+        let fused = Fused { cells: &mut cells, conflicts: &mut conflicts };
+        fuse(&maps, &geometry, &EvidenceTable::new(0.1192, 0.971), fused);
+        assert!(cells.iter().zip(&conflicts).all(|(cell, conflict)| *cell != UNKNOWN || *conflict == UNKNOWN));
         (geometry, cells)
     }
 

@@ -6,6 +6,9 @@ use gridweave_runtime::engine::RunReport;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
+/// The key under which an entry of `stages` has what a fuser has found.
+const AREA: &str = "area";
+
 /// What a run has found: the form that `--summary` writes.
 pub(crate) struct Summary {
     value: Map<String, Value>,
@@ -29,6 +32,9 @@ impl Summary {
             });
             if !stage.warnings.is_empty() {
                 entry["warnings"] = json!(stage.warnings);
+            }
+            if let Some(area) = stage.result.as_ref().filter(|_| stage.kind == "grid_fuser") {
+                entry[AREA] = area.clone();
             }
             for (name, count) in [("dropped", stage.dropped), ("restarts", stage.restarts)] {
                 if count > 0 {
@@ -88,6 +94,7 @@ impl Summary {
             writeln!(out, "not merged: {robot}: {}", reason.as_str().unwrap_or_default())?;
         }
         self.write_alignments(out)?;
+        self.write_areas(out)?;
         for (stage, what, count) in self.warnings() {
             let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
             writeln!(out, "warning: {stage}: {what} ({times})")?;
@@ -143,6 +150,21 @@ impl Summary {
             table.row([format!("{} {}", text("a"), text("b")), accepted.into(), score, text("method"), text("reason")]);
         }
         write!(out, "\n{table}")
+    }
+
+    /// How much of each fused map is known, and how much of it is in conflict.
+    fn write_areas(&self, out: &mut String) -> std::fmt::Result {
+        for (stage, area) in self.object("stages").filter_map(|(name, stage)| Some((name, stage.get(AREA)?))) {
+            let number = |field: &str| area[field].as_f64().unwrap_or_default();
+            let [one, several] = ["known_to_one_m2", "known_to_several_m2"].map(number);
+            write!(out, "\n{stage}: {one:.1} m2 known to one map, {several:.1} m2 to several")?;
+            if several > 0.0 {
+                let (conflict, percent) = (number("in_conflict_m2"), 100.0 * number("conflict_share"));
+                write!(out, ", which contradict each other on {conflict:.1} m2 of it ({percent:.1} %)")?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
     }
 
     /// All warnings: stage, text, count.
