@@ -17,37 +17,18 @@ use crate::geometry::UNKNOWN;
 const STEPS: f64 = 256.0;
 /// The log-odds of one map are within this. No probability below 1 - 1e-15 comes near it.
 const MOST_STEPS: f64 = 16_384.0;
-/// Sums stay within this.
-const MOST_SUM: i32 = 1 << 30;
 
 /// The tables that turn values into log-odds and back.
 #[derive(Clone, Debug)]
 pub struct EvidenceTable {
-    /// What each value says for a cell being occupied, and for its being free; one of them is 0.
-    log_odds: [LogOdds; 101],
+    /// What a map's cell says, by its value as an unsigned byte.
+    of_value: Box<[Evidence; 256]>,
     /// The value for every sum from the lowest to the highest.
     values: Vec<i8>,
+    /// The log-odds of the two bounds, in steps: the most that one map can say for a cell being free, below 0, and for its
+    /// being occupied.
     lowest: i32,
-    /// The most that one map can say.
-    most: LogOdds,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct LogOdds {
-    occupied: i32,
-    free: i32,
-}
-
-impl LogOdds {
-    /// From log-odds in steps: above 0 for occupied, below for free.
-    fn of(steps: i32) -> Self {
-        Self { occupied: steps.max(0), free: (-steps).max(0) }
-    }
-
-    fn add(&mut self, other: Self) {
-        self.occupied = (self.occupied + other.occupied).min(MOST_SUM);
-        self.free = (self.free + other.free).min(MOST_SUM);
-    }
+    highest: i32,
 }
 
 impl EvidenceTable {
@@ -63,32 +44,32 @@ impl EvidenceTable {
             _ if sum >= highest => 100,
             _ => (100.0 / (1.0 + (-f64::from(sum) / STEPS).exp())).round() as i8,
         };
+        let of_value = |byte: usize| match u32::try_from(byte) {
+            Ok(value @ 0..=100) => Evidence::of_one_map(value, steps(f64::from(value) / 100.0)),
+            _ => Evidence::NONE,
+        };
         Self {
-            log_odds: std::array::from_fn(|value| LogOdds::of(steps(value as f64 / 100.0))),
+            of_value: Box::new(std::array::from_fn(of_value)),
             values: (lowest..=highest.max(lowest)).map(value).collect(),
             lowest,
-            most: LogOdds { occupied: highest.max(1), free: (-lowest).max(1) },
+            highest,
         }
     }
 
     /// Adds what a map says of a cell. Values that are none, such as -1, say nothing.
     pub fn add(&self, cell: &mut Evidence, value: i8) {
-        let Some(&log_odds) = usize::try_from(value).ok().and_then(|value| self.log_odds.get(value)) else { return };
-        cell.sum.add(log_odds);
-        cell.known = match cell.known {
-            Known::ToNone => Known::ToOne(value),
-            Known::ToOne(_) | Known::ToSeveral => Known::ToSeveral,
-        };
+        *cell = cell.plus(self.of_value[usize::from(value.cast_unsigned())]);
     }
 
     /// The value that the evidence amounts to.
     pub fn value(&self, cell: Evidence) -> i8 {
-        match cell.known {
-            Known::ToNone => UNKNOWN,
-            Known::ToOne(value) => value,
-            Known::ToSeveral => {
-                let place = cell.sum.occupied - cell.sum.free - self.lowest;
-                self.values[place.clamp(0, self.values.len() as i32 - 1) as usize]
+        match cell.maps {
+            0 => UNKNOWN,
+            1 => cell.values as i8,
+            _ => {
+                let sum = i64::from(cell.occupied) - i64::from(cell.free);
+                let place = (sum - i64::from(self.lowest)).clamp(0, self.values.len() as i64 - 1);
+                self.values[place as usize]
             }
         }
     }
@@ -100,36 +81,54 @@ impl EvidenceTable {
     /// bound), no more than 1. The smaller share counts, in percent. So 100 is where maps that are as sure as one can be
     /// stand on both sides, and what hardly says anything hardly contradicts anything.
     pub fn conflict(&self, cell: Evidence) -> i8 {
-        match cell.known {
-            Known::ToNone | Known::ToOne(_) => UNKNOWN,
-            Known::ToSeveral => {
-                let percent = |sum: i32, most: i32| (100 * sum.min(most) + most / 2) / most;
-                let occupied = percent(cell.sum.occupied, self.most.occupied);
-                occupied.min(percent(cell.sum.free, self.most.free)) as i8
+        match cell {
+            Evidence { maps: 0 | 1, .. } => UNKNOWN,
+            Evidence { occupied: 0, .. } | Evidence { free: 0, .. } => 0,
+            Evidence { occupied, free, .. } => {
+                percent(occupied, self.highest.unsigned_abs()).min(percent(free, self.lowest.unsigned_abs()))
             }
         }
     }
 }
 
-/// What the maps say of one cell so far.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Evidence {
-    sum: LogOdds,
-    known: Known,
+/// A sum as a share of the most that one map can say, no more than 1, in percent.
+fn percent(sum: u32, most: u32) -> i8 {
+    let most = most.max(1);
+    ((100 * sum.min(most) + most / 2) / most) as i8
 }
 
-/// How many maps know a cell.
+/// What the maps say of one cell so far. All are sums over the maps, so that no order matters, and nothing is asked when
+/// a map is added; those of 200,000 maps fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
-    ToNone,
-    /// With its value.
-    ToOne(i8),
-    ToSeveral,
+pub struct Evidence {
+    /// Log-odds for the cell being occupied, in steps.
+    occupied: u32,
+    /// Log-odds for its being free.
+    free: u32,
+    /// How many maps know it.
+    maps: u32,
+    /// Their values: where one map knows it, its value.
+    values: u32,
 }
 
 impl Evidence {
     /// No map knows the cell.
-    pub const NONE: Self = Self { sum: LogOdds { occupied: 0, free: 0 }, known: Known::ToNone };
+    pub const NONE: Self = Self { occupied: 0, free: 0, maps: 0, values: 0 };
+
+    /// One map knows it: its value, and that in log-odds, above 0 for occupied and below for free.
+    fn of_one_map(value: u32, log_odds: i32) -> Self {
+        let occupied = log_odds.max(0).unsigned_abs();
+        Self { occupied, free: log_odds.min(0).unsigned_abs(), maps: 1, values: value }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            occupied: self.occupied.wrapping_add(other.occupied),
+            free: self.free.wrapping_add(other.free),
+            maps: self.maps.wrapping_add(other.maps),
+            values: self.values.wrapping_add(other.values),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
 use super::{Fused, KnownArea, PlacedGrid};
-use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN};
+use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN, is_known};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
@@ -19,18 +19,24 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
     rows.enumerate().for_each(|(row, (cells, conflicts))| {
         let rows: Vec<LookupRow<'_>> = lookups.iter().map(|lookup| lookup.row(row, cells.len())).collect();
         for (stretch, (cells, conflicts)) in cells.chunks_mut(TILE).zip(conflicts.chunks_mut(TILE)).enumerate() {
-            let mut evidence = [Evidence::NONE; TILE];
-            let mut known_to = 0;
-            for row in &rows {
-                known_to += usize::from(row.add_stretch(stretch * TILE, &mut evidence[..cells.len()], table));
-            }
-            match known_to {
-                0 => cells.fill(UNKNOWN),
-                _ => cells.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence)),
-            }
-            match known_to {
-                0 | 1 => conflicts.fill(UNKNOWN),
-                _ => conflicts.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence)),
+            let mut stretches = rows.iter().filter_map(|row| row.stretch(stretch * TILE, cells.len()));
+            match (stretches.next(), stretches.next()) {
+                (Some(one), Some(other)) => {
+                    let mut evidence = [Evidence::NONE; TILE];
+                    for stretch in [one, other].iter().chain(&stretches.collect::<Vec<_>>()) {
+                        stretch.values(&mut evidence, |evidence, value| table.add(evidence, value));
+                    }
+                    cells.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence));
+                    conflicts.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence));
+                }
+                // Most of what is known is known to one map, which nothing contradicts.
+                (only, _) => {
+                    cells.fill(UNKNOWN);
+                    conflicts.fill(UNKNOWN);
+                    if let Some(only) = only {
+                        only.values(cells, |cell, value| *cell = if is_known(value) { value } else { UNKNOWN });
+                    }
+                }
             }
         }
     });
@@ -95,23 +101,38 @@ struct LookupRow<'a> {
 }
 
 impl LookupRow<'_> {
-    /// Adds what the map says of the output cells from `first` on, at most [`TILE`] of them. Whether it may know any.
-    fn add_stretch(&self, first: usize, evidence: &mut [Evidence], table: &EvidenceTable) -> bool {
-        let (from, to) = (self.from.max(first), self.to.min(first + evidence.len()));
+    /// The part of the `count` output cells from `first` on, at most [`TILE`] of them, that may fall on known cells of the
+    /// map. `None` if no cell does.
+    fn stretch(&self, first: usize, count: usize) -> Option<Stretch<'_>> {
+        let (from, to) = (self.from.max(first), self.to.min(first + count));
         if from >= to {
-            return false;
+            return None;
         }
-        let lookup = self.lookup;
-        let place = |index: f64| self.start + lookup.step * index;
-        let middle = place((from + to) as f64 / 2.0);
+        let step = self.lookup.step;
+        let middle = self.start + step * ((from + to) as f64 / 2.0);
         // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
-        if lookup.step.norm() <= 2.0 && !lookup.area.is_near(middle.x, middle.y) {
-            return false;
+        let may_be_known = step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
+        may_be_known.then_some(Stretch { row: self, first, from, to })
+    }
+}
+
+/// A few cells of one output row on one map.
+struct Stretch<'a> {
+    row: &'a LookupRow<'a>,
+    /// The first cell of the stretch.
+    first: usize,
+    /// Its cells that may fall on the known part of the map: the first, and the one behind the last.
+    from: usize,
+    to: usize,
+}
+
+impl Stretch<'_> {
+    /// Hands out what the map says of every cell of the stretch that may fall on its known part.
+    fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
+        let LookupRow { lookup, start, .. } = self.row;
+        for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
+            take(cell, lookup.value(&(start + lookup.step * index as f64)));
         }
-        for (index, evidence) in (from..to).zip(&mut evidence[from - first..]) {
-            table.add(evidence, lookup.value(&place(index as f64)));
-        }
-        true
     }
 }
 

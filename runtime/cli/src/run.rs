@@ -83,10 +83,10 @@ impl Job<'_> {
             std::fs::write(path, summary.to_json() + "\n")
                 .with_context(|| format!("cannot write the summary {}", path.display()))?;
         }
-        exports.write(&summary, &pipeline.robots)?;
         if pipeline.mode == Mode::Replay {
             summary.check_for_maps()?;
         }
+        exports.write(&summary, &pipeline.robots)?;
         Ok(Some(summary))
     }
 
