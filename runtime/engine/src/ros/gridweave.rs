@@ -167,6 +167,11 @@ pub struct Alignment {
     /// Whether it may be used only once the walls of the maps have confirmed it: it was found from too little to be
     /// believed by itself. What confirms it sends it without this mark.
     pub provisional: bool,
+    /// Its place among the hypotheses that its stage has for the pair: 0 for the best.
+    pub rank: u32,
+    /// How many hypotheses its stage has for the pair. All are sent one after the other, by rank, and take the place of
+    /// those sent before. 0, as well as 1, where it is the only one.
+    pub hypotheses: u32,
     /// Why it is refused, or what speaks for it.
     pub reason: String,
 }
