@@ -43,9 +43,17 @@ pub fn kind() -> StageKind {
          far from the guess. merge_verifier says of the others whether the maps agree there.",
         vec![
             InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps."),
-            InputPort::many("alignment", PortType::of::<Alignment>(), "First guesses, one or several ranked ones for each pair of robots."),
+            InputPort::many(
+                "alignment",
+                PortType::of::<Alignment>(),
+                "First guesses, one or several ranked ones for each pair of robots.",
+            ),
         ],
-        vec![OutputPort::new("alignment", PortType::of::<Alignment>(), "The refined alignments, ranked as before, each settled or refused.")],
+        vec![OutputPort::new(
+            "alignment",
+            PortType::of::<Alignment>(),
+            "The refined alignments, ranked as before, each settled or refused.",
+        )],
         |parameters: IcpParameters, _context| Ok(stage::IcpRefiner::new(parameters)),
     )
 }

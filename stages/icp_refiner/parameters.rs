@@ -129,10 +129,7 @@ impl Parameters for IcpParameters {
                 errors.push(ParameterError::new(field, format!("must be a finite number above 0, not {value}")));
             }
         }
-        let not_negative = [
-            ("reuse_within", self.reuse_within),
-            ("reuse_within_yaw", self.reuse_within_yaw),
-        ];
+        let not_negative = [("reuse_within", self.reuse_within), ("reuse_within_yaw", self.reuse_within_yaw)];
         for (field, value) in not_negative {
             if !(value.is_finite() && value >= 0.0) {
                 errors.push(ParameterError::new(field, format!("must be a finite number from 0 up, not {value}")));

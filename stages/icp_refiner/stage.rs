@@ -117,9 +117,9 @@ impl IcpRefiner {
                 alignments.push(guess.clone());
                 continue;
             };
-            let reusable = before.next().filter(|refined| {
-                refined.maps == (a.number, b.number) && refined.holds_for(guess, &self.parameters)
-            });
+            let reusable = before
+                .next()
+                .filter(|refined| refined.maps == (a.number, b.number) && refined.holds_for(guess, &self.parameters));
             let refined = match reusable {
                 Some(refined) => refined,
                 None => {
@@ -151,7 +151,8 @@ impl Stage for IcpRefiner {
             if missing.is_empty() || guesses.first.iter().all(|guess| !guess.accepted) {
                 continue;
             }
-            let reason = format!("no usable map of {} has come, so the alignment cannot be refined", missing.join(" and "));
+            let reason =
+                format!("no usable map of {} has come, so the alignment cannot be refined", missing.join(" and "));
             let refused = |guess: &Alignment| Alignment { accepted: false, reason: reason.clone(), ..guess.clone() };
             guesses.send(guesses.first.iter().map(refused).collect(), output)?;
         }

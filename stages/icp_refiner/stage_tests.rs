@@ -191,7 +191,8 @@ fn ranked_guesses_are_refined_and_sent_together() {
     let mut bench = Bench::new();
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    let ranked = |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, method: "maps".into(), ..first_guess(place) };
+    let ranked =
+        |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, method: "maps".into(), ..first_guess(place) };
     assert_eq!(bench.give(ALIGNMENT, "", &ranked(0, &truth)), []);
     let sent = bench.give(ALIGNMENT, "", &ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
     assert_eq!(sent.iter().map(|one| (one.rank, one.hypotheses)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);

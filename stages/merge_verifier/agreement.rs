@@ -71,7 +71,12 @@ fn share(agree: f64, disagree: f64) -> f64 {
 }
 
 /// Compares two maps at an alignment.
-pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, parameters: &MergeVerifierParameters) -> Agreement {
+pub fn compare(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    transform_a_b: &Pose2,
+    parameters: &MergeVerifierParameters,
+) -> Agreement {
     compare_sampled(a, b, transform_a_b, parameters, usize::MAX)
 }
 

@@ -1,7 +1,9 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::refusal::{Hypotheses, Hypothesis};
-use super::{Agreement, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, probability};
+use super::{
+    Agreement, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, elsewhere, probability,
+};
 use gridweave_runtime::ros::Alignment;
 
 /// A hypothesis, and what the maps say of each other there.
@@ -108,15 +110,15 @@ fn judge_one<'a>(
         .find(|other| rival_of(other).is_none())
         .map(|other| other.alignment.source());
     // The first elsewhere has the most evidence.
-    let elsewhere = all.iter().find_map(|other| Some((other, rival_of(other)?)));
+    let another = all.iter().find_map(|other| Some((other, rival_of(other)?)));
     let is_strict = alignment.provisional && found_too_by.is_none();
-    let mut rival = elsewhere.map(|(_, rival)| rival);
+    let mut rival = another.map(|(_, rival)| rival);
 
     let refusal = match alignment.accepted {
         false => Some(Refusal::Before(alignment.reason.clone())),
         true => Refusal::by_bounds(agreement, &parameters.bounds(is_strict))
             .or_else(|| {
-                let (other, rival) = elsewhere?;
+                let (other, rival) = another?;
                 match is_strict {
                     true => ambiguity(candidate, other, &rival, all, parameters),
                     false => contradiction(candidate, other, &rival, parameters),
@@ -132,7 +134,8 @@ fn judge_one<'a>(
             }),
     };
     let rival_agreement = rival.map(|rival| rival.agreement);
-    let score = probability(agreement, rival_agreement.as_ref(), parameters.free_space_penalty);
+    let elsewhere = elsewhere(agreement, rival_agreement.as_ref(), parameters.free_space_penalty);
+    let score = probability(agreement, elsewhere);
     Verdict { candidate: *candidate, refusal, rival, score, found_too_by }
 }
 

@@ -27,7 +27,12 @@ pub struct Rival {
 impl Rival {
     /// What lies at `rival_a_b` as a rival of the alignment `transform_a_b`, whose walls in common have their middle at
     /// `centre`, frame a. `None` if the two are the same.
-    pub fn of(transform_a_b: &Pose2, centre: &Point2, rival_a_b: &Pose2, compare: impl FnOnce() -> Agreement) -> Option<Self> {
+    pub fn of(
+        transform_a_b: &Pose2,
+        centre: &Point2,
+        rival_a_b: &Pose2,
+        compare: impl FnOnce() -> Agreement,
+    ) -> Option<Self> {
         let change = rival_a_b * transform_a_b.inverse();
         let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
         (shift >= SAME_PLACE || turn.abs() >= SAME_TURN).then(|| Self { shift, turn, agreement: compare() })
@@ -86,9 +91,9 @@ fn starts(centre: &Point2, reach: f64, icp: &IcpParameters) -> impl Iterator<Ite
 
 #[cfg(test)]
 mod tests {
-    use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use super::*;
     use crate::geometry::pose;
+    use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use std::f64::consts::PI;
 
     fn rival(a: &DrawnMap, b: &DrawnMap, transform_a_b: &Pose2) -> Option<Rival> {

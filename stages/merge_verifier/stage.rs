@@ -1,6 +1,6 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
-use super::{MapView, MergeVerifierParameters, Verdict, judge};
+use super::{Agreement, MapView, MergeVerifierParameters, Verdict, elsewhere, judge};
 use crate::geometry::{Grid, read_map};
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::icp_refiner::{IcpParameters, WallMap};
@@ -25,8 +25,17 @@ pub(super) struct MergeVerifier {
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
     sent: BTreeMap<Pair, Alignment>,
-    /// Pairs judged, for the report.
-    judged: u64,
+    /// What the last judgement on each pair went by, for the report.
+    evidence: BTreeMap<Pair, Evidence>,
+}
+
+/// What a judgement went by.
+#[derive(Clone, Copy, Debug)]
+struct Evidence {
+    agreement: Agreement,
+    /// The evidence for the best place elsewhere, as a share of that here.
+    elsewhere: f64,
+    hypotheses: usize,
 }
 
 /// A robot's last map. The message is kept as it came; the walls are made when they are first asked for.
@@ -43,7 +52,7 @@ impl MergeVerifier {
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
             sent: BTreeMap::new(),
-            judged: 0,
+            evidence: BTreeMap::new(),
         }
     }
 
@@ -94,17 +103,23 @@ impl MergeVerifier {
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let alignment = match maps {
+        let verdict = match maps {
             Some((a, b)) => {
                 let doing = || format!("verify the alignment of `{}` and `{}`", pair.0, pair.1);
                 let (_, grid_a) = read_map(&a.message).map_err(|error| StageError::new(doing(), error))?;
                 let (_, grid_b) = read_map(&b.message).map_err(|error| StageError::new(doing(), error))?;
-                let verdict = judge(&a.view(grid_a), &b.view(grid_b), &proposed, &self.parameters);
-                verdict.map_or_else(|| refused(&proposed), |verdict| judged(&verdict, &proposed))
+                judge(&a.view(grid_a), &b.view(grid_b), &proposed, &self.parameters)
             }
+            None => None,
+        };
+        let evidence = verdict.as_ref().map(|verdict| Evidence::of(verdict, proposed.len(), &self.parameters));
+        let alignment = match &verdict {
+            Some(verdict) => judged(verdict, &proposed),
             None => refused(&proposed),
         };
-        self.judged += 1;
+        if let Some(evidence) = evidence {
+            self.evidence.insert(pair.clone(), evidence);
+        }
         self.send(pair, alignment, output)
     }
 
@@ -134,13 +149,17 @@ impl Stage for MergeVerifier {
     fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
         let pairs: BTreeSet<Pair> = self.hypotheses.keys().map(|origin| (origin.a.clone(), origin.b.clone())).collect();
         for pair in pairs {
-            let missing: Vec<&str> =
-                [&pair.0, &pair.1].into_iter().filter(|robot| !self.maps.contains_key(*robot)).map(String::as_str).collect();
+            let missing: Vec<&str> = [&pair.0, &pair.1]
+                .into_iter()
+                .filter(|robot| !self.maps.contains_key(*robot))
+                .map(String::as_str)
+                .collect();
             let proposed = self.proposed(&pair);
             if missing.is_empty() || proposed.iter().all(|alignment| !alignment.accepted) {
                 continue;
             }
-            let reason = format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
+            let reason =
+                format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
             let alignment = Alignment { reason, ..refused(&proposed) };
             self.send(&pair, alignment, output)?;
         }
@@ -148,7 +167,31 @@ impl Stage for MergeVerifier {
     }
 
     fn report(&self) -> Option<serde_json::Value> {
-        Some(serde_json::json!({ "judged": self.judged }))
+        let pairs: Vec<serde_json::Value> =
+            self.evidence.iter().map(|(pair, evidence)| evidence.report(pair)).collect();
+        Some(serde_json::json!({ "pairs": pairs }))
+    }
+}
+
+impl Evidence {
+    fn of(verdict: &Verdict<'_>, hypotheses: usize, parameters: &MergeVerifierParameters) -> Self {
+        let agreement = verdict.candidate.agreement;
+        let rival = verdict.rival.map(|rival| rival.agreement);
+        let elsewhere = elsewhere(&agreement, rival.as_ref(), parameters.free_space_penalty);
+        Self { agreement, elsewhere, hypotheses }
+    }
+
+    fn report(&self, (a, b): &Pair) -> serde_json::Value {
+        let Agreement { overlap, wall_on_wall, wall_on_free, .. } = self.agreement;
+        serde_json::json!({
+            "a": a,
+            "b": b,
+            "hypotheses": self.hypotheses,
+            "overlap_m2": overlap,
+            "wall_on_wall_m": wall_on_wall,
+            "wall_on_free_m": wall_on_free,
+            "elsewhere": self.elsewhere,
+        })
     }
 }
 
@@ -169,7 +212,11 @@ fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment]) -> Alignment {
         rank: 0,
         hypotheses: 0,
         score: verdict.score,
-        reason: if accepted { reason } else { with_other_sources(reason, verdict.candidate.alignment.source(), proposed) },
+        reason: if accepted {
+            reason
+        } else {
+            with_other_sources(reason, verdict.candidate.alignment.source(), proposed)
+        },
         ..verdict.candidate.alignment.clone()
     }
 }
