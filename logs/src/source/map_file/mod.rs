@@ -30,8 +30,8 @@ impl Parameters for MapFileSourceParameters {}
 pub fn kind() -> StageKind {
     StageKind::source::<MapFileSourceParameters, _>(
         "map_file_source",
-        "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files tell no time: all maps \
-         are logged at one second after the epoch, by the robots' names",
+        "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files tell no time: the maps \
+         are logged a second after each other, the first a second after the epoch, by the robots' names",
         vec![OutputPort::new(
             "map",
             PortType::of::<OccupancyGrid<'_>>(),

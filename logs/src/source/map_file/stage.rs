@@ -10,8 +10,9 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
 
-/// When all maps are logged, as files tell no time: a second after the epoch, since 0 stands for no time in ROS.
-const TIME: LogTime = LogTime(1_000_000_000);
+/// Files tell no time. The first map is logged so long after the epoch, since 0 stands for no time in ROS, and each other
+/// so long after the one before: what follows from one map can be handled before the next, however many there are.
+const INTERVAL: u64 = 1_000_000_000;
 const MAP: usize = 0;
 
 /// Reads map files; see the [module](super).
@@ -51,8 +52,8 @@ impl Source for MapFileSource {
     fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
         let Some(map) = self.maps.get(self.sent) else { return Ok(false) };
         self.sent += 1;
-        output.set_log_time(TIME);
-        // 0 stands for messages that no log has described.
+        output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
+        // Channel 0 stands for messages that no log has described.
         map.send(self.sent as u32, output)?;
         Ok(self.sent < self.maps.len())
     }
@@ -67,13 +68,14 @@ impl NamedMap {
     fn send(&self, channel_number: u32, output: &mut Output<'_>) -> Result<(), StageError> {
         let doing = || format!("send the map {}", self.file.display());
         let map = map_file::load(&self.file).map_err(|error| StageError::new("read a map file", error))?;
-        let header = Header::new(TIME, format!("{}/map", self.robot));
+        let time = output.log_time();
+        let header = Header::new(time, format!("{}/map", self.robot));
         let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };
         let bytes = encode(&message).map_err(|error| StageError::new(doing(), error))?;
 
         let header = MessageHeader {
-            log_time: TIME,
-            publish_time: TIME.0,
+            log_time: time,
+            publish_time: time.0,
             channel: channel_number,
             robot: FixedText::new(&self.robot).map_err(|error| StageError::new(doing(), error))?,
             topic: FixedText::new(&self.topic).map_err(|error| StageError::new(doing(), error))?,

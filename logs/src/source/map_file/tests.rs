@@ -39,10 +39,10 @@ fn every_file_is_the_map_of_a_robot() {
     let messages = run(files.clone(), RobotTopics::default()).unwrap();
     let robots: Vec<&str> = messages.iter().map(Message::robot).collect();
     assert_eq!(robots, ["a", "b"], "by name, whatever the order of the files");
-    for (message, (topic, file)) in messages.iter().zip([("/a/map", &files[1]), ("/b/map", &files[0])]) {
+    for (message, (topic, second, file)) in messages.iter().zip([("/a/map", 1, &files[1]), ("/b/map", 2, &files[0])]) {
         let grid: OccupancyGrid<'_> = message.decode().unwrap();
         assert_eq!(message.header().topic.as_str(), topic);
-        assert_eq!(message.header().log_time, LogTime(1_000_000_000));
+        assert_eq!(message.header().log_time, LogTime(second * 1_000_000_000));
         assert_eq!(grid.header.frame_id, topic.trim_start_matches('/'));
         assert_eq!(GridMap::from_message(&grid), map_file::load(file).unwrap());
     }
