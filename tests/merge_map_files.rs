@@ -199,7 +199,7 @@ fn one_map_has_nothing_to_be_merged_with() {
 }
 
 #[test]
-fn more_maps_than_a_reader_has_room_for_are_merged_to_the_end() {
+fn more_pairs_than_a_reader_has_room_for_are_merged_to_the_end() {
     let folder = TempDir::new().unwrap();
     let files: Vec<String> = (1..=9).map(|number| format!("robot{number}.yaml")).collect();
     files.iter().for_each(|file| save_room(&folder.path().join(file)));
