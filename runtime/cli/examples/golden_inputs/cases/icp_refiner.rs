@@ -7,7 +7,7 @@ use gridweave_runtime::ros::Alignment;
 use gridweave_stages::geometry::{Pose2, pose};
 use nalgebra::{UnitComplex, Vector2};
 
-const CELL: f32 = 0.05;
+pub(super) const CELL: f32 = 0.05;
 
 pub(super) fn cases() -> Vec<Case> {
     let case = |name, write| Case::new("icp_refiner", name, write);
@@ -101,21 +101,21 @@ pub(super) fn cases() -> Vec<Case> {
 }
 
 /// What robot1 sees of the office; its map frame is the building's.
-fn left() -> View {
+pub(super) fn left() -> View {
     View::of([-0.2, -0.2], [11.0, 10.2], CELL)
 }
 
 /// What robot2 sees, in a map frame of its own.
-fn right() -> View {
+pub(super) fn right() -> View {
     View { transform_building_map: truth(), ..View::of([3.0, -0.2], [14.2, 10.2], CELL) }
 }
 
 /// `T_1_2`.
-fn truth() -> Pose2 {
+pub(super) fn truth() -> Pose2 {
     pose(8.0, 3.0, 2.0)
 }
 
-fn maps(log: &mut LogBuilder) {
+pub(super) fn maps(log: &mut LogBuilder) {
     log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
     log.map(2.0, "robot2", &FloorPlan::office().draw(&right()));
 }
@@ -127,7 +127,7 @@ fn overlapping(log: &mut LogBuilder) {
 }
 
 /// A transform moved by (x, y) metres and turned about the origin of map b by `yaw` radians.
-fn off(transform_a_b: &Pose2, x: f64, y: f64, yaw: f64) -> Pose2 {
+pub(super) fn off(transform_a_b: &Pose2, x: f64, y: f64, yaw: f64) -> Pose2 {
     let mut off = *transform_a_b;
     off.translation.vector += Vector2::new(x, y);
     off.rotation *= UnitComplex::new(yaw);
