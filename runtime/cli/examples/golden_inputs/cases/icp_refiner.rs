@@ -28,18 +28,6 @@ pub(super) fn cases() -> Vec<Case> {
             log.map(2.0, "robot2", &office.draw(&View { low: [9.0, 0.0], ..right() }));
             guess(log, 3.0, &truth());
         }),
-        case("walls_on_free_space", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
-            guess(log, 3.0, &truth());
-        }),
-        case("mirrored", |log| {
-            let mut mirrored = FloorPlan::office();
-            mirrored.walls.iter_mut().for_each(|wall| (wall[1], wall[3]) = (10.0 - wall[1], 10.0 - wall[3]));
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &mirrored.draw(&right()));
-            guess(log, 3.0, &truth());
-        }),
         case("bare_corridor", |log| {
             let corridor = FloorPlan::new(&[[0.0, 0.5, 30.0, 0.5], [0.0, 2.5, 30.0, 2.5]]);
             log.map(1.0, "robot1", &corridor.draw(&View::of([0.0, 0.0], [24.0, 3.0], CELL)));

@@ -41,6 +41,13 @@ pub(super) fn cases() -> Vec<Case> {
             log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
             propose(log, 3.0, &by_tags(&truth()));
         }),
+        case("mirrored", |log| {
+            let mut mirrored = FloorPlan::office();
+            mirrored.walls.iter_mut().for_each(|wall| (wall[1], wall[3]) = (10.0 - wall[1], 10.0 - wall[3]));
+            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
+            log.map(2.0, "robot2", &mirrored.draw(&right()));
+            propose(log, 3.0, &by_tags(&truth()));
+        }),
         case("no_overlap", |log| {
             let office = FloorPlan::office();
             log.map(1.0, "robot1", &office.draw(&View { high: [5.0, 10.0], ..left() }));
