@@ -13,9 +13,15 @@
 //! - [`align_maps`]: all of it, and whether the outcome can be believed.
 
 mod align;
+mod climb;
 mod correlation;
 mod fine_search;
+mod fourier;
+mod overlay;
 mod parameters;
+mod peak_shape;
+mod peaks;
+mod prepared_map;
 mod raster;
 mod refusal;
 mod search;
@@ -26,13 +32,18 @@ mod stage_tests;
 #[cfg(test)]
 mod tests;
 
-pub use align::{MapAlignment, NamedMap, align_maps};
-pub use correlation::{Correlator, Workspace};
+pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_prepared};
+pub use climb::{Steps, climb};
+pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use fine_search::refine_peak;
+pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
+pub use peak_shape::covariance;
+pub use peaks::Peaks;
+pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::Refusal;
-pub use search::{Peak, SearchResult, search};
+pub use search::{Place, search};
 
 use gridweave_runtime::ros::{Alignment, OccupancyGrid};
 use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};

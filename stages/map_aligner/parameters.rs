@@ -9,9 +9,11 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapAlignerParameters {
-    /// The side of a cell in which all places are tried, metres; never less than 1.5 cells of the coarser map.
+    /// The side of a cell in which places are judged, metres; never less than 3 cells of the coarser map. The search for
+    /// them takes cells twice as wide, and wider ones in large maps; the best of them are placed in cells half as wide.
     pub cell: f64,
-    /// The rotations that are tried lie at most this far apart, radians.
+    /// The rotations at which places are judged lie at most this far apart, radians. The search for them takes steps
+    /// twice as wide.
     pub rotation_step: f64,
     /// How much a cell of wall that lies on known free space of the other map counts against a place, where a cell of
     /// wall on wall counts 1 for it.
@@ -28,12 +30,10 @@ pub struct MapAlignerParameters {
     /// About the least length of wall on which the maps must agree, metres. `icp_refiner` measures it exactly, and asks
     /// for more.
     pub min_wall_length: f64,
-    /// The side of a cell in the second, finer search round the best place, metres; never less than 1.5 cells of the
-    /// coarser map. It is also the standard deviation of the position that is sent.
-    pub fine_cell: f64,
-    /// The rotations of the finer search lie this far apart, radians. It is also the standard deviation of the rotation
-    /// that is sent.
-    pub fine_rotation_step: f64,
+    /// At most so many guesses are made for a pair of maps, each away from the others.
+    pub max_hypotheses: usize,
+    /// Guesses that score less than this share of the best are left out, but for the second, 0 to 1.
+    pub least_share: f64,
     /// Whether the guess is marked as provisional: then `icp_refiner` must confirm it by more than it asks of a guess
     /// that rests on tags.
     pub provisional: bool,
@@ -47,23 +47,16 @@ impl Default for MapAlignerParameters {
         Self {
             cell: 0.2,
             rotation_step: TAU / 360.0,
-            free_space_penalty: 0.6,
+            free_space_penalty: 1.2,
             apart_yaw: TAU / 36.0,
             apart: 1.0,
-            max_runner_up: 0.6,
+            max_runner_up: 0.5,
             min_wall_length: 15.0,
-            fine_cell: 0.1,
-            fine_rotation_step: TAU / 720.0,
+            max_hypotheses: 4,
+            least_share: 0.5,
             provisional: true,
             max_extent: 400.0,
         }
-    }
-}
-
-impl MapAlignerParameters {
-    /// The number of rotations that are tried, evenly spread over a full turn.
-    pub(super) fn rotations(&self) -> usize {
-        (TAU / self.rotation_step - 1e-9).ceil() as usize
     }
 }
 
@@ -78,8 +71,7 @@ impl Parameters for MapAlignerParameters {
             ("apart", self.apart, 0.0, 1e6),
             ("max_runner_up", self.max_runner_up, 0.0, 1.0),
             ("min_wall_length", self.min_wall_length, 0.0, 1e6),
-            ("fine_cell", self.fine_cell, 0.01, 10.0),
-            ("fine_rotation_step", self.fine_rotation_step, 1e-4, PI),
+            ("least_share", self.least_share, 0.0, 1.0),
             ("max_extent", self.max_extent, 1.0, 1e4),
         ];
         for (field, value, least, most) in ranges {
@@ -88,8 +80,11 @@ impl Parameters for MapAlignerParameters {
             }
         }
         // Beyond that, tables of all places do not fit in memory.
-        if self.max_extent / self.cell.min(self.fine_cell) > 2e4 {
-            errors.push(ParameterError::new("max_extent", "must be at most 20000 cells"));
+        if self.max_extent / self.cell > 1e4 {
+            errors.push(ParameterError::new("max_extent", "must be at most 10000 cells"));
+        }
+        if self.max_hypotheses == 0 {
+            errors.push(ParameterError::new("max_hypotheses", "must be at least 1"));
         }
         errors
     }

@@ -1,7 +1,6 @@
 //! The stage: keeps each robot's last map, and aligns each pair when one of its two maps has changed.
 
-use super::align::NamedMap;
-use super::{MapAlignerParameters, align_maps};
+use super::{MapAlignerParameters, MapAlignments, NamedMap, align_maps};
 use crate::geometry::{Grid, read_map, row_by_row};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, Header};
@@ -17,7 +16,7 @@ pub(super) struct MapAligner {
     /// The last usable map of each robot, as it came.
     maps: BTreeMap<String, Message>,
     /// What was sent last for a pair.
-    sent: BTreeMap<(String, String), Alignment>,
+    sent: BTreeMap<(String, String), Vec<Alignment>>,
     /// Pairs of maps that were searched, for the report.
     searches: u64,
 }
@@ -34,38 +33,53 @@ impl MapAligner {
         let (header, grid_a) = read_map(map_a).map_err(|error| StageError::new(doing(), error))?;
         let (_, grid_b) = read_map(map_b).map_err(|error| StageError::new(doing(), error))?;
         self.searches += 1;
-        let mut alignment = Alignment {
+        let (named_a, named_b) = (NamedMap { robot: a, grid: grid_a }, NamedMap { robot: b, grid: grid_b });
+        let found = align_maps(&named_a, &named_b, &self.parameters)
+            .and_then(|found| found.if_clear(self.parameters.max_runner_up));
+        let refused = Alignment {
             header: Header::new(output.log_time(), header.frame_id),
             a: a.to_owned(),
             b: b.to_owned(),
             method: "maps".into(),
             ..Alignment::default()
         };
-        let (named_a, named_b) = (NamedMap { robot: a, grid: grid_a }, NamedMap { robot: b, grid: grid_b });
-        match align_maps(&named_a, &named_b, &self.parameters) {
-            Ok(found) => {
-                alignment.set_transform_a_b(&found.transform_a_b);
-                alignment.covariance = row_by_row(&found.covariance);
-                alignment.score = found.wall_agreement;
-                alignment.reason = found.reason();
-                alignment.accepted = true;
-                alignment.provisional = self.parameters.provisional;
-            }
-            Err(refusal) => alignment.reason = refusal.to_string(),
-        }
-        self.send(alignment, output)
+        let alignments = match found {
+            Ok(found) => self.hypotheses(&found, &refused),
+            Err(refusal) => vec![Alignment { reason: refusal.to_string(), ..refused }],
+        };
+        self.send(alignments, output)
     }
 
-    /// Sends an alignment, unless it tells only what was sent last.
-    fn send(&mut self, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
-        let pair = (alignment.a.clone(), alignment.b.clone());
+    /// What is sent of a pair for which something was found, the best first.
+    fn hypotheses(&self, found: &MapAlignments, of_pair: &Alignment) -> Vec<Alignment> {
+        let hypotheses = found.hypotheses.iter().zip(0..).map(|(hypothesis, rank)| {
+            let mut alignment = Alignment {
+                covariance: row_by_row(&hypothesis.covariance),
+                score: hypothesis.share,
+                accepted: true,
+                provisional: self.parameters.provisional,
+                rank,
+                hypotheses: found.hypotheses.len() as u32,
+                reason: found.reason(rank as usize),
+                ..of_pair.clone()
+            };
+            alignment.set_transform_a_b(&hypothesis.transform_a_b);
+            alignment
+        });
+        hypotheses.collect()
+    }
+
+    /// Sends what there is of a pair, unless it tells only what was sent last.
+    fn send(&mut self, alignments: Vec<Alignment>, output: &mut Output<'_>) -> Result<(), StageError> {
+        let Some(first) = alignments.first() else { return Ok(()) };
+        let pair = (first.a.clone(), first.b.clone());
         let is_news = self.sent.get(&pair).is_none_or(|sent| {
-            let header = alignment.header.clone();
-            Alignment { header, ..sent.clone() } != alignment
+            let sent = sent.iter().map(|sent| Alignment { header: first.header.clone(), ..sent.clone() });
+            !sent.eq(alignments.iter().cloned())
         });
         if is_news {
-            output.send(ALIGNMENT, "", &alignment)?;
-            self.sent.insert(pair, alignment);
+            alignments.iter().try_for_each(|alignment| output.send(ALIGNMENT, "", alignment))?;
+            self.sent.insert(pair, alignments);
         }
         Ok(())
     }
