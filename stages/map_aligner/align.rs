@@ -53,17 +53,6 @@ impl MapAlignments {
              % as well"
         )
     }
-
-    /// Only the best guess, if no place elsewhere scores more than `max_runner_up` of it.
-    pub fn if_clear(mut self, max_runner_up: f64) -> Result<Self, Refusal> {
-        if self.runner_up_share > max_runner_up {
-            let (shift, turn) = self.runner_up_change;
-            let (share, turn) = (self.runner_up_share, turn.to_degrees());
-            return Err(Refusal::Ambiguous { share, most: max_runner_up, shift, turn });
-        }
-        self.hypotheses.truncate(1);
-        Ok(self)
-    }
 }
 
 /// A robot's map, as it takes part.

@@ -23,10 +23,6 @@ pub struct MapAlignerParameters {
     /// Another place differs from the best by more than this in the middle of the walls in common, metres, or by
     /// `apart_yaw`.
     pub apart: f64,
-    /// The guess is refused as ambiguous if another place scores more than this share of the best, 0 to 1. In maps of six
-    /// buildings that were drawn from laser scans and of 36 simulated ones, other places have 0.22 to 0.63 in pairs that
-    /// belong together, and 0.58 to 1.0 in pairs that do not.
-    pub max_runner_up: f64,
     /// About the least length of wall on which the maps must agree, metres. `icp_refiner` measures it exactly, and asks
     /// for more.
     pub min_wall_length: f64,
@@ -50,7 +46,6 @@ impl Default for MapAlignerParameters {
             free_space_penalty: 1.2,
             apart_yaw: TAU / 36.0,
             apart: 1.0,
-            max_runner_up: 0.5,
             min_wall_length: 15.0,
             max_hypotheses: 4,
             least_share: 0.5,
@@ -69,7 +64,6 @@ impl Parameters for MapAlignerParameters {
             ("free_space_penalty", self.free_space_penalty, 0.0, 100.0),
             ("apart_yaw", self.apart_yaw, 0.0, PI),
             ("apart", self.apart, 0.0, 1e6),
-            ("max_runner_up", self.max_runner_up, 0.0, 1.0),
             ("min_wall_length", self.min_wall_length, 0.0, 1e6),
             ("least_share", self.least_share, 0.0, 1.0),
             ("max_extent", self.max_extent, 1.0, 1e4),

@@ -34,8 +34,7 @@ impl MapAligner {
         let (_, grid_b) = read_map(map_b).map_err(|error| StageError::new(doing(), error))?;
         self.searches += 1;
         let (named_a, named_b) = (NamedMap { robot: a, grid: grid_a }, NamedMap { robot: b, grid: grid_b });
-        let found = align_maps(&named_a, &named_b, &self.parameters)
-            .and_then(|found| found.if_clear(self.parameters.max_runner_up));
+        let found = align_maps(&named_a, &named_b, &self.parameters);
         let refused = Alignment {
             header: Header::new(output.log_time(), header.frame_id),
             a: a.to_owned(),
