@@ -1,8 +1,8 @@
 //! The whole of it: search, judge, refine.
 
-use super::peaks::{JUDGED, change, overlay};
+use super::peaks::{JUDGED, change, is_near, overlay};
 use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, Refusal, covariance, refine_peak};
-use crate::geometry::{Grid, Point2, Pose2};
+use crate::geometry::{Grid, Pose2};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
@@ -101,6 +101,23 @@ pub fn align_prepared(
     })
 }
 
+/// The guess at the peak near a place that is known from elsewhere, without a search. `None` if the walls of the maps do
+/// not meet there, or contradict each other as much.
+pub fn align_near(
+    a: &PreparedMap,
+    b: &PreparedMap,
+    transform_a_b: &Pose2,
+    parameters: &MapAlignerParameters,
+) -> Option<MapAlignment> {
+    let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
+    let common = judged.common_walls(transform_a_b)?;
+    let peak = Place { transform_a_b: *transform_a_b, score: judged.score(transform_a_b) };
+    let mut found = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
+    found.score = judged.score(&found.transform_a_b);
+    found.share = 1.0;
+    (found.score > 0.0).then_some(found)
+}
+
 /// The guesses that peaks lead to, each away from the others, the best first.
 fn hypotheses(
     peaks: &Peaks,
@@ -168,10 +185,4 @@ impl Hypothesis {
     fn is_near(&self, place: &Pose2, parameters: &MapAlignerParameters) -> bool {
         is_near(&self.alignment.transform_a_b, place, &self.common.centre, parameters)
     }
-}
-
-/// Whether two places are one, `centre` being the middle of the walls in common at the first.
-fn is_near(one: &Pose2, other: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> bool {
-    let (metres, radians) = change(one, other, centre);
-    metres <= parameters.apart && radians.abs() <= parameters.apart_yaw
 }

@@ -21,6 +21,7 @@ mod overlay;
 mod parameters;
 mod peak_shape;
 mod peaks;
+mod plan;
 mod prepared_map;
 mod raster;
 mod refusal;
@@ -28,11 +29,13 @@ mod search;
 mod stage;
 
 #[cfg(test)]
+mod plan_tests;
+#[cfg(test)]
 mod stage_tests;
 #[cfg(test)]
 mod tests;
 
-pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_prepared};
+pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared};
 pub use climb::{Steps, climb};
 pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use fine_search::refine_peak;
@@ -40,6 +43,7 @@ pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
 pub use peak_shape::covariance;
 pub use peaks::Peaks;
+pub use plan::{MergePlan, Statement};
 pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::Refusal;

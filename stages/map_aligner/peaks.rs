@@ -106,3 +106,9 @@ pub(super) fn change(one: &Pose2, other: &Pose2, centre: &Point2) -> (f64, f64) 
     let turn = turn_difference(other.rotation.angle(), one.rotation.angle(), TAU);
     ((moved - centre).norm(), turn)
 }
+
+/// Whether two places are one, `centre` being the middle of the walls in common at the first.
+pub(super) fn is_near(one: &Pose2, other: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> bool {
+    let (metres, radians) = change(one, other, centre);
+    metres <= parameters.apart && radians.abs() <= parameters.apart_yaw
+}

@@ -1,6 +1,6 @@
 //! A map in wider cells, cropped to what is known.
 
-use crate::geometry::{Cell, Grid, Point2, is_free, is_known, is_occupied};
+use crate::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
 /// Cells round what is known: walls can be dilated into them, and still the outermost are unknown.
@@ -104,18 +104,58 @@ impl Raster {
         halved
     }
 
+    /// What several maps know together, in the frame that each is taken to by its transform. Where one has a wall there
+    /// is a wall. Cells are as wide as those of the first.
+    pub fn union(maps: &[(Pose2, &Self)]) -> Self {
+        let Some((_, first)) = maps.first() else { return Self::default() };
+        let (cell, mut bounds) = (first.cell, Bounds::default());
+        for (transform, map) in maps {
+            map.for_each_end(|point| bounds.add(&(transform * point)));
+        }
+        let mut union = Self::unknown(&bounds, cell, cell);
+        for (transform, map) in maps {
+            for (index, content) in map.cells.iter().enumerate() {
+                let centre = map.centre(index % map.width, index / map.width);
+                // A cell that is turned may leave a gap beside it; its quarters do not.
+                let quarter = 0.25 * map.cell;
+                let offsets: &[(f64, f64)] = match content {
+                    Content::Unknown | Content::BesideWall => continue,
+                    Content::Free => &[(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)],
+                    Content::Wall => &[(0.0, 0.0)],
+                };
+                for (x, y) in offsets {
+                    let point = transform * (centre + Vector2::new(*x, *y) * quarter);
+                    let place = (point.coords - union.corner) / cell;
+                    if let Some(cell) = union.cells.get_mut(place.y as usize * union.width + place.x as usize) {
+                        *cell = (*cell).max(*content);
+                    }
+                }
+            }
+        }
+        union.mark_beside_walls();
+        union
+    }
+
+    /// The number of cells of which anything is known.
+    pub fn known_cells(&self) -> usize {
+        self.cells.iter().filter(|content| **content != Content::Unknown).count()
+    }
+
     /// The least box that holds the map turned by an angle about the origin of its frame: its lower corner, and its
     /// size, metres.
     pub(super) fn box_turned(&self, angle: f64) -> (Vector2<f64>, Vector2<f64>) {
         let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
-        for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
-            let ends = known_range(cells, |content| *content != Content::Unknown);
-            for column in ends.into_iter().flat_map(|(first, last)| [first, last]) {
-                bounds.add(&(turn * self.centre(column, row)));
-            }
-        }
+        self.for_each_end(|point| bounds.add(&(turn * point)));
         let (least, most) = bounds.0.unwrap_or_default();
         (least, most - least)
+    }
+
+    /// Goes through the centres of the first and the last known cell of each row.
+    fn for_each_end(&self, mut visit: impl FnMut(Point2)) {
+        for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
+            let ends = known_range(cells, |content| *content != Content::Unknown);
+            ends.into_iter().flat_map(|(first, last)| [first, last]).for_each(|column| visit(self.centre(column, row)));
+        }
     }
 
     /// The centre of a cell, metres.
