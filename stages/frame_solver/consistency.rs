@@ -2,22 +2,17 @@
 //!
 //! The transforms along a cycle of alignments multiply to the identity, up to their covariances, when all of them are
 //! right. Where they do not, some alignment of the cycle is wrong. It can be told which one only if other cycles vouch
-//! for the rest: the smallest sets of alignments whose removal makes all cycles agree are found, and an alignment
-//! counts as wrong if it is in all of those sets, as right if it is in none, and as **disputed** otherwise. In a lone
-//! triangle that does not close, all three are disputed.
+//! for the rest: an alignment counts as right if it is in every largest set of alignments that agree with each other
+//! (see `consensus`), as wrong if it is in none, and as **disputed** otherwise. In a lone triangle that does not close,
+//! all three are disputed. So are two wrong alignments of a robot that agree with each other, and two right ones; but
+//! two that agree outweigh one.
 //!
-//! Alignments that are in no cycle cannot be checked and count as right. Cycles that share no alignment are judged
-//! apart from each other. Where there are many contradictions, alignments that many triangles speak against are taken
-//! out first, see `votes.rs`.
+//! Alignments that are in no cycle cannot be checked and count as right. Scores are not weighed: those of different
+//! methods do not compare, and the covariances say how exact an alignment is if it is right, not whether it is.
 
-use super::graph::{Cycle, Edge, Forest};
-use super::votes::outvoted;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Contradictions apart from each other beyond which alignments may be outvoted before the search.
-const SEARCHED_DEPTH: usize = 3;
-/// How much is tried for one group of cycles before all its alignments are called disputed: pose graphs times edges.
-const MOST_WORK: usize = 400_000;
+use super::consensus::{Consensus, Moves};
+use super::graph::{Cycle, Edge, Neighbours};
+use std::collections::BTreeMap;
 
 /// What the cycles say of one alignment.
 #[derive(Clone, Debug)]
@@ -32,171 +27,48 @@ pub enum Verdict {
 
 /// Judges every edge. A cycle contradicts if it is more than `gate` standard deviations from closing.
 pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
-    let mut verdicts = vec![Verdict::Right; edges.len()];
-    let forest = Forest::grow(robots, edges, 0, |_| true);
-    let closing = (0..edges.len()).filter(|&index| !forest.contains(index, &edges[index]));
-    let cycles: Vec<Cycle> = closing.filter_map(|index| forest.cycle(edges, index)).collect();
-    if cycles.iter().all(|cycle| cycle.remainder.distance_from_identity() <= gate) {
-        return verdicts;
-    }
-    for group in groups_of_cycles(&cycles, edges.len()) {
-        let mut search = Search::new(robots, edges, &group, gate);
-        let contradictions = search.contradictions();
-        if contradictions.is_empty() {
-            continue;
-        }
-        if count_disjoint(&contradictions) > SEARCHED_DEPTH {
-            outvoted(edges, &group, gate).into_iter().for_each(|index| search.choices[index] = Choice::Removed);
-        }
-        let removals = search.smallest_removals(contradictions.len());
-        let in_all = |edge: &usize| !removals.is_empty() && removals.iter().all(|set| set.contains(edge));
-        let in_none = |edge: &usize| !removals.is_empty() && !removals.iter().any(|set| set.contains(edge));
-        let right: BTreeSet<usize> = group.iter().copied().filter(in_none).collect();
-        let forest = Forest::grow(robots, edges, 0, |index| right.contains(&index));
-        for &index in group.iter().filter(|index| !right.contains(index)) {
-            let shown = contradictions.iter().find(|cycle| cycle.edges.contains(&index)).or(contradictions.first());
-            verdicts[index] = match (in_all(&index), forest.cycle(edges, index), shown) {
-                (true, Some(cycle), _) => Verdict::Wrong(cycle),
-                (_, _, Some(cycle)) => Verdict::Disputed(cycle.clone()),
-                (_, _, None) => Verdict::Right,
-            };
-        }
-    }
-    verdicts
+    let neighbours = Neighbours::new(robots, edges);
+    let consensus = Consensus::find(robots, edges, &neighbours, gate);
+    let outside = consensus.outside();
+    let disputed = dispute(&consensus, edges, &neighbours, &outside);
+    let is_right = |index: usize| consensus.contains(index) && !disputed.contains_key(&index);
+    let verdict = |index: usize| match disputed.get(&index) {
+        Some(cycle) => Verdict::Disputed(cycle.clone()),
+        None if consensus.contains(index) => Verdict::Right,
+        None => neighbours.cycle(edges, index, is_right).map_or(Verdict::Right, Verdict::Wrong),
+    };
+    (0..edges.len()).map(verdict).collect()
 }
 
-/// The edges that lie on cycles, in groups: two edges are in one group if a cycle goes through both (the biconnected
-/// components of the graph). Each group by rising index.
+/// The edges of which it cannot be told whether they are right, with a cycle that shows the contradiction.
 ///
-/// `cycles` are those that the edges outside of a spanning forest close; joining the edges of each gives the groups.
-fn groups_of_cycles(cycles: &[Cycle], edge_count: usize) -> Vec<Vec<usize>> {
-    let mut leader: Vec<usize> = (0..edge_count).collect();
-    let mut on_cycle = BTreeSet::new();
-    for cycle in cycles {
-        for (&one, &next) in cycle.edges.iter().zip(cycle.edges.iter().skip(1)) {
-            on_cycle.extend([one, next]);
-            let (one, next) = (find(&mut leader, one), find(&mut leader, next));
-            leader[one.max(next)] = one.min(next);
-        }
-    }
-    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for index in on_cycle {
-        groups.entry(find(&mut leader, index)).or_default().push(index);
-    }
-    groups.into_values().collect()
-}
-
-/// The leader of a set, with path halving.
-fn find(leader: &mut [usize], mut member: usize) -> usize {
-    while leader[member] != member {
-        leader[member] = leader[leader[member]];
-        member = leader[member];
-    }
-    member
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Choice {
-    Open,
-    Kept,
-    Removed,
-}
-
-/// The search for the smallest removals in one group of cycles: at least one edge of a contradicting cycle has to go,
-/// so each of them is tried in turn, to a depth that grows until something is found.
-struct Search<'a> {
-    robots: usize,
-    edges: &'a [Edge],
-    group: &'a [usize],
-    gate: f64,
-    choices: Vec<Choice>,
-    trials: usize,
-    found: Vec<BTreeSet<usize>>,
-}
-
-impl<'a> Search<'a> {
-    fn new(robots: usize, edges: &'a [Edge], group: &'a [usize], gate: f64) -> Self {
-        // Edges of other groups stay out of it.
-        let mut choices = vec![Choice::Removed; edges.len()];
-        group.iter().for_each(|&index| choices[index] = Choice::Open);
-        Self { robots, edges, group, gate, choices, trials: 0, found: Vec::new() }
-    }
-
-    /// The cycles that do not close with the present choices, the shortest first.
-    fn contradictions(&mut self) -> Vec<Cycle> {
-        self.trials += 1;
-        let in_use = |index: usize| self.choices[index] != Choice::Removed;
-        let root = self.group.first().map_or(0, |&index| self.edges[index].a);
-        let forest = Forest::grow(self.robots, self.edges, root, in_use);
-        let closing = self.group.iter().filter(|&&index| in_use(index) && !forest.contains(index, &self.edges[index]));
-        let mut cycles: Vec<Cycle> = closing
-            .filter_map(|&index| forest.cycle(self.edges, index))
-            .filter(|cycle| cycle.remainder.distance_from_identity() > self.gate)
-            .collect();
-        cycles.sort_by_key(|cycle| cycle.edges.len());
-        cycles
-    }
-
-    /// All smallest sets of edges whose removal leaves no contradiction; none if the search takes too long. There is
-    /// never a set with more than one edge for each of the `most` cycles that contradict at first.
-    fn smallest_removals(&mut self, most: usize) -> Vec<BTreeSet<usize>> {
-        for size in 0..=most {
-            self.descend(size);
-            if self.is_tired() {
-                return Vec::new();
+/// An edge outside of the set is disputed if following it loses no more than it wins, and so is what it may cost. What
+/// is disputed vouches for nothing, so the rest is looked at again without it.
+fn dispute(
+    consensus: &Consensus<'_>,
+    edges: &[Edge],
+    neighbours: &Neighbours,
+    outside: &[usize],
+) -> BTreeMap<usize, Cycle> {
+    let mut disputed: BTreeMap<usize, Cycle> = BTreeMap::new();
+    loop {
+        let before = disputed.len();
+        let mut moves = Moves::new(consensus, |index| !disputed.contains_key(&index));
+        for &index in outside {
+            if disputed.contains_key(&index) {
+                continue;
             }
-            if !self.found.is_empty() {
-                break;
+            let Some(cut) = moves.follow(index, outside).lost else { continue };
+            let Some(cycle) = neighbours.cycle(edges, index, |index| consensus.contains(index)) else { continue };
+            for lost in std::iter::once(index).chain(cut.in_some_cut) {
+                disputed.entry(lost).or_insert_with(|| cycle.clone());
             }
         }
-        std::mem::take(&mut self.found)
-    }
-
-    fn descend(&mut self, left: usize) {
-        if self.is_tired() {
-            return;
+        if disputed.len() == before {
+            return disputed;
         }
-        let contradictions = self.contradictions();
-        let Some(shortest) = contradictions.first() else {
-            self.found.push(self.removed());
-            return;
-        };
-        // Contradictions that share no edge need a removal each.
-        if count_disjoint(&contradictions) > left {
-            return;
-        }
-        let open: Vec<usize> =
-            shortest.edges.iter().copied().filter(|&index| self.choices[index] == Choice::Open).collect();
-        for &index in &open {
-            self.choices[index] = Choice::Removed;
-            self.descend(left - 1);
-            // The sets without this edge remain; so no set is found twice.
-            self.choices[index] = Choice::Kept;
-        }
-        open.iter().for_each(|&index| self.choices[index] = Choice::Open);
-    }
-
-    fn is_tired(&self) -> bool {
-        self.trials.saturating_mul(self.group.len()) > MOST_WORK
-    }
-
-    fn removed(&self) -> BTreeSet<usize> {
-        self.group.iter().copied().filter(|&index| self.choices[index] == Choice::Removed).collect()
     }
 }
-
-fn count_disjoint(cycles: &[Cycle]) -> usize {
-    let mut taken = BTreeSet::new();
-    let mut count = 0;
-    for cycle in cycles {
-        if cycle.edges.iter().all(|edge| !taken.contains(edge)) {
-            taken.extend(cycle.edges.iter().copied());
-            count += 1;
-        }
-    }
-    count
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::UncertainPose;

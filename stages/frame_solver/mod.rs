@@ -11,7 +11,9 @@
 //! - [`optimize`]: least squares on SE(2).
 //! - [`uncertain`]: transforms with a covariance.
 
+mod consensus;
 pub mod consistency;
+mod cut;
 pub mod graph;
 pub mod optimize;
 mod parameters;
@@ -21,7 +23,6 @@ mod stage;
 #[cfg(test)]
 mod tests;
 pub mod uncertain;
-mod votes;
 
 pub use parameters::FrameSolverParameters;
 pub use stage::kind;
