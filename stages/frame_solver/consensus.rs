@@ -14,12 +14,10 @@
 //! win k.
 
 use super::cut::{CutGraph, LeastCut};
-use super::graph::{Edge, Forest, Neighbours};
+use super::graph::{Cycle, Edge, Forest, Neighbours};
 use super::uncertain::UncertainPose;
-use std::cmp::Reverse;
-
-/// How many of the triangles of an edge are looked at to find the edges that agree most.
-const WITNESSES: usize = 8;
+use crate::geometry::wrap_angle;
+use std::collections::BTreeMap;
 
 /// A set of edges that agree with each other.
 pub(super) struct Consensus<'a> {
@@ -32,23 +30,27 @@ pub(super) struct Consensus<'a> {
 }
 
 /// What speaks for an edge outside of the set.
-pub(super) struct Move {
+struct Move {
     /// The edges outside that agree with it, itself among them.
-    pub(super) won: usize,
+    won: usize,
     /// What is lost if it is followed. `None` if that is more than what is won.
-    pub(super) lost: Option<LeastCut>,
+    lost: Option<LeastCut>,
 }
 
 impl<'a> Consensus<'a> {
-    /// Finds a set that no move makes larger. A cycle is closed if it is within `gate` standard deviations of it.
-    pub(super) fn find(robots: usize, edges: &'a [Edge], neighbours: &'a Neighbours, gate: f64) -> Self {
-        let mut consensus = Self { robots, edges, neighbours, gate, agrees: vec![false; edges.len()] };
+    /// Finds a set that no move makes larger, from edges that are known to agree. A cycle is closed if it is within
+    /// `gate` standard deviations of it.
+    pub(super) fn find(
+        robots: usize,
+        edges: &'a [Edge],
+        neighbours: &'a Neighbours,
+        known: Vec<bool>,
+        gate: f64,
+    ) -> Self {
+        let mut consensus = Self { robots, edges, neighbours, gate, agrees: known };
         let mut order: Vec<usize> = (0..edges.len()).collect();
-        let closing: Vec<usize> = order.iter().map(|&index| consensus.closing_triangles(index)).collect();
-        order.sort_by(|&i, &j| {
-            let spread = |index: usize| edges[index].transform_a_b.spread();
-            Reverse(closing[i]).cmp(&Reverse(closing[j])).then(spread(i).total_cmp(&spread(j))).then(i.cmp(&j))
-        });
+        let spread = |index: usize| edges[index].transform_a_b.spread();
+        order.sort_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(i.cmp(&j)));
         consensus.extend(&order);
         while consensus.make_a_move(&order) {}
         consensus
@@ -59,27 +61,36 @@ impl<'a> Consensus<'a> {
         self.agrees[index]
     }
 
-    /// The edges outside of the set, by rising index.
-    pub(super) fn outside(&self) -> Vec<usize> {
+    fn outside(&self) -> Vec<usize> {
         (0..self.edges.len()).filter(|&index| !self.agrees[index]).collect()
     }
 
-    fn closing_triangles(&self, index: usize) -> usize {
-        let Edge { a, b, transform_a_b } = self.edges[index];
-        let mut by_third = vec![None; self.robots];
-        for &side in self.neighbours.of(b) {
-            by_third[self.edges[side].other(b)] = Some(side);
+    /// The edges of which it cannot be told whether they are right, with a cycle that shows the contradiction.
+    ///
+    /// An edge outside of the set is disputed if following it loses no more than it wins, and so is what it may cost.
+    /// What is disputed vouches for nothing, so the rest is looked at again without it.
+    pub(super) fn disputed(&self) -> BTreeMap<usize, Cycle> {
+        let outside = self.outside();
+        let mut disputed: BTreeMap<usize, Cycle> = BTreeMap::new();
+        loop {
+            let before = disputed.len();
+            let mut moves = Moves::new(self, |index| self.agrees[index] && !disputed.contains_key(&index));
+            for &index in &outside {
+                if disputed.contains_key(&index) {
+                    continue;
+                }
+                let Some(cut) = moves.follow(index, &outside).lost else { continue };
+                let Some(cycle) = self.neighbours.cycle(self.edges, index, |index| self.agrees[index]) else {
+                    continue;
+                };
+                for lost in std::iter::once(index).chain(cut.in_some_cut) {
+                    disputed.entry(lost).or_insert_with(|| cycle.clone());
+                }
+            }
+            if disputed.len() == before {
+                return disputed;
+            }
         }
-        let triangles = self.neighbours.of(a).iter().filter_map(|&side| {
-            let third = self.edges[side].other(a);
-            Some((side, third, by_third[third].filter(|_| third != b)?))
-        });
-        let closes = |&(side_a, third, side_b): &(usize, usize, usize)| {
-            let transform_b_third = self.edges[side_b].transform_from(b);
-            let round = transform_a_b.then(&transform_b_third).then(&self.edges[side_a].transform_from(third));
-            round.distance_from_identity() <= self.gate
-        };
-        triangles.take(WITNESSES).filter(closes).count()
     }
 
     /// Takes in every edge that agrees with the set, in the order given.
@@ -116,7 +127,7 @@ impl<'a> Consensus<'a> {
 }
 
 /// What the moves of robots win and lose, over a part of a set of edges that agree.
-pub(super) struct Moves<'a> {
+struct Moves<'a> {
     edges: &'a [Edge],
     gate: f64,
     forest: Forest,
@@ -126,19 +137,19 @@ pub(super) struct Moves<'a> {
 }
 
 impl<'a> Moves<'a> {
-    /// The moves over those edges of the set for which `used` holds.
-    pub(super) fn new(consensus: &Consensus<'a>, used: impl Fn(usize) -> bool) -> Self {
+    /// The moves over those edges of the set for which `used` holds. The poses are those of the whole set.
+    fn new(consensus: &Consensus<'a>, used: impl Fn(usize) -> bool) -> Self {
         let Consensus { robots, edges, gate, .. } = *consensus;
         let forest = Forest::grow(robots, edges, 0, |index| consensus.agrees[index]);
         let placed = forest.poses_by_tree(edges);
-        let in_use = edges.iter().enumerate().filter(|(index, _)| consensus.agrees[*index] && used(*index));
+        let in_use = edges.iter().enumerate().filter(|(index, _)| used(*index));
         let graph = CutGraph::new(robots, in_use.map(|(index, edge)| (index, edge.a, edge.b)));
         Self { edges, gate, forest, placed, graph }
     }
 
     /// What is lost and won when robot b of an edge outside of the set moves so that the edge agrees, while robot a
     /// stays.
-    pub(super) fn follow(&mut self, index: usize, outside: &[usize]) -> Move {
+    fn follow(&mut self, index: usize, outside: &[usize]) -> Move {
         let Edge { a: stays, b: moved, transform_a_b: transform_stays_moved } = self.edges[index];
         let mut wishes = Vec::new();
         for &other in outside.iter().filter(|&&other| other != index) {
@@ -162,21 +173,20 @@ impl<'a> Moves<'a> {
         [other_moved, other_stays]: [usize; 2],
     ) -> bool {
         let transform_other = self.edges[other].transform_from(other_moved);
-        // The angles alone tell most pairs apart, and cost next to nothing.
+        // The angles alone tell most pairs apart, and cost little.
         let turn = |robot: usize| self.placed[robot].pose.rotation.angle();
         let angle = transform_stays_moved.pose.rotation.angle() + turn(other_moved) - turn(moved)
             + transform_other.pose.rotation.angle()
             + turn(stays)
             - turn(other_stays);
         let ends = [moved, stays, other_moved, other_stays].map(|robot| self.placed[robot].covariance[(2, 2)]);
-        let variance = ends.iter().sum::<f64>()
-            + transform_stays_moved.covariance[(2, 2)]
-            + transform_other.covariance[(2, 2)];
-        if crate::geometry::wrap_angle(angle).powi(2) > self.gate.powi(2) * variance {
+        let variance =
+            ends.iter().sum::<f64>() + transform_stays_moved.covariance[(2, 2)] + transform_other.covariance[(2, 2)];
+        if wrap_angle(angle).powi(2) > self.gate.powi(2) * variance {
             return false;
         }
         let path = |from, to| self.forest.path(self.edges, from, to);
-        let (Some(by_moved), Some(by_stays)) = (path(moved, other_moved), path(other_stays, stays)) else {
+        let (Some((_, by_moved)), Some((_, by_stays))) = (path(moved, other_moved), path(other_stays, stays)) else {
             return false;
         };
         let round = transform_stays_moved.then(&by_moved).then(&transform_other).then(&by_stays);

@@ -2,17 +2,25 @@
 //!
 //! The transforms along a cycle of alignments multiply to the identity, up to their covariances, when all of them are
 //! right. Where they do not, some alignment of the cycle is wrong. It can be told which one only if other cycles vouch
-//! for the rest: an alignment counts as right if it is in every largest set of alignments that agree with each other
-//! (see `consensus`), as wrong if it is in none, and as **disputed** otherwise. In a lone triangle that does not close,
-//! all three are disputed. So are two wrong alignments of a robot that agree with each other, and two right ones; but
-//! two that agree outweigh one.
+//! for the rest: the smallest sets of alignments whose removal makes all cycles agree are found, and an alignment
+//! counts as wrong if it is in all of those sets, as right if it is in none, and as **disputed** otherwise. In a lone
+//! triangle that does not close, all three are disputed. Where two wrong alignments of a robot agree with each other,
+//! and two right ones do, all four are; but two that agree outweigh one.
 //!
-//! Alignments that are in no cycle cannot be checked and count as right. Scores are not weighed: those of different
-//! methods do not compare, and the covariances say how exact an alignment is if it is right, not whether it is.
+//! Alignments that are in no cycle cannot be checked and count as right. Cycles that share no alignment are judged
+//! apart from each other. Where there are few contradictions all sets are tried (`search`), else the largest set of
+//! alignments that agree is sought by moves, and what might be otherwise is disputed (`consensus`).
+//!
+//! Scores are not weighed: those of different methods do not compare. Nor do small covariances speak for an alignment:
+//! they say how exact it is if it is right, not whether it is.
 
-use super::consensus::{Consensus, Moves};
-use super::graph::{Cycle, Edge, Neighbours};
-use std::collections::BTreeMap;
+use super::consensus::Consensus;
+use super::graph::{Cycle, Edge, Forest, Neighbours};
+use super::search::{Search, count_disjoint};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Contradictions apart from each other beyond which not all sets are tried.
+const SEARCHED_DEPTH: usize = 6;
 
 /// What the cycles say of one alignment.
 #[derive(Clone, Debug)]
@@ -26,55 +34,115 @@ pub enum Verdict {
 }
 
 /// Judges every edge. A cycle contradicts if it is more than `gate` standard deviations from closing.
-pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
-    let neighbours = Neighbours::new(robots, edges);
-    let consensus = Consensus::find(robots, edges, &neighbours, gate);
-    let outside = consensus.outside();
-    let disputed = dispute(&consensus, edges, &neighbours, &outside);
-    let is_right = |index: usize| consensus.contains(index) && !disputed.contains_key(&index);
-    let verdict = |index: usize| match disputed.get(&index) {
-        Some(cycle) => Verdict::Disputed(cycle.clone()),
-        None if consensus.contains(index) => Verdict::Right,
-        None => neighbours.cycle(edges, index, is_right).map_or(Verdict::Right, Verdict::Wrong),
-    };
-    (0..edges.len()).map(verdict).collect()
-}
-
-/// The edges of which it cannot be told whether they are right, with a cycle that shows the contradiction.
 ///
-/// An edge outside of the set is disputed if following it loses no more than it wins, and so is what it may cost. What
-/// is disputed vouches for nothing, so the rest is looked at again without it.
-fn dispute(
-    consensus: &Consensus<'_>,
-    edges: &[Edge],
-    neighbours: &Neighbours,
-    outside: &[usize],
-) -> BTreeMap<usize, Cycle> {
-    let mut disputed: BTreeMap<usize, Cycle> = BTreeMap::new();
-    loop {
-        let before = disputed.len();
-        let mut moves = Moves::new(consensus, |index| !disputed.contains_key(&index));
-        for &index in outside {
-            if disputed.contains_key(&index) {
-                continue;
-            }
-            let Some(cut) = moves.follow(index, outside).lost else { continue };
-            let Some(cycle) = neighbours.cycle(edges, index, |index| consensus.contains(index)) else { continue };
-            for lost in std::iter::once(index).chain(cut.in_some_cut) {
-                disputed.entry(lost).or_insert_with(|| cycle.clone());
-            }
+/// `known` marks edges that were right when the rest was judged before: they agree with each other. It saves work, and
+/// may mark none.
+pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Verdict> {
+    let mut verdicts = vec![Verdict::Right; edges.len()];
+    let neighbours = Neighbours::new(robots, edges);
+    let is_open = |cycle: &Cycle| cycle.remainder.distance_from_identity() > gate;
+    // A long cycle may hide what a short one shows.
+    let unknown = (0..edges.len()).filter(|&index| !known[index]);
+    let open: BTreeSet<usize> = unknown
+        .filter(|&index| neighbours.cycle(edges, index, |_| true).is_some_and(|cycle| is_open(&cycle)))
+        .collect();
+    let forest = Forest::grow(robots, edges, 0, |_| true);
+    let closing = (0..edges.len()).filter(|&index| !forest.contains(index, &edges[index]));
+    let cycles: Vec<Cycle> = closing.filter_map(|index| forest.cycle(edges, index)).collect();
+    if open.is_empty() && !cycles.iter().any(is_open) {
+        return verdicts;
+    }
+    for group in groups_of_cycles(&cycles, edges.len()) {
+        let mut search = Search::new(robots, edges, &group, gate);
+        let contradictions = search.contradictions();
+        if contradictions.is_empty() && !group.iter().any(|index| open.contains(index)) {
+            continue;
         }
-        if disputed.len() == before {
-            return disputed;
+        let depth = count_disjoint(&contradictions);
+        let removals = match depth {
+            1..=SEARCHED_DEPTH => search.smallest_removals(contradictions.len()),
+            _ => Vec::new(),
+        };
+        if removals.is_empty() {
+            judge_by_moves(robots, edges, known, gate, &group, &mut verdicts);
+            continue;
+        }
+        let right: BTreeSet<usize> =
+            group.iter().copied().filter(|edge| !removals.iter().any(|set| set.contains(edge))).collect();
+        for &index in group.iter().filter(|index| !right.contains(index)) {
+            let shown = contradictions.iter().find(|cycle| cycle.edges.contains(&index)).or(contradictions.first());
+            let is_in_all = removals.iter().all(|set| set.contains(&index));
+            verdicts[index] = match (is_in_all, neighbours.cycle(edges, index, |index| right.contains(&index)), shown) {
+                (true, Some(cycle), _) => Verdict::Wrong(cycle),
+                (_, _, Some(cycle)) => Verdict::Disputed(cycle.clone()),
+                (_, _, None) => Verdict::Right,
+            };
         }
     }
+    verdicts
 }
+
+/// Judges a group of edges that share cycles, however many contradictions there are.
+fn judge_by_moves(robots: usize, edges: &[Edge], known: &[bool], gate: f64, group: &[usize], verdicts: &mut [Verdict]) {
+    let own: Vec<Edge> = group.iter().map(|&index| edges[index]).collect();
+    let known = group.iter().map(|&index| known[index]).collect();
+    let neighbours = Neighbours::new(robots, &own);
+    let consensus = Consensus::find(robots, &own, &neighbours, known, gate);
+    let disputed = consensus.disputed();
+    let is_right = |index: usize| consensus.contains(index) && !disputed.contains_key(&index);
+    let in_all_edges = |cycle: Cycle| Cycle {
+        edges: cycle.edges.iter().map(|&index| group[index]).collect(),
+        remainder: cycle.remainder,
+    };
+    for (index, &place) in group.iter().enumerate().filter(|(index, _)| !is_right(*index)) {
+        verdicts[place] = match disputed.get(&index) {
+            Some(cycle) => Verdict::Disputed(in_all_edges(cycle.clone())),
+            None => match neighbours.cycle(&own, index, is_right) {
+                Some(cycle) => Verdict::Wrong(in_all_edges(cycle)),
+                None => Verdict::Right,
+            },
+        };
+    }
+}
+
+/// The edges that lie on cycles, in groups: two edges are in one group if a cycle goes through both (the biconnected
+/// components of the graph). Each group by rising index.
+///
+/// `cycles` are those that the edges outside of a spanning forest close; joining the edges of each gives the groups.
+fn groups_of_cycles(cycles: &[Cycle], edge_count: usize) -> Vec<Vec<usize>> {
+    let mut leader: Vec<usize> = (0..edge_count).collect();
+    let mut on_cycle = BTreeSet::new();
+    for cycle in cycles {
+        for (&one, &next) in cycle.edges.iter().zip(cycle.edges.iter().skip(1)) {
+            on_cycle.extend([one, next]);
+            let (one, next) = (find(&mut leader, one), find(&mut leader, next));
+            leader[one.max(next)] = one.min(next);
+        }
+    }
+    let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for index in on_cycle {
+        groups.entry(find(&mut leader, index)).or_default().push(index);
+    }
+    groups.into_values().collect()
+}
+
+/// The leader of a set, with path halving.
+fn find(leader: &mut [usize], mut member: usize) -> usize {
+    while leader[member] != member {
+        leader[member] = leader[leader[member]];
+        member = leader[member];
+    }
+    member
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::UncertainPose;
+    use super::super::team::Team;
     use super::*;
     use crate::geometry::{Pose2, pose};
     use nalgebra::Matrix3;
+    use proptest::prelude::*;
 
     /// Robots on a spiral, and edges between them; those in `wrong` are off by two metres.
     fn edges(pairs: &[(usize, usize)], wrong: &[(usize, usize)]) -> Vec<Edge> {
@@ -90,14 +158,22 @@ mod tests {
         pairs.iter().enumerate().map(edge).collect()
     }
 
+    fn judge_all(robots: usize, edges: &[Edge]) -> Vec<Verdict> {
+        judge(robots, edges, &vec![false; edges.len()], 4.0)
+    }
+
     /// `.` right, `x` wrong, `?` disputed.
     fn verdicts(robots: usize, pairs: &[(usize, usize)], wrong: &[(usize, usize)]) -> String {
+        letters(&judge_all(robots, &edges(pairs, wrong)))
+    }
+
+    fn letters(verdicts: &[Verdict]) -> String {
         let letter = |verdict: &Verdict| match verdict {
             Verdict::Right => '.',
             Verdict::Wrong(_) => 'x',
             Verdict::Disputed(_) => '?',
         };
-        judge(robots, &edges(pairs, wrong), 4.0).iter().map(letter).collect()
+        verdicts.iter().map(letter).collect()
     }
 
     fn complete(robots: usize) -> Vec<(usize, usize)> {
@@ -148,10 +224,74 @@ mod tests {
         assert_eq!(verdicts(24, &pairs, &wrong), expected);
     }
 
+    /// The same letters by trying all sets of edges.
+    fn verdicts_by_trial(robots: usize, edges: &[Edge]) -> String {
+        let agrees = |set: u32| {
+            let used = |index: usize| set >> index & 1 == 1;
+            let poses = Forest::grow(robots, edges, 0, used).poses_by_tree(edges);
+            edges.iter().enumerate().filter(|(index, _)| used(*index)).all(|(_, edge)| {
+                let off = poses[edge.a].pose.inverse() * poses[edge.b].pose * edge.transform_a_b.pose.inverse();
+                off.translation.vector.norm() < 0.01 && off.rotation.angle().abs() < 0.01
+            })
+        };
+        let sets: Vec<u32> = (0..1 << edges.len()).filter(|&set| agrees(set)).collect();
+        let most = sets.iter().map(|set| set.count_ones()).max().unwrap();
+        let largest = || sets.iter().filter(|set| set.count_ones() == most);
+        let letter = |index: usize| match largest().filter(|&set| set >> index & 1 == 1).count() {
+            0 => 'x',
+            count if count == largest().count() => '.',
+            _ => '?',
+        };
+        (0..edges.len()).map(letter).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_verdicts_on_few_robots_are_those_of_all_sets(
+            robots in 3usize..=5,
+            steps in prop::collection::vec(0u8..12, 10),
+        ) {
+            // A mistake is a step in the frame of the building, so that mistakes often agree with each other.
+            let error = |index: usize| pose(2.0 * f64::from(steps[index].saturating_sub(8)), 0.0, 0.0);
+            let place = |robot: usize| pose(3.0 * robot as f64, (robot * robot) as f64, robot as f64);
+            let edge = |(index, (a, b)): (usize, (usize, usize))| {
+                let pose = place(a).inverse() * error(index) * place(b);
+                Edge { a, b, transform_a_b: UncertainPose { pose, covariance: Matrix3::identity() * 1e-6 } }
+            };
+            let edges: Vec<Edge> = complete(robots).into_iter().enumerate().map(edge).collect();
+            let (judged, expected) = (letters(&judge_all(robots, &edges)), verdicts_by_trial(robots, &edges));
+            for (judged, expected) in judged.chars().zip(expected.chars()) {
+                prop_assert_eq!(judged == '.', expected == '.');
+                // What no right path leads round is disputed, though it be in none of the largest sets.
+                prop_assert!(judged != 'x' || expected == 'x');
+            }
+        }
+    }
+
     #[test]
     fn a_tangle_that_takes_too_long_is_disputed() {
         let pairs = complete(9);
         let wrong: Vec<_> = pairs.iter().copied().filter(|(a, b)| (a + b) % 5 != 0).collect();
         assert_eq!(verdicts(9, &pairs, &wrong), "?".repeat(pairs.len()));
+    }
+
+    #[test]
+    fn among_many_robots_with_many_mistakes_no_wrong_alignment_counts_as_right() {
+        let team = Team::new(32, 6, 3).with_mistakes(0.2);
+        let verdicts = judge_all(32, &team.edges);
+        assert!(team.wrong.iter().all(|&index| !matches!(verdicts[index], Verdict::Right)));
+        let right = verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Right)).count();
+        assert!(right > 70 * (team.edges.len() - team.wrong.len()) / 100, "{right} of {}", team.edges.len());
+    }
+
+    #[test]
+    fn two_wrong_alignments_that_agree_are_outweighed_by_more_right_ones() {
+        for seed in 0..20 {
+            let team = Team::new(10, 9, seed).with_agreeing_mistakes(0.1);
+            assert_eq!(team.wrong.len(), 4);
+            for (index, verdict) in judge_all(10, &team.edges).iter().enumerate() {
+                assert_eq!(matches!(verdict, Verdict::Wrong(_)), team.wrong.contains(&index), "{seed} {index}");
+            }
+        }
     }
 }

@@ -36,35 +36,43 @@ pub struct Cycle {
 
 /// The edges of a pose graph by the robots at their ends.
 #[derive(Clone, Debug)]
-pub struct Neighbours(Vec<Vec<usize>>);
+pub struct Neighbours {
+    edges_of: Vec<Vec<usize>>,
+    /// The least spread of the edges of each robot.
+    least_spread: Vec<f64>,
+}
 
 impl Neighbours {
     /// Sorts all edges by their ends.
     pub fn new(robots: usize, edges: &[Edge]) -> Self {
-        let mut neighbours = vec![Vec::new(); robots];
+        let mut edges_of = vec![Vec::new(); robots];
+        let mut least_spread = vec![f64::INFINITY; robots];
         for (index, edge) in edges.iter().enumerate() {
-            neighbours[edge.a].push(index);
-            neighbours[edge.b].push(index);
+            for robot in [edge.a, edge.b] {
+                edges_of[robot].push(index);
+                least_spread[robot] = edge.transform_a_b.spread().min(least_spread[robot]);
+            }
         }
-        Self(neighbours)
+        Self { edges_of, least_spread }
     }
 
     /// The edges of a robot, by rising index.
     pub fn of(&self, robot: usize) -> &[usize] {
-        &self.0[robot]
+        &self.edges_of[robot]
     }
 
     /// The cycle that an edge closes with the path of least variance between its ends over the other edges for which
     /// `used` holds (Dijkstra's algorithm on [`UncertainPose::spread`]). `None` if there is no such path.
     pub fn cycle(&self, edges: &[Edge], closing: usize, used: impl Fn(usize) -> bool) -> Option<Cycle> {
         let Edge { a, b, transform_a_b } = edges[closing];
-        let mut cost = vec![f64::INFINITY; self.0.len()];
-        let mut reached = vec![false; self.0.len()];
-        let mut parent = vec![None; self.0.len()];
+        let mut cost = vec![f64::INFINITY; self.edges_of.len()];
+        let mut reached = vec![false; self.edges_of.len()];
+        let mut parent = vec![None; self.edges_of.len()];
         cost[a] = 0.0;
         let mut border = vec![a];
         while let Some(robot) = take_cheapest(&mut border, &cost) {
-            if robot == b {
+            // Nothing that lies between can lead to the goal on a shorter way.
+            if robot == b || cost[robot] + self.least_spread[b] >= cost[b] {
                 break;
             }
             reached[robot] = true;
@@ -139,9 +147,24 @@ impl Forest {
         forest
     }
 
-    /// `T_from_to` along the trees. `None` if the robots lie in different trees.
-    pub fn path(&self, edges: &[Edge], from: usize, to: usize) -> Option<UncertainPose> {
+    /// Whether the edge is part of a tree.
+    pub fn contains(&self, index: usize, edge: &Edge) -> bool {
+        [edge.a, edge.b].iter().any(|&robot| self.parent[robot].is_some_and(|(through, _)| through == index))
+    }
+
+    /// The cycle that an edge outside of the trees closes with them. `None` if its ends lie in different trees.
+    pub fn cycle(&self, edges: &[Edge], closing: usize) -> Option<Cycle> {
+        let edge = &edges[closing];
+        let (mut on_cycle, transform_b_a) = self.path(edges, edge.b, edge.a)?;
+        on_cycle.insert(0, closing);
+        Some(Cycle { edges: on_cycle, remainder: edge.transform_a_b.then(&transform_b_a) })
+    }
+
+    /// The edges along the trees between two robots, in no order, and `T_from_to` along them. `None` if the robots lie
+    /// in different trees.
+    pub fn path(&self, edges: &[Edge], from: usize, to: usize) -> Option<(Vec<usize>, UncertainPose)> {
         let mut sides = [(from, UncertainPose::identity()), (to, UncertainPose::identity())];
+        let mut on_path = Vec::new();
         while sides[0].0 != sides[1].0 {
             // The deeper side climbs, so that both meet at their nearest common ancestor.
             let climbs = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
@@ -149,9 +172,10 @@ impl Forest {
             let (through, parent) = self.parent[*robot]?;
             *transform_end_robot = transform_end_robot.then(&edges[through].transform_from(*robot));
             *robot = parent;
+            on_path.push(through);
         }
         let [(_, transform_from_meet), (_, transform_to_meet)] = sides;
-        Some(transform_from_meet.then(&transform_to_meet.inverse()))
+        Some((on_path, transform_from_meet.then(&transform_to_meet.inverse())))
     }
 
     /// `T_root_robot` for every robot, along its tree, whichever root that has.
@@ -206,7 +230,10 @@ mod tests {
         let forest = Forest::grow(4, &edges, 0, |_| true);
         let poses = forest.poses(&edges, 0);
         assert_eq!(poses[2].unwrap().pose.translation.x, 2.0);
-        assert_eq!(forest.path(&edges, 2, 1).unwrap().pose.translation.x, -1.0);
+        assert!(forest.contains(1, &edges[1]) && !forest.contains(2, &edges[2]));
+        let cycle = forest.cycle(&edges, 2).unwrap();
+        assert_eq!((cycle.edges[0], cycle.edges.len(), cycle.remainder.pose.translation.x), (2, 3, 3.0));
+        assert_eq!(forest.path(&edges, 2, 1).unwrap().1.pose.translation.x, -1.0);
         assert!(forest.path(&edges, 2, 3).is_none());
     }
 

@@ -18,8 +18,11 @@ pub mod graph;
 pub mod optimize;
 mod parameters;
 mod reasons;
+mod search;
 pub mod solve;
 mod stage;
+#[cfg(test)]
+mod team;
 #[cfg(test)]
 mod tests;
 pub mod uncertain;
