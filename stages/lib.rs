@@ -1,14 +1,17 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
-//! it `stage.rs`, the thin adapter that turns messages into calls.
+//! it `stage.rs`, the thin adapter that turns messages into calls. `geometry` and `hypotheses` are what several stages
+//! share.
 
 #![forbid(unsafe_code)]
 
 pub mod frame_solver;
 pub mod geometry;
 pub mod grid_fuser;
+pub mod hypotheses;
 pub mod icp_refiner;
 pub mod line_extractor;
 pub mod map_aligner;
+pub mod merge_verifier;
 pub mod quadrant_classifier;
 pub mod simulator;
 pub mod tag_filter;
@@ -24,6 +27,7 @@ pub fn kinds() -> Vec<StageKind> {
         icp_refiner::kind(),
         line_extractor::kind(),
         map_aligner::kind(),
+        merge_verifier::kind(),
         quadrant_classifier::kind(),
         simulator::kind(),
         tag_filter::kind(),

@@ -1,7 +1,8 @@
 //! Floor plans for tests, and maps of them as robots would draw them.
 
-use super::{FirstGuess, IcpParameters, MapView, WallMap};
+use super::{FirstGuess, IcpParameters, WallMap};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN};
+use crate::merge_verifier::MapView;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Half of a wall's thickness, metres.

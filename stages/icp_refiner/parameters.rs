@@ -68,28 +68,6 @@ pub struct IcpParameters {
     pub yaw_slack: f64,
     /// How many standard deviations of the first guess the refined transform may lie away from it.
     pub max_step: f64,
-    /// Two walls agree when they lie within this distance, metres; never less than 1.5 cells of the coarser map.
-    pub wall_tolerance: f64,
-    /// The least area that both maps know, square metres.
-    pub min_overlap: f64,
-    /// The least length of wall on which the maps agree, metres.
-    pub min_wall_length: f64,
-    /// The least share of the walls seen by both maps on which they agree, 0 to 1; what is left is wall in one map and
-    /// free space in the other. On maps of six buildings that were drawn from laser scans, and where the two bounds above
-    /// are met, right alignments have 0.89 to 0.99, and the best of 17,000 registrations from wrong starts has 0.66.
-    pub min_wall_agreement: f64,
-    /// The least area that both maps know where the first guess is provisional (it rests on two tags, say), square metres.
-    pub provisional_overlap: f64,
-    /// The least length of wall on which the maps agree where the first guess is provisional, metres.
-    pub provisional_wall_length: f64,
-    /// The least share of the walls seen by both maps on which they agree where the first guess is provisional, 0 to 1.
-    pub provisional_wall_agreement: f64,
-    /// Where the first guess is provisional, map b is also laid elsewhere: turned by quarter turns, and moved by up to this
-    /// many metres. 0 only turns it.
-    pub rival_reach: f64,
-    /// At each of these other places the share of the walls that agree must be less than at the refined one by this,
-    /// 0 to 1.
-    pub rival_margin: f64,
     /// The greatest standard deviation of the position in the common section, in any direction, metres.
     pub max_position_deviation: f64,
     /// The greatest standard deviation of the rotation, radians.
@@ -121,31 +99,10 @@ impl Default for IcpParameters {
             position_slack: 0.1,
             yaw_slack: 0.02,
             max_step: 5.0,
-            wall_tolerance: 0.1,
-            min_overlap: 40.0,
-            min_wall_length: 25.0,
-            min_wall_agreement: 0.8,
-            provisional_overlap: 80.0,
-            provisional_wall_length: 50.0,
-            provisional_wall_agreement: 0.9,
-            rival_reach: 4.0,
-            rival_margin: 0.15,
             max_position_deviation: 0.2,
             max_yaw_deviation: 0.02,
             reuse_within: 0.05,
             reuse_within_yaw: 0.01,
-        }
-    }
-}
-
-impl IcpParameters {
-    /// The same with what a provisional first guess must meet, for what any first guess must meet.
-    pub(super) fn for_provisional(&self) -> Self {
-        Self {
-            min_overlap: self.min_overlap.max(self.provisional_overlap),
-            min_wall_length: self.min_wall_length.max(self.provisional_wall_length),
-            min_wall_agreement: self.min_wall_agreement.max(self.provisional_wall_agreement),
-            ..self.clone()
         }
     }
 }
@@ -164,7 +121,6 @@ impl Parameters for IcpParameters {
             ("position_slack", self.position_slack),
             ("yaw_slack", self.yaw_slack),
             ("max_step", self.max_step),
-            ("wall_tolerance", self.wall_tolerance),
             ("max_position_deviation", self.max_position_deviation),
             ("max_yaw_deviation", self.max_yaw_deviation),
         ];
@@ -173,15 +129,7 @@ impl Parameters for IcpParameters {
                 errors.push(ParameterError::new(field, format!("must be a finite number above 0, not {value}")));
             }
         }
-        let not_negative = [
-            ("min_overlap", self.min_overlap),
-            ("min_wall_length", self.min_wall_length),
-            ("provisional_overlap", self.provisional_overlap),
-            ("provisional_wall_length", self.provisional_wall_length),
-            ("rival_reach", self.rival_reach),
-            ("reuse_within", self.reuse_within),
-            ("reuse_within_yaw", self.reuse_within_yaw),
-        ];
+        let not_negative = [("reuse_within", self.reuse_within), ("reuse_within_yaw", self.reuse_within_yaw)];
         for (field, value) in not_negative {
             if !(value.is_finite() && value >= 0.0) {
                 errors.push(ParameterError::new(field, format!("must be a finite number from 0 up, not {value}")));
@@ -192,16 +140,6 @@ impl Parameters for IcpParameters {
         }
         if !(self.shrink > 0.0 && self.shrink < 1.0) {
             errors.push(ParameterError::new("shrink", format!("must lie between 0 and 1, not {}", self.shrink)));
-        }
-        let shares = [
-            ("min_wall_agreement", self.min_wall_agreement),
-            ("provisional_wall_agreement", self.provisional_wall_agreement),
-            ("rival_margin", self.rival_margin),
-        ];
-        for (field, value) in shares {
-            if !(0.0..=1.0).contains(&value) {
-                errors.push(ParameterError::new(field, format!("must lie between 0 and 1, not {value}")));
-            }
         }
         for (field, value) in [("max_iterations", self.max_iterations), ("coarse_points", self.coarse_points)] {
             if value == 0 {

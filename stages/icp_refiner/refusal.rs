@@ -1,6 +1,6 @@
 //! Why a refined alignment may not be used.
 
-use super::{Agreement, IcpParameters, Registration, Rival};
+use super::{IcpParameters, Registration};
 use nalgebra::{Matrix2, SymmetricEigen};
 
 /// More steps than the main axes of two numbers ever take.
@@ -17,39 +17,6 @@ pub enum Refusal {
     NotConverged {
         /// Iterations made.
         iterations: usize,
-    },
-    /// The maps share too little.
-    #[error("the maps overlap by {overlap:.0} m2, and at least {least:.0} m2 are needed")]
-    Overlap {
-        /// Area that both maps know, square metres.
-        overlap: f64,
-        /// What is asked for, square metres.
-        least: f64,
-    },
-    /// Too little wall lies on wall.
-    #[error("the maps agree on {length:.1} m of wall, and at least {least:.1} m are needed")]
-    WallLength {
-        /// Metres of wall on which the maps agree.
-        length: f64,
-        /// What is asked for, metres.
-        least: f64,
-    },
-    /// Walls lie where the other map knows free space.
-    #[error(
-        "the maps contradict each other: {agree:.1} m of wall agree, but {against:.1} m of wall lie on the other map's \
-         free space ({:.0} % agree, and at least {:.0} % are needed)",
-        share * 100.0,
-        least * 100.0
-    )]
-    WallAgreement {
-        /// Metres of wall on which the maps agree.
-        agree: f64,
-        /// Metres of wall on free space.
-        against: f64,
-        /// The share that agrees, 0 to 1.
-        share: f64,
-        /// What is asked for, 0 to 1.
-        least: f64,
     },
     /// The maps pull away from the first guess.
     #[error(
@@ -75,26 +42,6 @@ pub enum Refusal {
         /// What is allowed, metres.
         most: f64,
     },
-    /// The first guess is provisional, and the maps fit elsewhere nearly as well.
-    #[error(
-        "{:.0} % of the walls agree, but {:.0} % do with the map moved by {shift:.1} m and turned by {turn:.0} degrees, and \
-         at least {:.0} % less are needed: it cannot be told which is right",
-        share * 100.0,
-        rival * 100.0,
-        margin * 100.0
-    )]
-    Rival {
-        /// The share of the walls that agree, 0 to 1.
-        share: f64,
-        /// The share that agrees elsewhere, 0 to 1.
-        rival: f64,
-        /// How far elsewhere is, metres.
-        shift: f64,
-        /// How much the map is turned there, degrees.
-        turn: f64,
-        /// By how much the share must be less, 0 to 1.
-        margin: f64,
-    },
     /// The rotation is open.
     #[error("the maps leave the rotation open: it is known to {deviation:.1} degrees, and {most:.1} are allowed")]
     OpenRotation {
@@ -106,9 +53,8 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// The first reason against an alignment, if there is one.
-    pub fn of(registration: &Registration, agreement: &Agreement, parameters: &IcpParameters) -> Option<Self> {
-        let (agree, against, share) = (agreement.wall_on_wall, agreement.wall_on_free, agreement.wall_agreement());
+    /// The first reason against a registration, if there is one.
+    pub fn of(registration: &Registration, parameters: &IcpParameters) -> Option<Self> {
         let (along, direction) =
             widest_deviation(&registration.centre_covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let turn = registration.centre_covariance.m33.sqrt();
@@ -118,12 +64,6 @@ impl Refusal {
             Some(Self::NoWalls)
         } else if !registration.converged {
             Some(Self::NotConverged { iterations: registration.iterations })
-        } else if !at_least(agreement.overlap, parameters.min_overlap) {
-            Some(Self::Overlap { overlap: agreement.overlap, least: parameters.min_overlap })
-        } else if !at_least(agree, parameters.min_wall_length) {
-            Some(Self::WallLength { length: agree, least: parameters.min_wall_length })
-        } else if !at_least(share, parameters.min_wall_agreement) {
-            Some(Self::WallAgreement { agree, against, share, least: parameters.min_wall_agreement })
         } else if !at_least(parameters.max_step, registration.step) {
             Some(Self::Step { step: registration.step, most: parameters.max_step })
         } else if !at_least(parameters.max_position_deviation, along) {
@@ -135,21 +75,6 @@ impl Refusal {
         } else {
             None
         }
-    }
-}
-
-impl Refusal {
-    /// The reason against a provisional alignment that a rival gives, if it comes near.
-    pub(super) fn by_rival(agreement: &Agreement, rival: &Rival, parameters: &IcpParameters) -> Option<Self> {
-        let (share, margin) = (agreement.wall_agreement(), parameters.rival_margin);
-        let is_clear = share - rival.agreement.wall_agreement() >= margin;
-        (!is_clear).then(|| Self::Rival {
-            share,
-            rival: rival.agreement.wall_agreement(),
-            shift: rival.shift,
-            turn: rival.turn.to_degrees(),
-            margin,
-        })
     }
 }
 

@@ -1,7 +1,6 @@
 //! ICP: moves map b so that its walls lie on those of map a.
 
 use super::iteration::Iteration;
-use super::verify::stride;
 use super::{FirstGuess, IcpParameters, WallMap};
 use crate::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, Vector3};
@@ -88,7 +87,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
 }
 
 /// Registers roughly, to within the cells of the maps: a sample of the points of map b, from the first guess only.
-pub(super) fn approach(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Pose2 {
+pub(crate) fn approach(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Pose2 {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
     let stride = stride(b.walls.points().len(), parameters.coarse_points);
     draw_near(&mut iteration, first_guess.transform_a_b, stride, parameters).0
@@ -127,4 +126,9 @@ fn starts(
         }
     }
     starts
+}
+
+/// Every how many-th of `count` points makes a sample of at most so many.
+pub(crate) fn stride(count: usize, most_points: usize) -> usize {
+    count.div_ceil(most_points.max(1)).max(1)
 }

@@ -1,7 +1,9 @@
-//! The stage: keeps each robot's map with its walls, and refines each pair's first guess when one of the three changes.
+//! The stage: keeps each robot's map with its walls, and refines the first guesses for a pair when one of the maps or the
+//! guesses change.
 
-use super::{FirstGuess, IcpParameters, MapView, Refinement, WallMap, refine, refine_provisional};
+use super::{FirstGuess, IcpParameters, Refinement, WallMap, refine};
 use crate::geometry::{read_map, row_by_row, wrap_angle};
+use crate::hypotheses::{HypothesisGatherer, Origin};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, Header};
 use gridweave_runtime::stage::{Output, Stage, StageError};
@@ -18,7 +20,8 @@ const ALIGNMENT_OUTPUT: usize = 0;
 pub(super) struct IcpRefiner {
     parameters: IcpParameters,
     maps: BTreeMap<String, RobotMap>,
-    pairs: BTreeMap<(String, String), Pair>,
+    gatherer: HypothesisGatherer,
+    guesses: BTreeMap<Origin, Guesses>,
     /// Registrations made, for the report.
     registrations: u64,
 }
@@ -31,15 +34,14 @@ struct RobotMap {
     walls: OnceCell<WallMap>,
 }
 
-/// A pair of robots: the last first guess, and what was made of it.
+/// The last first guesses of one stage for one pair of robots, by rank, and what was made of them.
 #[derive(Default)]
-struct Pair {
-    /// The robot that the first guess's message was about; empty as a rule.
+struct Guesses {
+    /// The robot that the message was about; empty as a rule.
     robot: String,
-    /// The last first guess, refused or not.
-    first_guess: Alignment,
-    refined: Option<Refined>,
-    sent: Option<Alignment>,
+    first: Vec<Alignment>,
+    refined: Vec<Refined>,
+    sent: Vec<Alignment>,
 }
 
 /// A refinement and what it was made from.
@@ -52,7 +54,13 @@ struct Refined {
 
 impl IcpRefiner {
     pub(super) fn new(parameters: IcpParameters) -> Self {
-        Self { parameters, maps: BTreeMap::new(), pairs: BTreeMap::new(), registrations: 0 }
+        Self {
+            parameters,
+            maps: BTreeMap::new(),
+            gatherer: HypothesisGatherer::default(),
+            guesses: BTreeMap::new(),
+            registrations: 0,
+        }
     }
 
     fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
@@ -64,8 +72,8 @@ impl IcpRefiner {
         let number = self.maps.get(robot).map_or(0, |map| map.number + 1);
         let map = RobotMap { message: message.clone(), number, walls: OnceCell::new() };
         self.maps.insert(robot.to_owned(), map);
-        let pairs: Vec<_> = self.pairs.keys().filter(|(a, b)| a == robot || b == robot).cloned().collect();
-        pairs.iter().try_for_each(|pair| self.update(pair, output))
+        let origins: Vec<Origin> = self.guesses.keys().filter(|origin| origin.concerns(robot)).cloned().collect();
+        origins.iter().try_for_each(|origin| self.update(origin, output))
     }
 
     fn receive_alignment(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
@@ -80,34 +88,50 @@ impl IcpRefiner {
             output.warn("a first guess was left out: it holds a value that is no finite number");
             return Ok(());
         }
-        let key = (first_guess.a.clone(), first_guess.b.clone());
-        let pair = self.pairs.entry(key.clone()).or_default();
-        pair.robot = message.robot().to_owned();
-        pair.first_guess = first_guess;
-        self.update(&key, output)
+        match self.gatherer.add(first_guess) {
+            Ok(None) => Ok(()),
+            Ok(Some((origin, first))) => {
+                let guesses = self.guesses.entry(origin.clone()).or_default();
+                guesses.robot = message.robot().to_owned();
+                guesses.first = first;
+                self.update(&origin, output)
+            }
+            Err(missing) => {
+                output.warn(missing.to_string());
+                Ok(())
+            }
+        }
     }
 
-    /// Sends what is known of a pair, if it is not what was sent last.
-    fn update(&mut self, key: &(String, String), output: &mut Output<'_>) -> Result<(), StageError> {
-        let Some(pair) = self.pairs.get_mut(key) else { return Ok(()) };
-        if !pair.first_guess.accepted {
-            return pair.send(pair.first_guess.clone(), output);
+    /// Sends what is known of some guesses, if it is not what was sent last.
+    fn update(&mut self, origin: &Origin, output: &mut Output<'_>) -> Result<(), StageError> {
+        let Some(guesses) = self.guesses.get_mut(origin) else { return Ok(()) };
+        let maps = self.maps.get(&origin.a).zip(self.maps.get(&origin.b));
+        if maps.is_none() && guesses.first.iter().any(|guess| guess.accepted) {
+            return Ok(());
         }
-        let (Some(a), Some(b)) = (self.maps.get(&key.0), self.maps.get(&key.1)) else { return Ok(()) };
-        let reusable = pair.refined.take().filter(|refined| {
-            refined.maps == (a.number, b.number) && refined.holds_for(&pair.first_guess, &self.parameters)
-        });
-        let refined = match reusable {
-            Some(refined) => refined,
-            None => {
-                self.registrations += 1;
-                let refinement = refine_pair(a, b, &pair.first_guess, &self.parameters)?;
-                Refined { maps: (a.number, b.number), first_guess: pair.first_guess.clone(), refinement }
-            }
-        };
-        let alignment = refined.alignment(&pair.first_guess, output);
-        pair.refined = Some(refined);
-        pair.send(alignment, output)
+        let mut before = std::mem::take(&mut guesses.refined).into_iter();
+        let mut alignments = Vec::with_capacity(guesses.first.len());
+        for guess in &guesses.first {
+            let Some((a, b)) = maps.filter(|_| guess.accepted) else {
+                alignments.push(guess.clone());
+                continue;
+            };
+            let reusable = before
+                .next()
+                .filter(|refined| refined.maps == (a.number, b.number) && refined.holds_for(guess, &self.parameters));
+            let refined = match reusable {
+                Some(refined) => refined,
+                None => {
+                    self.registrations += 1;
+                    let refinement = refine_pair(a, b, guess, &self.parameters)?;
+                    Refined { maps: (a.number, b.number), first_guess: guess.clone(), refinement }
+                }
+            };
+            alignments.push(refined.alignment(guess, output));
+            guesses.refined.push(refined);
+        }
+        guesses.send(alignments, output)
     }
 }
 
@@ -119,18 +143,18 @@ impl Stage for IcpRefiner {
         }
     }
 
-    /// A pair that waits for a map to the end is refused, so that it does not go missing.
+    /// Guesses that wait for a map to the end are refused, so that they do not go missing.
     fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
-        for ((a, b), pair) in &mut self.pairs {
+        for (Origin { a, b, .. }, guesses) in &mut self.guesses {
             let missing: Vec<&str> =
                 [a, b].into_iter().filter(|robot| !self.maps.contains_key(*robot)).map(String::as_str).collect();
-            if pair.first_guess.accepted && !missing.is_empty() {
-                let mut alignment = pair.first_guess.clone();
-                alignment.accepted = false;
-                alignment.reason =
-                    format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
-                pair.send(alignment, output)?;
+            if missing.is_empty() || guesses.first.iter().all(|guess| !guess.accepted) {
+                continue;
             }
+            let reason =
+                format!("no usable map of {} has come, so the alignment cannot be refined", missing.join(" and "));
+            let refused = |guess: &Alignment| Alignment { accepted: false, reason: reason.clone(), ..guess.clone() };
+            guesses.send(guesses.first.iter().map(refused).collect(), output)?;
         }
         Ok(())
     }
@@ -140,17 +164,19 @@ impl Stage for IcpRefiner {
     }
 }
 
-impl Pair {
-    /// Sends an alignment, unless it tells only what was sent last.
-    fn send(&mut self, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
-        if let Some(sent) = &mut self.sent {
-            sent.header = alignment.header.clone();
-        }
-        if self.sent.as_ref() == Some(&alignment) {
+impl Guesses {
+    /// Sends alignments, unless they tell only what was sent last. They are sent together, as they are judged together.
+    fn send(&mut self, alignments: Vec<Alignment>, output: &mut Output<'_>) -> Result<(), StageError> {
+        let is_same = |(sent, alignment): (&Alignment, &Alignment)| {
+            *sent == Alignment { header: sent.header.clone(), ..alignment.clone() }
+        };
+        if self.sent.len() == alignments.len() && self.sent.iter().zip(&alignments).all(is_same) {
             return Ok(());
         }
-        output.send(ALIGNMENT_OUTPUT, &self.robot, &alignment)?;
-        self.sent = Some(alignment);
+        for alignment in &alignments {
+            output.send(ALIGNMENT_OUTPUT, &self.robot, alignment)?;
+        }
+        self.sent = alignments;
         Ok(())
     }
 }
@@ -162,9 +188,6 @@ impl Refined {
     /// guess, and holds for that alone.
     fn holds_for(&self, first_guess: &Alignment, parameters: &IcpParameters) -> bool {
         let before = &self.first_guess;
-        if before.provisional != first_guess.provisional {
-            return false;
-        }
         if self.refinement.refusal.is_some() {
             return (before.x, before.y, before.yaw, before.covariance)
                 == (first_guess.x, first_guess.y, first_guess.yaw, first_guess.covariance);
@@ -176,37 +199,16 @@ impl Refined {
             && wrap_angle(before.yaw - first_guess.yaw).abs() <= parameters.reuse_within_yaw
     }
 
-    /// What speaks for or against it. A provisional first guess has its own reason in it, for the walls alone are not
-    /// what the alignment rests on.
-    fn reason(&self, first_guess: &Alignment) -> String {
-        let by_walls = self.refinement.reason();
-        let Refinement { rival, refusal, agreement, .. } = &self.refinement;
-        let before = &first_guess.reason;
-        match (first_guess.provisional, refusal, rival) {
-            (false, ..) => by_walls,
-            (true, Some(_), _) => format!("{before}; the walls do not confirm them: {by_walls}"),
-            (true, None, None) => format!("{before}; the walls confirm them: {by_walls}"),
-            (true, None, Some(rival)) => format!(
-                "{before}; the walls confirm them: {by_walls}; {:.0} % of the walls agree, and {:.0} % at the best of other places",
-                100.0 * agreement.wall_agreement(),
-                100.0 * rival.agreement.wall_agreement(),
-            ),
-        }
-    }
-
-    /// The message that tells of it.
+    /// The message that tells of it. What the first guess rests on is part of the reason.
     fn alignment(&self, first_guess: &Alignment, output: &Output<'_>) -> Alignment {
-        let Refinement { registration, agreement, refusal, .. } = &self.refinement;
+        let Refinement { registration, refusal } = &self.refinement;
         let mut alignment = Alignment {
             header: Header::new(output.log_time(), first_guess.header.frame_id.clone()),
-            a: first_guess.a.clone(),
-            b: first_guess.b.clone(),
             covariance: row_by_row(&registration.covariance),
-            score: agreement.wall_agreement(),
             method: format!("{}+icp", first_guess.method),
             accepted: refusal.is_none(),
-            reason: self.reason(first_guess),
-            ..Alignment::default()
+            reason: format!("{}; {}", first_guess.reason, self.refinement.reason()),
+            ..first_guess.clone()
         };
         alignment.set_transform_a_b(&registration.transform_a_b);
         alignment
@@ -225,8 +227,6 @@ fn refine_pair(
     let walls_a = a.walls.get_or_init(|| WallMap::new(&grid_a, parameters.normal_radius));
     let walls_b = b.walls.get_or_init(|| WallMap::new(&grid_b, parameters.normal_radius));
     let covariance = Matrix3::from_row_slice(&first_guess.covariance);
-    let refine = if first_guess.provisional { refine_provisional } else { refine };
     let first_guess = FirstGuess::new(first_guess.transform_a_b(), covariance, parameters);
-    let (a, b) = (MapView { grid: grid_a, walls: walls_a }, MapView { grid: grid_b, walls: walls_b });
-    Ok(refine(&a, &b, &first_guess, parameters))
+    Ok(refine(walls_a, walls_b, &first_guess, parameters))
 }

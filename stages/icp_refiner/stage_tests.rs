@@ -92,7 +92,8 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
     assert!(refined.accepted, "{}", refined.reason);
     assert_eq!(refined.method, "tags+icp");
     assert_eq!(refined.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
-    assert!(refined.score > 0.95);
+    assert_eq!((refined.score, refined.provisional), (0.9, false), "these are the first guess's");
+    assert!(refined.reason.starts_with("three tags; walls lie within "), "{}", refined.reason);
     let off = truth.inverse() * refined.transform_a_b();
     assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
     assert_eq!(bench.finish(), []);
@@ -124,10 +125,10 @@ fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     bench.give(ALIGNMENT, "", &first_guess(&truth));
-    let other = Alignment { method: "features".into(), ..first_guess(&truth) };
+    let other = Alignment { method: "few tags".into(), ..first_guess(&truth) };
     let sent = bench.give(ALIGNMENT, "", &other);
     assert_eq!(sent.len(), 1);
-    assert_eq!(sent[0].method, "features+icp");
+    assert_eq!(sent[0].method, "few tags+icp");
     assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
 }
 
@@ -181,4 +182,21 @@ fn what_is_no_map_or_no_transform_is_warned_of() {
     bench.give_map("robot2", &b);
     let sent = bench.give(ALIGNMENT, "", &first_guess(&a.transform_to(&b)));
     assert!(sent[0].accepted, "the last good map stays");
+}
+
+#[test]
+fn ranked_guesses_are_refined_and_sent_together() {
+    let (a, b, more_of_b) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let ranked =
+        |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, method: "maps".into(), ..first_guess(place) };
+    assert_eq!(bench.give(ALIGNMENT, "", &ranked(0, &truth)), []);
+    let sent = bench.give(ALIGNMENT, "", &ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
+    assert_eq!(sent.iter().map(|one| (one.rank, one.hypotheses)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);
+    assert_eq!(bench.give_map("robot2", &more_of_b).len(), 2, "both, though one may have stayed as it was");
+    assert_eq!(bench.give(ALIGNMENT, "", &ranked(1, &truth)), [], "the first is missing");
+    assert_eq!(bench.outputs.warnings().len(), 1);
 }

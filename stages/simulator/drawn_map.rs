@@ -95,6 +95,7 @@ impl DrawnMapSettings {
 
     fn building(&self) -> BuildingSize {
         BuildingSize {
+            layout: super::floor_plan::Layout::Random,
             width: self.building_width,
             height: self.building_height,
             room_width: 4.0,

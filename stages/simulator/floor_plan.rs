@@ -8,6 +8,8 @@ use super::furniture::{furnish_corridor, furnish_room};
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::Point2;
 use rand::{Rng, RngExt};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// How thick walls are, metres.
 pub(super) const WALL: f64 = 0.15;
@@ -15,6 +17,19 @@ pub(super) const WALL: f64 = 0.15;
 const BAND: f64 = 14.0;
 /// A building wider than this has two corridors along y, metres.
 const WIDE: f64 = 30.0;
+
+/// How the rooms of a building are laid out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// No two rooms are alike.
+    #[default]
+    Random,
+    /// A corridor and the rooms along it look the same after half a turn, but for the furniture.
+    Symmetric,
+    /// All rooms are alike, but for the furniture.
+    Repeated,
+}
 
 /// What a building is asked to be, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +44,8 @@ pub(super) struct BuildingSize {
     pub(super) corridor_width: f64,
     /// Pieces of furniture a square metre.
     pub(super) clutter: f64,
+    /// How the rooms are laid out.
+    pub(super) layout: Layout,
 }
 
 /// A gap in a wall.
@@ -101,16 +118,21 @@ impl FloorPlan {
             plan.wall_along_y(x, (0.0, height), &[]);
         }
         let bands = (height / BAND).round().max(1.0);
-        let crossings = crossings(bands as usize, width, corridor_width, random);
+        let crossings = crossings(bands as usize, size, random);
         let spans = spans(width, &crossings);
         for band in 0..bands as usize {
             let bottom = height / bands * band as f64;
             let top = height / bands * (band + 1) as f64;
-            let low = bottom + (top - bottom - corridor_width) * between(random, 0.42, 0.58);
+            let below = if size.layout == Layout::Random { between(random, 0.42, 0.58) } else { 0.5 };
+            let low = bottom + (top - bottom - corridor_width) * below;
             let high = low + corridor_width;
             plan.corridors.push(Rectangle::new(0.0, low, width, high).expanded(-WALL / 2.0));
-            let first = plan.rooms.len();
+            let (first, first_wall) = (plan.rooms.len(), plan.solids.len());
             for row in [Row { low: bottom, high: low, door_wall: low }, Row { low: high, high: top, door_wall: high }] {
+                if size.layout == Layout::Symmetric && row.low > bottom {
+                    plan.turn_half(first, first_wall, &Point2::new(width, bottom + top));
+                    continue;
+                }
                 for &span in &spans {
                     plan.rooms_of_span(&row, span, size, random);
                 }
@@ -130,6 +152,22 @@ impl FloorPlan {
         plan.wall_count = plan.solids.len();
         plan.furnish(size.clutter, random);
         plan
+    }
+
+    /// Adds the images of the rooms and walls from the given ones on, after half a turn. `sum` is the sum of a point and
+    /// its image.
+    fn turn_half(&mut self, first_room: usize, first_wall: usize, sum: &Point2) {
+        let turned = |point: &Point2| Point2::from(sum.coords - point.coords);
+        let image = |bounds: &Rectangle| Rectangle { min: turned(&bounds.max), max: turned(&bounds.min) };
+        for number in first_room..self.rooms.len() {
+            let Room { bounds, doors } = &self.rooms[number];
+            let doors = doors.iter().map(|door| Door { centre: turned(&door.centre), ..*door }).collect();
+            self.rooms.push(Room { bounds: image(bounds), doors });
+        }
+        for number in first_wall..self.solids.len() {
+            let corners = self.solids[number].corners.iter().map(turned).collect();
+            self.solids.push(Solid { corners });
+        }
     }
 
     /// Puts `clutter` pieces of furniture a square metre into the rooms, and pilasters into the corridors.
@@ -153,10 +191,15 @@ impl FloorPlan {
 
     /// Divides the part of a row between two corridors along y into rooms.
     fn rooms_of_span(&mut self, row: &Row, (left, right): (f64, f64), size: &BuildingSize, random: &mut impl Rng) {
-        let walls = divide(left, right, size.room_width, random);
+        let is_repeated = size.layout == Layout::Repeated;
+        let walls = divide(left, right, size, random);
         let mut doors = vec![Vec::new(); walls.len().saturating_sub(1)];
         for (pair, doors) in walls.windows(2).zip(&mut doors) {
-            doors.push(corridor_door((pair[0], pair[1]), row.door_wall, random));
+            let centre = Point2::new(pair[0] + 1.0, row.door_wall);
+            doors.push(match is_repeated {
+                true => Door { centre, width: 1.0, along_x: true },
+                false => corridor_door((pair[0], pair[1]), row.door_wall, random),
+            });
         }
         let corridor_doors: Vec<Door> = doors.iter().flatten().copied().collect();
         self.wall_along_x(row.door_wall, (left, right), &corridor_doors);
@@ -167,7 +210,11 @@ impl FloorPlan {
             }
             // A room at a corner of two corridors may have a door to both.
             let at_crossing = index == 0 || index + 1 == walls.len();
-            let chance = if at_crossing { 0.3 } else { 0.15 };
+            let chance = match at_crossing {
+                _ if is_repeated => 0.0,
+                true => 0.3,
+                false => 0.15,
+            };
             let door = (random.random_bool(chance)).then(|| Door {
                 centre: Point2::new(x, between(random, row.low + 0.9, row.high - 0.9)),
                 width: 0.95,
@@ -209,9 +256,12 @@ fn between_gaps(from: f64, to: f64, doors: &[Door]) -> Vec<(f64, f64)> {
 }
 
 /// The corridors along y, as ranges of x.
-fn crossings(bands: usize, width: f64, corridor_width: f64, random: &mut impl Rng) -> Vec<(f64, f64)> {
+fn crossings(bands: usize, size: &BuildingSize, random: &mut impl Rng) -> Vec<(f64, f64)> {
+    let BuildingSize { width, corridor_width, layout, .. } = *size;
     let places: &[(f64, f64)] = match (bands, width > WIDE) {
         (0 | 1, _) => &[],
+        (_, false) if layout != Layout::Random => &[(0.5, 0.5)],
+        (_, true) if layout != Layout::Random => &[(0.3, 0.3), (0.7, 0.7)],
         (_, false) => &[(0.35, 0.65)],
         (_, true) => &[(0.2, 0.35), (0.65, 0.8)],
     };
@@ -227,9 +277,10 @@ fn spans(width: f64, crossings: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// Places of the walls that divide a span into rooms of about the given width, its ends among them.
-fn divide(left: f64, right: f64, room_width: f64, random: &mut impl Rng) -> Vec<f64> {
-    let rooms = ((right - left) / room_width).round().max(1.0) as usize;
-    let weights: Vec<f64> = (0..rooms).map(|_| between(random, 0.7, 1.3)).collect();
+fn divide(left: f64, right: f64, size: &BuildingSize, random: &mut impl Rng) -> Vec<f64> {
+    let rooms = ((right - left) / size.room_width).round().max(1.0) as usize;
+    let (narrow, wide) = if size.layout == Layout::Repeated { (1.0, 1.0) } else { (0.7, 1.3) };
+    let weights: Vec<f64> = (0..rooms).map(|_| between(random, narrow, wide)).collect();
     let total: f64 = weights.iter().sum();
     let mut walls = vec![left];
     let mut sum = 0.0;
@@ -258,13 +309,15 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn size() -> impl Strategy<Value = BuildingSize> {
-        (10.0..45.0, 9.0..45.0, 2.5..8.0, 1.4..3.0, 0.0..0.5).prop_map(
-            |(width, height, room_width, corridor_width, clutter)| BuildingSize {
+        let layout = prop_oneof![Just(Layout::Random), Just(Layout::Symmetric), Just(Layout::Repeated)];
+        (10.0..45.0, 9.0..45.0, 2.5..8.0, 1.4..3.0, 0.0..0.5, layout).prop_map(
+            |(width, height, room_width, corridor_width, clutter, layout)| BuildingSize {
                 width,
                 height,
                 room_width,
                 corridor_width,
                 clutter,
+                layout,
             },
         )
     }
@@ -295,6 +348,27 @@ mod tests {
                 prop_assert!(plan.corridors.iter().all(|corridor| !corridor.overlaps(&room.bounds)));
                 prop_assert!(room.bounds.width() > 1.3 && room.bounds.height() > 1.3, "{:?}", room.bounds);
             }
+        }
+    }
+
+    #[test]
+    fn a_symmetric_building_is_the_same_after_half_a_turn() {
+        let size = BuildingSize {
+            width: 20.0,
+            height: 15.0,
+            room_width: 4.5,
+            corridor_width: 2.0,
+            clutter: 0.0,
+            layout: Layout::Symmetric,
+        };
+        for seed in 0..5 {
+            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
+            let space = FreeSpace::new(&plan.bounds, &plan.solids, &plan.corridors[0].centre());
+            let places = space.places_in(&plan.bounds);
+            let turned: Vec<Point2> = places.iter().map(|place| Point2::new(20.0 - place.x, 15.0 - place.y)).collect();
+            let near = |place: &Point2| turned.iter().any(|other| (other - place).norm() < 0.11);
+            let same = places.iter().filter(|place| near(place)).count();
+            assert!(same as f64 > 0.98 * places.len() as f64, "{same} of {}", places.len());
         }
     }
 

@@ -35,7 +35,7 @@ mod world;
 
 pub use drawn_map::{DrawnMapSettings, WallStyle, draw_map};
 pub use drive::TICK_SECONDS;
-pub use floor_plan::{Door, FloorPlan, Room};
+pub use floor_plan::{Door, FloorPlan, Layout, Room};
 pub use mapper::SnapshotMap;
 pub use parameters::SimulatorParameters;
 pub use robot::RobotLog;

@@ -1,6 +1,6 @@
 //! The parameters of a simulation.
 
-use super::floor_plan::BuildingSize;
+use super::floor_plan::{BuildingSize, Layout};
 use super::lidar::Lidar;
 use super::tags::TagReader;
 use gridweave_runtime::stage::{ParameterError, Parameters};
@@ -28,6 +28,9 @@ pub struct SimulatorParameters {
     pub corridor_width: f64,
     /// Pieces of furniture a square metre of a room, 0 to 1. Where pieces would block a way there are fewer.
     pub clutter: f64,
+    /// How the rooms are laid out: `random`, `symmetric` (a corridor and its rooms look the same after half a turn), or
+    /// `repeated` (all rooms are alike). Furniture is placed at random in all of them.
+    pub layout: Layout,
     /// Share of its rooms that a robot has in common with the next one, 0 to 1.
     pub overlap: f64,
     /// Top speed of the robots, metres a second.
@@ -78,6 +81,7 @@ impl Default for SimulatorParameters {
             room_width: 4.5,
             corridor_width: 2.0,
             clutter: 0.12,
+            layout: Layout::Random,
             overlap: 0.65,
             speed: 0.7,
             duration: 600.0,
@@ -102,8 +106,8 @@ impl Default for SimulatorParameters {
 
 impl SimulatorParameters {
     pub(super) fn building(&self) -> BuildingSize {
-        let Self { width, height, room_width, corridor_width, clutter, .. } = *self;
-        BuildingSize { width, height, room_width, corridor_width, clutter }
+        let Self { width, height, room_width, corridor_width, clutter, layout, .. } = *self;
+        BuildingSize { width, height, room_width, corridor_width, clutter, layout }
     }
 
     pub(super) fn lidar(&self) -> Lidar {

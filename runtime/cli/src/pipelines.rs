@@ -9,7 +9,8 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 7] = [
+const SHIPPED: [(&str, &str); 8] = [
+    ("auto_merge", include_str!("../../../pipelines/auto_merge.toml")),
     ("cut", include_str!("../../../pipelines/cut.toml")),
     ("live", include_str!("../../../pipelines/live.toml")),
     ("map_merge", include_str!("../../../pipelines/map_merge.toml")),

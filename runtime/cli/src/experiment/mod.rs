@@ -3,6 +3,8 @@
 //! Each experiment is a file here. It prints its tables and writes them as CSV, and its curves as SVG, to a folder.
 //! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
 
+mod align;
+mod cut;
 mod direction;
 mod few_tags;
 mod localization;
@@ -41,6 +43,8 @@ enum Experiment {
     Localization(localization::LocalizationArgs),
     /// Merging with few common tags, and whether robots of two buildings are ever merged by chance.
     FewTags(few_tags::FewTagsArgs),
+    /// Merging by the maps alone: random pairs, pairs of two buildings, buildings whose parts are alike, and teams.
+    Align(align::AlignArgs),
     /// How often a merge succeeds as tags, odometry and overlap get worse.
     Noise(noise::NoiseArgs),
 }
@@ -53,6 +57,7 @@ pub(crate) fn experiment(args: &ExperimentArgs, registry: &Registry) -> Result<O
         Experiment::Methods(args) => methods::run(args, registry, &mut results),
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, registry, &mut results),
+        Experiment::Align(args) => align::run(args, registry, &mut results),
         Experiment::Noise(args) => noise::run(args, registry, &mut results),
     }?;
     results.say_where();

@@ -160,7 +160,7 @@ pub struct Alignment {
     pub covariance: [f64; 9],
     /// How well the maps agree, 0 to 1.
     pub score: f64,
-    /// How it was found.
+    /// How it was found: what from, and then what was added, as in `tags+directions+icp`.
     pub method: String,
     /// Whether it may be used to merge the maps.
     pub accepted: bool,
@@ -170,13 +170,20 @@ pub struct Alignment {
     /// Its place among the hypotheses that its stage has for the pair: 0 for the best.
     pub rank: u32,
     /// How many hypotheses its stage has for the pair. All are sent one after the other, by rank, and take the place of
-    /// those sent before. 0, as well as 1, where it is the only one.
+    /// those sent before. 0 if its stage does not look for others, 1 if it has looked and there is no other.
     pub hypotheses: u32,
     /// Why it is refused, or what speaks for it.
     pub reason: String,
 }
 
 impl Alignment {
+    /// What it was found from, `tag` or `map`: the last word of the first part of its method. Alignments of a pair from
+    /// one source take each other's place; those from several compete.
+    pub fn source(&self) -> &str {
+        let first = self.method.split('+').next().unwrap_or_default();
+        first.split(' ').next_back().unwrap_or_default().trim_end_matches('s')
+    }
+
     /// The transform that takes a point in map b to map a.
     pub fn transform_a_b(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.x, self.y), self.yaw)

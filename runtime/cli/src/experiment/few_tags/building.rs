@@ -1,8 +1,8 @@
 //! Buildings whose robots can be put together anew.
 
-use super::cut::{self, Member};
 use super::known::Known;
 use super::outcome::PairOutcome;
+use crate::experiment::cut::{self, Member};
 use crate::experiment::trial::World;
 use anyhow::{Context, Result, bail};
 use gridweave_runtime::stage::Registry;

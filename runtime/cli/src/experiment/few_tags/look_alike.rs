@@ -1,7 +1,7 @@
 //! Tags of two buildings that look as if they were the same ones.
 
-use super::cut::Kept;
 use super::known::Known;
+use crate::experiment::cut::Kept;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -12,7 +12,7 @@
 //! A pair is wrong if it is so in the end, and "ever wrong" if it was merged wrongly at any time of the run.
 
 mod building;
-mod cut;
+
 mod known;
 mod look_alike;
 mod outcome;

@@ -1,9 +1,9 @@
 //! Pairs of robots, put together to be merged.
 
 use super::building::Building;
-use super::cut::{Kept, Member};
 use super::known::Known;
 use super::look_alike::{look_alikes, spread};
+use crate::experiment::cut::{Kept, Member};
 use nalgebra::{Point2, Vector2};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;

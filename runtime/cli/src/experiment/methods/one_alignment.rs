@@ -9,8 +9,9 @@ use gridweave_runtime::pipeline::{Overrides, Pipeline};
 use gridweave_runtime::ros::{CommonTag, CommonTags, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::geometry::{Grid, Pose2};
-use gridweave_stages::icp_refiner::{self, IcpParameters, MapView, WallMap, refine};
+use gridweave_stages::icp_refiner::{self, IcpParameters, WallMap, refine};
 use gridweave_stages::line_extractor::{LineExtractorParameters, extract_segments};
+use gridweave_stages::merge_verifier::{MapView, MergeVerifierParameters, compare};
 use gridweave_stages::quadrant_classifier::{QuadrantClassifierParameters, first_guess, map_direction};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -32,6 +33,8 @@ pub(super) struct Aligner {
     classifier: QuadrantClassifierParameters,
     /// Those of the ICP refiner, if the pipeline has one.
     icp: Option<IcpParameters>,
+    /// Those of the merge verifier, if the pipeline has one.
+    verifier: Option<MergeVerifierParameters>,
 }
 
 /// The alignment of two maps.
@@ -50,7 +53,7 @@ pub(super) struct AlignmentTime {
     pub(super) lines: f64,
     /// The maps' directions, the quarter turn and the translation.
     pub(super) classifier: f64,
-    /// ICP and the verification of its result.
+    /// ICP and the comparison of the maps where it ends.
     pub(super) icp: f64,
     /// All of it.
     pub(super) total: f64,
@@ -75,6 +78,7 @@ impl Aligner {
             lines: parameters(&pipeline, "line_extractor")?,
             classifier,
             icp: parameters(&pipeline, "icp_refiner")?.map(|(parameters, _)| parameters),
+            verifier: parameters(&pipeline, "merge_verifier")?.map(|(parameters, _)| parameters),
         })
     }
 
@@ -106,9 +110,13 @@ impl Aligner {
         let guess = guess?.ok()?;
         let (refined, icp_time) = timed(self.icp.as_ref(), |parameters| {
             let [a, b] = [&maps.a, &maps.b].map(|map| WallMap::new(map, parameters.normal_radius));
-            let (a, b) = (MapView { grid: maps.a, walls: &a }, MapView { grid: maps.b, walls: &b });
             let guess = icp_refiner::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
-            refine(&a, &b, &guess, parameters).registration.transform_a_b
+            let transform_a_b = refine(&a, &b, &guess, parameters).registration.transform_a_b;
+            if let Some(parameters) = &self.verifier {
+                let (a, b) = (MapView { grid: maps.a, walls: &a }, MapView { grid: maps.b, walls: &b });
+                std::hint::black_box(compare(&a, &b, &transform_a_b, parameters));
+            }
+            transform_a_b
         });
         let transform_a_b = refined.unwrap_or(guess.transform_a_b);
         Some(Timed { transform_a_b, parts: [lines_time, classifier_time, icp_time] })

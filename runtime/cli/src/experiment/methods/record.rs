@@ -8,8 +8,8 @@ use crate::table::Table;
 use gridweave_stages::geometry::{Grid, Pose2, pose};
 
 /// The stages whose time is told, by their names in the pipelines.
-pub(super) const STAGES: [&str; 9] =
-    ["log", "tags", "common_tags", "lines", "quadrants", "icp", "frames", "fuser", "output"];
+pub(super) const STAGES: [&str; 10] =
+    ["log", "tags", "common_tags", "lines", "quadrants", "icp", "verifier", "frames", "fuser", "output"];
 
 /// One robot, placed or not placed by one method.
 #[derive(Clone, Debug)]

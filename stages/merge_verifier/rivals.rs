@@ -1,14 +1,14 @@
 //! Other places where two maps fit: what an alignment must be better than.
 
-use super::registration::approach;
-use super::verify::compare_sampled;
-use super::{Agreement, FirstGuess, IcpParameters, MapView};
+use super::agreement::compare_sampled;
+use super::{Agreement, MapView, MergeVerifierParameters};
 use crate::geometry::{Point2, Pose2};
+use crate::icp_refiner::{FirstGuess, IcpParameters, approach};
 use nalgebra::{Matrix3, UnitComplex, Vector2};
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
-/// An alignment whose middle lies within this many metres of the one in question, and that is turned by less than
-/// [`SAME_TURN`], is the same one.
+/// An alignment whose middle lies within this many metres of another, and that is turned by less than [`SAME_TURN`], is
+/// the same one.
 const SAME_PLACE: f64 = 0.5;
 /// Radians.
 const SAME_TURN: f64 = 0.2;
@@ -24,34 +24,47 @@ pub struct Rival {
     pub agreement: Agreement,
 }
 
-/// The rival of an alignment `T_a_b` on whose walls the maps agree best, if there is any at which they have enough area and
-/// walls in common (`min_overlap`, `min_wall_length`).
+impl Rival {
+    /// What lies at `rival_a_b` as a rival of the alignment `transform_a_b`, whose walls in common have their middle at
+    /// `centre`, frame a. `None` if the two are the same.
+    pub fn of(
+        transform_a_b: &Pose2,
+        centre: &Point2,
+        rival_a_b: &Pose2,
+        compare: impl FnOnce() -> Agreement,
+    ) -> Option<Self> {
+        let change = rival_a_b * transform_a_b.inverse();
+        let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
+        (shift >= SAME_PLACE || turn.abs() >= SAME_TURN).then(|| Self { shift, turn, agreement: compare() })
+    }
+}
+
+/// The rival near an alignment `T_a_b` on whose walls the maps agree best, if there is any at which they have enough area
+/// and walls in common (`min_overlap`, `min_wall_length`).
 ///
 /// Map b is turned by quarter turns about `centre`, a place in frame a, and moved by up to `rival_reach`; each of these is
-/// registered and compared, both by a sample of the points. In a building whose rooms are alike the maps fit at many places, and so their fitting at
-/// one says little. And if the maps have nothing to do with each other, the one place at which tags have laid them by
-/// chance is as good as any other: that it is by far the best of n has a probability of 1 / n at most.
-pub fn best_rival(
+/// registered and compared, both by a sample of the points. In a building whose rooms are alike the maps fit at many
+/// places, and so their fitting at one says little. And if the maps have nothing to do with each other, the one place at
+/// which tags have laid them by chance is as good as any other: that it is by far the best of n has a probability of
+/// 1 / n at most.
+pub fn best_rival_nearby(
     a: &MapView<'_>,
     b: &MapView<'_>,
     transform_a_b: &Pose2,
     centre: &Point2,
-    parameters: &IcpParameters,
+    parameters: &MergeVerifierParameters,
 ) -> Option<Rival> {
+    let icp = IcpParameters::default();
     let mut best: Option<Rival> = None;
-    for start in starts(centre, parameters) {
-        let guess = FirstGuess::new(start * transform_a_b, Matrix3::zeros(), parameters);
-        let rival_a_b = approach(a.walls, b.walls, &guess, parameters);
-        let change = rival_a_b * transform_a_b.inverse();
-        let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
-        if shift < SAME_PLACE && turn.abs() < SAME_TURN {
-            continue;
-        }
-        let agreement = compare_sampled(a, b, &rival_a_b, parameters, parameters.coarse_points);
-        let counts =
-            agreement.overlap >= parameters.min_overlap && agreement.wall_on_wall >= parameters.min_wall_length;
-        if counts && best.is_none_or(|best| agreement.wall_agreement() > best.agreement.wall_agreement()) {
-            best = Some(Rival { shift, turn, agreement });
+    for start in starts(centre, parameters.rival_reach, &icp) {
+        let guess = FirstGuess::new(start * transform_a_b, Matrix3::zeros(), &icp);
+        let rival_a_b = approach(a.walls, b.walls, &guess, &icp);
+        let compare = || compare_sampled(a, b, &rival_a_b, parameters, icp.coarse_points);
+        let Some(rival) = Rival::of(transform_a_b, centre, &rival_a_b, compare) else { continue };
+        let Agreement { overlap, wall_on_wall, .. } = rival.agreement;
+        let counts = overlap >= parameters.min_overlap && wall_on_wall >= parameters.min_wall_length;
+        if counts && best.is_none_or(|best| rival.agreement.wall_agreement() > best.agreement.wall_agreement()) {
+            best = Some(rival);
         }
     }
     best
@@ -59,10 +72,10 @@ pub fn best_rival(
 
 /// The changes of an alignment to begin with, in frame a: quarter turns about a place, and shifts on a raster so wide that
 /// registration finds all there is between.
-fn starts(centre: &Point2, parameters: &IcpParameters) -> impl Iterator<Item = Pose2> {
-    let (centre, reach) = (*centre, parameters.rival_reach);
+fn starts(centre: &Point2, reach: f64, icp: &IcpParameters) -> impl Iterator<Item = Pose2> {
+    let centre = *centre;
     // Then no place is farther from one of them than partners may lie.
-    let spacing = SQRT_2 * parameters.max_distance;
+    let spacing = SQRT_2 * icp.max_distance;
     let steps = (reach / spacing) as i32;
     let shifts = (-steps..=steps).flat_map(move |x| (-steps..=steps).map(move |y| (x, y)));
     let shifts = shifts.map(move |(x, y)| Vector2::new(f64::from(x), f64::from(y)) * spacing);
@@ -78,21 +91,21 @@ fn starts(centre: &Point2, parameters: &IcpParameters) -> impl Iterator<Item = P
 
 #[cfg(test)]
 mod tests {
-    use super::super::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use super::*;
     use crate::geometry::pose;
+    use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use std::f64::consts::PI;
 
     fn rival(a: &DrawnMap, b: &DrawnMap, transform_a_b: &Pose2) -> Option<Rival> {
         let centre = a.transform_world_map.inverse() * Point2::new(10.0, 6.0);
-        best_rival(&a.view(), &b.view(), transform_a_b, &centre, &IcpParameters::default())
+        best_rival_nearby(&a.view(), &b.view(), transform_a_b, &centre, &MergeVerifierParameters::default())
     }
 
     #[test]
     fn the_starts_are_all_quarter_turns_and_shifts_but_the_alignment_itself() {
         let centre = Point2::new(3.0, -2.0);
         let starts = |rival_reach: f64| -> Vec<Pose2> {
-            super::starts(&centre, &IcpParameters { rival_reach, ..Default::default() }).collect()
+            super::starts(&centre, rival_reach, &IcpParameters::default()).collect()
         };
         assert_eq!(starts(0.0).len(), 3);
         assert!(starts(0.0).iter().all(|start| (start * centre - centre).norm() < 1e-9));

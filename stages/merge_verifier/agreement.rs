@@ -1,7 +1,9 @@
 //! How well two maps agree where both know something.
 
-use super::{IcpParameters, WallMap};
+use super::MergeVerifierParameters;
 use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_free, is_known};
+use crate::icp_refiner::{WallMap, stride};
+use nalgebra::Vector2;
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
 /// cells.
@@ -32,6 +34,8 @@ pub struct Agreement {
     pub wall_on_free: f64,
     /// Square metres that a metre of wall covers: the side of a cell.
     pub wall_width: f64,
+    /// The middle of the walls of map b that lie on walls of map a, frame a; the origin if there are none.
+    pub centre: Point2,
 }
 
 impl Agreement {
@@ -41,6 +45,17 @@ impl Agreement {
     /// wherever one lays it.
     pub fn wall_agreement(&self) -> f64 {
         share(self.wall_on_wall, self.wall_on_free)
+    }
+
+    /// Length of wall of one map of which the other knows what is there, metres.
+    pub fn wall_seen(&self) -> f64 {
+        self.wall_on_wall + self.wall_on_free
+    }
+
+    /// Metres of wall that speak for an alignment when those on free space count `penalty` times against it. Above 0 only
+    /// where more speaks for it than against it.
+    pub fn evidence(&self, penalty: f64) -> f64 {
+        (self.wall_on_wall - penalty * self.wall_on_free).max(0.0)
     }
 
     /// The acceptance index omega of Birk and Carpin (2006): agree / (agree + disagree) over what both maps know, 0 to
@@ -56,16 +71,21 @@ fn share(agree: f64, disagree: f64) -> f64 {
 }
 
 /// Compares two maps at an alignment.
-pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, parameters: &IcpParameters) -> Agreement {
+pub fn compare(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    transform_a_b: &Pose2,
+    parameters: &MergeVerifierParameters,
+) -> Agreement {
     compare_sampled(a, b, transform_a_b, parameters, usize::MAX)
 }
 
 /// Compares two maps at an alignment by samples of at most so many points of the walls and of known space each.
-pub(super) fn compare_sampled(
+pub fn compare_sampled(
     a: &MapView<'_>,
     b: &MapView<'_>,
     transform_a_b: &Pose2,
-    parameters: &IcpParameters,
+    parameters: &MergeVerifierParameters,
     most_points: usize,
 ) -> Agreement {
     let coarser = a.grid.geometry.resolution.max(b.grid.geometry.resolution);
@@ -86,6 +106,7 @@ pub(super) fn compare_sampled(
         wall_on_wall: (of_a.on_wall + of_b.on_wall) / 2.0,
         wall_on_free: (of_a.on_free + of_b.on_free) / 2.0,
         wall_width: (a.grid.geometry.resolution + b.grid.geometry.resolution) / 2.0,
+        centre: of_b.centre,
     }
 }
 
@@ -93,6 +114,8 @@ pub(super) fn compare_sampled(
 struct WallLengths {
     on_wall: f64,
     on_free: f64,
+    /// The middle of what lies on walls, in the frame of the map it is looked up in.
+    centre: Point2,
 }
 
 fn walls_on(
@@ -102,7 +125,7 @@ fn walls_on(
     tolerance: f64,
     most_points: usize,
 ) -> WallLengths {
-    let (mut on_wall, mut on_free) = (0usize, 0usize);
+    let (mut on_wall, mut on_free, mut sum) = (0usize, 0usize, Vector2::zeros());
     let stride = stride(other.walls.points().len(), most_points);
     for point in other.walls.points().iter().step_by(stride) {
         let point = transform_map_other * point;
@@ -113,17 +136,14 @@ fn walls_on(
         }
         if map.walls.walls.nearest(&point, tolerance).is_some() {
             on_wall += 1;
+            sum += point.coords;
         } else if is_free(value) {
             on_free += 1;
         }
     }
     let length = stride as f64 * other.spacing;
-    WallLengths { on_wall: on_wall as f64 * length, on_free: on_free as f64 * length }
-}
-
-/// Every how many-th of `count` points makes a sample of at most so many.
-pub(super) fn stride(count: usize, most_points: usize) -> usize {
-    count.div_ceil(most_points.max(1)).max(1)
+    let centre = Point2::from(sum / on_wall.max(1) as f64);
+    WallLengths { on_wall: on_wall as f64 * length, on_free: on_free as f64 * length, centre }
 }
 
 fn value_at(grid: &Grid<'_>, point: &Point2) -> i8 {

@@ -1,0 +1,56 @@
+//! Says which of the alignments of two maps that anything has proposed is right, if any, and why.
+//!
+//! Walls of one map on walls of the other speak for an alignment, and walls on known free space against it: Birk and
+//! Carpin, "Merging occupancy grid maps from multiple robots" (Proceedings of the IEEE 2006).
+//!
+//! - [`compare`]: what two maps say of each other at one alignment.
+//! - [`best_rival_nearby`]: where else they fit, for alignments of which nobody has looked for others.
+//! - [`judge`]: all hypotheses for a pair against each other; [`Refusal`] says why none is accepted.
+//! - [`probability`]: how probable it is that an alignment is right.
+
+mod agreement;
+mod judge;
+mod parameters;
+mod refusal;
+mod rivals;
+mod score;
+mod stage;
+
+#[cfg(test)]
+mod stage_tests;
+#[cfg(test)]
+mod tests;
+
+pub use agreement::{Agreement, MapView, compare, compare_sampled};
+pub use judge::{Candidate, Verdict, judge};
+pub use parameters::{Bounds, MergeVerifierParameters};
+pub use refusal::{Hypotheses, Hypothesis, Refusal};
+pub use rivals::{Rival, best_rival_nearby};
+pub use score::{elsewhere, probability};
+
+use gridweave_runtime::ros::{Alignment, OccupancyGrid};
+use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
+
+/// The stage kind `merge_verifier`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "merge_verifier",
+        "Judges all alignments that were proposed for each pair of robots, from tags and from maps, against each other and \
+         by the maps: walls must lie on walls and not on free space, enough of them, and no other place may fit nearly as \
+         well. It accepts one or none, says why, and how probable it is that it is right.",
+        vec![
+            InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps."),
+            InputPort::many(
+                "alignment",
+                PortType::of::<Alignment>(),
+                "Refined alignments, one or several ranked ones for each pair of robots and source.",
+            ),
+        ],
+        vec![OutputPort::new(
+            "alignment",
+            PortType::of::<Alignment>(),
+            "One alignment for each pair of robots, accepted or refused; its score is the probability that it is right.",
+        )],
+        |parameters: MergeVerifierParameters, _context| Ok(stage::MergeVerifier::new(parameters)),
+    )
+}

@@ -1,0 +1,212 @@
+//! Comparison and judgement on drawn floor plans.
+
+use super::{Agreement, MergeVerifierParameters, Refusal, Verdict, compare, compare_sampled, judge};
+use crate::geometry::{Pose2, pose, row_by_row};
+use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use gridweave_runtime::ros::Alignment;
+use gridweave_runtime::stage::Parameters;
+use nalgebra::Matrix3;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// The west and the east of the office, in frames of their own.
+fn office_maps() -> (DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b)
+}
+
+/// A hypothesis that rests on enough tags.
+fn by_tags(transform_a_b: &Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        method: "tags+icp".into(),
+        accepted: true,
+        covariance: row_by_row(&(Matrix3::identity() * 1e-4)),
+        reason: "four tags".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(transform_a_b);
+    alignment
+}
+
+/// Hypotheses of the maps alone.
+fn by_maps(places: &[Pose2]) -> Vec<Alignment> {
+    let hypothesis = |(rank, place): (usize, &Pose2)| Alignment {
+        method: "maps+icp".into(),
+        provisional: true,
+        rank: rank as u32,
+        hypotheses: places.len() as u32,
+        reason: "the maps alone".into(),
+        ..by_tags(place)
+    };
+    places.iter().enumerate().map(hypothesis).collect()
+}
+
+fn judged<'a>(a: &DrawnMap, b: &DrawnMap, hypotheses: &'a [Alignment]) -> Verdict<'a> {
+    let hypotheses: Vec<&Alignment> = hypotheses.iter().collect();
+    judge(&a.view(), &b.view(), &hypotheses, &MergeVerifierParameters::default()).unwrap()
+}
+
+/// A building whose two halves are the same but for one short wall.
+fn nearly_symmetric() -> FloorPlan {
+    let mut walls = vec![];
+    for [x1, y1, x2, y2] in [
+        [0.0, 0.0, 20.0, 0.0],
+        [0.0, 0.0, 0.0, 12.0],
+        [4.0, 0.0, 4.0, 4.0],
+        [4.0, 5.0, 9.0, 5.0],
+        [12.0, 0.0, 12.0, 5.0],
+        [15.0, 3.0, 20.0, 3.0],
+    ] {
+        walls.extend([[x1, y1, x2, y2], [20.0 - x1, 12.0 - y1, 20.0 - x2, 12.0 - y2]]);
+    }
+    walls.push([9.0, 8.0, 9.8, 8.0]);
+    FloorPlan::new(&walls)
+}
+
+#[test]
+fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let tags = [by_tags(&truth)];
+    let verdict = judged(&a, &b, &tags);
+    assert_eq!(verdict.refusal, None);
+    assert!(verdict.candidate.agreement.wall_agreement() > 0.95);
+    assert!(verdict.reason().starts_with("four tags; the maps confirm it: "), "{}", verdict.reason());
+    let elsewhere = pose(1.5, 0.0, 0.0) * truth;
+    let maps = by_maps(&[elsewhere, truth]);
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!((verdict.refusal.clone(), verdict.candidate.alignment.rank), (None, 1), "{}", verdict.reason());
+    assert!(verdict.rival.is_some_and(|rival| (rival.shift - 1.5).abs() < 0.05));
+    assert!(verdict.score > 0.5);
+}
+
+#[test]
+fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
+    let plan = nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
+    let truth = a.transform_to(&b);
+    let turned = pose(0.0, 0.0, PI) * truth;
+    let maps = by_maps(&[truth, turned]);
+    let verdict = judged(&a, &b, &maps);
+    let Some(Refusal::Ambiguous { turn, share, hypotheses, .. }) = &verdict.refusal else { panic!("{verdict:?}") };
+    assert!((turn.abs() - 180.0).abs() < 0.1 && *share > 0.6 && hypotheses.0.len() == 2);
+    assert!(verdict.reason().contains("it cannot be told which is right"), "{}", verdict.reason());
+
+    let both: Vec<Alignment> = [vec![by_tags(&truth)], by_maps(&[turned, truth])].concat();
+    let verdict = judged(&a, &b, &both);
+    assert_eq!(verdict.refusal, None, "{}", verdict.reason());
+    assert!(verdict.candidate.alignment.transform_a_b() == by_tags(&truth).transform_a_b());
+    assert!(verdict.found_too_by.is_some());
+}
+
+#[test]
+fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let hypotheses: Vec<Alignment> = [vec![by_tags(&(pose(1.5, 0.0, 0.0) * truth))], by_maps(&[truth])].concat();
+    let verdict = judged(&a, &b, &hypotheses);
+    assert!(verdict.refusal.is_none() && verdict.candidate.alignment.source() == "map");
+}
+
+#[test]
+fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
+    let plan = nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
+    let truth = a.transform_to(&b);
+    let mut maps = by_maps(&[truth, pose(0.0, 0.0, PI) * truth]);
+    maps[0].accepted = false;
+    maps[0].reason = "ICP has not settled".into();
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!(verdict.reason(), "ICP has not settled");
+    let nowhere = Alignment { covariance: [0.0; 9], accepted: false, ..maps[0].clone() };
+    assert!(judge(&a.view(), &b.view(), &[&nowhere], &MergeVerifierParameters::default()).is_none());
+}
+
+#[test]
+fn walls_on_free_space_are_refused() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    for (x, y, yaw) in [(1.5, 0.0, 0.0), (0.0, 2.0, 0.0), (-1.2, 1.2, 0.0)] {
+        let wrong = pose(x, y, 0.0) * truth;
+        let agreement = compare(&a.view(), &b.view(), &wrong, &MergeVerifierParameters::default());
+        assert!(agreement.wall_agreement() < 0.7, "{x} {y} {yaw}: {agreement:?}");
+        let hypotheses = [by_tags(&wrong)];
+        assert!(judged(&a, &b, &hypotheses).refusal.is_some(), "{x} {y} {yaw}");
+    }
+}
+
+#[test]
+fn a_mirrored_map_and_another_building_are_refused() {
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let a = FloorPlan::office().draw(part, drawing(3.0, 2.0, 0.4));
+    for other in [FloorPlan::office().mirrored(6.0), FloorPlan::another_office()] {
+        let b = other.draw(part, drawing(12.0, 6.0, -2.1));
+        let hypotheses = [by_tags(&a.transform_to(&b))];
+        let verdict = judged(&a, &b, &hypotheses);
+        assert!(matches!(verdict.refusal, Some(Refusal::WallAgreement { .. })), "{}", verdict.reason());
+    }
+}
+
+#[test]
+fn maps_that_hardly_overlap_are_refused() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 8.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(6.5, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let hypotheses = [by_tags(&a.transform_to(&b))];
+    let verdict = judged(&a, &b, &hypotheses);
+    assert!(matches!(verdict.refusal, Some(Refusal::Overlap { .. })), "{}", verdict.reason());
+}
+
+#[test]
+fn a_sample_of_the_points_tells_nearly_the_same() {
+    let (a, b) = office_maps();
+    for transform_a_b in [a.transform_to(&b), pose(1.5, 0.0, 0.0) * a.transform_to(&b)] {
+        let (a, b, parameters) = (a.view(), b.view(), MergeVerifierParameters::default());
+        let all = compare(&a, &b, &transform_a_b, &parameters);
+        let some = compare_sampled(&a, &b, &transform_a_b, &parameters, 600);
+        assert!((all.wall_agreement() - some.wall_agreement()).abs() < 0.03, "{all:?} {some:?}");
+        assert!((all.overlap - some.overlap).abs() < 0.1 * all.overlap, "{all:?} {some:?}");
+        assert!((all.wall_on_wall - some.wall_on_wall).abs() < 0.1 * all.wall_on_wall, "{all:?} {some:?}");
+    }
+}
+
+#[test]
+fn the_acceptance_index_counts_free_space_too() {
+    let (a, b) = office_maps();
+    let off = pose(1.5, 0.0, 0.0) * a.transform_to(&b);
+    let agreement = compare(&a.view(), &b.view(), &off, &MergeVerifierParameters::default());
+    assert!(agreement.acceptance_index() < 1.0);
+    assert!(agreement.acceptance_index() > agreement.wall_agreement());
+    assert!(agreement.free_on_free < agreement.overlap);
+    assert_eq!(Agreement::default().acceptance_index(), 0.0);
+    assert_eq!(Agreement::default().wall_agreement(), 0.0);
+}
+
+#[test]
+fn the_wrong_quarter_is_refused() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.0));
+    let b = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.3));
+    for turn in [FRAC_PI_2, PI, -FRAC_PI_2] {
+        let hypotheses = [by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)))];
+        let verdict = judged(&a, &b, &hypotheses);
+        assert!(verdict.refusal.is_some(), "{turn}: {}", verdict.reason());
+    }
+}
+
+#[test]
+fn the_defaults_are_in_range_and_nonsense_is_not() {
+    assert!(MergeVerifierParameters::default().check().is_empty());
+    let nonsense = MergeVerifierParameters {
+        wall_tolerance: 0.0,
+        min_wall_agreement: 1.5,
+        rival_reach: 1e9,
+        free_space_penalty: f64::NAN,
+        min_overlap: -1.0,
+        ..Default::default()
+    };
+    assert_eq!(nonsense.check().len(), 5);
+}
