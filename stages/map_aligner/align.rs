@@ -1,13 +1,13 @@
 //! The whole of it: search, judge, refine.
 
-use super::fine_search::covariance;
-use super::{MapAlignerParameters, Raster, Refusal, refine_peak, search};
+use super::peaks::{JUDGED, change, is_near, overlay};
+use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, Refusal, covariance, refine_peak};
 use crate::geometry::{Grid, Pose2};
 use nalgebra::Matrix3;
+use rayon::prelude::*;
 
-/// A cell of a raster is at least as many cells of the grid wide: then, however the grid is turned, none in its midst is
-/// left out.
-const LEAST_CELLS: f64 = 1.5;
+/// More peaks than hypotheses are refined, as some lead to the same place.
+const SPARE: usize = 2;
 
 /// A first guess of how two maps lie to each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,26 +16,41 @@ pub struct MapAlignment {
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
     pub covariance: Matrix3<f64>,
-    /// By how much the place stands out: 1 less what the best other place scores of it, 0 to 1.
-    pub margin: f64,
+    /// The length of wall on wall less that of wall on free space, weighted, metres.
+    pub score: f64,
+    /// The score as a share of that of the best guess, 0 to 1.
+    pub share: f64,
     /// About the length of wall on which the maps agree, metres.
     pub wall_in_common: f64,
     /// The share of the walls of map b that meet walls, and not free space, of map a, 0 to 1.
     pub wall_agreement: f64,
-    /// How far the best other place is, metres, and how much the map is turned there, radians.
+}
+
+/// What is known of how two maps lie to each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapAlignments {
+    /// At least one, the best first, each away from the others.
+    pub hypotheses: Vec<MapAlignment>,
+    /// What the best place elsewhere scores of the best, 0 to 1. It need not be a hypothesis: it may lie on the slope
+    /// of a wide peak, as along a corridor.
+    pub runner_up_share: f64,
+    /// How far that place is, metres, and how much the map is turned there, radians.
     pub runner_up_change: (f64, f64),
 }
 
-impl MapAlignment {
-    /// What speaks for it, in plain words.
-    pub fn reason(&self) -> String {
+impl MapAlignments {
+    /// What speaks for a guess, in plain words.
+    pub fn reason(&self, rank: usize) -> String {
+        let Some(found) = self.hypotheses.get(rank) else { return String::new() };
+        let common = format!("the maps alone: {:.0} m of walls in common", found.wall_in_common);
+        if rank > 0 {
+            return format!("{common}, and they fit {:.0} % as well as at the best place", 100.0 * found.share);
+        }
         let (shift, turn) = self.runner_up_change;
+        let (turn, share) = (turn.to_degrees(), 100.0 * self.runner_up_share);
         format!(
-            "the maps alone: {:.0} m of walls in common, and at the best of all other places, {shift:.1} m and {:.0} \
-             degrees away, they fit {:.0} % as well",
-            self.wall_in_common,
-            turn.to_degrees(),
-            100.0 * (1.0 - self.margin),
+            "{common}, and at the best of all other places, {shift:.1} m and {turn:.0} degrees away, they fit {share:.0} \
+             % as well"
         )
     }
 }
@@ -49,38 +64,125 @@ pub struct NamedMap<'a> {
     pub grid: Grid<'a>,
 }
 
-/// Finds how map b lies on map a.
+/// Finds how map b may lie on map a.
 pub fn align_maps(
     a: &NamedMap<'_>,
     b: &NamedMap<'_>,
     parameters: &MapAlignerParameters,
-) -> Result<MapAlignment, Refusal> {
-    let least = LEAST_CELLS * a.grid.geometry.resolution.max(b.grid.geometry.resolution);
-    let raster = |map: &NamedMap<'_>, cell: f64| {
-        let raster = Raster::new(&map.grid, cell.max(least), parameters.max_extent)
-            .ok_or_else(|| Refusal::TooLarge { robot: map.robot.to_owned(), most: parameters.max_extent })?;
-        let has_walls = raster.wall_cells().next().is_some();
-        if has_walls { Ok(raster) } else { Err(Refusal::NoWalls { robot: map.robot.to_owned() }) }
-    };
-    let (coarse_a, coarse_b) = (raster(a, parameters.cell)?, raster(b, parameters.cell)?);
-    let found = search(&coarse_a, &coarse_b, parameters).ok_or(Refusal::NoFit)?;
-    let (share, (shift, turn)) = (found.runner_up_share(), found.runner_up_change());
-    if found.wall_in_common < parameters.min_wall_length {
-        let (length, least) = (found.wall_in_common, parameters.min_wall_length);
+) -> Result<MapAlignments, Refusal> {
+    let least = PreparedMap::least_cell(&a.grid).max(PreparedMap::least_cell(&b.grid));
+    let cell = least.max(0.5 * parameters.cell);
+    let prepare = |map: &NamedMap<'_>| PreparedMap::new(map.robot, &map.grid, cell, parameters.max_extent);
+    let (a, b) = rayon::join(|| prepare(a), || prepare(b));
+    align_prepared(&a?, &b?, parameters)
+}
+
+/// Finds how map b may lie on map a, of two maps in cells of the same size.
+pub fn align_prepared(
+    a: &PreparedMap,
+    b: &PreparedMap,
+    parameters: &MapAlignerParameters,
+) -> Result<MapAlignments, Refusal> {
+    let peaks = Peaks::find(a, b, parameters);
+    let best = peaks.all().first().ok_or(Refusal::NoFit)?;
+    let hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
+    let best_found = hypotheses.first().ok_or(Refusal::NoFit)?;
+    let (length, least) = (best_found.alignment.wall_in_common, parameters.min_wall_length);
+    if length < least {
         return Err(Refusal::TooLittleInCommon { length, least });
     }
-    if share > parameters.max_runner_up {
-        let most = parameters.max_runner_up;
-        return Err(Refusal::Ambiguous { share, most, shift, turn: turn.to_degrees() });
-    }
-    let (fine_a, fine_b) = (raster(a, parameters.fine_cell)?, raster(b, parameters.fine_cell)?);
-    let transform_a_b = refine_peak(&fine_a, &fine_b, &found.best.transform_a_b, &found.centre, parameters);
-    Ok(MapAlignment {
-        transform_a_b,
-        covariance: covariance(&transform_a_b, &found.centre, fine_a.cell, parameters),
-        margin: 1.0 - share,
-        wall_in_common: found.wall_in_common,
-        wall_agreement: found.wall_agreement,
-        runner_up_change: (shift, turn),
+    let centre = &best_found.common.centre;
+    let elsewhere = peaks.best_elsewhere(&best.transform_a_b, centre, parameters);
+    Ok(MapAlignments {
+        runner_up_share: elsewhere.map_or(0.0, |place| (place.score / best.score).min(1.0)),
+        runner_up_change: elsewhere
+            .map_or((0.0, 0.0), |place| change(&best.transform_a_b, &place.transform_a_b, centre)),
+        hypotheses: hypotheses.into_iter().map(|found| found.alignment).collect(),
     })
+}
+
+/// The guess at the peak near a place that is known from elsewhere, without a search. `None` if the walls of the maps do
+/// not meet there, or contradict each other as much.
+pub fn align_near(
+    a: &PreparedMap,
+    b: &PreparedMap,
+    transform_a_b: &Pose2,
+    parameters: &MapAlignerParameters,
+) -> Option<MapAlignment> {
+    let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
+    let common = judged.common_walls(transform_a_b)?;
+    let peak = Place { transform_a_b: *transform_a_b, score: judged.score(transform_a_b) };
+    let mut found = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
+    found.score = judged.score(&found.transform_a_b);
+    found.share = 1.0;
+    (found.score > 0.0).then_some(found)
+}
+
+/// The guesses that peaks lead to, each away from the others, the best first.
+fn hypotheses(
+    peaks: &Peaks,
+    best_score: f64,
+    a: &PreparedMap,
+    b: &PreparedMap,
+    parameters: &MapAlignerParameters,
+) -> Vec<Hypothesis> {
+    let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
+    let mut apart: Vec<(Place, CommonWalls)> = Vec::new();
+    for peak in peaks.all() {
+        let is_same = |(known, common): &(Place, CommonWalls)| {
+            is_near(&known.transform_a_b, &peak.transform_a_b, &common.centre, parameters)
+        };
+        if !apart.iter().any(is_same) && apart.len() < parameters.max_hypotheses.saturating_add(SPARE) {
+            apart.extend(judged.common_walls(&peak.transform_a_b).map(|common| (*peak, common)));
+        }
+    }
+    let refined =
+        apart.par_iter().filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
+    let mut hypotheses: Vec<Hypothesis> = Vec::new();
+    for found in refined.collect::<Vec<_>>() {
+        // Places on the slope of a peak lead to its top.
+        let is_same = hypotheses.iter().any(|known| known.is_near(&found.alignment.transform_a_b, parameters));
+        let is_wanted = hypotheses.len() < 2 || found.alignment.share >= parameters.least_share;
+        if is_wanted && !is_same {
+            hypotheses.push(found);
+        }
+    }
+    hypotheses.truncate(parameters.max_hypotheses);
+    hypotheses
+}
+
+/// A guess, with what it takes to tell others from it.
+struct Hypothesis {
+    alignment: MapAlignment,
+    common: CommonWalls,
+}
+
+impl Hypothesis {
+    /// The guess that a peak leads to.
+    fn at(
+        peak: &Place,
+        best_score: f64,
+        common: &CommonWalls,
+        a: &PreparedMap,
+        b: &PreparedMap,
+        parameters: &MapAlignerParameters,
+    ) -> Option<Self> {
+        let overlay = |level| overlay(a, b, level, parameters.free_space_penalty);
+        let radians = 0.5 * parameters.rotation_step;
+        let transform_a_b = refine_peak(&overlay(0), &peak.transform_a_b, &common.centre, radians);
+        let common = overlay(JUDGED).common_walls(&transform_a_b)?;
+        let alignment = MapAlignment {
+            transform_a_b,
+            covariance: covariance(&overlay(JUDGED), &transform_a_b, &common),
+            score: peak.score,
+            share: peak.score / best_score,
+            wall_in_common: common.length,
+            wall_agreement: common.agreement,
+        };
+        Some(Self { alignment, common })
+    }
+
+    fn is_near(&self, place: &Pose2, parameters: &MapAlignerParameters) -> bool {
+        is_near(&self.alignment.transform_a_b, place, &self.common.centre, parameters)
+    }
 }

@@ -6,33 +6,48 @@
 //! it, which is what tells right from wrong: Birk and Carpin, "Merging occupancy grid maps from multiple robots"
 //! (Proceedings of the IEEE 2006), judge by the same.
 //!
-//! - [`Raster`]: a map in wider cells, cropped to what is known, turned by any angle.
-//! - [`Correlator`]: the score of every translation of one raster on another.
-//! - [`search`]: the best place, and the best one elsewhere.
-//! - [`refine_peak`]: the place to half a cell.
-//! - [`align_maps`]: all of it, and whether the outcome can be believed.
+//! - [`PreparedMap`]: a map in [`Raster`]s of wider and wider cells, and points on its walls.
+//! - [`search`]: all places in wide cells, by a [`Correlator`] that scores every translation of one map on another.
+//! - [`Peaks`]: the best of them, each followed up to the peak near it and judged in narrower cells by an [`Overlay`].
+//! - [`refine_peak`]: the place to a part of a cell, and [`covariance`], how sure it is.
+//! - [`align_maps`]: all of it.
 
 mod align;
+mod climb;
 mod correlation;
 mod fine_search;
+mod fourier;
+mod overlay;
 mod parameters;
+mod peak_shape;
+mod peaks;
+mod plan;
+mod prepared_map;
 mod raster;
 mod refusal;
 mod search;
 mod stage;
 
 #[cfg(test)]
+mod plan_tests;
+#[cfg(test)]
 mod stage_tests;
 #[cfg(test)]
 mod tests;
 
-pub use align::{MapAlignment, NamedMap, align_maps};
-pub use correlation::{Correlator, Workspace};
+pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared};
+pub use climb::{Steps, climb};
+pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use fine_search::refine_peak;
+pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
+pub use peak_shape::covariance;
+pub use peaks::Peaks;
+pub use plan::{MergePlan, Statement};
+pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::Refusal;
-pub use search::{Peak, SearchResult, search};
+pub use search::{Place, search};
 
 use gridweave_runtime::ros::{Alignment, OccupancyGrid};
 use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
@@ -41,14 +56,15 @@ use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
 pub fn kind() -> StageKind {
     StageKind::stage(
         "map_aligner",
-        "Finds how the maps of each pair of robots lie to each other from the maps alone: every rotation and every \
-         translation is tried, and a place is taken where walls lie on walls, and no other place is nearly as good. It \
-         sends a first guess, marked as provisional, which icp_refiner makes exact and verifies.",
+        "Finds how the maps of each pair of robots may lie to each other from the maps alone: every rotation and every \
+         translation is tried, and the places are taken at which walls lie on walls and not on free space of the other \
+         map. It sends the best few, ranked and marked as provisional: icp_refiner makes them exact, and merge_verifier \
+         decides between them.",
         vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps.")],
         vec![OutputPort::new(
             "alignment",
             PortType::of::<Alignment>(),
-            "A first guess for each pair of robots, or why there is none.",
+            "First guesses for each pair of robots, the best first, or why there is none.",
         )],
         |parameters: MapAlignerParameters, _context| Ok(stage::MapAligner::new(parameters)),
     )

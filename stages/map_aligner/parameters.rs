@@ -9,9 +9,11 @@ use std::f64::consts::{PI, TAU};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapAlignerParameters {
-    /// The side of a cell in which all places are tried, metres; never less than 1.5 cells of the coarser map.
+    /// The side of a cell in which places are judged, metres; never less than 3 cells of the coarser map. The search for
+    /// them takes cells twice as wide, and wider ones in large maps; the best of them are placed in cells half as wide.
     pub cell: f64,
-    /// The rotations that are tried lie at most this far apart, radians.
+    /// The rotations at which places are judged lie at most this far apart, radians. The search for them takes steps
+    /// twice as wide.
     pub rotation_step: f64,
     /// How much a cell of wall that lies on known free space of the other map counts against a place, where a cell of
     /// wall on wall counts 1 for it.
@@ -21,19 +23,23 @@ pub struct MapAlignerParameters {
     /// Another place differs from the best by more than this in the middle of the walls in common, metres, or by
     /// `apart_yaw`.
     pub apart: f64,
-    /// The guess is refused as ambiguous if another place scores more than this share of the best, 0 to 1. In maps of six
-    /// buildings that were drawn from laser scans and of 36 simulated ones, other places have 0.22 to 0.63 in pairs that
-    /// belong together, and 0.58 to 1.0 in pairs that do not.
-    pub max_runner_up: f64,
     /// About the least length of wall on which the maps must agree, metres. `icp_refiner` measures it exactly, and asks
     /// for more.
     pub min_wall_length: f64,
-    /// The side of a cell in the second, finer search round the best place, metres; never less than 1.5 cells of the
-    /// coarser map. It is also the standard deviation of the position that is sent.
-    pub fine_cell: f64,
-    /// The rotations of the finer search lie this far apart, radians. It is also the standard deviation of the rotation
-    /// that is sent.
-    pub fine_rotation_step: f64,
+    /// At most so many guesses are made for a pair of maps, each away from the others.
+    pub max_hypotheses: usize,
+    /// Guesses that score less than this share of the best are left out, but for the second, 0 to 1.
+    pub least_share: f64,
+    /// Maps are laid together, to be searched as one, if the best place elsewhere scores at most this share of the best,
+    /// 0 to 1. In maps of six buildings that were drawn from laser scans and of ten simulated ones, other places have 0.05
+    /// to 0.41 in pairs that belong together, and 0.63 to 1.0 in pairs that do not.
+    pub tie_runner_up: f64,
+    /// A robot that is laid on several maps that lie together is aligned with at most so many more of them, besides
+    /// the one with which it has the most wall in common.
+    pub predictions: usize,
+    /// A map whose known area has grown by at most this share keeps its guesses, if they still fit, and is not searched
+    /// again.
+    pub little_growth: f64,
     /// Whether the guess is marked as provisional: then `icp_refiner` must confirm it by more than it asks of a guess
     /// that rests on tags.
     pub provisional: bool,
@@ -47,23 +53,18 @@ impl Default for MapAlignerParameters {
         Self {
             cell: 0.2,
             rotation_step: TAU / 360.0,
-            free_space_penalty: 0.6,
+            free_space_penalty: 1.2,
             apart_yaw: TAU / 36.0,
             apart: 1.0,
-            max_runner_up: 0.6,
             min_wall_length: 15.0,
-            fine_cell: 0.1,
-            fine_rotation_step: TAU / 720.0,
+            max_hypotheses: 4,
+            least_share: 0.5,
+            tie_runner_up: 0.5,
+            predictions: 2,
+            little_growth: 0.2,
             provisional: true,
             max_extent: 400.0,
         }
-    }
-}
-
-impl MapAlignerParameters {
-    /// The number of rotations that are tried, evenly spread over a full turn.
-    pub(super) fn rotations(&self) -> usize {
-        (TAU / self.rotation_step - 1e-9).ceil() as usize
     }
 }
 
@@ -76,10 +77,10 @@ impl Parameters for MapAlignerParameters {
             ("free_space_penalty", self.free_space_penalty, 0.0, 100.0),
             ("apart_yaw", self.apart_yaw, 0.0, PI),
             ("apart", self.apart, 0.0, 1e6),
-            ("max_runner_up", self.max_runner_up, 0.0, 1.0),
             ("min_wall_length", self.min_wall_length, 0.0, 1e6),
-            ("fine_cell", self.fine_cell, 0.01, 10.0),
-            ("fine_rotation_step", self.fine_rotation_step, 1e-4, PI),
+            ("least_share", self.least_share, 0.0, 1.0),
+            ("tie_runner_up", self.tie_runner_up, 0.0, 1.0),
+            ("little_growth", self.little_growth, 0.0, 1e3),
             ("max_extent", self.max_extent, 1.0, 1e4),
         ];
         for (field, value, least, most) in ranges {
@@ -88,8 +89,11 @@ impl Parameters for MapAlignerParameters {
             }
         }
         // Beyond that, tables of all places do not fit in memory.
-        if self.max_extent / self.cell.min(self.fine_cell) > 2e4 {
-            errors.push(ParameterError::new("max_extent", "must be at most 20000 cells"));
+        if self.max_extent / self.cell > 1e4 {
+            errors.push(ParameterError::new("max_extent", "must be at most 10000 cells"));
+        }
+        if self.max_hypotheses == 0 {
+            errors.push(ParameterError::new("max_hypotheses", "must be at least 1"));
         }
         errors
     }

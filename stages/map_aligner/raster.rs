@@ -1,13 +1,14 @@
 //! A map in wider cells, cropped to what is known.
 
-use crate::geometry::{Cell, Grid, Point2, is_free, is_known, is_occupied};
+use crate::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
-/// Cells round what is known, into which walls can be dilated.
-const RIM: f64 = 2.0;
+/// Cells round what is known: walls can be dilated into them, and still the outermost are unknown.
+const RIM: f64 = 3.0;
 
-/// What a cell of a raster holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What a cell of a raster holds. What is greater wins where several things lie in one cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
 pub enum Content {
     /// Nothing is known of it.
     #[default]
@@ -38,10 +39,8 @@ pub struct Raster {
     pub width: usize,
     /// Cells along y.
     pub height: usize,
-    /// Row by row.
+    /// Row by row. The outermost cells are unknown.
     pub cells: Vec<Content>,
-    /// The centre of every occupied cell of the map itself, in the frame of the raster, metres.
-    walls: Vec<Point2>,
 }
 
 impl Raster {
@@ -50,48 +49,113 @@ impl Raster {
     /// A cell is wall if any cell of the grid in it is occupied, and free if any other is free. `cell` must be so wide
     /// that every cell in the midst of the grid gets one.
     pub fn new(grid: &Grid<'_>, cell: f64, max_extent: f64) -> Option<Self> {
-        let (mut bounds, mut walls) = (Bounds::default(), Vec::new());
-        for_each_known(grid, |point, value| {
-            bounds.add(&point);
-            if is_occupied(value) {
-                walls.push(point);
+        let geometry = &grid.geometry;
+        let rows = || {
+            let rows = grid.cells.chunks(geometry.width.max(1)).enumerate();
+            rows.filter_map(|(row, cells)| Some((row, known_range(cells, |value| is_known(*value))?, cells)))
+        };
+        let mut bounds = Bounds::default();
+        for (row, (first, last), _) in rows() {
+            for column in [first, last] {
+                bounds.add(&geometry.centre(Cell { column, row }));
             }
-        });
+        }
         if bounds.0.is_some_and(|(least, most)| (most - least).max() > max_extent) {
             return None;
         }
-        let mut raster = Self::unknown(&bounds, cell);
-        for_each_known(grid, |point, value| {
-            if let (true, Some(index)) = (is_free(value), raster.index(&point)) {
-                raster.cells[index] = Content::Free;
+        let mut raster = Self::unknown(&bounds, cell, geometry.resolution);
+        let step = geometry.origin.rotation * Vector2::new(geometry.resolution, 0.0) / cell;
+        for (row, (first, last), cells) in rows() {
+            let start = (geometry.centre(Cell { column: first, row }).coords - raster.corner) / cell;
+            for (number, value) in cells[first..=last].iter().enumerate() {
+                let content = match *value {
+                    value if is_occupied(value) => Content::Wall,
+                    value if is_free(value) => Content::Free,
+                    _ => continue,
+                };
+                // Never below zero, as there is a rim.
+                let place = start + step * number as f64;
+                if let Some(cell) = raster.cells.get_mut(place.y as usize * raster.width + place.x as usize) {
+                    *cell = content.max(*cell);
+                }
             }
-        });
-        raster.draw_walls(walls);
+        }
+        raster.mark_beside_walls();
         Some(raster)
     }
 
-    /// The most cells along x and along y that the map takes, turned by any of some angles.
-    pub fn size_turned(&self, angles: &[f64]) -> (usize, usize) {
-        let sizes = angles.iter().filter_map(|angle| self.bounds_turned(*angle).size(self.cell));
-        sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)))
-    }
-
-    /// The same map turned about the origin of its frame.
-    pub fn turned(&self, angle: f64) -> Self {
-        let turn = UnitComplex::new(angle);
-        let mut turned = Self::unknown(&self.bounds_turned(angle), self.cell);
-        let along_x = turn.inverse() * Vector2::new(self.cell, 0.0);
-        for row in 0..turned.height {
-            let mut point = turn.inverse() * turned.centre(0, row);
-            for cell in &mut turned.cells[row * turned.width..(row + 1) * turned.width] {
-                if self.at(&point) == Content::Free {
-                    *cell = Content::Free;
+    /// The same map in cells twice as wide.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2) + 2, self.height.div_ceil(2) + 2);
+        let corner = self.corner - Vector2::repeat(2.0 * self.cell);
+        let mut halved =
+            Self { corner, cell: 2.0 * self.cell, width, height, cells: vec![Content::Unknown; width * height] };
+        for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
+            let start = (row / 2 + 1) * width + 1;
+            for (column, content) in cells.iter().enumerate() {
+                // What lies beside a wall lies beside it in wider cells too, and is marked so below.
+                if *content != Content::BesideWall {
+                    let cell = &mut halved.cells[start + column / 2];
+                    *cell = (*cell).max(*content);
                 }
-                point += along_x;
             }
         }
-        turned.draw_walls(self.walls.iter().map(|wall| turn * wall).collect());
-        turned
+        halved.mark_beside_walls();
+        halved
+    }
+
+    /// What several maps know together, in the frame that each is taken to by its transform. Where one has a wall there
+    /// is a wall. Cells are as wide as those of the first.
+    pub fn union(maps: &[(Pose2, &Self)]) -> Self {
+        let Some((_, first)) = maps.first() else { return Self::default() };
+        let (cell, mut bounds) = (first.cell, Bounds::default());
+        for (transform, map) in maps {
+            map.for_each_end(|point| bounds.add(&(transform * point)));
+        }
+        let mut union = Self::unknown(&bounds, cell, cell);
+        for (transform, map) in maps {
+            for (index, content) in map.cells.iter().enumerate() {
+                let centre = map.centre(index % map.width, index / map.width);
+                // A cell that is turned may leave a gap beside it; its quarters do not.
+                let quarter = 0.25 * map.cell;
+                let offsets: &[(f64, f64)] = match content {
+                    Content::Unknown | Content::BesideWall => continue,
+                    Content::Free => &[(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)],
+                    Content::Wall => &[(0.0, 0.0)],
+                };
+                for (x, y) in offsets {
+                    let point = transform * (centre + Vector2::new(*x, *y) * quarter);
+                    let place = (point.coords - union.corner) / cell;
+                    if let Some(cell) = union.cells.get_mut(place.y as usize * union.width + place.x as usize) {
+                        *cell = (*cell).max(*content);
+                    }
+                }
+            }
+        }
+        union.mark_beside_walls();
+        union
+    }
+
+    /// The number of cells of which anything is known.
+    pub fn known_cells(&self) -> usize {
+        self.cells.iter().filter(|content| **content != Content::Unknown).count()
+    }
+
+    /// The least box that holds the map turned by an angle about the origin of its frame: its lower corner, and its
+    /// size, metres.
+    pub(super) fn box_turned(&self, angle: f64) -> (Vector2<f64>, Vector2<f64>) {
+        let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
+        self.for_each_end(|point| bounds.add(&(turn * point)));
+        let (least, most) = bounds.0.unwrap_or_default();
+        (least, most - least)
+    }
+
+    /// Goes through the centres of the first and the last known cell of each row.
+    fn for_each_end(&self, mut visit: impl FnMut(Point2)) {
+        for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
+            let ends = known_range(cells, |content| *content != Content::Unknown);
+            ends.into_iter().flat_map(|(first, last)| [first, last]).for_each(|column| visit(self.centre(column, row)));
+        }
     }
 
     /// The centre of a cell, metres.
@@ -101,7 +165,17 @@ impl Raster {
 
     /// What is at a point.
     pub fn at(&self, point: &Point2) -> Content {
-        self.index(point).map_or(Content::Unknown, |index| self.cells[index])
+        let place = (point.coords - self.corner) / self.cell;
+        self.content(place.x, place.y)
+    }
+
+    /// What is at a place given in cells from the corner. What lies outside is drawn to the outermost cells, which
+    /// are unknown.
+    #[inline]
+    pub(super) fn content(&self, x: f64, y: f64) -> Content {
+        let within = |place: f64, count: usize| (place as i32).clamp(0, count.saturating_sub(1) as i32) as usize;
+        let index = within(y, self.height) * self.width + within(x, self.width);
+        self.cells.get(index).copied().unwrap_or_default()
     }
 
     /// The centres of the cells with walls, row by row.
@@ -110,63 +184,41 @@ impl Raster {
         walls.map(|(index, _)| self.centre(index % self.width, index / self.width))
     }
 
-    fn unknown(bounds: &Bounds, cell: f64) -> Self {
-        let (Some((least, _)), Some((width, height))) = (bounds.0, bounds.size(cell)) else {
-            return Self { cell, ..Self::default() };
-        };
-        let corner = least - Vector2::repeat((RIM - 0.5) * cell);
-        Self { corner, cell, width, height, cells: vec![Content::Unknown; width * height], walls: Vec::new() }
+    /// Nothing but unknown cells, for centres of cells of a grid within some bounds.
+    fn unknown(bounds: &Bounds, cell: f64, resolution: f64) -> Self {
+        let Some((least, most)) = bounds.0 else { return Self { cell, ..Self::default() } };
+        let size = ((most - least) / cell).map(|cells| cells as usize + 2 * RIM as usize);
+        // With half a cell of the grid more no centre comes to lie on a border between cells, where rounding would decide.
+        let corner = least - Vector2::repeat((RIM - 0.5) * cell + 0.5 * resolution);
+        Self { corner, cell, width: size.x, height: size.y, cells: vec![Content::Unknown; size.x * size.y] }
     }
 
-    fn index(&self, point: &Point2) -> Option<usize> {
-        let place = (point.coords - self.corner) / self.cell;
-        if !(place.x >= 0.0 && place.y >= 0.0) {
-            return None;
-        }
-        let (column, row) = (place.x as usize, place.y as usize);
-        (column < self.width && row < self.height).then(|| row * self.width + column)
-    }
-
-    /// Puts the walls into the cells, and marks those beside them.
-    fn draw_walls(&mut self, walls: Vec<Point2>) {
-        let with_walls: Vec<usize> = walls.iter().filter_map(|wall| self.index(wall)).collect();
-        for &index in &with_walls {
-            self.cells[index] = Content::Wall;
-        }
-        for index in with_walls {
-            let (column, row) = (index % self.width, index / self.width);
-            for row in row.saturating_sub(1)..=(row + 1).min(self.height - 1) {
-                for column in column.saturating_sub(1)..=(column + 1).min(self.width - 1) {
-                    let cell = &mut self.cells[row * self.width + column];
-                    if *cell != Content::Wall {
-                        *cell = Content::BesideWall;
+    fn mark_beside_walls(&mut self) {
+        for row in 0..self.height {
+            for column in 0..self.width {
+                if self.cells[row * self.width + column] != Content::Wall {
+                    continue;
+                }
+                for row in row.saturating_sub(1)..=(row + 1).min(self.height - 1) {
+                    for column in column.saturating_sub(1)..=(column + 1).min(self.width - 1) {
+                        let cell = &mut self.cells[row * self.width + column];
+                        *cell = (*cell).max(Content::BesideWall);
                     }
                 }
             }
         }
-        self.walls = walls;
-    }
-
-    fn bounds_turned(&self, angle: f64) -> Bounds {
-        let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
-        self.rim().for_each(|point| bounds.add(&(turn * point)));
-        bounds
-    }
-
-    /// The first and the last known cell of each row, which bound the map however it is turned.
-    fn rim(&self) -> impl Iterator<Item = Point2> {
-        let is_known = |content: &Content| *content != Content::Unknown;
-        self.cells.chunks(self.width.max(1)).enumerate().flat_map(move |(row, cells)| {
-            let ends = [cells.iter().position(is_known), cells.iter().rposition(is_known)];
-            ends.into_iter().flatten().map(move |column| self.centre(column, row))
-        })
     }
 }
 
 impl Default for Raster {
     fn default() -> Self {
-        Self { corner: Vector2::zeros(), cell: 1.0, width: 0, height: 0, cells: Vec::new(), walls: Vec::new() }
+        Self { corner: Vector2::zeros(), cell: 1.0, width: 0, height: 0, cells: Vec::new() }
     }
+}
+
+/// The first and the last known cell of a row. Those of all rows bound the map however it is turned.
+fn known_range<T>(row: &[T], is_known: impl Fn(&T) -> bool) -> Option<(usize, usize)> {
+    Some((row.iter().position(&is_known)?, row.iter().rposition(&is_known)?))
 }
 
 /// The least box that holds some points, if there are any.
@@ -178,22 +230,6 @@ impl Bounds {
         let (least, most) = self.0.unwrap_or((point.coords, point.coords));
         self.0 = Some((least.inf(&point.coords), most.sup(&point.coords)));
     }
-
-    /// The cells along x and y that it takes, with a rim.
-    fn size(&self, cell: f64) -> Option<(usize, usize)> {
-        let (least, most) = self.0?;
-        let cells = (most - least) / cell;
-        Some((cells.x as usize + 2 * RIM as usize, cells.y as usize + 2 * RIM as usize))
-    }
-}
-
-/// Goes through the known cells of a grid: the centre in the map frame, and the value.
-fn for_each_known(grid: &Grid<'_>, mut visit: impl FnMut(Point2, i8)) {
-    for (row, cells) in grid.cells.chunks(grid.geometry.width.max(1)).enumerate() {
-        for (column, &value) in cells.iter().enumerate().filter(|(_, value)| is_known(**value)) {
-            visit(grid.geometry.centre(Cell { column, row }), value);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -203,8 +239,9 @@ mod tests {
     use proptest::prelude::*;
 
     /// A map of 6 x 4 m with a straight wall through its middle, along x, and an unknown margin.
-    fn map() -> (GridGeometry, Vec<i8>) {
-        let geometry = GridGeometry { width: 160, height: 120, resolution: 0.05, origin: pose(-4.0, -3.0, 0.0) };
+    fn map(origin_yaw: f64) -> (GridGeometry, Vec<i8>) {
+        let origin = pose(0.0, 0.0, origin_yaw) * pose(-4.0, -3.0, 0.0);
+        let geometry = GridGeometry { width: 160, height: 120, resolution: 0.05, origin };
         let value = |index: usize| match (index % 160, index / 160) {
             (20..140, 60) => 100,
             (20..140, 20..100) => 0,
@@ -219,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_raster_is_cropped_to_what_is_known() {
-        let (geometry, cells) = map();
+        let (geometry, cells) = map(0.0);
         let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
         assert!(raster.width <= 35 && raster.height <= 25, "{} x {}", raster.width, raster.height);
         assert!((area(&raster, Content::is_near_wall) - 6.4 * 0.6).abs() < 0.3);
@@ -227,25 +264,26 @@ mod tests {
         assert_eq!(raster.at(&Point2::new(1.0, 1.0)), Content::Free);
         assert_eq!(raster.at(&Point2::new(1.0, 9.0)), Content::Unknown);
         assert!(Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 5.0).is_none());
+        let (least, size) = raster.box_turned(0.0);
+        assert!((least.x + 3.0).abs() < 0.4 && (size.y - 4.0).abs() < 0.6, "{least} {size}");
     }
 
     proptest! {
         #[test]
-        fn a_turn_leaves_no_holes(angle in -7.0..7.0) {
-            let (geometry, cells) = map();
-            let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
-            let turned = raster.turned(angle);
-            let turn = UnitComplex::new(angle);
-            for step in -140..140 {
-                let along = f64::from(step) * 0.02;
-                prop_assert!(turned.at(&(turn * Point2::new(along, 0.03))).is_near_wall());
-                prop_assert_eq!(turned.at(&(turn * Point2::new(along, 1.0))), Content::Free);
-                prop_assert_eq!(turned.at(&(turn * Point2::new(along, -1.5))), Content::Free);
+        fn a_turned_grid_leaves_no_holes_and_wider_cells_hold_the_same(yaw in -7.0..7.0) {
+            let (geometry, cells) = map(yaw);
+            let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.1, 100.0).unwrap();
+            let turn = UnitComplex::new(yaw);
+            for raster in [raster.halved(), raster] {
+                for step in -140..140 {
+                    let along = f64::from(step) * 0.02;
+                    prop_assert!(raster.at(&(turn * Point2::new(along, 0.03))).is_near_wall());
+                    prop_assert_eq!(raster.at(&(turn * Point2::new(along, 1.0))), Content::Free);
+                    prop_assert_eq!(raster.at(&(turn * Point2::new(along, -1.5))), Content::Free);
+                }
+                let known = area(&raster, |content| content != Content::Unknown);
+                prop_assert!((known - 24.0).abs() < 4.5, "{known}");
             }
-            let free = |raster: &Raster| area(raster, |content| content == Content::Free);
-            prop_assert!((free(&turned) - free(&raster)).abs() < 2.5, "{} {}", free(&turned), free(&raster));
-            let (width, height) = raster.size_turned(&[angle]);
-            prop_assert_eq!((width, height), (turned.width, turned.height));
         }
     }
 }

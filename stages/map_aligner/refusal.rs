@@ -31,21 +31,4 @@ pub enum Refusal {
         /// What is asked for, metres.
         least: f64,
     },
-    /// Another place fits nearly as well.
-    #[error(
-        "the maps fit at several places, and it cannot be told which is right: with the map moved by {shift:.1} m and \
-         turned by {turn:.0} degrees they fit {:.0} % as well as at the best place, and at most {:.0} % are allowed",
-        share * 100.0,
-        most * 100.0
-    )]
-    Ambiguous {
-        /// What the other place scores of the best, 0 to 1.
-        share: f64,
-        /// What is allowed, 0 to 1.
-        most: f64,
-        /// How far elsewhere is, metres.
-        shift: f64,
-        /// How much the map is turned there, degrees.
-        turn: f64,
-    },
 }

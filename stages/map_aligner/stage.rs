@@ -1,7 +1,6 @@
-//! The stage: keeps each robot's last map, and aligns each pair when one of its two maps has changed.
+//! The stage: keeps each robot's last map, and sends what a plan of searches tells of pairs of robots.
 
-use super::align::NamedMap;
-use super::{MapAlignerParameters, align_maps};
+use super::{MapAlignerParameters, MergePlan, Statement};
 use crate::geometry::{Grid, read_map, row_by_row};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{Alignment, Header};
@@ -11,61 +10,49 @@ use std::collections::BTreeMap;
 /// The output port of the first guesses.
 const ALIGNMENT: usize = 0;
 
-/// Aligns the maps of pairs of robots.
+/// Aligns the maps of robots.
 pub(super) struct MapAligner {
-    parameters: MapAlignerParameters,
     /// The last usable map of each robot, as it came.
     maps: BTreeMap<String, Message>,
-    /// What was sent last for a pair.
-    sent: BTreeMap<(String, String), Alignment>,
-    /// Pairs of maps that were searched, for the report.
-    searches: u64,
+    plan: MergePlan,
+    /// Whether guesses are marked as provisional.
+    provisional: bool,
 }
 
 impl MapAligner {
     pub(super) fn new(parameters: MapAlignerParameters) -> Self {
-        Self { parameters, maps: BTreeMap::new(), sent: BTreeMap::new(), searches: 0 }
+        Self { provisional: parameters.provisional, maps: BTreeMap::new(), plan: MergePlan::new(parameters) }
     }
 
-    /// Aligns the pair of two robots, the first by name being robot a.
-    fn align(&mut self, a: &str, b: &str, output: &mut Output<'_>) -> Result<(), StageError> {
-        let (Some(map_a), Some(map_b)) = (self.maps.get(a), self.maps.get(b)) else { return Ok(()) };
-        let doing = || format!("align the maps of `{a}` and `{b}`");
-        let (header, grid_a) = read_map(map_a).map_err(|error| StageError::new(doing(), error))?;
-        let (_, grid_b) = read_map(map_b).map_err(|error| StageError::new(doing(), error))?;
-        self.searches += 1;
-        let mut alignment = Alignment {
+    /// Sends what is told of a pair: each guess in a message of its own, the best first, or why there is none.
+    fn send(&self, statement: &Statement, output: &mut Output<'_>) -> Result<(), StageError> {
+        let doing = || format!("align the maps of `{}` and `{}`", statement.a, statement.b);
+        let Some(map_a) = self.maps.get(&statement.a) else { return Ok(()) };
+        let (header, _) = read_map(map_a).map_err(|error| StageError::new(doing(), error))?;
+        let of_pair = Alignment {
             header: Header::new(output.log_time(), header.frame_id),
-            a: a.to_owned(),
-            b: b.to_owned(),
+            a: statement.a.clone(),
+            b: statement.b.clone(),
             method: "maps".into(),
             ..Alignment::default()
         };
-        let (named_a, named_b) = (NamedMap { robot: a, grid: grid_a }, NamedMap { robot: b, grid: grid_b });
-        match align_maps(&named_a, &named_b, &self.parameters) {
-            Ok(found) => {
-                alignment.set_transform_a_b(&found.transform_a_b);
-                alignment.covariance = row_by_row(&found.covariance);
-                alignment.score = found.wall_agreement;
-                alignment.reason = found.reason();
-                alignment.accepted = true;
-                alignment.provisional = self.parameters.provisional;
-            }
-            Err(refusal) => alignment.reason = refusal.to_string(),
-        }
-        self.send(alignment, output)
-    }
-
-    /// Sends an alignment, unless it tells only what was sent last.
-    fn send(&mut self, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
-        let pair = (alignment.a.clone(), alignment.b.clone());
-        let is_news = self.sent.get(&pair).is_none_or(|sent| {
-            let header = alignment.header.clone();
-            Alignment { header, ..sent.clone() } != alignment
-        });
-        if is_news {
+        let guesses = match &statement.found {
+            Ok(guesses) => guesses,
+            Err(reason) => return output.send(ALIGNMENT, "", &Alignment { reason: reason.clone(), ..of_pair }),
+        };
+        for (rank, (found, reason)) in (0..).zip(guesses) {
+            let mut alignment = Alignment {
+                covariance: row_by_row(&found.covariance),
+                score: found.share,
+                accepted: true,
+                provisional: self.provisional,
+                rank,
+                hypotheses: guesses.len() as u32,
+                reason: reason.clone(),
+                ..of_pair.clone()
+            };
+            alignment.set_transform_a_b(&found.transform_a_b);
             output.send(ALIGNMENT, "", &alignment)?;
-            self.sent.insert(pair, alignment);
         }
         Ok(())
     }
@@ -87,15 +74,18 @@ impl Stage for MapAligner {
         if is_same {
             return Ok(());
         }
-        let others: Vec<String> = self.maps.keys().filter(|other| **other != robot).cloned().collect();
-        others.iter().try_for_each(|other| match robot < *other {
-            true => self.align(&robot, other, output),
-            false => self.align(other, &robot, output),
-        })
+        let grids = self.maps.iter().filter_map(|(robot, map)| Some((robot.clone(), read_map(map).ok()?.1)));
+        let statements = self.plan.update(&robot, &grids.collect());
+        statements.iter().try_for_each(|statement| self.send(statement, output))
+    }
+
+    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+        let statements = self.plan.finish();
+        statements.iter().try_for_each(|statement| self.send(statement, output))
     }
 
     fn report(&self) -> Option<serde_json::Value> {
-        Some(serde_json::json!({ "searches": self.searches }))
+        Some(serde_json::json!({ "searches": self.plan.searches, "predictions": self.plan.predictions }))
     }
 }
 

@@ -63,11 +63,10 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     let mut bench = Bench::new("");
     assert_eq!(bench.give_map("robot2", &b), []);
     let first = bench.give_map("robot1", &a);
-    assert_eq!(first.len(), 1);
     assert_eq!((first[0].a.as_str(), first[0].b.as_str()), ("robot1", "robot2"));
     assert_eq!((first[0].method.as_str(), first[0].header.frame_id.as_str()), ("maps", "robot1/map"));
     assert!(first[0].accepted && first[0].provisional, "{}", first[0].reason);
-    assert!((0.9..=1.0).contains(&first[0].score), "{}", first[0].score);
+    assert_eq!((first[0].score, first[0].rank, first[0].hypotheses), (1.0, 0, first.len() as u32));
     assert!(first[0].reason.contains("m of walls in common"), "{}", first[0].reason);
     let (metres, radians) = apart(&first[0].transform_a_b(), &a.transform_to(&b), &b);
     assert!(metres < 0.15 && radians < 0.015, "{metres} m, {radians} rad");
@@ -75,22 +74,43 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     assert_eq!(bench.give_map("robot1", &a), [], "the same map again");
     assert_eq!(bench.searches(), 1);
     let second = bench.give_map("robot2", &more_of_b);
-    assert_eq!(second.len(), 1);
+    assert!(second[0].accepted && second.len() == second[0].hypotheses as usize, "{second:?}");
     assert_eq!(bench.searches(), 2);
 }
 
 #[test]
-fn every_pair_of_robots_is_aligned_and_what_is_refused_says_why() {
+fn what_is_refused_says_why() {
     let (a, b, _) = maps();
-    let other = FloorPlan::another_office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(1.0, 1.0, 1.0));
+    let corner = angular_office().draw(seen(-0.2, -0.2, 3.0, 3.0), drawing(1.0, 1.0, 1.0));
     let mut bench = Bench::new("");
     bench.give_map("robot1", &a);
-    assert_eq!(bench.give_map("robot3", &b).len(), 1);
-    let sent = bench.give_map("robot2", &other);
+    let first = bench.give_map("robot3", &b);
+    assert!(first.iter().all(|one| one.accepted && one.reason.contains("m of walls in common")), "{first:?}");
+    let sent = bench.give_map("robot2", &corner);
     let pairs: Vec<(&str, &str, bool)> =
         sent.iter().map(|one| (one.a.as_str(), one.b.as_str(), one.accepted)).collect();
-    assert_eq!(pairs, [("robot1", "robot2", false), ("robot2", "robot3", false)]);
-    assert!(sent.iter().all(|one| one.reason.contains("several places")), "{sent:?}");
+    // The maps of the other two are searched as one.
+    assert_eq!(pairs, [("robot1", "robot2", false)]);
+    assert!(sent.iter().all(|one| one.reason.contains("too little in common") && one.hypotheses == 0), "{sent:?}");
+}
+
+#[test]
+fn hypotheses_are_ranked_and_counted_and_their_scores_fall() {
+    let hall = FloorPlan::new(&[
+        [0.0, 0.0, 20.0, 0.0],
+        [20.0, 0.0, 20.0, 12.0],
+        [20.0, 12.0, 0.0, 12.0],
+        [0.0, 12.0, 0.0, 0.0],
+    ]);
+    let all = seen(-0.2, -0.2, 20.2, 12.2);
+    let mut bench = Bench::new("max_hypotheses = 3\nleast_share = 0.0");
+    bench.give_map("robot1", &hall.draw(all, drawing(3.0, 2.0, 0.4)));
+    let sent = bench.give_map("robot2", &hall.draw(all, drawing(12.0, 6.0, -2.1)));
+    assert!((2..=3).contains(&sent.len()), "{sent:?}");
+    let ranks: Vec<(u32, u32)> = sent.iter().map(|one| (one.rank, one.hypotheses)).collect();
+    assert_eq!(ranks, (0..sent.len() as u32).map(|rank| (rank, sent.len() as u32)).collect::<Vec<_>>());
+    assert!(sent[0].score == 1.0 && sent[1].score > 0.9, "{sent:?}");
+    assert!(sent.is_sorted_by(|one, other| one.score >= other.score));
 }
 
 #[test]
@@ -98,19 +118,16 @@ fn the_parameters_decide() {
     let (a, b, _) = maps();
     for (parameters, accepted, provisional) in [
         ("provisional = false", true, false),
-        ("max_runner_up = 0.0", false, false),
+        ("max_hypotheses = 1", true, true),
         ("min_wall_length = 1000.0", false, false),
         ("max_extent = 10.0", false, false),
     ] {
         let mut bench = Bench::new(parameters);
         bench.give_map("robot1", &a);
         let sent = bench.give_map("robot2", &b);
-        assert_eq!(
-            (sent[0].accepted, sent[0].provisional),
-            (accepted, provisional),
-            "{parameters}: {}",
-            sent[0].reason
-        );
+        let said = (sent[0].accepted, sent[0].provisional);
+        assert_eq!(said, (accepted, provisional), "{parameters}: {}", sent[0].reason);
+        assert!(sent.len() == 1 || !parameters.contains("max_hypotheses"), "{sent:?}");
     }
 }
 
@@ -127,7 +144,9 @@ fn what_cannot_be_read_is_left_out_with_a_warning() {
 
 #[test]
 fn parameters_that_cannot_be_are_refused() {
-    for parameters in ["cell = 0.0", "rotation_step = nan", "max_runner_up = 1.5", "max_extent = 9000.0"] {
+    for parameters in
+        ["cell = 0.0", "rotation_step = nan", "least_share = 1.5", "max_hypotheses = 0", "max_extent = 9000.0"]
+    {
         assert!(super::kind().make(parameters.parse().unwrap(), &Context::default()).is_err(), "{parameters}");
     }
 }

@@ -1,18 +1,22 @@
 //! Maps of known places, aligned.
 
-use super::align::NamedMap;
-use super::{MapAlignerParameters, MapAlignment, Refusal, align_maps};
+use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, Refusal, align_maps};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use crate::icp_refiner::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-fn align_grids(a: Grid<'_>, b: Grid<'_>, parameters: &MapAlignerParameters) -> Result<MapAlignment, Refusal> {
+fn align_grids(a: Grid<'_>, b: Grid<'_>, parameters: &MapAlignerParameters) -> Result<MapAlignments, Refusal> {
     align_maps(&NamedMap { robot: "robot1", grid: a }, &NamedMap { robot: "robot2", grid: b }, parameters)
 }
 
-fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, Refusal> {
+fn hypotheses(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignments, Refusal> {
     align_grids(a.view().grid, b.view().grid, &MapAlignerParameters::default())
+}
+
+/// The best guess.
+fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, Refusal> {
+    Ok(hypotheses(a, b)?.hypotheses[0].clone())
 }
 
 #[track_caller]
@@ -99,32 +103,39 @@ fn the_other_order_gives_the_inverse() {
 }
 
 #[test]
-fn a_room_that_looks_the_same_after_half_a_turn_is_ambiguous() {
+fn of_a_room_that_looks_the_same_after_half_a_turn_there_are_two_hypotheses() {
     let walls = [[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]];
     let hall = FloorPlan::new(&walls);
     let (a, b) = (hall.draw(all(), drawing(3.0, 2.0, 0.4)), hall.draw(all(), drawing(12.0, 6.0, -2.1)));
-    let Err(Refusal::Ambiguous { share, turn, .. }) = align(&a, &b) else { panic!("{:?}", align(&a, &b)) };
-    assert!(share > 0.9 && turn.abs() > 178.0, "{share} {turn}");
+    let found = hypotheses(&a, &b).unwrap();
+    let (_, turn) = found.runner_up_change;
+    assert!(found.runner_up_share > 0.9 && turn.abs().to_degrees() > 178.0, "{found:?}");
+    assert!(found.hypotheses.len() >= 2 && found.hypotheses[1].share == found.runner_up_share, "{found:?}");
+    let truth = a.transform_to(&b);
+    let errors = found.hypotheses.iter().map(|found| apart(&found.transform_a_b, &truth, &b).0);
+    assert!(errors.fold(f64::MAX, f64::min) < 0.15, "{found:?}");
+}
+
+/// A wall along a circle about (10, 6), from east round to the left, as short straight walls.
+fn round_wall(radius: f64, share: f64) -> Vec<[f64; 4]> {
+    let corner = |i: i32| pose(10.0, 6.0, TAU * share * f64::from(i) / 60.0) * Point2::new(radius, 0.0);
+    (0..60).map(|i| [corner(i).x, corner(i).y, corner(i + 1).x, corner(i + 1).y]).collect()
 }
 
 #[test]
-fn a_round_hall_and_a_corridor_are_ambiguous() {
-    let corners: Vec<Point2> =
-        (0..=36).map(|i| pose(10.0, 6.0, TAU * f64::from(i) / 36.0) * Point2::new(5.5, 0.0)).collect();
-    let round: Vec<[f64; 4]> = corners.windows(2).map(|ends| [ends[0].x, ends[0].y, ends[1].x, ends[1].y]).collect();
-    for place in [FloorPlan::new(&round), FloorPlan::corridor()] {
+fn a_round_hall_fits_at_every_angle_and_a_corridor_at_both_ways_round() {
+    let corridor = FloorPlan::corridor();
+    for place in [FloorPlan::new(&round_wall(5.5, 1.0)), corridor] {
         let part = seen(-0.2, -1.2, 20.2, 12.2);
         let (a, b) = (place.draw(part, drawing(3.0, 2.0, 0.4)), place.draw(part, drawing(12.0, 6.0, -2.1)));
-        assert!(matches!(align(&a, &b), Err(Refusal::Ambiguous { .. })), "{:?}", align(&a, &b));
+        let found = hypotheses(&a, &b).unwrap();
+        assert!(found.runner_up_share > 0.9 && found.hypotheses[1].share > 0.9, "{found:?}");
     }
 }
 
 #[test]
 fn a_curved_wall_with_a_mark_is_aligned() {
-    let corners: Vec<Point2> =
-        (0..=36).map(|i| pose(10.0, 6.0, TAU * f64::from(i) / 40.0) * Point2::new(5.5, 0.0)).collect();
-    let mut walls: Vec<[f64; 4]> =
-        corners.windows(2).map(|ends| [ends[0].x, ends[0].y, ends[1].x, ends[1].y]).collect();
+    let mut walls = round_wall(5.5, 0.9);
     walls.extend([
         [10.0, 6.0, 14.0, 6.5],
         [8.0, 3.0, 8.0, 8.0],
@@ -138,13 +149,15 @@ fn a_curved_wall_with_a_mark_is_aligned() {
 }
 
 #[test]
-fn maps_of_other_buildings_and_mirrored_ones_are_refused() {
+fn maps_of_other_buildings_and_mirrored_ones_fit_nowhere_better_than_elsewhere() {
     let office = FloorPlan::office();
     let a = office.draw(all(), drawing(3.0, 2.0, 0.4));
     for other in [FloorPlan::another_office(), office.mirrored(6.0)] {
         let b = other.draw(all(), drawing(12.0, 6.0, -2.1));
-        let refusal = align(&a, &b).unwrap_err();
-        assert!(matches!(refusal, Refusal::Ambiguous { .. }), "{refusal}");
+        match hypotheses(&a, &b) {
+            Ok(found) => assert!(found.runner_up_share > 0.6, "{found:?}"),
+            Err(refusal) => assert!(matches!(refusal, Refusal::TooLittleInCommon { .. }), "{refusal}"),
+        }
     }
 }
 
@@ -211,7 +224,63 @@ fn an_unknown_margin_changes_nothing() {
     let shift = Pose2::translation(-100.0 * b.geometry.resolution, -200.0 * b.geometry.resolution);
     let geometry = GridGeometry { width, height, origin: b.geometry.origin * shift, ..b.geometry };
     let wide = align_grids(a.view().grid, Grid::new(geometry, &cells).unwrap(), &MapAlignerParameters::default());
-    let (wide, narrow) = (wide.unwrap(), align(&a, &b).unwrap());
-    assert!((wide.transform_a_b.to_homogeneous() - narrow.transform_a_b.to_homogeneous()).norm() < 1e-9);
-    assert!((wide.margin - narrow.margin).abs() < 1e-9);
+    let (wide, narrow) = (wide.unwrap(), hypotheses(&a, &b).unwrap());
+    let (of_wide, of_narrow) = (&wide.hypotheses[0].transform_a_b, &narrow.hypotheses[0].transform_a_b);
+    assert!((of_wide.to_homogeneous() - of_narrow.to_homogeneous()).norm() < 1e-9);
+    assert!((wide.runner_up_share - narrow.runner_up_share).abs() < 1e-9);
+}
+
+#[test]
+fn along_a_corridor_the_covariance_is_long() {
+    let corridor = FloorPlan::new(&[[0.0, 0.0, 40.0, 0.0], [0.0, 2.5, 40.0, 2.5]]);
+    let part = seen(5.0, -0.2, 35.0, 2.7);
+    let (a, b) = (corridor.draw(part, drawing(0.0, 0.0, 0.5)), corridor.draw(part, drawing(0.0, 0.0, 0.5)));
+    let found = align(&a, &b).unwrap();
+    // In frame a, the frame of both maps, the corridor runs along -0.5 rad.
+    let along = pose(0.0, 0.0, -0.5) * nalgebra::Vector2::x();
+    let across = pose(0.0, 0.0, -0.5) * nalgebra::Vector2::y();
+    let position = found.covariance.fixed_view::<2, 2>(0, 0);
+    // Without the part that comes from the turn about the middle of the walls.
+    let deviation = |direction: nalgebra::Vector2<f64>| direction.dot(&(position * direction)).sqrt();
+    assert!(deviation(along) > 1.5 && deviation(along) > 3.0 * deviation(across), "{found:?}");
+}
+
+/// An open campus of 60 x 40 m: scattered small huts and short walls, none parallel to another.
+fn campus() -> FloorPlan {
+    let mut walls = Vec::new();
+    for number in 0..26 {
+        // Spread by irrational steps, so that no two places look alike.
+        let (x, y) = (60.0 * (0.618 * f64::from(number)).fract(), 40.0 * (0.445 * f64::from(number)).fract());
+        let corner = |turn: i32, side: f64| {
+            let at = pose(x, y, 0.7 * f64::from(number)) * pose(0.0, 0.0, TAU * f64::from(turn) / 4.0);
+            at * Point2::new(side, 0.4 * side)
+        };
+        let side = 0.8 + 1.9 * (0.271 * f64::from(number)).fract();
+        for turn in 0..(2 + number % 3) {
+            let (start, end) = (corner(turn, side), corner(turn + 1, side));
+            walls.push([start.x, start.y, end.x, end.y]);
+        }
+    }
+    FloorPlan::new(&walls)
+}
+
+#[test]
+fn an_open_campus_with_scattered_huts_is_aligned() {
+    let campus = campus();
+    let a = campus.draw(seen(-2.0, -2.0, 44.0, 42.0), Drawing { resolution: 0.1, ..drawing(3.0, 2.0, 0.4) });
+    for yaw in [0.3, 2.9] {
+        let b = campus.draw(seen(16.0, -2.0, 62.0, 42.0), Drawing { resolution: 0.1, ..drawing(50.0, 6.0, yaw) });
+        assert_right(&a, &b);
+        let found = hypotheses(&a, &b).unwrap();
+        assert!(found.runner_up_share < 0.5, "{found:?}");
+    }
+}
+
+#[test]
+fn a_round_hall_with_a_few_pillars_is_aligned() {
+    let mut walls = round_wall(5.5, 1.0);
+    walls.extend([[12.0, 7.0, 12.6, 7.3], [8.0, 3.0, 8.0, 4.1], [6.5, 7.0, 7.2, 7.6], [10.8, 3.4, 11.9, 3.1]]);
+    let place = FloorPlan::new(&walls);
+    let (a, b) = (place.draw(all(), drawing(3.0, 2.0, 0.4)), place.draw(all(), drawing(12.0, 6.0, -2.1)));
+    assert_right(&a, &b);
 }

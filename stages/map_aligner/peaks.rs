@@ -1,0 +1,114 @@
+//! The places at which two maps fit best, each away from the others.
+
+use super::climb::{Steps, climb};
+use super::overlay::Overlay;
+use super::search::{Place, search};
+use super::{MapAlignerParameters, PreparedMap};
+use crate::geometry::{Point2, Pose2, turn_difference};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// Maps that are longer, in cells of the search, are searched in wider ones. In cells of more than about 0.8 m the walls
+/// of rooms can no longer be told apart.
+const MOST_CELLS: usize = 320;
+/// The level in whose cells places are judged.
+pub(super) const JUDGED: usize = 1;
+/// As many places are taken from the search.
+const PLACES: usize = 1024;
+/// As many of them, each away from the others, are looked at closely.
+const CANDIDATES: usize = 96;
+
+/// Places that were judged in the same way, the best first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Peaks {
+    /// Where the search and the way up from there came by: the best place, then all that are elsewhere.
+    visited: Vec<Place>,
+    /// The peaks that it led to.
+    peaks: Vec<Place>,
+}
+
+impl Peaks {
+    /// Searches for all places of map b on map a.
+    pub fn find(a: &PreparedMap, b: &PreparedMap, parameters: &MapAlignerParameters) -> Self {
+        // The search itself takes cells twice as wide as those of its level.
+        let level = a.level_of_size(2 * MOST_CELLS).max(b.level_of_size(2 * MOST_CELLS)).max(JUDGED);
+        let penalty = parameters.free_space_penalty;
+        let step = 2.0 * parameters.rotation_step;
+        let half_turns = (PI / step - 1e-9).ceil() as usize;
+        let (coarse_a, coarse_b) = (a.level(level), b.level(level));
+        let places = search(coarse_a, coarse_b, half_turns, penalty, parameters.apart, PLACES);
+        let candidates = apart_from_better(&overlay(a, b, level, penalty), &places, parameters.apart, 2.0 * step);
+        let ways = candidates.par_iter().map(|(start, centre)| {
+            let mut place = *start;
+            for number in (JUDGED..=level).rev() {
+                let walls = (a.few_walls(), b.few_walls());
+                let overlay = Overlay { walls_a: walls.0, walls_b: walls.1, ..overlay(a, b, number, penalty) };
+                let radians = 0.5 * step / (1 << (level - number)) as f64;
+                let steps = Steps { metres: overlay.a.cell, radians, halvings: 1 };
+                place = climb(|place| overlay.score(place), &place, centre, steps).transform_a_b;
+            }
+            let overlay = overlay(a, b, JUDGED, penalty);
+            let judged = |transform_a_b: Pose2| Place { transform_a_b, score: overlay.score(&transform_a_b) };
+            (judged(*start), judged(place))
+        });
+        let (starts, mut peaks): (Vec<Place>, Vec<Place>) = ways.collect::<Vec<_>>().into_iter().unzip();
+        peaks.retain(|place| place.score > 0.0);
+        peaks.sort_by(Place::best_first);
+        let mut visited = [starts, peaks.clone()].concat();
+        visited.sort_by(Place::best_first);
+        Self { visited, peaks }
+    }
+
+    /// The peaks, the best first.
+    pub fn all(&self) -> &[Place] {
+        &self.peaks
+    }
+
+    /// The best place that is apart from a given one, of whose walls in common `centre` is the middle, if it scores at
+    /// all. It may lie on the slope of a peak that is wide.
+    pub fn best_elsewhere(&self, place: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> Option<&Place> {
+        let mut elsewhere = self.visited.iter().filter(|other| {
+            let (metres, radians) = change(place, &other.transform_a_b, centre);
+            other.score > 0.0 && (metres > parameters.apart || radians.abs() > parameters.apart_yaw)
+        });
+        elsewhere.next()
+    }
+}
+
+/// The first of some places within `metres` and `radians`, each with the middle of its walls in common.
+fn apart_from_better(overlay: &Overlay<'_>, places: &[Place], metres: f64, radians: f64) -> Vec<(Pose2, Point2)> {
+    let mut kept: Vec<(Pose2, Point2)> = Vec::new();
+    for Place { transform_a_b, .. } in places {
+        let is_apart = |(other, centre): &(Pose2, Point2)| {
+            let (shift, turn) = change(other, transform_a_b, centre);
+            shift > metres || turn.abs() > radians
+        };
+        if kept.iter().all(is_apart) {
+            let centre = overlay.common_walls(transform_a_b).map(|common| common.centre);
+            kept.extend(centre.map(|centre| (*transform_a_b, centre)));
+        }
+        if kept.len() == CANDIDATES {
+            break;
+        }
+    }
+    kept
+}
+
+/// Two maps on each other, in the cells of a level.
+pub(super) fn overlay<'a>(a: &'a PreparedMap, b: &'a PreparedMap, level: usize, penalty: f64) -> Overlay<'a> {
+    Overlay { a: a.level(level), b: b.level(level), walls_a: a.walls(), walls_b: b.walls(), penalty }
+}
+
+/// How far a point of map b that lies at `centre` in frame a is moved from one transform to another, metres, and by how
+/// much the map is turned, radians.
+pub(super) fn change(one: &Pose2, other: &Pose2, centre: &Point2) -> (f64, f64) {
+    let moved = other * (one.inverse() * centre);
+    let turn = turn_difference(other.rotation.angle(), one.rotation.angle(), TAU);
+    ((moved - centre).norm(), turn)
+}
+
+/// Whether two places are one, `centre` being the middle of the walls in common at the first.
+pub(super) fn is_near(one: &Pose2, other: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> bool {
+    let (metres, radians) = change(one, other, centre);
+    metres <= parameters.apart && radians.abs() <= parameters.apart_yaw
+}

@@ -1,0 +1,378 @@
+//! Which maps of many robots are searched, so that not every pair of them must be.
+
+use super::peaks::{JUDGED, is_near, overlay};
+use super::{
+    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, Raster, Refusal, align_near,
+    align_prepared,
+};
+use crate::geometry::{Grid, Pose2};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// As many groups, the largest first, are tried for a robot when its map comes; the others at the end.
+const GROUPS_TRIED: usize = 3;
+/// At the end all groups are tried on the largest again as often as this, as long as it grows.
+const LAST_ROUNDS: usize = 3;
+/// Guesses are kept for a map that has grown a little if they score at least this share of what they did.
+const KEPT_SCORE: f64 = 0.9;
+
+/// What is to be told of a pair of robots.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statement {
+    /// The robot whose map stays, the first of the two by name.
+    pub a: String,
+    /// The robot whose map is moved.
+    pub b: String,
+    /// Guesses, the best first, each with what speaks for it; or why there are none.
+    pub found: Result<Vec<(MapAlignment, String)>, String>,
+}
+
+/// Robots whose maps are searched, and those that are laid together.
+///
+/// Maps that fit clearly at one place make a group, which is searched as one map: so a robot that comes in takes one
+/// search, however many robots there are.
+pub struct MergePlan {
+    parameters: MapAlignerParameters,
+    /// The side of the narrowest cells, metres.
+    cell: f64,
+    robots: BTreeMap<String, Robot>,
+    groups: Vec<Group>,
+    /// Pairs of groups that were searched, by number.
+    tried: BTreeSet<(u64, u64)>,
+    /// The number of the next group.
+    next: u64,
+    /// What was told last of each pair.
+    told: BTreeMap<(String, String), Statement>,
+    /// Searches made.
+    pub searches: u64,
+    /// Guesses made without a search.
+    pub predictions: u64,
+}
+
+struct Robot {
+    map: Result<PreparedMap, Refusal>,
+    /// Known cells when it was searched last.
+    searched_cells: usize,
+}
+
+/// Robots whose maps are laid together.
+struct Group {
+    number: u64,
+    /// `T_group_robot`.
+    members: BTreeMap<String, Pose2>,
+    /// Their maps as one, if there are several.
+    joint: Option<PreparedMap>,
+}
+
+impl Group {
+    fn name(&self) -> &str {
+        self.members.keys().next().map_or("", String::as_str)
+    }
+}
+
+impl MergePlan {
+    /// Without any robots.
+    pub fn new(parameters: MapAlignerParameters) -> Self {
+        Self {
+            cell: 0.5 * parameters.cell,
+            parameters,
+            robots: BTreeMap::new(),
+            groups: Vec::new(),
+            tried: BTreeSet::new(),
+            next: 0,
+            told: BTreeMap::new(),
+            searches: 0,
+            predictions: 0,
+        }
+    }
+
+    /// A robot has another map. `grids` are the last maps of all robots, itself among them.
+    pub fn update(&mut self, robot: &str, grids: &BTreeMap<String, Grid<'_>>) -> Vec<Statement> {
+        let Some(grid) = grids.get(robot) else { return Vec::new() };
+        let least = PreparedMap::least_cell(grid);
+        if least > self.cell {
+            // All maps take cells of one size.
+            self.cell = least;
+            for (name, known) in &mut self.robots {
+                if let Some(grid) = grids.get(name) {
+                    known.map = PreparedMap::new(name, grid, self.cell, self.parameters.max_extent);
+                }
+            }
+        }
+        let map = PreparedMap::new(robot, grid, self.cell, self.parameters.max_extent);
+        let cells = map.as_ref().map_or(0, |map| map.level(0).known_cells());
+        let searched_cells = self.robots.get(robot).map_or(0, |known| known.searched_cells);
+        self.robots.insert(robot.to_owned(), Robot { map, searched_cells });
+        let has_grown_little = (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
+        if has_grown_little && self.group_of(robot).is_some_and(|group| self.groups[group].members.len() > 1) {
+            if let Some(kept) = self.kept(robot) {
+                if let Some(group) = self.group_of(robot) {
+                    let members = self.groups.remove(group).members;
+                    self.add(members);
+                }
+                return self.tell(kept);
+            }
+        }
+        self.leave(robot);
+        if let Some(known) = self.robots.get_mut(robot) {
+            known.searched_cells = cells;
+        }
+        let mut statements = self.refusals(robot);
+        if self.robots.get(robot).is_some_and(|known| known.map.is_ok()) {
+            let number = self.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())]));
+            self.tie_with_others(number, GROUPS_TRIED, &mut statements);
+        }
+        statements.extend(self.retractions(robot, &statements));
+        self.tell(statements)
+    }
+
+    /// No more maps come: what has not found its place is tried once more.
+    pub fn finish(&mut self) -> Vec<Statement> {
+        let mut statements = Vec::new();
+        for _ in 0..LAST_ROUNDS {
+            let count = self.groups.len();
+            let Some(largest) = self.by_size().first().copied() else { break };
+            self.tie_with_others(largest, usize::MAX, &mut statements);
+            if self.groups.len() == count {
+                break;
+            }
+        }
+        self.tell(statements)
+    }
+
+    /// Tries to lay a group together with others, the largest first.
+    fn tie_with_others(&mut self, number: u64, most: usize, statements: &mut Vec<Statement>) {
+        let mut mine = number;
+        let others: Vec<u64> = self.by_size().into_iter().filter(|other| *other != number).take(most).collect();
+        for other in others {
+            let pair = (mine.min(other), mine.max(other));
+            if self.tried.insert(pair) {
+                mine = self.tie(mine, other, statements).unwrap_or(mine);
+            }
+        }
+    }
+
+    /// Searches one group on another. The number of the group of both, if they fit clearly.
+    fn tie(&mut self, one: u64, other: u64, statements: &mut Vec<Statement>) -> Option<u64> {
+        let (one, other) = (self.index_of(one)?, self.index_of(other)?);
+        // The larger stays; of two robots the first by name.
+        let is_before =
+            |one: &Group, other: &Group| (other.members.len(), one.name()) < (one.members.len(), other.name());
+        let (first, second) =
+            if is_before(&self.groups[one], &self.groups[other]) { (one, other) } else { (other, one) };
+        let (group_a, group_b) = (&self.groups[first], &self.groups[second]);
+        let found = align_prepared(self.map_of(group_a)?, self.map_of(group_b)?, &self.parameters);
+        let pair = (group_a.name().to_owned(), group_b.name().to_owned());
+        let (count_a, count_b) = (group_a.members.len(), group_b.members.len());
+        self.searches += 1;
+        let found = match found {
+            Ok(found) => found,
+            Err(refusal) => {
+                statements.push(statement_of(pair, Err(refusal.to_string())));
+                return None;
+            }
+        };
+        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up;
+        let best = found.hypotheses.first()?.transform_a_b;
+        if count_a + count_b == 2 {
+            statements.push(statement_of(pair, Ok(with_reasons(&found))));
+            return is_clear.then(|| self.unite(first, second, &best));
+        }
+        let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
+        if is_clear {
+            let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b)));
+            let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
+            self.predictions += told.len() as u64;
+            let fits = !told.is_empty();
+            statements.extend(told);
+            return fits.then(|| self.unite(first, second, &best));
+        }
+        // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
+        statements.extend(self.searched(pairs.first()?));
+        None
+    }
+
+    /// The guesses for a pair of robots by a search of their own.
+    fn searched(&mut self, PairInCommon { a, b, .. }: &PairInCommon) -> Option<Statement> {
+        let (a, b) = if a < b { (a, b) } else { (b, a) };
+        let found = align_prepared(self.map(a)?, self.map(b)?, &self.parameters);
+        self.searches += 1;
+        let found = found.map(|found| with_reasons(&found)).map_err(|refusal| refusal.to_string());
+        Some(statement_of((a.clone(), b.clone()), found))
+    }
+
+    /// The guess for a pair of robots where their groups put it.
+    fn predicted(&self, pair: &PairInCommon, others: usize) -> Option<Statement> {
+        let (a, b, guess) = match pair.a < pair.b {
+            true => (&pair.a, &pair.b, pair.transform_a_b),
+            false => (&pair.b, &pair.a, pair.transform_a_b.inverse()),
+        };
+        let found = align_near(self.map(a)?, self.map(b)?, &guess, &self.parameters)?;
+        if found.wall_in_common < self.parameters.min_wall_length {
+            return None;
+        }
+        let reason = format!(
+            "the maps alone: {:.0} m of walls in common, at the place that stands out on the maps of {others} robots \
+             together",
+            found.wall_in_common
+        );
+        Some(statement_of((a.clone(), b.clone()), Ok(vec![(found, reason)])))
+    }
+
+    /// The pairs of a robot of each group, those with the most wall in common first, if the groups lie so.
+    fn pairs_in_common(&self, group_a: &Group, group_b: &Group, transform_groups: &Pose2) -> Vec<PairInCommon> {
+        let mut pairs = Vec::new();
+        for (a, to_group_a) in &group_a.members {
+            for (b, to_group_b) in &group_b.members {
+                let transform_a_b = to_group_a.inverse() * transform_groups * to_group_b;
+                if let Some(length) = self.common_walls(a, b, &transform_a_b).map(|common| common.length) {
+                    pairs.push(PairInCommon { a: a.clone(), b: b.clone(), transform_a_b, length });
+                }
+            }
+        }
+        pairs.sort_by(|one, other| other.length.total_cmp(&one.length));
+        pairs
+    }
+
+    /// The guesses of a robot whose map has grown a little, if all still fit.
+    fn kept(&mut self, robot: &str) -> Option<Vec<Statement>> {
+        let mut kept = Vec::new();
+        for statement in self.told.values().filter(|told| told.a == robot || told.b == robot) {
+            let Ok(found) = &statement.found else { continue };
+            let (map_a, map_b) = (self.map(&statement.a)?, self.map(&statement.b)?);
+            let mut refined = Vec::new();
+            for (before, reason) in found {
+                let again = align_near(map_a, map_b, &before.transform_a_b, &self.parameters)?;
+                if again.score < KEPT_SCORE * before.score {
+                    return None;
+                }
+                refined.push((again, reason.clone()));
+            }
+            let best = refined.first().map_or(1.0, |(best, _)| best.score);
+            refined.iter_mut().for_each(|(again, _)| again.share = again.score / best);
+            kept.push(Statement { found: Ok(refined), ..statement.clone() });
+        }
+        self.predictions += kept.len() as u64;
+        Some(kept)
+    }
+
+    /// Why a robot cannot be aligned with others, for those of them for which a map alone says so.
+    fn refusals(&self, robot: &str) -> Vec<Statement> {
+        let Some(mine) = self.robots.get(robot) else { return Vec::new() };
+        let others = self.robots.iter().filter(|(other, _)| *other != robot);
+        let refusals = others.filter_map(|(other, known)| {
+            let (first, second) = if robot < other.as_str() { (mine, known) } else { (known, mine) };
+            let refusal = first.map.as_ref().err().or(second.map.as_ref().err())?;
+            Some(statement_of((robot.to_owned(), other.clone()), Err(refusal.to_string())))
+        });
+        refusals.collect()
+    }
+
+    /// What was told of a robot before, and cannot be so any more.
+    fn retractions(&self, robot: &str, statements: &[Statement]) -> Vec<Statement> {
+        let group = self.group_of(robot).map(|group| &self.groups[group]);
+        let stands = |told: &Statement| {
+            let (Some(group), Ok(found)) = (group, &told.found) else { return told.found.is_err() };
+            let places = group.members.get(&told.a).zip(group.members.get(&told.b));
+            places.zip(found.first()).is_some_and(|((a, b), (best, _))| {
+                let common = self.common_walls(&told.a, &told.b, &best.transform_a_b);
+                let place = a.inverse() * b;
+                common.is_some_and(|common| is_near(&best.transform_a_b, &place, &common.centre, &self.parameters))
+            })
+        };
+        let is_told_again = |told: &Statement| statements.iter().any(|new| new.a == told.a && new.b == told.b);
+        let told = self.told.values().filter(|told| told.a == robot || told.b == robot);
+        let fallen = told.filter(|told| !is_told_again(told) && !stands(told));
+        let reason = format!("the map of {robot} has changed, and does not lie where it lay on this map any more");
+        fallen.map(|told| Statement { found: Err(reason.clone()), ..told.clone() }).collect()
+    }
+
+    /// Remembers what is told, and leaves out what was told before.
+    fn tell(&mut self, statements: Vec<Statement>) -> Vec<Statement> {
+        let mut news = Vec::new();
+        for statement in statements {
+            let pair = (statement.a.clone(), statement.b.clone());
+            if self.told.get(&pair) != Some(&statement) {
+                self.told.insert(pair, statement.clone());
+                news.push(statement);
+            }
+        }
+        news
+    }
+
+    /// Takes a robot out of its group.
+    fn leave(&mut self, robot: &str) {
+        let Some(index) = self.group_of(robot) else { return };
+        let mut members = self.groups.remove(index).members;
+        members.remove(robot);
+        if !members.is_empty() {
+            self.add(members);
+        }
+    }
+
+    /// Lays two groups together. The number of the group of both.
+    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> u64 {
+        let later = self.groups.remove(first.max(second));
+        let sooner = self.groups.remove(first.min(second));
+        let (kept, moved) = if first < second { (sooner, later) } else { (later, sooner) };
+        let mut members = kept.members;
+        members.extend(moved.members.into_iter().map(|(robot, place)| (robot, transform_groups * place)));
+        self.add(members)
+    }
+
+    /// Adds a group of robots with their places. Its number.
+    fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
+        let maps: Vec<(Pose2, &Raster)> =
+            members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0)))).collect();
+        let joint = (maps.len() > 1).then(|| PreparedMap::of_raster(Raster::union(&maps)));
+        let number = self.next;
+        self.next += 1;
+        self.groups.push(Group { number, members, joint });
+        number
+    }
+
+    fn map_of<'a>(&'a self, group: &'a Group) -> Option<&'a PreparedMap> {
+        group.joint.as_ref().or_else(|| self.map(group.name()))
+    }
+
+    fn map(&self, robot: &str) -> Option<&PreparedMap> {
+        self.robots.get(robot)?.map.as_ref().ok()
+    }
+
+    fn common_walls(&self, a: &str, b: &str, transform_a_b: &Pose2) -> Option<CommonWalls> {
+        overlay(self.map(a)?, self.map(b)?, JUDGED, 0.0).common_walls(transform_a_b)
+    }
+
+    /// The numbers of all groups, the largest first, of equals the first by name.
+    fn by_size(&self) -> Vec<u64> {
+        let mut groups: Vec<&Group> = self.groups.iter().collect();
+        groups.sort_by(|one, other| (other.members.len(), one.name()).cmp(&(one.members.len(), other.name())));
+        groups.into_iter().map(|group| group.number).collect()
+    }
+
+    fn index_of(&self, number: u64) -> Option<usize> {
+        self.groups.iter().position(|group| group.number == number)
+    }
+
+    fn group_of(&self, robot: &str) -> Option<usize> {
+        self.groups.iter().position(|group| group.members.contains_key(robot))
+    }
+}
+
+/// Two robots of different groups, and how they lie if the groups lie so.
+struct PairInCommon {
+    a: String,
+    b: String,
+    transform_a_b: Pose2,
+    /// About the length of wall in common, metres.
+    length: f64,
+}
+
+/// A statement on a pair, of which the first by name becomes robot a if there is no guess that says which it is.
+fn statement_of(pair: (String, String), found: Result<Vec<(MapAlignment, String)>, String>) -> Statement {
+    let (a, b) = if pair.0 < pair.1 { pair } else { (pair.1, pair.0) };
+    Statement { a, b, found }
+}
+
+fn with_reasons(found: &MapAlignments) -> Vec<(MapAlignment, String)> {
+    found.hypotheses.iter().enumerate().map(|(rank, found_at)| (found_at.clone(), found.reason(rank))).collect()
+}
