@@ -82,7 +82,7 @@ pub(crate) struct RunOptions {
     /// Seeds all randomness.
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// The robot whose map frame is the world; the first by name if none is given.
+    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     #[arg(long, value_name = "ROBOT")]
     pub(crate) reference: Option<String>,
     /// Set a parameter of a stage.

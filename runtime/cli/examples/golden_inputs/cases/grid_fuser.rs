@@ -105,6 +105,7 @@ fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]) {
         reference: "robot1".into(),
         frames: placed.iter().map(frame).collect(),
         unmerged: vec![UnmergedRobot { robot: "robot9".into(), reason: "no alignment".into() }],
+        groups: Vec::new(),
     };
     log.message(seconds, TOPIC, &frames);
 }
