@@ -207,7 +207,7 @@ fn use_that_makes_no_sense() {
     let folder = TempDir::new().unwrap();
     for (args, word) in [
         (&["run", "no_such_pipeline.toml"][..], "no_such_pipeline"),
-        (&["merge", "map.yaml", "-o", "out.mcap"], "map file"),
+        (&["merge", "map.yaml", "in.mcap", "-o", "out.mcap"], "in.mcap is a log"),
         (&["merge", "in.mcap", "-o", "out.mcap", "--set", "icp"], "STAGE.PARAMETER=VALUE"),
         (&["merge", "in.mcap", "-o", "out.mcap", "--set", "icpp.radius=1"], "icp"),
         (&["merge", "in.mcap", "-o", "out.mcap", "--engine", "fast"], "single"),

@@ -19,5 +19,5 @@ use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![sink::kind(), source::kind(), source::live_kind()]
+    vec![sink::kind(), source::kind(), source::live_kind(), source::map_file::kind()]
 }

@@ -32,6 +32,7 @@ definitions![
     "gridweave_msgs/MapDirection",
     "gridweave_msgs/RobotFrame",
     "gridweave_msgs/RobotFrames",
+    "gridweave_msgs/RobotGroup",
     "gridweave_msgs/Segment",
     "gridweave_msgs/Segments",
     "gridweave_msgs/TagEstimate",

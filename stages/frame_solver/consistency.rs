@@ -4,20 +4,23 @@
 //! right. Where they do not, some alignment of the cycle is wrong. It can be told which one only if other cycles vouch
 //! for the rest: the smallest sets of alignments whose removal makes all cycles agree are found, and an alignment
 //! counts as wrong if it is in all of those sets, as right if it is in none, and as **disputed** otherwise. In a lone
-//! triangle that does not close, all three are disputed.
+//! triangle that does not close, all three are disputed. Where two wrong alignments of a robot agree with each other,
+//! and two right ones do, all four are; but two that agree outweigh one.
 //!
 //! Alignments that are in no cycle cannot be checked and count as right. Cycles that share no alignment are judged
-//! apart from each other. Where there are many contradictions, alignments that many triangles speak against are taken
-//! out first, see `votes.rs`.
+//! apart from each other. Where there are few contradictions all sets are tried (`search`), else the largest set of
+//! alignments that agree is sought by moves, and what might be otherwise is disputed (`consensus`).
+//!
+//! Scores are not weighed: those of different methods do not compare. Nor do small covariances speak for an alignment:
+//! they say how exact it is if it is right, not whether it is.
 
-use super::graph::{Cycle, Edge, Forest};
-use super::votes::outvoted;
+use super::consensus::Consensus;
+use super::graph::{Cycle, Edge, Forest, Neighbours};
+use super::search::{Search, count_disjoint};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Contradictions apart from each other beyond which alignments may be outvoted before the search.
-const SEARCHED_DEPTH: usize = 3;
-/// How much is tried for one group of cycles before all its alignments are called disputed: pose graphs times edges.
-const MOST_WORK: usize = 400_000;
+/// Contradictions apart from each other beyond which not all sets are tried.
+const SEARCHED_DEPTH: usize = 6;
 
 /// What the cycles say of one alignment.
 #[derive(Clone, Debug)]
@@ -31,31 +34,45 @@ pub enum Verdict {
 }
 
 /// Judges every edge. A cycle contradicts if it is more than `gate` standard deviations from closing.
-pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
+///
+/// `known` marks edges that were right when the rest was judged before: they agree with each other. It saves work, and
+/// may mark none.
+pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict::Right; edges.len()];
+    let neighbours = Neighbours::new(robots, edges);
+    let is_open = |cycle: &Cycle| cycle.remainder.distance_from_identity() > gate;
+    // A long cycle may hide what a short one shows.
+    let unknown = (0..edges.len()).filter(|&index| !known[index]);
+    let open: BTreeSet<usize> = unknown
+        .filter(|&index| neighbours.cycle(edges, index, |_| true).is_some_and(|cycle| is_open(&cycle)))
+        .collect();
     let forest = Forest::grow(robots, edges, 0, |_| true);
     let closing = (0..edges.len()).filter(|&index| !forest.contains(index, &edges[index]));
     let cycles: Vec<Cycle> = closing.filter_map(|index| forest.cycle(edges, index)).collect();
-    if cycles.iter().all(|cycle| cycle.remainder.distance_from_identity() <= gate) {
+    if open.is_empty() && !cycles.iter().any(is_open) {
         return verdicts;
     }
     for group in groups_of_cycles(&cycles, edges.len()) {
         let mut search = Search::new(robots, edges, &group, gate);
         let contradictions = search.contradictions();
-        if contradictions.is_empty() {
+        if contradictions.is_empty() && !group.iter().any(|index| open.contains(index)) {
             continue;
         }
-        if count_disjoint(&contradictions) > SEARCHED_DEPTH {
-            outvoted(edges, &group, gate).into_iter().for_each(|index| search.choices[index] = Choice::Removed);
+        let depth = count_disjoint(&contradictions);
+        let removals = match depth {
+            1..=SEARCHED_DEPTH => search.smallest_removals(contradictions.len()),
+            _ => Vec::new(),
+        };
+        if removals.is_empty() {
+            judge_by_moves(robots, edges, known, gate, &group, &mut verdicts);
+            continue;
         }
-        let removals = search.smallest_removals(contradictions.len());
-        let in_all = |edge: &usize| !removals.is_empty() && removals.iter().all(|set| set.contains(edge));
-        let in_none = |edge: &usize| !removals.is_empty() && !removals.iter().any(|set| set.contains(edge));
-        let right: BTreeSet<usize> = group.iter().copied().filter(in_none).collect();
-        let forest = Forest::grow(robots, edges, 0, |index| right.contains(&index));
+        let right: BTreeSet<usize> =
+            group.iter().copied().filter(|edge| !removals.iter().any(|set| set.contains(edge))).collect();
         for &index in group.iter().filter(|index| !right.contains(index)) {
             let shown = contradictions.iter().find(|cycle| cycle.edges.contains(&index)).or(contradictions.first());
-            verdicts[index] = match (in_all(&index), forest.cycle(edges, index), shown) {
+            let is_in_all = removals.iter().all(|set| set.contains(&index));
+            verdicts[index] = match (is_in_all, neighbours.cycle(edges, index, |index| right.contains(&index)), shown) {
                 (true, Some(cycle), _) => Verdict::Wrong(cycle),
                 (_, _, Some(cycle)) => Verdict::Disputed(cycle.clone()),
                 (_, _, None) => Verdict::Right,
@@ -63,6 +80,29 @@ pub fn judge(robots: usize, edges: &[Edge], gate: f64) -> Vec<Verdict> {
         }
     }
     verdicts
+}
+
+/// Judges a group of edges that share cycles, however many contradictions there are.
+fn judge_by_moves(robots: usize, edges: &[Edge], known: &[bool], gate: f64, group: &[usize], verdicts: &mut [Verdict]) {
+    let own: Vec<Edge> = group.iter().map(|&index| edges[index]).collect();
+    let known = group.iter().map(|&index| known[index]).collect();
+    let neighbours = Neighbours::new(robots, &own);
+    let consensus = Consensus::find(robots, &own, &neighbours, known, gate);
+    let disputed = consensus.disputed();
+    let is_right = |index: usize| consensus.contains(index) && !disputed.contains_key(&index);
+    let in_all_edges = |cycle: Cycle| Cycle {
+        edges: cycle.edges.iter().map(|&index| group[index]).collect(),
+        remainder: cycle.remainder,
+    };
+    for (index, &place) in group.iter().enumerate().filter(|(index, _)| !is_right(*index)) {
+        verdicts[place] = match disputed.get(&index) {
+            Some(cycle) => Verdict::Disputed(in_all_edges(cycle.clone())),
+            None => match neighbours.cycle(&own, index, is_right) {
+                Some(cycle) => Verdict::Wrong(in_all_edges(cycle)),
+                None => Verdict::Right,
+            },
+        };
+    }
 }
 
 /// The edges that lie on cycles, in groups: two edges are in one group if a cycle goes through both (the biconnected
@@ -95,114 +135,14 @@ fn find(leader: &mut [usize], mut member: usize) -> usize {
     member
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Choice {
-    Open,
-    Kept,
-    Removed,
-}
-
-/// The search for the smallest removals in one group of cycles: at least one edge of a contradicting cycle has to go,
-/// so each of them is tried in turn, to a depth that grows until something is found.
-struct Search<'a> {
-    robots: usize,
-    edges: &'a [Edge],
-    group: &'a [usize],
-    gate: f64,
-    choices: Vec<Choice>,
-    trials: usize,
-    found: Vec<BTreeSet<usize>>,
-}
-
-impl<'a> Search<'a> {
-    fn new(robots: usize, edges: &'a [Edge], group: &'a [usize], gate: f64) -> Self {
-        // Edges of other groups stay out of it.
-        let mut choices = vec![Choice::Removed; edges.len()];
-        group.iter().for_each(|&index| choices[index] = Choice::Open);
-        Self { robots, edges, group, gate, choices, trials: 0, found: Vec::new() }
-    }
-
-    /// The cycles that do not close with the present choices, the shortest first.
-    fn contradictions(&mut self) -> Vec<Cycle> {
-        self.trials += 1;
-        let in_use = |index: usize| self.choices[index] != Choice::Removed;
-        let root = self.group.first().map_or(0, |&index| self.edges[index].a);
-        let forest = Forest::grow(self.robots, self.edges, root, in_use);
-        let closing = self.group.iter().filter(|&&index| in_use(index) && !forest.contains(index, &self.edges[index]));
-        let mut cycles: Vec<Cycle> = closing
-            .filter_map(|&index| forest.cycle(self.edges, index))
-            .filter(|cycle| cycle.remainder.distance_from_identity() > self.gate)
-            .collect();
-        cycles.sort_by_key(|cycle| cycle.edges.len());
-        cycles
-    }
-
-    /// All smallest sets of edges whose removal leaves no contradiction; none if the search takes too long. There is
-    /// never a set with more than one edge for each of the `most` cycles that contradict at first.
-    fn smallest_removals(&mut self, most: usize) -> Vec<BTreeSet<usize>> {
-        for size in 0..=most {
-            self.descend(size);
-            if self.is_tired() {
-                return Vec::new();
-            }
-            if !self.found.is_empty() {
-                break;
-            }
-        }
-        std::mem::take(&mut self.found)
-    }
-
-    fn descend(&mut self, left: usize) {
-        if self.is_tired() {
-            return;
-        }
-        let contradictions = self.contradictions();
-        let Some(shortest) = contradictions.first() else {
-            self.found.push(self.removed());
-            return;
-        };
-        // Contradictions that share no edge need a removal each.
-        if count_disjoint(&contradictions) > left {
-            return;
-        }
-        let open: Vec<usize> =
-            shortest.edges.iter().copied().filter(|&index| self.choices[index] == Choice::Open).collect();
-        for &index in &open {
-            self.choices[index] = Choice::Removed;
-            self.descend(left - 1);
-            // The sets without this edge remain; so no set is found twice.
-            self.choices[index] = Choice::Kept;
-        }
-        open.iter().for_each(|&index| self.choices[index] = Choice::Open);
-    }
-
-    fn is_tired(&self) -> bool {
-        self.trials.saturating_mul(self.group.len()) > MOST_WORK
-    }
-
-    fn removed(&self) -> BTreeSet<usize> {
-        self.group.iter().copied().filter(|&index| self.choices[index] == Choice::Removed).collect()
-    }
-}
-
-fn count_disjoint(cycles: &[Cycle]) -> usize {
-    let mut taken = BTreeSet::new();
-    let mut count = 0;
-    for cycle in cycles {
-        if cycle.edges.iter().all(|edge| !taken.contains(edge)) {
-            taken.extend(cycle.edges.iter().copied());
-            count += 1;
-        }
-    }
-    count
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::UncertainPose;
+    use super::super::team::Team;
     use super::*;
     use crate::geometry::{Pose2, pose};
     use nalgebra::Matrix3;
+    use proptest::prelude::*;
 
     /// Robots on a spiral, and edges between them; those in `wrong` are off by two metres.
     fn edges(pairs: &[(usize, usize)], wrong: &[(usize, usize)]) -> Vec<Edge> {
@@ -218,14 +158,22 @@ mod tests {
         pairs.iter().enumerate().map(edge).collect()
     }
 
+    fn judge_all(robots: usize, edges: &[Edge]) -> Vec<Verdict> {
+        judge(robots, edges, &vec![false; edges.len()], 4.0)
+    }
+
     /// `.` right, `x` wrong, `?` disputed.
     fn verdicts(robots: usize, pairs: &[(usize, usize)], wrong: &[(usize, usize)]) -> String {
+        letters(&judge_all(robots, &edges(pairs, wrong)))
+    }
+
+    fn letters(verdicts: &[Verdict]) -> String {
         let letter = |verdict: &Verdict| match verdict {
             Verdict::Right => '.',
             Verdict::Wrong(_) => 'x',
             Verdict::Disputed(_) => '?',
         };
-        judge(robots, &edges(pairs, wrong), 4.0).iter().map(letter).collect()
+        verdicts.iter().map(letter).collect()
     }
 
     fn complete(robots: usize) -> Vec<(usize, usize)> {
@@ -276,10 +224,74 @@ mod tests {
         assert_eq!(verdicts(24, &pairs, &wrong), expected);
     }
 
+    /// The same letters by trying all sets of edges.
+    fn verdicts_by_trial(robots: usize, edges: &[Edge]) -> String {
+        let agrees = |set: u32| {
+            let used = |index: usize| set >> index & 1 == 1;
+            let poses = Forest::grow(robots, edges, 0, used).poses_by_tree(edges);
+            edges.iter().enumerate().filter(|(index, _)| used(*index)).all(|(_, edge)| {
+                let off = poses[edge.a].pose.inverse() * poses[edge.b].pose * edge.transform_a_b.pose.inverse();
+                off.translation.vector.norm() < 0.01 && off.rotation.angle().abs() < 0.01
+            })
+        };
+        let sets: Vec<u32> = (0..1 << edges.len()).filter(|&set| agrees(set)).collect();
+        let most = sets.iter().map(|set| set.count_ones()).max().unwrap();
+        let largest = || sets.iter().filter(|set| set.count_ones() == most);
+        let letter = |index: usize| match largest().filter(|&set| set >> index & 1 == 1).count() {
+            0 => 'x',
+            count if count == largest().count() => '.',
+            _ => '?',
+        };
+        (0..edges.len()).map(letter).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_verdicts_on_few_robots_are_those_of_all_sets(
+            robots in 3usize..=5,
+            steps in prop::collection::vec(0u8..12, 10),
+        ) {
+            // A mistake is a step in the frame of the building, so that mistakes often agree with each other.
+            let error = |index: usize| pose(2.0 * f64::from(steps[index].saturating_sub(8)), 0.0, 0.0);
+            let place = |robot: usize| pose(3.0 * robot as f64, (robot * robot) as f64, robot as f64);
+            let edge = |(index, (a, b)): (usize, (usize, usize))| {
+                let pose = place(a).inverse() * error(index) * place(b);
+                Edge { a, b, transform_a_b: UncertainPose { pose, covariance: Matrix3::identity() * 1e-6 } }
+            };
+            let edges: Vec<Edge> = complete(robots).into_iter().enumerate().map(edge).collect();
+            let (judged, expected) = (letters(&judge_all(robots, &edges)), verdicts_by_trial(robots, &edges));
+            for (judged, expected) in judged.chars().zip(expected.chars()) {
+                prop_assert_eq!(judged == '.', expected == '.');
+                // What no right path leads round is disputed, though it be in none of the largest sets.
+                prop_assert!(judged != 'x' || expected == 'x');
+            }
+        }
+    }
+
     #[test]
     fn a_tangle_that_takes_too_long_is_disputed() {
         let pairs = complete(9);
         let wrong: Vec<_> = pairs.iter().copied().filter(|(a, b)| (a + b) % 5 != 0).collect();
         assert_eq!(verdicts(9, &pairs, &wrong), "?".repeat(pairs.len()));
+    }
+
+    #[test]
+    fn among_many_robots_with_many_mistakes_no_wrong_alignment_counts_as_right() {
+        let team = Team::new(32, 6, 3).with_mistakes(0.2);
+        let verdicts = judge_all(32, &team.edges);
+        assert!(team.wrong.iter().all(|&index| !matches!(verdicts[index], Verdict::Right)));
+        let right = verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Right)).count();
+        assert!(right > 70 * (team.edges.len() - team.wrong.len()) / 100, "{right} of {}", team.edges.len());
+    }
+
+    #[test]
+    fn two_wrong_alignments_that_agree_are_outweighed_by_more_right_ones() {
+        for seed in 0..20 {
+            let team = Team::new(10, 9, seed).with_agreeing_mistakes(0.1);
+            assert_eq!(team.wrong.len(), 4);
+            for (index, verdict) in judge_all(10, &team.edges).iter().enumerate() {
+                assert_eq!(matches!(verdict, Verdict::Wrong(_)), team.wrong.contains(&index), "{seed} {index}");
+            }
+        }
     }
 }

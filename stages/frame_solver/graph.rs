@@ -28,10 +28,78 @@ impl Edge {
 /// A cycle of alignments, and what is left when the transforms along it are multiplied: the identity, if they agree.
 #[derive(Clone, Debug)]
 pub struct Cycle {
-    /// The edges; the first is the one that closes the cycle over the forest.
+    /// The edges; the first is the one that was asked about.
     pub edges: Vec<usize>,
     /// The product of the transforms round the cycle.
     pub remainder: UncertainPose,
+}
+
+/// The edges of a pose graph by the robots at their ends.
+#[derive(Clone, Debug)]
+pub struct Neighbours {
+    edges_of: Vec<Vec<usize>>,
+    /// The least spread of the edges of each robot.
+    least_spread: Vec<f64>,
+}
+
+impl Neighbours {
+    /// Sorts all edges by their ends.
+    pub fn new(robots: usize, edges: &[Edge]) -> Self {
+        let mut edges_of = vec![Vec::new(); robots];
+        let mut least_spread = vec![f64::INFINITY; robots];
+        for (index, edge) in edges.iter().enumerate() {
+            for robot in [edge.a, edge.b] {
+                edges_of[robot].push(index);
+                least_spread[robot] = edge.transform_a_b.spread().min(least_spread[robot]);
+            }
+        }
+        Self { edges_of, least_spread }
+    }
+
+    /// The edges of a robot, by rising index.
+    pub fn of(&self, robot: usize) -> &[usize] {
+        &self.edges_of[robot]
+    }
+
+    /// The cycle that an edge closes with the path of least variance between its ends over the other edges for which
+    /// `used` holds (Dijkstra's algorithm on [`UncertainPose::spread`]). `None` if there is no such path.
+    pub fn cycle(&self, edges: &[Edge], closing: usize, used: impl Fn(usize) -> bool) -> Option<Cycle> {
+        let Edge { a, b, transform_a_b } = edges[closing];
+        let mut cost = vec![f64::INFINITY; self.edges_of.len()];
+        let mut reached = vec![false; self.edges_of.len()];
+        let mut parent = vec![None; self.edges_of.len()];
+        cost[a] = 0.0;
+        let mut border = vec![a];
+        while let Some(robot) = take_cheapest(&mut border, &cost) {
+            // Nothing that lies between can lead to the goal on a shorter way.
+            if robot == b || cost[robot] + self.least_spread[b] >= cost[b] {
+                break;
+            }
+            reached[robot] = true;
+            for &index in self.of(robot).iter().filter(|&&index| index != closing && used(index)) {
+                let next = edges[index].other(robot);
+                let through = cost[robot] + edges[index].transform_a_b.spread();
+                // What is as far off as the goal cannot lead to it.
+                if !reached[next] && through < cost[next].min(cost[b]) {
+                    if parent[next].is_none() {
+                        border.push(next);
+                    }
+                    cost[next] = through;
+                    parent[next] = Some((index, robot));
+                }
+            }
+        }
+        let mut on_cycle = vec![closing];
+        let mut transform_b_a = UncertainPose::identity();
+        let mut robot = b;
+        while robot != a {
+            let (through, before) = parent[robot]?;
+            on_cycle.push(through);
+            transform_b_a = transform_b_a.then(&edges[through].transform_from(robot));
+            robot = before;
+        }
+        Some(Cycle { edges: on_cycle, remainder: transform_a_b.then(&transform_b_a) })
+    }
 }
 
 /// Spanning trees of the pose graph: for every robot the path of least accumulated variance to the root of its tree.
@@ -48,11 +116,7 @@ impl Forest {
     /// Grows trees over the edges for which `used` holds: one from `first`, then from the robots not yet reached, by
     /// index (Dijkstra's algorithm on [`UncertainPose::spread`]).
     pub fn grow(robots: usize, edges: &[Edge], first: usize, used: impl Fn(usize) -> bool) -> Self {
-        let mut neighbours = vec![Vec::new(); robots];
-        for (index, edge) in edges.iter().enumerate().filter(|(index, _)| used(*index)) {
-            neighbours[edge.a].push(index);
-            neighbours[edge.b].push(index);
-        }
+        let neighbours = Neighbours::new(robots, edges);
         let mut forest = Self { parent: vec![None; robots], depth: vec![0; robots], order: Vec::with_capacity(robots) };
         let mut cost = vec![f64::INFINITY; robots];
         let mut reached = vec![false; robots];
@@ -65,7 +129,7 @@ impl Forest {
             while let Some(robot) = take_cheapest(&mut border, &cost) {
                 reached[robot] = true;
                 forest.order.push(robot);
-                for &index in &neighbours[robot] {
+                for &index in neighbours.of(robot).iter().filter(|&&index| used(index)) {
                     let next = edges[index].other(robot);
                     let through = cost[robot] + edges[index].transform_a_b.spread();
                     if reached[next] || through >= cost[next] {
@@ -91,8 +155,16 @@ impl Forest {
     /// The cycle that an edge outside of the trees closes with them. `None` if its ends lie in different trees.
     pub fn cycle(&self, edges: &[Edge], closing: usize) -> Option<Cycle> {
         let edge = &edges[closing];
-        let mut sides = [(edge.a, UncertainPose::identity()), (edge.b, UncertainPose::identity())];
-        let mut on_cycle = vec![closing];
+        let (mut on_cycle, transform_b_a) = self.path(edges, edge.b, edge.a)?;
+        on_cycle.insert(0, closing);
+        Some(Cycle { edges: on_cycle, remainder: edge.transform_a_b.then(&transform_b_a) })
+    }
+
+    /// The edges along the trees between two robots, in no order, and `T_from_to` along them. `None` if the robots lie
+    /// in different trees.
+    pub fn path(&self, edges: &[Edge], from: usize, to: usize) -> Option<(Vec<usize>, UncertainPose)> {
+        let mut sides = [(from, UncertainPose::identity()), (to, UncertainPose::identity())];
+        let mut on_path = Vec::new();
         while sides[0].0 != sides[1].0 {
             // The deeper side climbs, so that both meet at their nearest common ancestor.
             let climbs = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
@@ -100,11 +172,21 @@ impl Forest {
             let (through, parent) = self.parent[*robot]?;
             *transform_end_robot = transform_end_robot.then(&edges[through].transform_from(*robot));
             *robot = parent;
-            on_cycle.push(through);
+            on_path.push(through);
         }
-        let [(_, transform_a_meet), (_, transform_b_meet)] = sides;
-        let transform_a_b = transform_a_meet.then(&transform_b_meet.inverse());
-        Some(Cycle { edges: on_cycle, remainder: transform_a_b.then(&edge.transform_a_b.inverse()) })
+        let [(_, transform_from_meet), (_, transform_to_meet)] = sides;
+        Some((on_path, transform_from_meet.then(&transform_to_meet.inverse())))
+    }
+
+    /// `T_root_robot` for every robot, along its tree, whichever root that has.
+    pub fn poses_by_tree(&self, edges: &[Edge]) -> Vec<UncertainPose> {
+        let mut poses = vec![UncertainPose::identity(); self.parent.len()];
+        for &robot in &self.order {
+            if let Some((through, parent)) = self.parent[robot] {
+                poses[robot] = poses[parent].then(&edges[through].transform_from(parent));
+            }
+        }
+        poses
     }
 
     /// `T_root_robot` for every robot in the tree of `root`, along the tree.
@@ -145,14 +227,25 @@ mod tests {
     #[test]
     fn a_robot_is_reached_along_the_most_certain_path() {
         let edges = [edge(0, 1, 1.0, 1.0), edge(1, 2, 1.0, 1.0), edge(0, 2, 5.0, 3.0)];
-        let forest = Forest::grow(3, &edges, 0, |_| true);
+        let forest = Forest::grow(4, &edges, 0, |_| true);
         let poses = forest.poses(&edges, 0);
         assert_eq!(poses[2].unwrap().pose.translation.x, 2.0);
         assert!(forest.contains(1, &edges[1]) && !forest.contains(2, &edges[2]));
         let cycle = forest.cycle(&edges, 2).unwrap();
-        assert_eq!(cycle.edges[0], 2);
-        assert_eq!(cycle.edges.len(), 3);
-        assert_eq!(cycle.remainder.pose.translation.x, -3.0);
+        assert_eq!((cycle.edges[0], cycle.edges.len(), cycle.remainder.pose.translation.x), (2, 3, 3.0));
+        assert_eq!(forest.path(&edges, 2, 1).unwrap().1.pose.translation.x, -1.0);
+        assert!(forest.path(&edges, 2, 3).is_none());
+    }
+
+    #[test]
+    fn a_cycle_leads_back_along_the_most_certain_path() {
+        let edges = [edge(0, 1, 1.0, 1.0), edge(1, 2, 1.0, 1.0), edge(0, 2, 5.0, 3.0), edge(2, 0, -4.0, 4.0)];
+        let neighbours = Neighbours::new(4, &edges);
+        let cycle = neighbours.cycle(&edges, 2, |_| true).unwrap();
+        assert_eq!((cycle.edges, cycle.remainder.pose.translation.x), (vec![2, 1, 0], 3.0));
+        let cycle = neighbours.cycle(&edges, 2, |index| index != 1).unwrap();
+        assert_eq!((cycle.edges, cycle.remainder.pose.translation.x), (vec![2, 3], 1.0));
+        assert!(neighbours.cycle(&edges, 2, |index| index == 0).is_none());
     }
 
     #[test]

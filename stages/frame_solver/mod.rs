@@ -3,25 +3,34 @@
 //! The accepted alignments form a pose graph. Cycles of the graph are checked: alignments that contradict the others
 //! are left out, and where it cannot be told which of several is wrong, the robots that hang on them are not merged,
 //! for a wrong merge is worse than none. All the others are solved together by weighted least squares. Any number of
-//! robots.
+//! robots. Robots that are tied to each other, but not to the reference, are solved in the same way in a frame of their
+//! own.
+//!
+//! Maps grow, and so alignments are refined again and again. Frames that were sent stay until the alignments fit others
+//! better by a margin, and the reference stays once robots are placed in its frame.
 //!
 //! - [`solve`]: names in, poses and reasons out; the whole of the algorithm.
 //! - [`graph`]: the pose graph, its spanning trees and cycles.
-//! - [`consistency`]: which alignments contradict each other.
+//! - [`consistency`]: which alignments contradict each other; by trial where there are few contradictions (`search`),
+//!   else by moves of robots (`consensus`), which are least cuts (`cut`).
 //! - [`optimize`]: least squares on SE(2).
 //! - [`uncertain`]: transforms with a covariance.
 
+mod consensus;
 pub mod consistency;
+mod cut;
 pub mod graph;
 pub mod optimize;
 mod parameters;
 mod reasons;
+mod search;
 pub mod solve;
 mod stage;
 #[cfg(test)]
+mod team;
+#[cfg(test)]
 mod tests;
 pub mod uncertain;
-mod votes;
 
 pub use parameters::FrameSolverParameters;
 pub use stage::kind;

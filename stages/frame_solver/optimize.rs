@@ -66,6 +66,14 @@ pub fn optimize(poses: &[Option<UncertainPose>], edges: &[Edge], root: usize) ->
     None
 }
 
+/// The squared deviation (Mahalanobis distance) of an edge from the poses of its ends. Infinite if its covariance has
+/// no inverse.
+pub fn squared_deviation(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> f64 {
+    let (error, _, _) = linearize(edge, pose_a, pose_b);
+    let squared = edge.transform_a_b.covariance.cholesky().map(|cholesky| error.dot(&cholesky.solve(&error)));
+    squared.unwrap_or(f64::INFINITY)
+}
+
 /// The error of an edge and its derivatives by (x, y, yaw) of both ends.
 fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matrix3<f64>, Matrix3<f64>) {
     let predicted = error_vector(&(pose_a.inverse() * pose_b));

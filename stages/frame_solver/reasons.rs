@@ -1,7 +1,7 @@
 //! Why an alignment was left out, and why a robot is not merged, in plain words.
 
 use super::UncertainPose;
-use super::solve::{Alignments, OpenCycle, Pair};
+use super::solve::{Alignments, OpenCycle, Pair, Solution};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The reason of an alignment that the others show to be wrong.
@@ -25,60 +25,33 @@ fn gap(cycle: &OpenCycle) -> String {
     )
 }
 
-/// The reason for every robot without a frame.
+/// The reason for every robot that the solution has no frame for.
 pub(super) fn unmerged(
     robots: &BTreeSet<String>,
-    frames: &BTreeMap<String, UncertainPose>,
+    solution: &Solution,
     alignments: &Alignments,
-    left_out: &BTreeMap<Pair, String>,
     disputed: &BTreeMap<String, String>,
 ) -> BTreeMap<String, String> {
+    let Solution { frames, groups, left_out, .. } = solution;
     let outside: BTreeSet<&str> =
         robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
-    let groups = tied_groups(&outside, alignments, left_out);
     let refusals = Refusals::new(&outside, alignments, left_out);
     let reason = |robot: &str| {
         if let Some(reason) = disputed.get(robot) {
             return reason.clone();
         }
-        let group = groups.iter().find(|group| group.contains(robot));
-        let others: Vec<String> =
-            group.into_iter().flatten().filter(|other| **other != robot).map(|&other| other.to_owned()).collect();
-        match others.is_empty() {
-            true => no_tie(robot, frames, &refusals),
-            false => {
-                // What keeps the group apart may be known of another member only.
-                let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
-                let known = members.clone().find_map(|member| disputed.get(member).cloned());
-                let refused = || members.clone().find_map(|member| refusals.telling(member, frames));
-                let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
-                format!("it is tied to {} only, not to the reference: {why}", list(&others))
-            }
-        }
+        let Some(group) = groups.iter().find(|group| group.frames.contains_key(robot)) else {
+            return no_tie(robot, frames, &refusals);
+        };
+        let others: Vec<String> = group.frames.keys().filter(|other| *other != robot).cloned().collect();
+        // What keeps the group apart may be known of another member only.
+        let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
+        let known = members.clone().find_map(|member| disputed.get(member).cloned());
+        let refused = || members.clone().find_map(|member| refusals.telling(member, frames));
+        let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
+        format!("it is tied to {} only, not to the reference: {why}", list(&others))
     };
     outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
-}
-
-/// Robots outside that alignments tie to each other.
-fn tied_groups<'a>(
-    outside: &BTreeSet<&'a str>,
-    alignments: &'a Alignments,
-    left_out: &BTreeMap<Pair, String>,
-) -> Vec<BTreeSet<&'a str>> {
-    let mut groups: Vec<BTreeSet<&str>> = Vec::new();
-    let in_use = alignments.iter().filter(|(pair, alignment)| alignment.accepted && !left_out.contains_key(*pair));
-    for ((a, b), _) in in_use.filter(|((a, b), _)| outside.contains(a.as_str()) && outside.contains(b.as_str())) {
-        let mut joined = BTreeSet::from([a.as_str(), b.as_str()]);
-        groups.retain(|group| {
-            let meets = !group.is_disjoint(&joined);
-            if meets {
-                joined.extend(group);
-            }
-            !meets
-        });
-        groups.push(joined);
-    }
-    groups
 }
 
 fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &Refusals<'_>) -> String {

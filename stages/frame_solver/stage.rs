@@ -1,11 +1,11 @@
 //! The frame solver as a stage.
 
-use super::solve::{Alignments, Solution, by_name, solve};
+use super::solve::{Alignments, Group, Pair, Solution, by_name, solve};
 use super::{FrameSolverParameters, UncertainPose};
 use crate::geometry::row_by_row;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{
-    Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TransformStamped, UnmergedRobot,
+    Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot,
 };
 use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
 use serde_json::{Value, json};
@@ -21,7 +21,8 @@ pub fn kind() -> StageKind {
         "frame_solver",
         "Places every robot's map in the reference robot's map, from alignments of pairs. Alignments that contradict \
          others along a cycle are left out; robots that cannot be placed with confidence are not merged, and the reason \
-         is given.",
+         is given. Where the pipeline names no reference, it is the first robot by name of those heard of when the \
+         first two are merged, and stays so.",
         vec![
             InputPort::one(
                 "map",
@@ -34,11 +35,18 @@ pub fn kind() -> StageKind {
             OutputPort::new(
                 "frames",
                 PortType::of::<RobotFrames>(),
-                "the pose of every robot's map, and why the others have none; sent when something changes",
+                "the pose of every robot's map, why the others have none, and how those of them that are tied to each \
+                 other lie; sent when something changes. Robots are moved only if that improves the fit by more than \
+                 `min_improvement`, and at the end",
             )
             .on_topic("/robot_frames"),
-            OutputPort::new("tf", PortType::of::<TFMessage>(), "the same poses as static transforms from `world`")
-                .on_topic("/tf_static"),
+            OutputPort::new(
+                "tf",
+                PortType::of::<TFMessage>(),
+                "the same poses as static transforms from `world`, and of robots tied to each other only from a frame of \
+                 their own, `world/ROBOT`, with the name of the robot in whose map frame they are placed",
+            )
+            .on_topic("/tf_static"),
         ],
         |parameters: FrameSolverParameters, context: &Context| Ok(FrameSolver::new(parameters, context)),
     )
@@ -53,9 +61,11 @@ struct FrameSolver {
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
     reference: Option<String>,
+    /// Whether robots have been placed in the reference's frame.
+    is_settled: bool,
     solution: Solution,
     sent: Option<RobotFrames>,
-    sent_tf: Vec<RobotFrame>,
+    sent_tf: TFMessage,
 }
 
 impl Stage for FrameSolver {
@@ -95,9 +105,13 @@ impl Stage for FrameSolver {
                 "covariance": row_by_row(&pose.covariance),
             })
         };
-        let frames: BTreeMap<&str, Value> =
-            self.solution.frames.iter().map(|(robot, frame)| (robot.as_str(), pose(frame))).collect();
-        let alignment = |alignment: &Alignment, left_out: Option<&String>| {
+        let frames = |frames: &BTreeMap<String, UncertainPose>| -> BTreeMap<String, Value> {
+            frames.iter().map(|(robot, frame)| (robot.clone(), pose(frame))).collect()
+        };
+        let group = |group: &Group| json!({ "reference": group.reference, "frames": frames(&group.frames) });
+        let unchecked = self.solution.unchecked();
+        let alignment = |(pair, alignment): (&Pair, &Alignment)| {
+            let left_out = self.solution.left_out.get(pair);
             json!({
                 "a": alignment.a,
                 "b": alignment.b,
@@ -107,15 +121,16 @@ impl Stage for FrameSolver {
                 "yaw": alignment.yaw,
                 "score": alignment.score,
                 "accepted": alignment.accepted && left_out.is_none(),
+                "checked": self.solution.used.contains_key(pair) && !unchecked.contains(pair),
                 "reason": left_out.unwrap_or(&alignment.reason),
             })
         };
-        let alignments: Vec<Value> =
-            self.alignments.iter().map(|(pair, one)| alignment(one, self.solution.left_out.get(pair))).collect();
+        let alignments: Vec<Value> = self.alignments.iter().map(alignment).collect();
         Some(json!({
             "reference": self.reference,
-            "frames": frames,
+            "frames": frames(&self.solution.frames),
             "unmerged": self.solution.unmerged,
+            "groups": self.solution.groups.iter().map(group).collect::<Vec<Value>>(),
             "alignments": alignments,
         }))
     }
@@ -130,9 +145,10 @@ impl FrameSolver {
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
             reference: None,
+            is_settled: false,
             solution: Solution::default(),
             sent: None,
-            sent_tf: Vec::new(),
+            sent_tf: TFMessage::default(),
         }
     }
 
@@ -177,38 +193,88 @@ impl FrameSolver {
     }
 
     fn solve(&mut self) {
+        // Once robots are placed in its frame, a reference stays: an earlier name is no reason to move them all.
+        let is_settled = self.solution.frames.len() > 1;
         self.reference = match &self.wanted {
             Some(wanted) => self.robots.get(wanted).cloned(),
+            None if is_settled || self.is_settled => self.reference.take(),
             None => self.robots.first().cloned(),
         };
+        self.is_settled |= is_settled;
         if let Some(reference) = &self.reference {
-            self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters);
+            self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
         }
     }
 
-    /// Sends the frames and transforms if they differ from those sent last: at all if they are the `last` ones, else by
-    /// more than the parameters allow. Without a reference there is nothing to send.
+    /// Sends the frames and transforms if they differ from those sent last: the `last` ones as they are solved, others
+    /// with the robots that were sent left in place as long as the parameters allow. Without a reference there is
+    /// nothing to send.
     fn send(&mut self, output: &mut Output<'_>, last: bool) -> Result<(), StageError> {
         let Some(reference) = self.reference.clone() else { return Ok(()) };
-        let frames: Vec<RobotFrame> =
-            self.solution.frames.iter().map(|(robot, pose)| self.frame(robot, pose)).collect();
-        let unmerged = self.solution.unmerged.iter();
-        let unmerged = unmerged.map(|(robot, reason)| UnmergedRobot { robot: robot.clone(), reason: reason.clone() });
         let header = Header::new(output.log_time(), RobotFrames::WORLD);
-        let message = RobotFrames { header: header.clone(), reference, frames, unmerged: unmerged.collect() };
+        let solved = self.message(header, reference);
+        let message = match &self.sent {
+            Some(sent) if !last => self.held(sent, solved),
+            _ => solved,
+        };
         if self.sent.as_ref().is_some_and(|sent| match last {
             true => RobotFrames { header: sent.header.clone(), ..message.clone() } == *sent,
-            false => self.is_nearly(sent, &message),
+            false => says_the_same(sent, &message),
         }) {
             return Ok(());
         }
         output.send(FRAMES, "", &message)?;
-        if self.sent_tf != message.frames {
-            output.send(TF, "", &transforms(&header, &message.frames))?;
-            self.sent_tf.clone_from(&message.frames);
+        let tf = transforms(&message);
+        let place = |one: &TransformStamped| (one.header.frame_id.clone(), one.child_frame_id.clone(), one.transform);
+        if !tf.transforms.iter().map(place).eq(self.sent_tf.transforms.iter().map(place)) {
+            output.send(TF, "", &tf)?;
+            self.sent_tf = tf;
         }
         self.sent = Some(message);
         Ok(())
+    }
+
+    /// The solution as a message.
+    fn message(&self, header: Header, reference: String) -> RobotFrames {
+        let frames = |frames: &BTreeMap<String, UncertainPose>| -> Vec<RobotFrame> {
+            frames.iter().map(|(robot, pose)| self.frame(robot, pose)).collect()
+        };
+        let group = |group: &Group| RobotGroup {
+            reference: group.reference.clone(),
+            frame_id: format!("{}/{}", RobotFrames::WORLD, group.reference),
+            frames: frames(&group.frames),
+        };
+        let unmerged = self.solution.unmerged.iter();
+        let unmerged = unmerged.map(|(robot, reason)| UnmergedRobot { robot: robot.clone(), reason: reason.clone() });
+        RobotFrames {
+            header,
+            reference,
+            frames: frames(&self.solution.frames),
+            unmerged: unmerged.collect(),
+            groups: self.solution.groups.iter().map(group).collect(),
+        }
+    }
+
+    /// What was solved, with the robots that were `sent` in the same frame left in their places; or as it is, if the
+    /// alignments fit it better by more than `min_improvement`.
+    fn held(&self, sent: &RobotFrames, solved: RobotFrames) -> RobotFrames {
+        let mut held = solved.clone();
+        if held.reference == sent.reference {
+            hold(&mut held.frames, &sent.frames);
+        }
+        for group in &mut held.groups {
+            if let Some(sent) = sent.groups.iter().find(|sent| sent.reference == group.reference) {
+                hold(&mut group.frames, &sent.frames);
+            }
+        }
+        let cost = |message: &RobotFrames| {
+            let grouped = message.groups.iter().flat_map(|group| &group.frames);
+            let frames = message.frames.iter().chain(grouped);
+            let poses = frames.map(|frame| (frame.robot.as_str(), frame.transform_reference_robot())).collect();
+            self.solution.squared_deviations(&poses)
+        };
+        let improvement = cost(&held) - cost(&solved);
+        if improvement <= self.parameters.min_improvement { held } else { solved }
     }
 
     fn frame(&self, robot: &str, pose: &UncertainPose) -> RobotFrame {
@@ -221,17 +287,29 @@ impl FrameSolver {
             covariance: row_by_row(&pose.covariance),
         }
     }
+}
 
-    fn is_nearly(&self, sent: &RobotFrames, message: &RobotFrames) -> bool {
-        let FrameSolverParameters { min_move, min_turn, .. } = self.parameters;
-        let near = |(one, next): (&RobotFrame, &RobotFrame)| {
-            one.frame_id == next.frame_id && one.is_near(next, min_move, min_turn)
-        };
-        sent.reference == message.reference
-            && sent.unmerged == message.unmerged
-            && sent.frames.len() == message.frames.len()
-            && sent.frames.iter().zip(&message.frames).all(near)
+/// Leaves the robots that were `sent` in their places. Both by name.
+fn hold(frames: &mut [RobotFrame], sent: &[RobotFrame]) {
+    for frame in frames {
+        if let Ok(place) = sent.binary_search_by(|sent| sent.robot.cmp(&frame.robot)) {
+            let RobotFrame { x, y, yaw, .. } = sent[place];
+            (frame.x, frame.y, frame.yaw) = (x, y, yaw);
+        }
     }
+}
+
+/// Whether two messages differ by nothing but their times and covariances.
+fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
+    let place = |frame: &RobotFrame| RobotFrame { covariance: [0.0; 9], ..frame.clone() };
+    let same = |one: &[RobotFrame], other: &[RobotFrame]| one.iter().map(place).eq(other.iter().map(place));
+    let same_group =
+        |(one, other): (&RobotGroup, &RobotGroup)| one.reference == other.reference && same(&one.frames, &other.frames);
+    one.reference == other.reference
+        && one.unmerged == other.unmerged
+        && same(&one.frames, &other.frames)
+        && one.groups.len() == other.groups.len()
+        && one.groups.iter().zip(&other.groups).all(same_group)
 }
 
 /// The name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
@@ -244,11 +322,15 @@ fn prefixed(robot: &str, frame_id: &str) -> String {
     }
 }
 
-fn transforms(header: &Header, frames: &[RobotFrame]) -> TFMessage {
-    let transform = |frame: &RobotFrame| TransformStamped {
-        header: header.clone(),
+/// The frames of the message as transforms from `world`, and those of groups from the groups' own frames.
+fn transforms(message: &RobotFrames) -> TFMessage {
+    let main = (&message.header.frame_id, &message.frames);
+    let all = std::iter::once(main).chain(message.groups.iter().map(|group| (&group.frame_id, &group.frames)));
+    let transform = |parent: &str, frame: &RobotFrame| TransformStamped {
+        header: Header { stamp: message.header.stamp, frame_id: parent.to_owned() },
         child_frame_id: frame.frame_id.clone(),
         transform: frame.transform_reference_robot().into(),
     };
-    TFMessage { transforms: frames.iter().map(transform).collect() }
+    let transforms = all.flat_map(|(parent, frames)| frames.iter().map(move |frame| transform(parent, frame)));
+    TFMessage { transforms: transforms.collect() }
 }

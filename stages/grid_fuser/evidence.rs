@@ -1,11 +1,15 @@
-//! Cell values as log-odds, and their sum.
+//! Cell values as log-odds, their sum, and how far they contradict each other.
 //!
 //! A cell's value v stands for the probability v / 100, cut to a lower and an upper bound; its log-odds are
 //! `ln(p / (1 - p))`. Log-odds of several maps add. Unknown cells say nothing. The sum, cut to the log-odds of the two
 //! bounds, becomes a probability again and that a value, where the bounds themselves stand for 0 and 100. A cell that
 //! one map alone knows keeps its value.
 //!
-//! The log-odds are whole numbers of a small unit, so that the sum does not depend on the order of the maps.
+//! What the maps say for a cell being occupied and what they say for its being free are added apart, so that it shows
+//! where they contradict each other: the sum alone does not tell two maps that are sure of the opposite from two that
+//! know nothing for sure.
+//!
+//! The log-odds are whole numbers of a small unit, so that the sums do not depend on the order of the maps.
 
 use crate::geometry::UNKNOWN;
 
@@ -13,20 +17,18 @@ use crate::geometry::UNKNOWN;
 const STEPS: f64 = 256.0;
 /// The log-odds of one map are within this. No probability below 1 - 1e-15 comes near it.
 const MOST_STEPS: f64 = 16_384.0;
-/// Sums stay within this, far from the values with a meaning of their own.
-const MOST_SUM: i32 = 1 << 30;
-/// What [`Evidence`] holds for a cell that no map knows.
-const NOTHING: i32 = i32::MIN;
-/// A cell that one map knows holds this and the value.
-const ONE_MAP: i32 = i32::MAX - 200;
 
 /// The tables that turn values into log-odds and back.
 #[derive(Clone, Debug)]
 pub struct EvidenceTable {
-    log_odds: [i32; 101],
+    /// What a map's cell says, by its value as an unsigned byte.
+    of_value: Box<[Evidence; 256]>,
     /// The value for every sum from the lowest to the highest.
     values: Vec<i8>,
+    /// The log-odds of the two bounds, in steps: the most that one map can say for a cell being free, below 0, and for its
+    /// being occupied.
     lowest: i32,
+    highest: i32,
 }
 
 impl EvidenceTable {
@@ -42,44 +44,91 @@ impl EvidenceTable {
             _ if sum >= highest => 100,
             _ => (100.0 / (1.0 + (-f64::from(sum) / STEPS).exp())).round() as i8,
         };
+        let of_value = |byte: usize| match u32::try_from(byte) {
+            Ok(value @ 0..=100) => Evidence::of_one_map(value, steps(f64::from(value) / 100.0)),
+            _ => Evidence::NONE,
+        };
         Self {
-            log_odds: std::array::from_fn(|value| steps(value as f64 / 100.0)),
+            of_value: Box::new(std::array::from_fn(of_value)),
             values: (lowest..=highest.max(lowest)).map(value).collect(),
             lowest,
+            highest,
         }
     }
 
     /// Adds what a map says of a cell. Values that are none, such as -1, say nothing.
     pub fn add(&self, cell: &mut Evidence, value: i8) {
-        let Some(log_odds) = usize::try_from(value).ok().and_then(|value| self.log_odds.get(value)) else { return };
-        cell.0 = match cell.0 {
-            NOTHING => ONE_MAP + i32::from(value),
-            // The earlier value is 0 to 100, since it went in here.
-            one if one >= ONE_MAP => self.log_odds[(one - ONE_MAP) as usize] + log_odds,
-            sum => (sum + log_odds).clamp(-MOST_SUM, MOST_SUM),
-        };
+        *cell = cell.plus(self.of_value[usize::from(value.cast_unsigned())]);
     }
 
     /// The value that the evidence amounts to.
     pub fn value(&self, cell: Evidence) -> i8 {
-        match cell.0 {
-            NOTHING => UNKNOWN,
-            one if one >= ONE_MAP => (one - ONE_MAP) as i8,
-            sum => {
-                let place = (i64::from(sum) - i64::from(self.lowest)).clamp(0, self.values.len() as i64 - 1);
+        match cell.maps {
+            0 => UNKNOWN,
+            1 => cell.values as i8,
+            _ => {
+                let sum = i64::from(cell.occupied) - i64::from(cell.free);
+                let place = (sum - i64::from(self.lowest)).clamp(0, self.values.len() as i64 - 1);
                 self.values[place as usize]
+            }
+        }
+    }
+
+    /// How far the maps contradict each other: unknown where fewer than two know the cell, 0 where all that say
+    /// something say the same, and up to 100.
+    ///
+    /// The log-odds for occupied and those for free are taken as shares of the most that one map can say for each (its
+    /// bound), no more than 1. The smaller share counts, in percent. So 100 is where maps that are as sure as one can be
+    /// stand on both sides, and what hardly says anything hardly contradicts anything.
+    pub fn conflict(&self, cell: Evidence) -> i8 {
+        match cell {
+            Evidence { maps: 0 | 1, .. } => UNKNOWN,
+            Evidence { occupied: 0, .. } | Evidence { free: 0, .. } => 0,
+            Evidence { occupied, free, .. } => {
+                percent(occupied, self.highest.unsigned_abs()).min(percent(free, self.lowest.unsigned_abs()))
             }
         }
     }
 }
 
-/// What the maps say of one cell so far.
+/// A sum as a share of the most that one map can say, no more than 1, in percent.
+fn percent(sum: u32, most: u32) -> i8 {
+    let most = most.max(1);
+    ((100 * sum.min(most) + most / 2) / most) as i8
+}
+
+/// What the maps say of one cell so far. All are sums over the maps, so that no order matters, and nothing is asked when
+/// a map is added; those of 200,000 maps fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Evidence(i32);
+pub struct Evidence {
+    /// Log-odds for the cell being occupied, in steps.
+    occupied: u32,
+    /// Log-odds for its being free.
+    free: u32,
+    /// How many maps know it.
+    maps: u32,
+    /// Their values: where one map knows it, its value.
+    values: u32,
+}
 
 impl Evidence {
     /// No map knows the cell.
-    pub const NONE: Self = Self(NOTHING);
+    pub const NONE: Self = Self { occupied: 0, free: 0, maps: 0, values: 0 };
+
+    /// One map knows it: its value, and that in log-odds, above 0 for occupied and below for free.
+    fn of_one_map(value: u32, log_odds: i32) -> Self {
+        let occupied = log_odds.max(0).unsigned_abs();
+        Self { occupied, free: log_odds.min(0).unsigned_abs(), maps: 1, values: value }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            occupied: self.occupied.wrapping_add(other.occupied),
+            free: self.free.wrapping_add(other.free),
+            maps: self.maps.wrapping_add(other.maps),
+            values: self.values.wrapping_add(other.values),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -99,14 +148,42 @@ mod tests {
         table.value(cell)
     }
 
+    fn conflict(values: &[i8]) -> i8 {
+        let table = table();
+        let mut cell = Evidence::NONE;
+        values.iter().for_each(|&value| table.add(&mut cell, value));
+        table.conflict(cell)
+    }
+
     proptest! {
         #[test]
         fn the_order_of_the_maps_does_not_matter(mut values in prop::collection::vec(-1i8..=100, 0..9)) {
-            let fused = fuse(&values);
+            let fused = (fuse(&values), conflict(&values));
             values.sort_unstable();
-            prop_assert_eq!(fuse(&values), fused);
+            prop_assert_eq!((fuse(&values), conflict(&values)), fused);
             values.reverse();
-            prop_assert_eq!(fuse(&values), fused);
+            prop_assert_eq!((fuse(&values), conflict(&values)), fused);
+        }
+
+        #[test]
+        fn what_two_maps_say_is_in_conflict_if_it_lies_on_both_sides_of_one_half(one in 0i8..=100, other in 0i8..=100) {
+            let is_within = (0..=100).contains(&conflict(&[one, other]));
+            prop_assert!(is_within);
+            let is_split = (one < 50 && other > 50) || (one > 50 && other < 50);
+            prop_assert!(is_split || conflict(&[one, other]) == 0);
+            prop_assert!(!((one < 48 && other > 52) || (one > 52 && other < 48)) || conflict(&[one, other]) > 0);
+        }
+
+        #[test]
+        fn another_map_takes_no_conflict_away(values in prop::collection::vec(0i8..=100, 2..6), more in -1i8..=100) {
+            let all = [values.clone(), vec![more]].concat();
+            prop_assert!(conflict(&all) >= conflict(&values));
+        }
+
+        #[test]
+        fn fewer_than_two_maps_are_in_no_conflict(value in 0i8..=100) {
+            prop_assert_eq!(conflict(&[]), -1);
+            prop_assert_eq!(conflict(&[value, -1]), -1);
         }
 
         #[test]
@@ -142,9 +219,22 @@ mod tests {
     }
 
     #[test]
+    fn a_conflict_is_as_strong_as_the_weaker_side() {
+        assert_eq!(conflict(&[100, 0]), 100);
+        assert_eq!(conflict(&[100, 100]), 0);
+        assert_eq!(conflict(&[50, 100]), 0);
+        // ln(0.7 / 0.3) of ln(0.971 / 0.029), though 0 could say more.
+        assert_eq!(conflict(&[70, 0]), 24);
+        assert_eq!(conflict(&[70, 70, 0]), 48);
+        // ln(0.7 / 0.3) of ln(0.8808 / 0.1192).
+        assert_eq!(conflict(&[30, 100]), 42);
+    }
+
+    #[test]
     fn any_number_of_maps_can_be_added() {
         assert_eq!(fuse(&[100; 5000]), 100);
         assert_eq!(fuse(&[0; 5000]), 0);
+        assert_eq!(conflict(&[[0; 5000], [100; 5000]].concat()), 100);
     }
 
     #[test]
@@ -154,6 +244,7 @@ mod tests {
             let mut cell = Evidence::NONE;
             (0..=100).for_each(|value| table.add(&mut cell, value));
             let _ = table.value(cell);
+            assert!((0..=100).contains(&table.conflict(cell)));
         }
     }
 }

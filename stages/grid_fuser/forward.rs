@@ -3,7 +3,7 @@
 //! Rounding the turned cells leaves gaps (equations 14, 15), which a conditional mean closes.
 
 use super::evidence::{Evidence, EvidenceTable};
-use super::{KnownArea, PlacedGrid};
+use super::{Fused, KnownArea, PlacedGrid};
 use crate::geometry::{Cell, GridGeometry, UNKNOWN, is_known, is_occupied};
 use rayon::prelude::*;
 
@@ -11,15 +11,16 @@ use rayon::prelude::*;
 /// rounded area has at most five, and gaps come single or in pairs.
 const GAP_NEIGHBOURS: usize = 6;
 
-/// Writes the fused map of `maps` to `cells`, the rows of `geometry`: each map is carried over, its gaps are closed,
-/// and the evidence is added.
-pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, cells: &mut [i8]) {
-    let mut evidence = vec![Evidence::NONE; cells.len()];
+/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`: each map is carried over, its
+/// gaps are closed, and the evidence is added.
+pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
+    let mut evidence = vec![Evidence::NONE; fused.cells.len()];
     for (map, _) in maps {
         let carried = close_gaps(&carry(map, geometry), geometry);
         evidence.par_iter_mut().zip(carried).for_each(|(evidence, value)| table.add(evidence, value));
     }
-    cells.par_iter_mut().zip(evidence).for_each(|(cell, evidence)| *cell = table.value(evidence));
+    fused.cells.par_iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence));
+    fused.conflicts.par_iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence));
 }
 
 /// The known cells of a map on the cells of `geometry` that their centres fall in (equation 15). Where several fall in

@@ -2,28 +2,41 @@
 
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
-use super::{KnownArea, PlacedGrid};
-use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN};
+use super::{Fused, KnownArea, PlacedGrid};
+use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN, is_known};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-/// Writes the fused map of `maps` to `cells`, the rows of `geometry`, which lies along the world's axes.
+/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`, which lies along the world's
+/// axes.
 ///
 /// Every cell takes what each map says of the cell that its centre falls in. Rows are independent of each other and
 /// made in parallel.
-pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, cells: &mut [i8]) {
+pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
     let lookups: Vec<Lookup<'_>> = maps.iter().map(|(map, area)| Lookup::new(map, area, geometry)).collect();
-    cells.par_chunks_mut(geometry.width.max(1)).enumerate().for_each(|(row, cells)| {
+    let width = geometry.width.max(1);
+    let rows = fused.cells.par_chunks_mut(width).zip(fused.conflicts.par_chunks_mut(width));
+    rows.enumerate().for_each(|(row, (cells, conflicts))| {
         let rows: Vec<LookupRow<'_>> = lookups.iter().map(|lookup| lookup.row(row, cells.len())).collect();
-        for (stretch, cells) in cells.chunks_mut(TILE).enumerate() {
-            let mut evidence = [Evidence::NONE; TILE];
-            let mut is_known = false;
-            for row in &rows {
-                is_known |= row.add_stretch(stretch * TILE, &mut evidence[..cells.len()], table);
-            }
-            match is_known {
-                true => cells.iter_mut().zip(evidence).for_each(|(cell, evidence)| *cell = table.value(evidence)),
-                false => cells.fill(UNKNOWN),
+        for (stretch, (cells, conflicts)) in cells.chunks_mut(TILE).zip(conflicts.chunks_mut(TILE)).enumerate() {
+            let mut stretches = rows.iter().filter_map(|row| row.stretch(stretch * TILE, cells.len()));
+            match (stretches.next(), stretches.next()) {
+                (Some(one), Some(other)) => {
+                    let mut evidence = [Evidence::NONE; TILE];
+                    for stretch in [one, other].iter().chain(&stretches.collect::<Vec<_>>()) {
+                        stretch.values(&mut evidence, |evidence, value| table.add(evidence, value));
+                    }
+                    cells.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence));
+                    conflicts.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence));
+                }
+                // Most of what is known is known to one map, which nothing contradicts.
+                (only, _) => {
+                    cells.fill(UNKNOWN);
+                    conflicts.fill(UNKNOWN);
+                    if let Some(only) = only {
+                        only.values(cells, |cell, value| *cell = if is_known(value) { value } else { UNKNOWN });
+                    }
+                }
             }
         }
     });
@@ -88,23 +101,38 @@ struct LookupRow<'a> {
 }
 
 impl LookupRow<'_> {
-    /// Adds what the map says of the output cells from `first` on, at most [`TILE`] of them. Whether it may know any.
-    fn add_stretch(&self, first: usize, evidence: &mut [Evidence], table: &EvidenceTable) -> bool {
-        let (from, to) = (self.from.max(first), self.to.min(first + evidence.len()));
+    /// The part of the `count` output cells from `first` on, at most [`TILE`] of them, that may fall on known cells of the
+    /// map. `None` if no cell does.
+    fn stretch(&self, first: usize, count: usize) -> Option<Stretch<'_>> {
+        let (from, to) = (self.from.max(first), self.to.min(first + count));
         if from >= to {
-            return false;
+            return None;
         }
-        let lookup = self.lookup;
-        let place = |index: f64| self.start + lookup.step * index;
-        let middle = place((from + to) as f64 / 2.0);
+        let step = self.lookup.step;
+        let middle = self.start + step * ((from + to) as f64 / 2.0);
         // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
-        if lookup.step.norm() <= 2.0 && !lookup.area.is_near(middle.x, middle.y) {
-            return false;
+        let may_be_known = step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
+        may_be_known.then_some(Stretch { row: self, first, from, to })
+    }
+}
+
+/// A few cells of one output row on one map.
+struct Stretch<'a> {
+    row: &'a LookupRow<'a>,
+    /// The first cell of the stretch.
+    first: usize,
+    /// Its cells that may fall on the known part of the map: the first, and the one behind the last.
+    from: usize,
+    to: usize,
+}
+
+impl Stretch<'_> {
+    /// Hands out what the map says of every cell of the stretch that may fall on its known part.
+    fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
+        let LookupRow { lookup, start, .. } = self.row;
+        for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
+            take(cell, lookup.value(&(start + lookup.step * index as f64)));
         }
-        for (index, evidence) in (from..to).zip(&mut evidence[from - first..]) {
-            table.add(evidence, lookup.value(&place(index as f64)));
-        }
-        true
     }
 }
 
@@ -138,8 +166,10 @@ mod tests {
         let resolution = maps.iter().map(|(map, _)| map.grid.geometry.resolution).fold(f64::INFINITY, f64::min);
         let lattice = Lattice { anchor, resolution, max_extent: 100.0, max_cells: 1_000_000 };
         let geometry = lay_out(&maps, &lattice).geometry.unwrap();
-        let mut cells = vec![0; geometry.cell_count()];
-        fuse(&maps, &geometry, &EvidenceTable::new(0.1192, 0.971), &mut cells);
+        let (mut cells, mut conflicts) = (vec![0; geometry.cell_count()], vec![0; geometry.cell_count()]);
+        let fused = Fused { cells: &mut cells, conflicts: &mut conflicts };
+        fuse(&maps, &geometry, &EvidenceTable::new(0.1192, 0.971), fused);
+        assert!(cells.iter().zip(&conflicts).all(|(cell, conflict)| *cell != UNKNOWN || *conflict == UNKNOWN));
         (geometry, cells)
     }
 

@@ -1,14 +1,17 @@
-//! Grid fuser: the maps of all placed robots in, one map out (Tsardoulias et al., section 4.4).
+//! Grid fuser: the maps of all placed robots in, one map out (Tsardoulias et al., section 4.4), and where they
+//! contradict each other.
 //!
 //! Every robot's map is carried into the world, which is the reference robot's map frame, and the maps are added in
 //! log-odds. Coverage fields, which are grids too, can be fused by a second stage of this kind.
 //!
 //! - [`known`]: where the known cells of a map lie, so that nothing else is walked.
 //! - [`layout`]: how large the fused grid is, and where its cells lie.
-//! - [`evidence`]: cell values as log-odds, and their sum.
+//! - [`evidence`]: cell values as log-odds, their sum, and how far they contradict each other.
+//! - [`agreement`]: how much is known to one map and to several, and how much of it is in conflict.
 //! - [`inverse`]: every output cell looked up in the maps; the default.
 //! - [`forward`]: every map cell carried to the output and rounded, gaps closed by a conditional mean; the paper's way.
 
+pub mod agreement;
 pub mod evidence;
 pub mod forward;
 pub mod inverse;
@@ -32,6 +35,15 @@ pub struct PlacedGrid<'a> {
     pub grid: Grid<'a>,
     /// `T_world_map`: the pose of the map frame in the world.
     pub transform_world_map: Pose2,
+}
+
+/// What is made of the maps: two grids of the same size.
+#[derive(Debug)]
+pub struct Fused<'a> {
+    /// The fused map: -1 unknown, 0 free to 100 occupied.
+    pub cells: &'a mut [i8],
+    /// How far the maps contradict each other: see [`EvidenceTable::conflict`](evidence::EvidenceTable::conflict).
+    pub conflicts: &'a mut [i8],
 }
 
 impl PlacedGrid<'_> {

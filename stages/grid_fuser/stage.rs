@@ -1,16 +1,19 @@
 //! The grid fuser as a stage.
 
+use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
-use super::{GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
+use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
 use crate::geometry::{GridGeometry, Point2, read_map};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 const MAP: usize = 0;
 const FUSED: usize = 0;
+const CONFLICTS: usize = 1;
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {
@@ -18,7 +21,8 @@ pub fn kind() -> StageKind {
         "grid_fuser",
         "Fuses the maps of all placed robots in log-odds: unknown says nothing, evidence adds. The map is sent when the \
          frames change by more than `min_move` or `min_turn`, when a robot that is placed has another map, and at the \
-         end if anything has changed since.",
+         end if anything has changed since. Where maps contradict each other is sent beside it, and the area of that is in \
+         the stage's report.",
         vec![
             InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, or their coverage fields"),
             InputPort::one("frames", PortType::of::<RobotFrames>(), "where the maps lie"),
@@ -26,6 +30,14 @@ pub fn kind() -> StageKind {
         vec![
             OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the fused map, in the frame `world`")
                 .on_topic("/map"),
+            OutputPort::new(
+                "conflicts",
+                PortType::of::<OccupancyGrid<'_>>(),
+                "sent with the fused map, on the same cells: how far the maps contradict each other. -1 where fewer than two \
+                 maps know the cell, 0 where all say the same; otherwise the log-odds for occupied and those for free, as \
+                 shares of the most that one map can say for each, the smaller of them, in percent",
+            )
+            .on_topic("/map_conflicts"),
         ],
         |parameters: GridFuserParameters, _: &Context| Ok(GridFuser::new(parameters)),
     )
@@ -38,6 +50,8 @@ struct GridFuser {
     frames: RobotFrames,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
+    /// How far the maps agree in the fused map sent last, and the area of a cell in it, square metres.
+    agreement: Option<(Agreement, f64)>,
 }
 
 /// A robot's latest map, where it came in: its bytes are not copied.
@@ -61,12 +75,23 @@ impl Stage for GridFuser {
         });
         if is_sent { Ok(()) } else { self.fuse(output) }
     }
+
+    fn report(&self) -> Option<Value> {
+        let (agreement, cell_area) = self.agreement?;
+        let area = |cells: u64| cells as f64 * cell_area;
+        Some(json!({
+            "known_to_one_m2": area(agreement.known_to_one),
+            "known_to_several_m2": area(agreement.known_to_several),
+            "in_conflict_m2": area(agreement.in_conflict),
+            "conflict_share": agreement.conflict_share(),
+        }))
+    }
 }
 
 impl GridFuser {
     fn new(parameters: GridFuserParameters) -> Self {
         let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
-        Self { table, parameters, maps: BTreeMap::new(), frames: RobotFrames::default(), fused: None }
+        Self { table, parameters, maps: BTreeMap::new(), frames: RobotFrames::default(), fused: None, agreement: None }
     }
 
     /// Keeps a robot's map. Whether it belongs in the fused one: a map of a robot that is not placed waits for its
@@ -114,7 +139,8 @@ impl GridFuser {
 
     fn fuse(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
         self.fused = Some(self.frames.clone());
-        if !output.is_read(FUSED) {
+        self.agreement = None;
+        if !output.is_read(FUSED) && !output.is_read(CONFLICTS) {
             return Ok(());
         }
         let placed = self.placed(&self.frames);
@@ -146,13 +172,31 @@ impl GridFuser {
         maps.retain(|_| takes_part.next().is_some_and(|takes_part| *takes_part));
         let Some(geometry) = layout.geometry else { return Ok(()) };
         let prefix = prefix(&geometry, Header::new(output.log_time(), RobotFrames::WORLD));
-        output.send_grid(FUSED, "", &prefix, |cells| {
+        let mut conflicts = vec![0; geometry.cell_count()];
+        let mut fuse = |cells: &mut [i8]| {
+            let fused = Fused { cells, conflicts: &mut conflicts };
             match self.parameters.warp {
-                Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, cells),
-                Warp::Forward => forward::fuse(&maps, &geometry, &self.table, cells),
+                Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, fused),
+                Warp::Forward => forward::fuse(&maps, &geometry, &self.table, fused),
             }
-            Ok(())
-        })
+            Agreement::of(cells, &conflicts)
+        };
+        let mut agreement = Agreement::default();
+        match output.is_read(FUSED) {
+            true => output.send_grid(FUSED, "", &prefix, |cells| {
+                agreement = fuse(cells);
+                Ok(())
+            })?,
+            false => agreement = fuse(&mut vec![0; geometry.cell_count()]),
+        }
+        if output.is_read(CONFLICTS) {
+            output.send_grid(CONFLICTS, "", &prefix, |cells| {
+                cells.copy_from_slice(&conflicts);
+                Ok(())
+            })?;
+        }
+        self.agreement = Some((agreement, geometry.resolution.powi(2)));
+        Ok(())
     }
 }
 

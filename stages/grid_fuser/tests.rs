@@ -35,6 +35,15 @@ impl Run {
         self.fused()
     }
 
+    /// What was sent on `conflicts`, and the report.
+    fn conflicts(&mut self) -> (Vec<Vec<i8>>, serde_json::Value) {
+        let read = |message: &Message| {
+            assert_eq!(message.header().topic.as_str(), "/map_conflicts");
+            message.decode::<OccupancyGrid<'_>>().unwrap().cells().to_vec()
+        };
+        (self.outputs.take(1).iter().map(read).collect(), self.stage.report().unwrap_or_default())
+    }
+
     fn fused(&mut self) -> Vec<(u32, u32, Vec<i8>)> {
         let read = |message: &Message| {
             let grid: OccupancyGrid<'_> = message.decode().unwrap();
@@ -127,6 +136,37 @@ fn both_warps_give_the_same_where_nothing_is_turned() {
         let fused = run.feed(1, "", frames(&[("robot1", 0.0), ("robot2", 0.5)]));
         assert_eq!(fused, [(4, 1, vec![0, 100, -1, 0])], "{parameters}");
     }
+}
+
+#[test]
+fn conflicts_lie_on_the_cells_of_the_fused_map_and_their_area_is_reported() {
+    for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
+        let mut run = Run::new(parameters);
+        run.feed(0, "robot1", map(0.0, &[0, 100, 100, -1, 0]));
+        run.feed(0, "robot2", map(0.0, &[0, 0, 100, 0, 30]));
+        run.feed(1, "", frames(&[("robot1", 0.0)]));
+        let (sent, report) = run.conflicts();
+        assert_eq!(sent, [[-1; 5]]);
+        assert_eq!(
+            (report["known_to_one_m2"].as_f64(), report["known_to_several_m2"].as_f64()),
+            (Some(4.0), Some(0.0))
+        );
+        run.feed(1, "", frames(&[("robot1", 0.0), ("robot2", 1.0)]));
+        let (sent, report) = run.conflicts();
+        assert_eq!(sent, [[-1, 100, 100, -1, 0, -1]], "{parameters}");
+        let expected = serde_json::json!({
+            "known_to_one_m2": 3.0, "known_to_several_m2": 3.0, "in_conflict_m2": 2.0, "conflict_share": 2.0 / 3.0,
+        });
+        assert_eq!(report, expected);
+    }
+}
+
+#[test]
+fn nothing_is_reported_of_a_map_that_is_not_made() {
+    let mut run = Run::new("");
+    run.feed(0, "robot1", map(0.0, &[-1]));
+    run.feed(1, "", frames(&[("robot1", 0.0)]));
+    assert_eq!(run.conflicts(), (Vec::new(), serde_json::Value::Null));
 }
 
 #[test]

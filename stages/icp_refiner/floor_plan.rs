@@ -3,6 +3,7 @@
 use super::{FirstGuess, IcpParameters, WallMap};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN};
 use crate::merge_verifier::MapView;
+use gridweave_runtime::ros::MapMetaData;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Half of a wall's thickness, metres.
@@ -137,6 +138,22 @@ impl FloorPlan {
 }
 
 impl DrawnMap {
+    /// What a message says of the grid.
+    pub(crate) fn info(&self) -> MapMetaData {
+        MapMetaData {
+            resolution: self.geometry.resolution as f32,
+            width: self.geometry.width as u32,
+            height: self.geometry.height as u32,
+            origin: self.geometry.origin.into(),
+            ..Default::default()
+        }
+    }
+
+    /// The cells as a message holds them.
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        self.cells.iter().map(|cell| *cell as u8).collect()
+    }
+
     pub(crate) fn view(&self) -> MapView<'_> {
         MapView { grid: Grid::new(self.geometry, &self.cells).unwrap(), walls: &self.walls }
     }

@@ -88,7 +88,7 @@ impl Default for IcpParameters {
             max_distance: 1.0,
             min_distance: 0.15,
             shrink: 0.8,
-            max_iterations: 30,
+            max_iterations: 100,
             convergence: 1e-4,
             coarse_points: 600,
             start_spacing: 0.05,

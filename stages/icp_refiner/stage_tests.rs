@@ -34,15 +34,7 @@ impl Bench {
     }
 
     fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
-        let cells: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
-        let info = MapMetaData {
-            resolution: map.geometry.resolution as f32,
-            width: map.geometry.width as u32,
-            height: map.geometry.height as u32,
-            origin: map.geometry.origin.into(),
-            ..Default::default()
-        };
-        self.give(MAP, robot, &OccupancyGrid { info, data: &cells, ..Default::default() })
+        self.give(MAP, robot, &OccupancyGrid { info: map.info(), data: &map.bytes(), ..Default::default() })
     }
 
     fn finish(&mut self) -> Vec<Alignment> {

@@ -125,12 +125,20 @@ fn judge_one<'a>(
                 }
             })
             .or_else(|| {
-                if !is_strict || alignment.hypotheses > 0 {
+                if !is_strict {
                     return None;
                 }
-                let nearby = best_rival_nearby(a, b, &transform_a_b, &agreement.centre, parameters)?;
-                rival = Some(nearby);
-                by_rival_nearby(agreement, &nearby, parameters)
+                // A stage that has looked for others has sent the best of them.
+                let alike = match alignment.hypotheses {
+                    0 => best_rival_nearby(a, b, &transform_a_b, &agreement.centre, parameters)?,
+                    _ => all
+                        .iter()
+                        .filter_map(rival_of)
+                        .filter(|rival| rival.counts(parameters))
+                        .max_by(Rival::by_share)?,
+                };
+                rival = Some(alike);
+                by_rival(agreement, &alike, parameters)
             }),
     };
     let rival_agreement = rival.map(|rival| rival.agreement);
@@ -176,7 +184,9 @@ fn contradiction(
     })
 }
 
-fn by_rival_nearby(agreement: &Agreement, rival: &Rival, parameters: &MergeVerifierParameters) -> Option<Refusal> {
+/// Wherever else enough of the maps meets, a smaller share of the walls must agree: where as large a share does, what a
+/// robot happens to have seen of the one place and not of the other is all that speaks for the one.
+fn by_rival(agreement: &Agreement, rival: &Rival, parameters: &MergeVerifierParameters) -> Option<Refusal> {
     let (share, margin) = (agreement.wall_agreement(), parameters.rival_margin);
     let is_clear = share - rival.agreement.wall_agreement() >= margin;
     (!is_clear).then(|| Refusal::Rival {

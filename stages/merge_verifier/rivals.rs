@@ -5,6 +5,7 @@ use super::{Agreement, MapView, MergeVerifierParameters};
 use crate::geometry::{Point2, Pose2};
 use crate::icp_refiner::{FirstGuess, IcpParameters, approach};
 use nalgebra::{Matrix3, UnitComplex, Vector2};
+use std::cmp::Ordering;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 /// An alignment whose middle lies within this many metres of another, and that is turned by less than [`SAME_TURN`], is
@@ -37,6 +38,17 @@ impl Rival {
         let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
         (shift >= SAME_PLACE || turn.abs() >= SAME_TURN).then(|| Self { shift, turn, agreement: compare() })
     }
+
+    /// Whether the maps have enough area and walls in common there for their agreement to mean something
+    /// (`min_overlap`, `min_wall_length`).
+    pub(super) fn counts(&self, parameters: &MergeVerifierParameters) -> bool {
+        self.agreement.overlap >= parameters.min_overlap && self.agreement.wall_on_wall >= parameters.min_wall_length
+    }
+
+    /// By the share of the walls that agree.
+    pub(super) fn by_share(&self, other: &Self) -> Ordering {
+        self.agreement.wall_agreement().total_cmp(&other.agreement.wall_agreement())
+    }
 }
 
 /// The rival near an alignment `T_a_b` on whose walls the maps agree best, if there is any at which they have enough area
@@ -61,9 +73,7 @@ pub fn best_rival_nearby(
         let rival_a_b = approach(a.walls, b.walls, &guess, &icp);
         let compare = || compare_sampled(a, b, &rival_a_b, parameters, icp.coarse_points);
         let Some(rival) = Rival::of(transform_a_b, centre, &rival_a_b, compare) else { continue };
-        let Agreement { overlap, wall_on_wall, .. } = rival.agreement;
-        let counts = overlap >= parameters.min_overlap && wall_on_wall >= parameters.min_wall_length;
-        if counts && best.is_none_or(|best| rival.agreement.wall_agreement() > best.agreement.wall_agreement()) {
+        if rival.counts(parameters) && best.is_none_or(|best| rival.by_share(&best).is_gt()) {
             best = Some(rival);
         }
     }

@@ -1,1 +1,149 @@
+//! The stage from outside: messages in, messages out.
 
+use crate::geometry::{Pose2, pose};
+use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RosMessage, encode};
+use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
+use serde::Serialize;
+
+const MAP: usize = 0;
+const ALIGNMENT: usize = 1;
+
+/// The stage, and what it sends.
+struct Bench {
+    stage: Box<dyn Stage>,
+    outputs: CollectedOutputs,
+    time: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let kind = super::kind();
+        let Ok(Node::Stage(stage)) = kind.make(Default::default(), &Context::default()) else { panic!("no stage") };
+        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
+    }
+
+    fn give<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Vec<Alignment> {
+        self.time += 1;
+        let log_time = LogTime(self.time * 1_000_000_000);
+        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
+        let message = Message::from_vec(header, encode(message).unwrap());
+        self.stage.receive(port, &message, &mut self.outputs.output(log_time)).unwrap();
+        self.sent()
+    }
+
+    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
+        self.give(MAP, robot, &OccupancyGrid { info: map.info(), data: &map.bytes(), ..Default::default() })
+    }
+
+    fn finish(&mut self) -> Vec<Alignment> {
+        self.stage.finish(&mut self.outputs.output(LogTime(self.time))).unwrap();
+        self.sent()
+    }
+
+    fn sent(&mut self) -> Vec<Alignment> {
+        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+    }
+}
+
+/// West and east.
+fn maps() -> (DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b)
+}
+
+fn proposed(method: &str, transform_a_b: &Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        header: Header::new(LogTime(0), "robot1/map"),
+        a: "robot1".into(),
+        b: "robot2".into(),
+        covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
+        score: 0.3,
+        method: method.into(),
+        accepted: true,
+        reason: "somebody says so".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(transform_a_b);
+    alignment
+}
+
+#[test]
+fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map() {
+    let (a, b) = maps();
+    let mut bench = Bench::new();
+    let truth = a.transform_to(&b);
+    assert_eq!(bench.give(ALIGNMENT, "", &Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
+    assert_eq!(bench.give_map("robot1", &a), []);
+    let sent = bench.give_map("robot2", &b);
+    let [judged] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(judged.accepted && !judged.provisional, "{}", judged.reason);
+    assert_eq!(judged.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert!(judged.score > 0.9 && judged.transform_a_b() == proposed("tags", &truth).transform_a_b());
+    assert_eq!(bench.give_map("robot2", &b), [], "nothing has changed");
+    let other = FloorPlan::another_office().draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let sent = bench.give_map("robot2", &other);
+    assert!(!sent[0].accepted && sent[0].reason.contains("the maps do not confirm it"), "{}", sent[0].reason);
+    assert_eq!(bench.finish(), []);
+    assert_eq!(bench.stage.report().unwrap()["pairs"][0]["hypotheses"], 1);
+}
+
+#[test]
+fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_last() {
+    let (a, b) = maps();
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let truth = a.transform_to(&b);
+    let ranked =
+        |rank: u32, place: &Pose2| Alignment { provisional: true, rank, hypotheses: 2, ..proposed("maps+icp", place) };
+    let wrong = pose(1.5, 0.0, 0.0) * truth;
+    assert_eq!(bench.give(ALIGNMENT, "", &ranked(0, &wrong)), []);
+    let sent = bench.give(ALIGNMENT, "", &ranked(1, &truth));
+    assert!(sent[0].accepted && (sent[0].rank, sent[0].hypotheses) == (0, 0), "{sent:?}");
+    assert_eq!(sent[0].transform_a_b(), ranked(1, &truth).transform_a_b());
+    let sent = bench.give(ALIGNMENT, "", &Alignment { hypotheses: 1, ..ranked(0, &wrong) });
+    assert!(!sent[0].accepted, "{}", sent[0].reason);
+    let sent = bench.give(ALIGNMENT, "", &proposed("tags", &truth));
+    assert!(sent[0].accepted && sent[0].method == "tags", "{sent:?}");
+}
+
+#[test]
+fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
+    let mut bench = Bench::new();
+    let nothing = |method: &str, reason: &str| Alignment {
+        accepted: false,
+        covariance: [0.0; 9],
+        reason: reason.into(),
+        ..proposed(method, &Pose2::identity())
+    };
+    assert_eq!(bench.give(ALIGNMENT, "", &nothing("maps", "no walls"))[0].reason, "no walls");
+    let sent = bench.give(ALIGNMENT, "", &nothing("tags", "no tags"));
+    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls; by the tags: no tags"));
+    assert_eq!(bench.give(ALIGNMENT, "", &nothing("tags", "no tags")), []);
+    assert_eq!(bench.finish(), []);
+}
+
+#[test]
+fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
+    let (a, _) = maps();
+    let mut bench = Bench::new();
+    bench.give_map("robot1", &a);
+    bench.give(ALIGNMENT, "", &proposed("tags", &Pose2::identity()));
+    let sent = bench.finish();
+    assert!(!sent[0].accepted && sent[0].reason.contains("no usable map of robot2"), "{}", sent[0].reason);
+}
+
+#[test]
+fn what_cannot_be_read_is_warned_of() {
+    let mut bench = Bench::new();
+    for port in [MAP, ALIGNMENT] {
+        let message = Message::from_vec(MessageHeader::default(), vec![0, 1, 0, 0]);
+        bench.stage.receive(port, &message, &mut bench.outputs.output(LogTime(9))).unwrap();
+    }
+    bench.give(ALIGNMENT, "", &Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
+    assert_eq!(bench.outputs.warnings().len(), 3, "{:?}", bench.outputs.warnings());
+}

@@ -10,8 +10,8 @@ mod save;
 mod shades;
 
 pub use error::MapFileError;
-pub use load::load;
-pub use save::save;
+pub use load::{image_of, load};
+pub use save::{image_beside, save};
 
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 

@@ -37,6 +37,11 @@ pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     write(yaml, text.as_bytes())
 }
 
+/// The image that [`save`] writes beside the YAML file at `yaml`.
+pub fn image_beside(yaml: &Path) -> PathBuf {
+    yaml.with_extension("pgm")
+}
+
 /// The YAML text, the path of the image, and its pixels. Otherwise what is wrong.
 fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'static str> {
     let GridMap { info, cells } = map;
@@ -49,7 +54,7 @@ fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'
     if !(info.resolution.is_finite() && info.resolution > 0.0 && [x, y, yaw].iter().all(|value| value.is_finite())) {
         return Err("its resolution must be above 0 and its origin finite");
     }
-    let image = yaml.with_extension("pgm");
+    let image = image_beside(yaml);
     if image == yaml {
         return Err("name the YAML file; the image gets the same name with the ending pgm");
     }

@@ -106,6 +106,11 @@ fn result_messages_agree_with_their_definitions() {
         reference: "robot1".into(),
         frames: vec![frame("robot1"), frame("robot10")],
         unmerged: vec![UnmergedRobot { robot: "r3".into(), reason: "no common tags".into() }; 2],
+        groups: vec![RobotGroup {
+            reference: "r3".into(),
+            frame_id: "world/r3".into(),
+            frames: vec![frame("r3"), frame("robot4")],
+        }],
     });
 }
 

@@ -1,8 +1,10 @@
-//! `mcap_source`: the messages of MCAP logs, each on the port that its topic and type call for.
+//! Where messages come from: `mcap_source` gives those of MCAP logs, each on the port that its topic and type call for;
+//! [`map_file`] gives the maps of map files.
 
 mod carry;
 mod count;
 mod live;
+pub mod map_file;
 mod pose;
 mod route;
 mod router;

@@ -33,7 +33,7 @@ fn main() {
     };
     let output = |name: &str| folder.path().join(name).display().to_string();
     let second =
-        format!("\n[stages.second]\nkind = \"mcap_sink\"\nfile = \"{}\"\ninputs = [\"fuser\"]\n", output("b.mcap"));
+        format!("\n[stages.second]\nkind = \"mcap_sink\"\nfile = \"{}\"\ninputs = [\"fuser.map\"]\n", output("b.mcap"));
     let text = LIVE.replace("kind = \"mcap_sink\"", &format!("kind = \"mcap_sink\"\nfile = \"{}\"", output("a.mcap")));
     std::fs::write(folder.path().join("ten.toml"), text + &second).unwrap();
     let supervisor = command(&["run", &output("ten.toml")]).spawn().unwrap();

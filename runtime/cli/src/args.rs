@@ -23,7 +23,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Run a pipeline.
     Run(RunArgs),
-    /// Merge the maps in logs by the shipped pipeline that fits.
+    /// Merge the maps in logs, or map files, by the shipped pipeline that fits.
     Merge(MergeArgs),
     /// Check pipeline files and show everything that is wrong with them.
     Check(CheckArgs),
@@ -82,7 +82,7 @@ pub(crate) struct RunOptions {
     /// Seeds all randomness.
     #[arg(long)]
     pub(crate) seed: Option<u64>,
-    /// The robot whose map frame is the world; the first by name if none is given.
+    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     #[arg(long, value_name = "ROBOT")]
     pub(crate) reference: Option<String>,
     /// Set a parameter of a stage.
@@ -100,7 +100,8 @@ pub(crate) struct RunOptions {
 pub(crate) struct RunArgs {
     /// A pipeline file, or the name of a shipped pipeline such as `tag_merge`.
     pub(crate) pipeline: PathBuf,
-    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time.
+    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time. Or, for a pipeline that reads map files,
+    /// the map of a robot (map_server YAML).
     #[arg(short, long, value_name = "LOG")]
     pub(crate) input: Vec<PathBuf>,
     /// The log to write.
@@ -112,10 +113,12 @@ pub(crate) struct RunArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
-    /// Logs to read (MCAP files or rosbag2 folders).
+    /// Logs (MCAP files or rosbag2 folders), or map files (map_server YAML), each the map of a robot that is called as the
+    /// file.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The log to write.
+    /// What to write: a log or, when it is called FILE.yaml, the merged map alone (map_server YAML, with the image beside
+    /// it).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]

@@ -39,7 +39,7 @@ impl<'a> Exports<'a> {
         let Some(log) = self.log.filter(|_| self.map.is_some() || self.picture.is_some()) else { return Ok(()) };
         let maps = last_maps(log)?;
         let Some(merged) = maps.get(MERGED) else {
-            bail!("{} holds no merged map on {MERGED}: there is nothing to draw", log.display());
+            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}, as no map says anything");
         };
         if let Some(path) = self.map {
             map_file::save(path, merged).context("cannot write the merged map")?;

@@ -21,7 +21,10 @@ mod experiment;
 mod export;
 mod golden;
 mod info;
+mod inputs;
 mod live;
+mod merge;
+mod outputs;
 mod pipelines;
 mod processes;
 mod progress;
@@ -78,7 +81,7 @@ fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 fn dispatch(command: Command, registry: &Registry) -> Result<Outcome> {
     match command {
         Command::Run(args) => run::run(&args, registry),
-        Command::Merge(args) => run::merge(&args, registry),
+        Command::Merge(args) => merge::merge(&args, registry),
         Command::Check(args) => pipelines::check(&args, registry),
         Command::Graph(args) => pipelines::graph(&args, registry),
         Command::Kinds(args) => pipelines::kinds(&args, registry),

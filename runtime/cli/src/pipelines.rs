@@ -9,10 +9,11 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 8] = [
+const SHIPPED: [(&str, &str); 9] = [
     ("auto_merge", include_str!("../../../pipelines/auto_merge.toml")),
     ("cut", include_str!("../../../pipelines/cut.toml")),
     ("live", include_str!("../../../pipelines/live.toml")),
+    ("map_file_merge", include_str!("../../../pipelines/map_file_merge.toml")),
     ("map_merge", include_str!("../../../pipelines/map_merge.toml")),
     ("simulate", include_str!("../../../pipelines/simulate.toml")),
     ("tag_direction", include_str!("../../../pipelines/tag_direction.toml")),

@@ -1,8 +1,10 @@
-//! `gridweave run` and `gridweave merge`.
+//! `gridweave run`, and the run of any pipeline that a command needs.
 
 use crate::Outcome;
-use crate::args::{BadUse, MergeArgs, RunArgs, RunOptions};
+use crate::args::{BadUse, RunArgs, RunOptions};
 use crate::export::Exports;
+use crate::inputs::{self, Inputs};
+use crate::outputs;
 use crate::pipelines;
 use crate::progress::Progress;
 use crate::summary::Summary;
@@ -18,7 +20,7 @@ use std::time::SystemTime;
 pub(crate) struct Job<'a> {
     /// A pipeline file, or the name of a shipped pipeline.
     pub(crate) pipeline: &'a Path,
-    /// What the only source of logs reads; if none, what the pipeline says.
+    /// What the only source of logs, or of map files, reads; if none, what the pipeline says.
     pub(crate) inputs: &'a [PathBuf],
     /// What the only sink writes; if none, what the pipeline says.
     pub(crate) output: Option<&'a Path>,
@@ -29,6 +31,10 @@ pub(crate) struct Job<'a> {
 
 /// Runs a pipeline file.
 pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Outcome> {
+    if let Some(output) = args.output.as_deref().filter(|output| inputs::is_yaml(output)) {
+        let text = format!("`run` writes a log to {0}: for the merged map say --map {0}", output.display());
+        return Err(BadUse(text).into());
+    }
     let job = Job {
         pipeline: &args.pipeline,
         inputs: &args.input,
@@ -39,25 +45,9 @@ pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Outcome> {
     job.run_and_print()
 }
 
-/// Merges logs by the shipped pipeline for them.
-pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Outcome> {
-    if let Some(map) = args.inputs.iter().find(|path| path.extension().is_some_and(|end| end == "yaml" || end == "yml"))
-    {
-        let text = format!("{} is a map file: merge takes logs (MCAP files or rosbag2 folders)", map.display());
-        return Err(BadUse(text).into());
-    }
-    let job = Job {
-        pipeline: Path::new("tag_merge"),
-        inputs: &args.inputs,
-        output: Some(&args.output),
-        options: &args.options,
-        registry,
-    };
-    job.run_and_print()
-}
-
 impl Job<'_> {
-    fn run_and_print(&self) -> Result<Outcome> {
+    /// Runs the pipeline, writes all that was asked for, and prints the summary.
+    pub(crate) fn run_and_print(&self) -> Result<Outcome> {
         let Some(summary) = self.run()? else { return Ok(Outcome::BadUse) };
         match self.options.json {
             true => println!("{}", summary.to_json()),
@@ -75,7 +65,7 @@ impl Job<'_> {
         let Some(pipeline) = pipelines::load(self.pipeline, &self.overrides()?, self.registry)? else {
             return Ok(None);
         };
-        refuse_to_overwrite_inputs(&pipeline)?;
+        outputs::check(&pipeline, self.options)?;
         let progress = Progress::new(pipeline.mode);
         let start = SystemTime::now();
         let by_mode = match pipeline.mode {
@@ -93,10 +83,10 @@ impl Job<'_> {
             std::fs::write(path, summary.to_json() + "\n")
                 .with_context(|| format!("cannot write the summary {}", path.display()))?;
         }
-        exports.write(&summary, &pipeline.robots)?;
         if pipeline.mode == Mode::Replay {
             summary.check_for_maps()?;
         }
+        exports.write(&summary, &pipeline.robots)?;
         Ok(Some(summary))
     }
 
@@ -106,7 +96,7 @@ impl Job<'_> {
         overrides.seed = self.options.seed;
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
-            overrides.set_for_kind("mcap_source", "files", files);
+            overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);
         }
         if let Some(output) = self.output {
             overrides.set_for_kind("mcap_sink", "file", text_of(output)?);
@@ -135,38 +125,4 @@ fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
             tracing::warn!("the output {} has no end: {error}", file.display());
         }
     }
-}
-
-/// A sink must not write to a file that a source reads, by whatever name.
-fn refuse_to_overwrite_inputs(pipeline: &Pipeline) -> Result<()> {
-    let of_kind = |kind: &'static str| pipeline.stages.iter().filter(move |stage| stage.kind.name == kind);
-    let outputs = of_kind("mcap_sink").filter_map(|stage| stage.parameters.get("file")?.as_str());
-    for output in outputs {
-        let inputs = of_kind("mcap_source").filter_map(|stage| stage.parameters.get("files")?.as_array());
-        for input in inputs.flatten().filter_map(|input| input.as_str()) {
-            if is_or_holds(Path::new(input), Path::new(output)) {
-                let text = format!("{output} is an input, and would be overwritten: choose another output");
-                return Err(BadUse(text).into());
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Whether two paths lead to the same file, or the first to a folder that holds the second, through links as well.
-fn is_or_holds(input: &Path, output: &Path) -> bool {
-    let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
-    output.starts_with(&input) || same_file(&input, &output)
-}
-
-#[cfg(unix)]
-fn same_file(a: &Path, b: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let (Ok(a), Ok(b)) = (a.metadata(), b.metadata()) else { return false };
-    (a.dev(), a.ino()) == (b.dev(), b.ino())
-}
-
-#[cfg(not(unix))]
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b
 }

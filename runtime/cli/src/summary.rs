@@ -6,6 +6,9 @@ use gridweave_runtime::engine::RunReport;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
+/// The key under which an entry of `stages` has what a fuser has found.
+const AREA: &str = "area";
+
 /// What a run has found: the form that `--summary` writes.
 pub(crate) struct Summary {
     value: Map<String, Value>,
@@ -29,6 +32,9 @@ impl Summary {
             });
             if !stage.warnings.is_empty() {
                 entry["warnings"] = json!(stage.warnings);
+            }
+            if let Some(area) = stage.result.as_ref().filter(|_| stage.kind == "grid_fuser") {
+                entry[AREA] = area.clone();
             }
             for (name, count) in [("dropped", stage.dropped), ("restarts", stage.restarts)] {
                 if count > 0 {
@@ -87,7 +93,11 @@ impl Summary {
         for (robot, reason) in self.object("unmerged") {
             writeln!(out, "not merged: {robot}: {}", reason.as_str().unwrap_or_default())?;
         }
+        for group in self.value.get("groups").and_then(Value::as_array).into_iter().flatten() {
+            write_group(out, group)?;
+        }
         self.write_alignments(out)?;
+        self.write_areas(out)?;
         for (stage, what, count) in self.warnings() {
             let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
             writeln!(out, "warning: {stage}: {what} ({times})")?;
@@ -118,16 +128,7 @@ impl Summary {
             (1, _) => writeln!(out, "none of the other {} robots could be merged with {reference}", all - 1)?,
             _ => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
         }
-        let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
-        for (robot, [x, y, yaw]) in self.frames() {
-            let covariance = self.value.get("frames").and_then(|frames| frames[robot]["covariance"].as_array());
-            let variance =
-                |place: usize| covariance.and_then(|values| values.get(place)?.as_f64()).unwrap_or_default().max(0.0);
-            let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
-            let numbers = [x, y, yaw.to_degrees(), std_position, std_yaw];
-            table.row(std::iter::once(robot.to_owned()).chain(numbers.map(|number| format!("{number:.3}"))));
-        }
-        write!(out, "{table}")
+        write!(out, "{}", frames_table(self.object("frames")))
     }
 
     fn write_alignments(&self, out: &mut String) -> std::fmt::Result {
@@ -145,6 +146,21 @@ impl Summary {
         write!(out, "\n{table}")
     }
 
+    /// How much of each fused map is known, and how much of it is in conflict.
+    fn write_areas(&self, out: &mut String) -> std::fmt::Result {
+        for (stage, area) in self.object("stages").filter_map(|(name, stage)| Some((name, stage.get(AREA)?))) {
+            let number = |field: &str| area[field].as_f64().unwrap_or_default();
+            let [one, several] = ["known_to_one_m2", "known_to_several_m2"].map(number);
+            write!(out, "\n{stage}: {one:.1} m2 known to one map, {several:.1} m2 to several")?;
+            if several > 0.0 {
+                let (conflict, percent) = (number("in_conflict_m2"), 100.0 * number("conflict_share"));
+                write!(out, ", which contradict each other on {conflict:.1} m2 of it ({percent:.1} %)")?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
     /// All warnings: stage, text, count.
     fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
         self.object("stages").flat_map(|(stage, entry)| {
@@ -156,5 +172,53 @@ impl Summary {
     fn object(&self, name: &str) -> impl Iterator<Item = (&str, &Value)> {
         let object = self.value.get(name).and_then(Value::as_object);
         object.into_iter().flatten().map(|(name, value)| (name.as_str(), value))
+    }
+}
+
+/// Robots that are merged with each other, but not with the reference.
+fn write_group(out: &mut String, group: &Value) -> std::fmt::Result {
+    let reference = group["reference"].as_str().unwrap_or_default();
+    let frames = group["frames"].as_object().into_iter().flatten();
+    let frames = frames.map(|(robot, frame)| (robot.as_str(), frame));
+    let count = frames.clone().count();
+    writeln!(out, "{count} of these are tied to each other; map frames in the frame of {reference}:")?;
+    write!(out, "{}", frames_table(frames))
+}
+
+/// Poses of map frames, as the frame solver reports them, with their standard deviations.
+fn frames_table<'a>(frames: impl Iterator<Item = (&'a str, &'a Value)>) -> Table {
+    let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
+    for (robot, frame) in frames {
+        let [x, y, yaw] = ["x", "y", "yaw"].map(|field| frame[field].as_f64().unwrap_or_default());
+        let variance = |place: usize| frame["covariance"][place].as_f64().unwrap_or_default().max(0.0);
+        let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
+        let numbers = [x, y, yaw.to_degrees(), std_position, std_yaw];
+        table.row(std::iter::once(robot.to_owned()).chain(numbers.map(|number| format!("{number:.3}"))));
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn robots_tied_to_each_other_only_are_shown_in_their_own_frame() {
+        let frame = |x: f64| json!({"x": x, "y": 0.0, "yaw": 0.5, "covariance": vec![0.01; 9]});
+        let Value::Object(value) = json!({
+            "reference": "robot1",
+            "frames": {"robot1": frame(0.0)},
+            "unmerged": {"robot2": "it is tied to robot3 only", "robot3": "it is tied to robot2 only"},
+            "groups": [{"reference": "robot2", "frames": {"robot2": frame(0.0), "robot3": frame(4.25)}}],
+            "stages": {},
+        }) else {
+            panic!("an object was written");
+        };
+        let text = Summary { value }.to_text();
+        let lines: Vec<&str> = text.lines().collect();
+        let start = lines.iter().position(|line| line.starts_with("2 of these")).unwrap();
+        assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
+        assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
+        assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
     }
 }

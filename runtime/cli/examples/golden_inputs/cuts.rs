@@ -22,7 +22,7 @@ pub(crate) struct Cut {
 }
 
 /// All cuts.
-pub(crate) const CUTS: [Cut; 8] = [
+pub(crate) const CUTS: [Cut; 9] = [
     Cut { kind: "line_extractor", name: "simulated", topics: &["/{robot}/map"], seconds: f64::INFINITY },
     Cut { kind: "map_aligner", name: "simulated", topics: &["/{robot}/map"], seconds: f64::INFINITY },
     Cut { kind: "tag_localizer", name: "simulated", topics: &["/robot1/pose", "/robot1/tag_ranges"], seconds: 30.0 },
@@ -40,9 +40,15 @@ pub(crate) const CUTS: [Cut; 8] = [
         seconds: f64::INFINITY,
     },
     Cut {
-        kind: "frame_solver",
+        kind: "merge_verifier",
         name: "simulated",
         topics: &["/{robot}/map", "/icp/alignment"],
+        seconds: f64::INFINITY,
+    },
+    Cut {
+        kind: "frame_solver",
+        name: "simulated",
+        topics: &["/{robot}/map", "/verifier/alignment"],
         seconds: f64::INFINITY,
     },
     Cut { kind: "grid_fuser", name: "simulated", topics: &["/{robot}/map", "/robot_frames"], seconds: f64::INFINITY },

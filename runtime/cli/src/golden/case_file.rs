@@ -24,6 +24,8 @@ pub(super) struct Case {
     pub(super) float_tolerance: f64,
     /// What must hold whatever is expected.
     pub(super) expects: Vec<Expect>,
+    /// Where it lies.
+    pub(super) folder: PathBuf,
     /// `input.mcap`.
     pub(super) input: PathBuf,
     /// `expected.mcap`.
@@ -95,6 +97,7 @@ impl Case {
             stage,
             inputs,
             float_tolerance: tolerance,
+            folder: folder.path.clone(),
             input: folder.path.join("input.mcap"),
             expected: folder.path.join("expected.mcap"),
         })

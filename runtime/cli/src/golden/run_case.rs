@@ -18,9 +18,11 @@ use tempfile::TempDir;
 const SOURCE: &str = "INPUT";
 const SINK: &str = "OUTPUT";
 
-/// What stands in a parameter for the path of `input.mcap`, and for that of a file that the stage is to write.
+/// What stands in a parameter for the path of `input.mcap`, for that of a file that the stage is to write, and for that of
+/// the folder of the case, where other files for the stage to read lie.
 const INPUT: &str = "{input}";
 const OUTPUT: &str = "{output}";
+const CASE: &str = "{case}";
 
 /// Runs the stage of a case; gives all that it has sent, or written.
 pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording> {
@@ -34,7 +36,7 @@ pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording
     }
     let folder = TempDir::new().context("cannot make a folder for the output of a case")?;
     let output = folder.path().join("output.mcap");
-    let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?)];
+    let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?), (CASE, text_of(&case.folder)?)];
     let mut recording = run_stage(case, &files, observer)?;
     if case.has_placeholder(OUTPUT) {
         if !output.exists() {

@@ -93,7 +93,7 @@ pub struct Pipeline {
     pub name: String,
     /// Whether it replays logs or runs live.
     pub mode: Mode,
-    /// The robot whose map frame is the world; the first by name if none is given.
+    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     pub reference: Option<String>,
     /// Seeds all randomness.
     pub seed: u64,

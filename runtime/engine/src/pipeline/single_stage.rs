@@ -21,7 +21,7 @@ pub struct SingleStage {
     pub topics: Vec<String>,
     /// How many samples each input may hold before the sender waits.
     pub depth: usize,
-    /// The robot whose map frame is the world; the first by name if none is given.
+    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     pub reference: Option<String>,
     /// Seeds all randomness.
     pub seed: u64,

@@ -197,7 +197,7 @@ impl Alignment {
     }
 }
 
-/// The pose of one robot's map frame in the reference robot's.
+/// The pose of one robot's map frame in the map frame of the reference robot, or of its group's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RobotFrame {
     /// Whose map.
@@ -248,6 +248,22 @@ pub struct RobotFrames {
     pub frames: Vec<RobotFrame>,
     /// The robots that are not, by name.
     pub unmerged: Vec<UnmergedRobot>,
+    /// Those of them that are tied to each other, by the name of the group's reference.
+    pub groups: Vec<RobotGroup>,
+}
+
+/// Robots that are tied to each other, but not to the reference: how they lie to each other is known, where they all
+/// lie is not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotGroup {
+    /// The robot of the group in whose map frame the others are placed.
+    pub reference: String,
+    /// The name of the frame that the group is shown in: `world/REFERENCE`, the reference's map frame. Nothing ties it
+    /// to the frame `world`.
+    pub frame_id: String,
+    /// The robots of the group, its reference among them, by name. Their poses are in the map frame of the group's
+    /// reference.
+    pub frames: Vec<RobotFrame>,
 }
 
 impl RobotFrames {

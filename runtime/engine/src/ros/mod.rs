@@ -16,8 +16,8 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonTag, CommonTags, MapDirection, RobotFrame, RobotFrames, Segment, Segments, TagEstimate,
-    TagEstimates, TagRange, UnmergedRobot,
+    Alignment, CommonTag, CommonTags, MapDirection, RobotFrame, RobotFrames, RobotGroup, Segment, Segments,
+    TagEstimate, TagEstimates, TagRange, UnmergedRobot,
 };
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};
 pub use std_msgs::{Header, Time};

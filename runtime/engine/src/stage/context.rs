@@ -9,7 +9,7 @@ pub struct Context {
     pub stage: String,
     /// Seeds the stage's randomness: made from the pipeline's seed and the stage's name.
     pub seed: u64,
-    /// The robot whose map frame is the world; the first by name if none is given.
+    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     pub reference: Option<String>,
     /// How topics are told apart.
     pub robots: RobotTopics,

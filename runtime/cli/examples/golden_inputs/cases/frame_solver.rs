@@ -79,9 +79,28 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         case("small_changes", |log| {
             maps(log, 2);
-            for (seconds, metres) in [(2.0, 0.0), (3.0, 0.0005), (4.0, 0.01), (5.0, 0.0105)] {
+            for (seconds, metres) in [(2.0, 0.0), (3.0, 0.005), (4.0, 0.1), (5.0, 0.105)] {
                 align(log, seconds, 1, 2, &(true_transform(1, 2) * pose(metres, 0.0, 0.0)));
             }
+        }),
+        case("two_groups", |log| {
+            maps(log, 4);
+            align(log, 2.0, 3, 4, &true_transform(3, 4));
+            align(log, 3.0, 1, 2, &true_transform(1, 2));
+            refuse(log, 4.0, 2, 3, 0.6, "the maps contradict each other");
+        }),
+        case("groups_that_meet", |log| {
+            maps(log, 4);
+            align(log, 2.0, 3, 4, &true_transform(3, 4));
+            align(log, 3.0, 1, 2, &true_transform(1, 2));
+            align(log, 4.0, 2, 3, &true_transform(2, 3));
+        }),
+        case("later_robot", |log| {
+            for (seconds, robot) in [(0.1, 2), (0.2, 3), (3.0, 1)] {
+                log.map(seconds, &format!("robot{robot}"), &TestMap::filled(2, 2, 0.05, 0));
+            }
+            align(log, 2.0, 2, 3, &true_transform(2, 3));
+            align(log, 4.0, 1, 3, &true_transform(1, 3));
         }),
     ]
 }

@@ -16,6 +16,18 @@ pub(super) fn cases() -> Vec<Case> {
         case("conditional_mean", conditional_mean),
         case("conditional_mean_inverse", conditional_mean),
         case("evidence", evidence),
+        case("conflicts", conflicts),
+        case("conflicts_forward", conflicts),
+        case("conflicts_apart", |log| {
+            log.map(1.0, "robot1", &grid(2, &[0, 100])).map(2.0, "robot2", &grid(2, &[100, 0]));
+            place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(2.0, 0.0, 0.0))]);
+        }),
+        case("conflicts_of_resolutions", |log| {
+            let mut coarse = grid(2, &[0, 100]);
+            coarse.info.resolution = 2.0;
+            log.map(1.0, "robot1", &coarse).map(2.0, "robot2", &grid(4, &[0, 0, 100, 0, 0, 100, 100, 100]));
+            place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", Pose2::identity())]);
+        }),
         case("turned_origin", |log| {
             let turned = grid(3, &[100, 0, 0, 0, 0, 50]).at(2.0, 0.0, FRAC_PI_2);
             log.map(1.0, "robot1", &turned);
@@ -93,6 +105,7 @@ fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]) {
         reference: "robot1".into(),
         frames: placed.iter().map(frame).collect(),
         unmerged: vec![UnmergedRobot { robot: "robot9".into(), reason: "no alignment".into() }],
+        groups: Vec::new(),
     };
     log.message(seconds, TOPIC, &frames);
 }
@@ -135,6 +148,17 @@ fn evidence(log: &mut LogBuilder) {
     log.map(1.0, "robot1", &grid(10, &[0, 0, 0, 0, 100, 100, 100, 50, -1, 70]));
     log.map(2.0, "robot2", &grid(10, &[0, 100, 50, -1, 100, 50, -1, 50, 30, 70]));
     log.map(3.0, "robot3", &grid(10, &[0, 0, -1, -1, 0, -1, -1, 50, -1, 70]));
+    let all = ["robot1", "robot2", "robot3"].map(|robot| (robot, Pose2::identity()));
+    place(log, 4.0, &all[..2]);
+    place(log, 5.0, &all);
+}
+
+/// One row for each of two maps, and then of three: what is known to one, what agrees, and what contradicts, surely and
+/// less so.
+fn conflicts(log: &mut LogBuilder) {
+    log.map(1.0, "robot1", &grid(9, &[0, -1, 0, 100, 100, 70, 70, 50, 100]));
+    log.map(2.0, "robot2", &grid(9, &[-1, 100, 0, 100, 0, 0, 30, 100, 30]));
+    log.map(3.0, "robot3", &grid(9, &[-1, 0, 100, 50, -1, 70, -1, 0, 0]));
     let all = ["robot1", "robot2", "robot3"].map(|robot| (robot, Pose2::identity()));
     place(log, 4.0, &all[..2]);
     place(log, 5.0, &all);

@@ -12,6 +12,7 @@ mod icp_refiner;
 mod line_extractor;
 mod logs;
 mod map_aligner;
+mod merge_verifier;
 mod quadrant_classifier;
 mod tag_filter;
 mod tag_localizer;
@@ -52,6 +53,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         line_extractor::cases(),
         logs::cases(),
         map_aligner::cases(),
+        merge_verifier::cases(),
         quadrant_classifier::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),

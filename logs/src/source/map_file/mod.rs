@@ -1,0 +1,42 @@
+//! `map_file_source`: the maps of nav2's map server, a file for each robot.
+
+mod names;
+mod stage;
+
+#[cfg(test)]
+mod tests;
+
+pub use stage::MapFileSource;
+
+use gridweave_runtime::ros::OccupancyGrid;
+use gridweave_runtime::stage::{OutputPort, Parameters, PortType, StageKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The parameters of `map_file_source`.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapFileSourceParameters {
+    /// The maps to read: YAML files of nav2's map server, one for each robot. A robot is called as its file without the
+    /// ending; files that are called alike are told apart by the folders that they lie in. `--input` on the command line
+    /// stands in for it.
+    pub files: Vec<PathBuf>,
+}
+
+impl Parameters for MapFileSourceParameters {}
+
+/// The kind `map_file_source`.
+pub fn kind() -> StageKind {
+    StageKind::source::<MapFileSourceParameters, _>(
+        "map_file_source",
+        "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files tell no time: the maps \
+         are logged a second after each other, the first a second after the epoch, by the robots' names",
+        vec![OutputPort::new(
+            "map",
+            PortType::of::<OccupancyGrid<'_>>(),
+            "the robots' maps, on the topics of [robots]",
+        )],
+        MapFileSource::new,
+    )
+}

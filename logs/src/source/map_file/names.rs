@@ -1,0 +1,137 @@
+//! What the robots are called whose maps come as files.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Why map files give no names.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(super) enum NameError {
+    /// One file would be two robots' map.
+    #[error("{0} is given twice; give every map once")]
+    GivenTwice(PathBuf),
+    /// Two robots would have one name.
+    #[error(
+        "{one} and {other} would both be the map of a robot called `{name}`; rename one of these files or folders",
+        one = one.display(), other = other.display()
+    )]
+    Alike {
+        /// The name.
+        name: String,
+        /// The first file.
+        one: PathBuf,
+        /// The second.
+        other: PathBuf,
+    },
+}
+
+/// The name of a robot for every map file, in the order of the files: that of the file without its ending or, where
+/// several are called alike, that of its folder. Names are parts of topics: what may not stand there becomes `_`.
+pub(super) fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
+    check_once(files)?;
+    let stems: Vec<String> = files.iter().map(|file| topic_part(file.file_stem())).collect();
+    let count = |stem: &String| stems.iter().filter(|other| *other == stem).count();
+    let name = |(file, stem): (&PathBuf, &String)| match count(stem) {
+        1 => stem.clone(),
+        _ => topic_part(folder_of(file).file_name()),
+    };
+    let names: Vec<String> = files.iter().zip(&stems).map(name).collect();
+    let mut owners: BTreeMap<&str, &PathBuf> = BTreeMap::new();
+    for (name, file) in names.iter().zip(files) {
+        if let Some(one) = owners.insert(name, file) {
+            return Err(NameError::Alike { name: name.clone(), one: one.clone(), other: file.clone() });
+        }
+    }
+    Ok(names)
+}
+
+fn check_once(files: &[PathBuf]) -> Result<(), NameError> {
+    // A file that is not there is found out when it is read.
+    let mut places: Vec<PathBuf> =
+        files.iter().map(|file| file.canonicalize().unwrap_or_else(|_| file.clone())).collect();
+    places.sort();
+    match places.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(NameError::GivenTwice(pair[0].clone())),
+        None => Ok(()),
+    }
+}
+
+/// The folder of a file, by its full path: `map.yaml` and `../map.yaml` do not say how theirs are called.
+fn folder_of(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
+}
+
+/// A name as ROS 2 allows it for a part of a topic: letters, digits and `_`, the first no digit.
+fn topic_part(name: Option<&std::ffi::OsStr>) -> String {
+    let name = name.map(|name| name.to_string_lossy()).unwrap_or_default();
+    let part: String = name.chars().map(|char| if char.is_ascii_alphanumeric() { char } else { '_' }).collect();
+    match part.chars().next() {
+        Some(first) if !first.is_ascii_digit() => part,
+        _ => format!("map_{part}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn names(files: &[&str]) -> Result<Vec<String>, NameError> {
+        robot_names(&files.iter().map(PathBuf::from).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_robot_is_called_as_its_file() {
+        assert_eq!(names(&["maps/robot2.yaml", "robot1.yml", "/x/r3"]).unwrap(), ["robot2", "robot1", "r3"]);
+    }
+
+    #[test]
+    fn files_that_are_called_alike_are_told_apart_by_their_folders() {
+        assert_eq!(names(&["r1/map.yaml", "a/r2/map.yaml", "hall.yaml"]).unwrap(), ["r1", "r2", "hall"]);
+    }
+
+    #[test]
+    fn a_folder_has_its_name_from_wherever_it_is_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("r1/maps");
+        std::fs::create_dir_all(&inner).unwrap();
+        let files = [inner.join("../map.yaml"), folder.path().join("r2/map.yaml")];
+        assert_eq!(robot_names(&files).unwrap(), ["r1", "r2"]);
+    }
+
+    #[test]
+    fn names_fit_a_topic() {
+        assert_eq!(
+            names(&["ground floor.v2.yaml", "2.yaml", "küche.yaml"]).unwrap(),
+            ["ground_floor_v2", "map_2", "k_che"]
+        );
+    }
+
+    #[test]
+    fn names_that_stay_alike_are_an_error_that_says_what_would_mend_it() {
+        for files in [["a/r1/map.yaml", "b/r1/map.yaml"], ["a/map.yaml", "a/map.yml"]] {
+            let error = names(&files).unwrap_err().to_string();
+            assert!(files.iter().all(|file| error.contains(file)) && error.contains("rename"), "{error}");
+        }
+        // A folder is called as another file.
+        assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(NameError::Alike { .. })));
+    }
+
+    #[test]
+    fn a_file_given_twice_is_an_error_under_whatever_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.yaml");
+        std::fs::write(&file, "").unwrap();
+        let error = robot_names(&[file.clone(), folder.path().join("./a.yaml")]).unwrap_err();
+        assert!(matches!(error, NameError::GivenTwice(_)), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_name_is_a_part_of_a_topic(name in "\\PC*") {
+            let part = topic_part(Some(std::ffi::OsStr::new(&name)));
+            prop_assert!(part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_'));
+            prop_assert!(part.chars().all(|char| char.is_ascii_alphanumeric() || char == '_'));
+        }
+    }
+}
