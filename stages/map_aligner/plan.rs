@@ -103,14 +103,14 @@ impl MergePlan {
         let searched_cells = self.robots.get(robot).map_or(0, |known| known.searched_cells);
         self.robots.insert(robot.to_owned(), Robot { map, searched_cells });
         let has_grown_little = (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
-        if has_grown_little && self.group_of(robot).is_some_and(|group| self.groups[group].members.len() > 1) {
-            if let Some(kept) = self.kept(robot) {
-                if let Some(group) = self.group_of(robot) {
-                    let members = self.groups.remove(group).members;
-                    self.add(members);
-                }
-                return self.tell(kept);
-            }
+        let group = self.group_of(robot).filter(|group| self.groups[*group].members.len() > 1);
+        if let (true, Some(group)) = (has_grown_little, group)
+            && let Some(kept) = self.kept(robot)
+        {
+            // The map of the group holds the one before.
+            let members = self.groups.remove(group).members;
+            self.add(members);
+            return self.tell(kept);
         }
         self.leave(robot);
         if let Some(known) = self.robots.get_mut(robot) {
@@ -175,7 +175,7 @@ impl MergePlan {
         let best = found.hypotheses.first()?.transform_a_b;
         if count_a + count_b == 2 {
             statements.push(statement_of(pair, Ok(with_reasons(&found))));
-            return is_clear.then(|| self.unite(first, second, &best));
+            return if is_clear { self.unite(first, second, &best) } else { None };
         }
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
         if is_clear {
@@ -184,7 +184,7 @@ impl MergePlan {
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
             statements.extend(told);
-            return fits.then(|| self.unite(first, second, &best));
+            return if fits { self.unite(first, second, &best) } else { None };
         }
         // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
         statements.extend(self.searched(pairs.first()?));
@@ -310,20 +310,26 @@ impl MergePlan {
     }
 
     /// Lays two groups together. The number of the group of both.
-    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> u64 {
-        let later = self.groups.remove(first.max(second));
-        let sooner = self.groups.remove(first.min(second));
-        let (kept, moved) = if first < second { (sooner, later) } else { (later, sooner) };
-        let mut members = kept.members;
-        members.extend(moved.members.into_iter().map(|(robot, place)| (robot, transform_groups * place)));
-        self.add(members)
+    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> Option<u64> {
+        let (kept, moved) = (&self.groups[first], &self.groups[second]);
+        let maps = [(Pose2::identity(), self.map_of(kept)?), (*transform_groups, self.map_of(moved)?)];
+        let joint = PreparedMap::of_raster(Raster::union(&maps.map(|(place, map)| (place, map.level(0)))));
+        let mut members = kept.members.clone();
+        members.extend(moved.members.iter().map(|(robot, place)| (robot.clone(), transform_groups * place)));
+        let numbers = [kept.number, moved.number];
+        self.groups.retain(|group| !numbers.contains(&group.number));
+        Some(self.add_joint(members, Some(joint)))
     }
 
     /// Adds a group of robots with their places. Its number.
     fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
-        let maps: Vec<(Pose2, &Raster)> =
-            members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0)))).collect();
+        let maps = members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0))));
+        let maps: Vec<(Pose2, &Raster)> = maps.collect();
         let joint = (maps.len() > 1).then(|| PreparedMap::of_raster(Raster::union(&maps)));
+        self.add_joint(members, joint)
+    }
+
+    fn add_joint(&mut self, members: BTreeMap<String, Pose2>, joint: Option<PreparedMap>) -> u64 {
         let number = self.next;
         self.next += 1;
         self.groups.push(Group { number, members, joint });
