@@ -24,6 +24,9 @@ pub struct Statement {
     pub b: String,
     /// Guesses, the best first, each with what speaks for it; or why there are none.
     pub found: Result<Vec<(MapAlignment, String)>, String>,
+    /// Whether the guess stands out on the maps of more robots than these two, and on more wall than the two have in
+    /// common.
+    pub is_supported: bool,
 }
 
 /// Robots whose maps are searched, and those that are laid together.
@@ -171,7 +174,7 @@ impl MergePlan {
                 return None;
             }
         };
-        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up;
+        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && !self.has_alike(&found);
         let best = found.hypotheses.first()?.transform_a_b;
         if count_a + count_b == 2 {
             statements.push(statement_of(pair, Ok(with_reasons(&found))));
@@ -179,16 +182,46 @@ impl MergePlan {
         }
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
         if is_clear {
+            let is_supported = self.supports(&found);
             let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b)));
+            let told = told.map(|told| Statement { is_supported, ..told });
             let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
             statements.extend(told);
             return if fits { self.unite(first, second, &best) } else { None };
         }
+        if self.has_alike(&found) {
+            let reason = format!(
+                "on the maps of {} robots together the map fits at several places, and it cannot be told which is right: {}",
+                count_a + count_b - 1,
+                found.reason(0)
+            );
+            statements.extend(pairs.first().map(|pair| statement_of((pair.a.clone(), pair.b.clone()), Err(reason))));
+            return None;
+        }
         // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
         statements.extend(self.searched(pairs.first()?));
         None
+    }
+
+    /// Whether about as large a share of the walls agrees at another guess: then the place is not clear, however much
+    /// more wall there is at the best. What there is depends on what the robots happen to have seen.
+    fn has_alike(&self, found: &MapAlignments) -> bool {
+        let Some((best, others)) = found.hypotheses.split_first() else { return false };
+        let is_alike = |other: &MapAlignment| {
+            other.share >= self.parameters.tie_least_share
+                && other.wall_agreement + self.parameters.tie_margin >= best.wall_agreement
+        };
+        others.iter().any(is_alike)
+    }
+
+    /// Whether two groups that lie together clearly have so much in common that any of their pairs needs less.
+    fn supports(&self, found: &MapAlignments) -> bool {
+        let MapAlignerParameters { supporting_wall_length, supporting_wall_agreement, .. } = self.parameters;
+        found.hypotheses.first().is_some_and(|best| {
+            best.wall_in_common >= supporting_wall_length && best.wall_agreement >= supporting_wall_agreement
+        })
     }
 
     /// The guesses for a pair of robots by a search of their own.
@@ -376,7 +409,7 @@ struct PairInCommon {
 /// A statement on a pair, of which the first by name becomes robot a if there is no guess that says which it is.
 fn statement_of(pair: (String, String), found: Result<Vec<(MapAlignment, String)>, String>) -> Statement {
     let (a, b) = if pair.0 < pair.1 { pair } else { (pair.1, pair.0) };
-    Statement { a, b, found }
+    Statement { a, b, found, is_supported: false }
 }
 
 fn with_reasons(found: &MapAlignments) -> Vec<(MapAlignment, String)> {
