@@ -36,7 +36,17 @@ impl World {
 
     /// Merges a log of this folder. Gives how that ended, what is said of the pair, and the outcome.
     fn merge(&self, log: &Path, more: &[&str]) -> (Ended, Value, Value) {
-        let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--results-only", "--summary", "summary.json"];
+        let args = [
+            "run",
+            "tag_merge",
+            "--input",
+            log.to_str().unwrap(),
+            "--output",
+            "out.mcap",
+            "--results-only",
+            "--summary",
+            "summary.json",
+        ];
         let ended = gridweave(self.path(), &[&args, more].concat());
         let evaluated = gridweave(self.path(), &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
         let alignment = json(&self.path().join("summary.json"))["alignments"][0].clone();
@@ -135,6 +145,6 @@ fn robots_of_two_buildings_whose_tags_bear_the_same_ids_are_refused() {
         }
     }
     strangers.finish();
-    let args = ["merge", "strangers.mcap", "-o", "out.mcap", "--results-only"];
+    let args = ["run", "tag_merge", "--input", "strangers.mcap", "--output", "out.mcap", "--results-only"];
     gridweave(world.path(), &args).assert(3, &["not merged: robot2"]);
 }
