@@ -59,7 +59,8 @@ fn maps_of_two_buildings_are_not_merged() {
         let (ended, summary) = merge(folder.path(), &[&a, &b], &[]);
         ended.assert(3, &["not merged: robot2"]);
         let said = summary["unmerged"]["robot2"].as_str().unwrap();
-        assert!(said.contains("the maps alone") && said.contains("the maps do not confirm it"), "{said}");
+        let reasons = ["the maps do not confirm it", "the maps have too little in common"];
+        assert!(reasons.iter().any(|reason| said.contains(reason)), "{said}");
     }
 }
 

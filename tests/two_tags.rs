@@ -89,7 +89,7 @@ fn two_tags_merge_and_the_summary_says_what_the_merge_rests_on() {
     assert_eq!(evaluation["right"], 1, "{evaluation}");
     assert_eq!(alignment["method"], "few tags+directions+icp");
     let reason = alignment["reason"].as_str().unwrap();
-    for part in ["2 common tags only", "of the maps' directions", "the walls confirm them", "the best of other places"]
+    for part in ["2 common tags only", "of the maps' directions", "the maps confirm it", "the best of other places"]
     {
         assert!(reason.contains(part), "{reason}");
     }
@@ -126,7 +126,7 @@ fn tags_that_have_both_moved_alike_are_refused_by_the_walls() {
     let world = World::new();
     for shift in [Vector2::new(0.0, 1.0), Vector2::new(0.0, 2.0), Vector2::new(-0.7, 0.7), Vector2::new(-1.4, 1.4)] {
         let log = world.with_tags_at(|tag, places| places[tag] + shift);
-        assert_refused(&world.merge(&log, &[]), "the walls do not confirm them");
+        assert_refused(&world.merge(&log, &[]), "the maps do not confirm it");
     }
 }
 
