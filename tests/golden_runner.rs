@@ -214,7 +214,7 @@ fn a_stage_kind_without_a_case_fails() {
         ],
     );
     let json: serde_json::Value = serde_json::from_str(&cases.golden(&["--json"]).stdout).unwrap();
-    assert_eq!(json["kinds_without_a_case"].as_array().unwrap().len(), 10);
+    assert_eq!(json["kinds_without_a_case"].as_array().unwrap().len(), 12);
     assert_eq!((&json["failed"], &json["cases"][0]["status"]), (&true.into(), &"passed".into()));
 }
 

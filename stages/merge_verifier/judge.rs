@@ -2,7 +2,8 @@
 
 use super::refusal::{Hypotheses, Hypothesis};
 use super::{
-    Agreement, Elsewhere, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, probability,
+    Agreement, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, evidence_elsewhere,
+    probability,
 };
 use gridweave_runtime::ros::Alignment;
 
@@ -26,8 +27,8 @@ pub struct Verdict<'a> {
     pub refusal: Option<Refusal>,
     /// The best place elsewhere, if there is one.
     pub rival: Option<Rival>,
-    /// What speaks for all other places.
-    pub elsewhere: Elsewhere,
+    /// The most evidence for another place, as a share of that for this one.
+    pub evidence_elsewhere: f64,
     /// The probability that it is right, 0 to 1, see [`probability`].
     pub score: f64,
     /// Another source that has found the same place.
@@ -149,10 +150,9 @@ fn judge_one<'a>(
             }),
     };
     let rivals = all.iter().filter_map(rival_of).chain(rival);
-    let penalty = parameters.free_space_penalty;
-    let elsewhere = Elsewhere::of(agreement, rivals, penalty, |rival| rival.counts(parameters));
-    let score = probability(agreement, &elsewhere);
-    Verdict { candidate: *candidate, refusal, rival, elsewhere, score, found_too_by }
+    let evidence_elsewhere = evidence_elsewhere(agreement, rivals, parameters.free_space_penalty);
+    let score = probability(agreement, evidence_elsewhere);
+    Verdict { candidate: *candidate, refusal, rival, evidence_elsewhere, score, found_too_by }
 }
 
 /// A provisional hypothesis must be better by far than the best elsewhere.

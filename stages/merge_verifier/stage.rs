@@ -1,6 +1,6 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
-use super::{Agreement, Elsewhere, MapView, MergeVerifierParameters, Verdict, judge};
+use super::{Agreement, MapView, MergeVerifierParameters, Verdict, judge};
 use crate::geometry::{Grid, read_map};
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::icp_refiner::{IcpParameters, WallMap};
@@ -33,7 +33,8 @@ pub(super) struct MergeVerifier {
 #[derive(Clone, Copy, Debug)]
 struct Evidence {
     agreement: Agreement,
-    elsewhere: Elsewhere,
+    /// The most evidence for another place, as a share of that for this one.
+    evidence_elsewhere: f64,
     hypotheses: usize,
 }
 
@@ -174,7 +175,7 @@ impl Stage for MergeVerifier {
 
 impl Evidence {
     fn of(verdict: &Verdict<'_>, hypotheses: usize) -> Self {
-        Self { agreement: verdict.candidate.agreement, elsewhere: verdict.elsewhere, hypotheses }
+        Self { agreement: verdict.candidate.agreement, evidence_elsewhere: verdict.evidence_elsewhere, hypotheses }
     }
 
     fn report(&self, (a, b): &Pair) -> serde_json::Value {
@@ -186,8 +187,7 @@ impl Evidence {
             "overlap_m2": overlap,
             "wall_on_wall_m": wall_on_wall,
             "wall_on_free_m": wall_on_free,
-            "evidence_elsewhere": self.elsewhere.evidence,
-            "agreement_elsewhere": self.elsewhere.agreement,
+            "evidence_elsewhere": self.evidence_elsewhere,
         })
     }
 }

@@ -21,8 +21,6 @@ pub(super) struct Judged {
     pub(super) wall_on_free: f64,
     /// The most evidence elsewhere, as a share of that here.
     pub(super) evidence_elsewhere: f64,
-    /// The largest share of the walls that agree elsewhere.
-    pub(super) agreement_elsewhere: f64,
     /// Whether it lies within 0.5 m and 1 degree of the truth, accepted or not.
     pub(super) is_right: bool,
 }
@@ -43,7 +41,7 @@ pub(super) struct PairTrial {
 }
 
 impl PairTrial {
-    pub(super) const HEADS: [&'static str; 14] = [
+    pub(super) const HEADS: [&'static str; 13] = [
         "set",
         "world",
         "outcome",
@@ -55,7 +53,6 @@ impl PairTrial {
         "wall on wall m",
         "wall on free m",
         "evidence elsewhere",
-        "agreement elsewhere",
         "best is right",
         "reason",
     ];
@@ -75,7 +72,6 @@ impl PairTrial {
             judged(|judged| judged.wall_on_wall),
             judged(|judged| judged.wall_on_free),
             judged(|judged| judged.evidence_elsewhere),
-            judged(|judged| judged.agreement_elsewhere),
             self.judged.map_or_else(String::new, |judged| judged.is_right.to_string()),
             self.reason.clone(),
         ]
@@ -123,7 +119,6 @@ fn judged(pair: &PairWorld, report: &RunReport) -> Result<Option<Judged>> {
         wall_on_wall: number(&evidence["wall_on_wall_m"]),
         wall_on_free: number(&evidence["wall_on_free_m"]),
         evidence_elsewhere: number(&evidence["evidence_elsewhere"]),
-        agreement_elsewhere: number(&evidence["agreement_elsewhere"]),
         is_right: evaluation.related && evaluation.right == 1,
     }))
 }
