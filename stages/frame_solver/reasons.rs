@@ -108,11 +108,15 @@ impl<'a> Refusals<'a> {
     }
 }
 
-/// "a", "a and b", "a, b and c".
+/// "a", "a and b", "a, b and c"; of many the first, and how many others.
 pub(super) fn list(names: &[String]) -> String {
+    const MOST: usize = 6;
     match names {
         [] => String::new(),
         [one] => one.clone(),
+        [first @ .., _] if first.len() >= MOST => {
+            format!("{} and {} others", first[..MOST - 2].join(", "), names.len() - (MOST - 2))
+        }
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }

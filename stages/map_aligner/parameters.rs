@@ -34,13 +34,23 @@ pub struct MapAlignerParameters {
     /// 0 to 1. In maps of six buildings that were drawn from laser scans and of ten simulated ones, other places have 0.05
     /// to 0.41 in pairs that belong together, and 0.63 to 1.0 in pairs that do not.
     pub tie_runner_up: f64,
+    /// Nor are they laid together if at another place, which scores at least `tie_least_share` of the best, the share of the
+    /// walls that agree is less by this only, or not at all, 0 to 1.
+    pub tie_margin: f64,
+    /// What another place must score, as a share of the best, for `tie_margin` to count, 0 to 1.
+    pub tie_least_share: f64,
+    /// A guess that stands out on several maps together need not be confirmed by more than one that rests on tags if they
+    /// have at least so many metres of wall in common.
+    pub supporting_wall_length: f64,
+    /// The least share of these walls on which they agree, 0 to 1.
+    pub supporting_wall_agreement: f64,
     /// A robot that is laid on several maps that lie together is aligned with at most so many more of them, besides
     /// the one with which it has the most wall in common.
     pub predictions: usize,
     /// A map whose known area has grown by at most this share keeps its guesses, if they still fit, and is not searched
     /// again.
     pub little_growth: f64,
-    /// Whether the guess is marked as provisional: then `icp_refiner` must confirm it by more than it asks of a guess
+    /// Whether the guess is marked as provisional: then `merge_verifier` must confirm it by more than it asks of a guess
     /// that rests on tags.
     pub provisional: bool,
     /// A map whose known part is longer than this in x or in y is not aligned, metres: time and memory grow with the
@@ -60,6 +70,10 @@ impl Default for MapAlignerParameters {
             max_hypotheses: 4,
             least_share: 0.5,
             tie_runner_up: 0.5,
+            tie_margin: 0.1,
+            tie_least_share: 0.3,
+            supporting_wall_length: 50.0,
+            supporting_wall_agreement: 0.9,
             predictions: 2,
             little_growth: 0.2,
             provisional: true,
@@ -80,6 +94,10 @@ impl Parameters for MapAlignerParameters {
             ("min_wall_length", self.min_wall_length, 0.0, 1e6),
             ("least_share", self.least_share, 0.0, 1.0),
             ("tie_runner_up", self.tie_runner_up, 0.0, 1.0),
+            ("tie_margin", self.tie_margin, 0.0, 1.0),
+            ("tie_least_share", self.tie_least_share, 0.0, 1.0),
+            ("supporting_wall_length", self.supporting_wall_length, 0.0, 1e6),
+            ("supporting_wall_agreement", self.supporting_wall_agreement, 0.0, 1.0),
             ("little_growth", self.little_growth, 0.0, 1e3),
             ("max_extent", self.max_extent, 1.0, 1e4),
         ];

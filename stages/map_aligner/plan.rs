@@ -24,6 +24,9 @@ pub struct Statement {
     pub b: String,
     /// Guesses, the best first, each with what speaks for it; or why there are none.
     pub found: Result<Vec<(MapAlignment, String)>, String>,
+    /// Whether the guess stands out on the maps of more robots than these two, and on more wall than the two have in
+    /// common.
+    pub is_supported: bool,
 }
 
 /// Robots whose maps are searched, and those that are laid together.
@@ -103,14 +106,14 @@ impl MergePlan {
         let searched_cells = self.robots.get(robot).map_or(0, |known| known.searched_cells);
         self.robots.insert(robot.to_owned(), Robot { map, searched_cells });
         let has_grown_little = (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
-        if has_grown_little && self.group_of(robot).is_some_and(|group| self.groups[group].members.len() > 1) {
-            if let Some(kept) = self.kept(robot) {
-                if let Some(group) = self.group_of(robot) {
-                    let members = self.groups.remove(group).members;
-                    self.add(members);
-                }
-                return self.tell(kept);
-            }
+        let group = self.group_of(robot).filter(|group| self.groups[*group].members.len() > 1);
+        if let (true, Some(group)) = (has_grown_little, group)
+            && let Some(kept) = self.kept(robot)
+        {
+            // The map of the group holds the one before.
+            let members = self.groups.remove(group).members;
+            self.add(members);
+            return self.tell(kept);
         }
         self.leave(robot);
         if let Some(known) = self.robots.get_mut(robot) {
@@ -171,24 +174,54 @@ impl MergePlan {
                 return None;
             }
         };
-        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up;
+        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && !self.has_alike(&found);
         let best = found.hypotheses.first()?.transform_a_b;
         if count_a + count_b == 2 {
             statements.push(statement_of(pair, Ok(with_reasons(&found))));
-            return is_clear.then(|| self.unite(first, second, &best));
+            return if is_clear { self.unite(first, second, &best) } else { None };
         }
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
         if is_clear {
+            let is_supported = self.supports(&found);
             let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b)));
+            let told = told.map(|told| Statement { is_supported, ..told });
             let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
             statements.extend(told);
-            return fits.then(|| self.unite(first, second, &best));
+            return if fits { self.unite(first, second, &best) } else { None };
+        }
+        if self.has_alike(&found) {
+            let reason = format!(
+                "on the maps of {} robots together the map fits at several places, and it cannot be told which is right: {}",
+                count_a + count_b - 1,
+                found.reason(0)
+            );
+            statements.extend(pairs.first().map(|pair| statement_of((pair.a.clone(), pair.b.clone()), Err(reason))));
+            return None;
         }
         // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
         statements.extend(self.searched(pairs.first()?));
         None
+    }
+
+    /// Whether about as large a share of the walls agrees at another guess: then the place is not clear, however much
+    /// more wall there is at the best. What there is depends on what the robots happen to have seen.
+    fn has_alike(&self, found: &MapAlignments) -> bool {
+        let Some((best, others)) = found.hypotheses.split_first() else { return false };
+        let is_alike = |other: &MapAlignment| {
+            other.share >= self.parameters.tie_least_share
+                && other.wall_agreement + self.parameters.tie_margin >= best.wall_agreement
+        };
+        others.iter().any(is_alike)
+    }
+
+    /// Whether two groups that lie together clearly have so much in common that any of their pairs needs less.
+    fn supports(&self, found: &MapAlignments) -> bool {
+        let MapAlignerParameters { supporting_wall_length, supporting_wall_agreement, .. } = self.parameters;
+        found.hypotheses.first().is_some_and(|best| {
+            best.wall_in_common >= supporting_wall_length && best.wall_agreement >= supporting_wall_agreement
+        })
     }
 
     /// The guesses for a pair of robots by a search of their own.
@@ -310,20 +343,26 @@ impl MergePlan {
     }
 
     /// Lays two groups together. The number of the group of both.
-    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> u64 {
-        let later = self.groups.remove(first.max(second));
-        let sooner = self.groups.remove(first.min(second));
-        let (kept, moved) = if first < second { (sooner, later) } else { (later, sooner) };
-        let mut members = kept.members;
-        members.extend(moved.members.into_iter().map(|(robot, place)| (robot, transform_groups * place)));
-        self.add(members)
+    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> Option<u64> {
+        let (kept, moved) = (&self.groups[first], &self.groups[second]);
+        let maps = [(Pose2::identity(), self.map_of(kept)?), (*transform_groups, self.map_of(moved)?)];
+        let joint = PreparedMap::of_raster(Raster::union(&maps.map(|(place, map)| (place, map.level(0)))));
+        let mut members = kept.members.clone();
+        members.extend(moved.members.iter().map(|(robot, place)| (robot.clone(), transform_groups * place)));
+        let numbers = [kept.number, moved.number];
+        self.groups.retain(|group| !numbers.contains(&group.number));
+        Some(self.add_joint(members, Some(joint)))
     }
 
     /// Adds a group of robots with their places. Its number.
     fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
-        let maps: Vec<(Pose2, &Raster)> =
-            members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0)))).collect();
+        let maps = members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0))));
+        let maps: Vec<(Pose2, &Raster)> = maps.collect();
         let joint = (maps.len() > 1).then(|| PreparedMap::of_raster(Raster::union(&maps)));
+        self.add_joint(members, joint)
+    }
+
+    fn add_joint(&mut self, members: BTreeMap<String, Pose2>, joint: Option<PreparedMap>) -> u64 {
         let number = self.next;
         self.next += 1;
         self.groups.push(Group { number, members, joint });
@@ -370,7 +409,7 @@ struct PairInCommon {
 /// A statement on a pair, of which the first by name becomes robot a if there is no guess that says which it is.
 fn statement_of(pair: (String, String), found: Result<Vec<(MapAlignment, String)>, String>) -> Statement {
     let (a, b) = if pair.0 < pair.1 { pair } else { (pair.1, pair.0) };
-    Statement { a, b, found }
+    Statement { a, b, found, is_supported: false }
 }
 
 fn with_reasons(found: &MapAlignments) -> Vec<(MapAlignment, String)> {

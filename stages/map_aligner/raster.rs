@@ -112,7 +112,8 @@ impl Raster {
         for (transform, map) in maps {
             map.for_each_end(|point| bounds.add(&(transform * point)));
         }
-        let mut union = Self::unknown(&bounds, cell, cell);
+        // So the cells of a map that is not turned come to lie on cells.
+        let mut union = Self::unknown(&bounds, cell, 0.0);
         for (transform, map) in maps {
             for (index, content) in map.cells.iter().enumerate() {
                 let centre = map.centre(index % map.width, index / map.width);
@@ -252,6 +253,28 @@ mod tests {
 
     fn area(raster: &Raster, counts: impl Fn(Content) -> bool) -> f64 {
         raster.cells.iter().filter(|content| counts(**content)).count() as f64 * raster.cell * raster.cell
+    }
+
+    #[test]
+    fn a_union_knows_what_its_maps_know() {
+        let (geometry, cells) = map(0.0);
+        let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.1, 100.0).unwrap();
+        let alone = Raster::union(&[(Pose2::identity(), &raster)]);
+        for (index, content) in raster.cells.iter().enumerate() {
+            let centre = raster.centre(index % raster.width, index / raster.width);
+            assert_eq!(alone.at(&centre), *content, "{centre}");
+        }
+        let moved = pose(20.0, 5.0, 0.7);
+        let union = Raster::union(&[(Pose2::identity(), &raster), (moved, &raster)]);
+        for step in -28..28 {
+            let along = 0.1 * f64::from(step);
+            for place in [Pose2::identity(), moved] {
+                assert_eq!(union.at(&(place * Point2::new(along, 1.0))), Content::Free);
+                assert!(union.at(&(place * Point2::new(along, 0.03))).is_near_wall());
+            }
+        }
+        assert!((union.known_cells() as f64 / raster.known_cells() as f64 - 2.0).abs() < 0.1);
+        assert_eq!(Raster::union(&[]).known_cells(), 0);
     }
 
     #[test]

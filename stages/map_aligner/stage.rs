@@ -45,7 +45,7 @@ impl MapAligner {
                 covariance: row_by_row(&found.covariance),
                 score: found.share,
                 accepted: true,
-                provisional: self.provisional,
+                provisional: self.provisional && !statement.is_supported,
                 rank,
                 hypotheses: guesses.len() as u32,
                 reason: reason.clone(),

@@ -2,7 +2,7 @@
 
 use super::refusal::{Hypotheses, Hypothesis};
 use super::{
-    Agreement, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, elsewhere, probability,
+    Agreement, Elsewhere, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, probability,
 };
 use gridweave_runtime::ros::Alignment;
 
@@ -26,6 +26,8 @@ pub struct Verdict<'a> {
     pub refusal: Option<Refusal>,
     /// The best place elsewhere, if there is one.
     pub rival: Option<Rival>,
+    /// What speaks for all other places.
+    pub elsewhere: Elsewhere,
     /// The probability that it is right, 0 to 1, see [`probability`].
     pub score: f64,
     /// Another source that has found the same place.
@@ -141,10 +143,11 @@ fn judge_one<'a>(
                 by_rival(agreement, &alike, parameters)
             }),
     };
-    let rival_agreement = rival.map(|rival| rival.agreement);
-    let elsewhere = elsewhere(agreement, rival_agreement.as_ref(), parameters.free_space_penalty);
-    let score = probability(agreement, elsewhere);
-    Verdict { candidate: *candidate, refusal, rival, score, found_too_by }
+    let rivals = all.iter().filter_map(rival_of).chain(rival);
+    let penalty = parameters.free_space_penalty;
+    let elsewhere = Elsewhere::of(agreement, rivals, penalty, |rival| rival.counts(parameters));
+    let score = probability(agreement, &elsewhere);
+    Verdict { candidate: *candidate, refusal, rival, elsewhere, score, found_too_by }
 }
 
 /// A provisional hypothesis must be better by far than the best elsewhere.

@@ -26,7 +26,7 @@ pub use judge::{Candidate, Verdict, judge};
 pub use parameters::{Bounds, MergeVerifierParameters};
 pub use refusal::{Hypotheses, Hypothesis, Refusal};
 pub use rivals::{Rival, best_rival_nearby};
-pub use score::{elsewhere, probability};
+pub use score::{Elsewhere, probability};
 
 use gridweave_runtime::ros::{Alignment, OccupancyGrid};
 use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};

@@ -1,6 +1,6 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
-use super::{Agreement, MapView, MergeVerifierParameters, Verdict, elsewhere, judge};
+use super::{Agreement, Elsewhere, MapView, MergeVerifierParameters, Verdict, judge};
 use crate::geometry::{Grid, read_map};
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::icp_refiner::{IcpParameters, WallMap};
@@ -33,8 +33,7 @@ pub(super) struct MergeVerifier {
 #[derive(Clone, Copy, Debug)]
 struct Evidence {
     agreement: Agreement,
-    /// The evidence for the best place elsewhere, as a share of that here.
-    elsewhere: f64,
+    elsewhere: Elsewhere,
     hypotheses: usize,
 }
 
@@ -112,7 +111,7 @@ impl MergeVerifier {
             }
             None => None,
         };
-        let evidence = verdict.as_ref().map(|verdict| Evidence::of(verdict, proposed.len(), &self.parameters));
+        let evidence = verdict.as_ref().map(|verdict| Evidence::of(verdict, proposed.len()));
         let alignment = match &verdict {
             Some(verdict) => judged(verdict, &proposed),
             None => refused(&proposed),
@@ -174,11 +173,8 @@ impl Stage for MergeVerifier {
 }
 
 impl Evidence {
-    fn of(verdict: &Verdict<'_>, hypotheses: usize, parameters: &MergeVerifierParameters) -> Self {
-        let agreement = verdict.candidate.agreement;
-        let rival = verdict.rival.map(|rival| rival.agreement);
-        let elsewhere = elsewhere(&agreement, rival.as_ref(), parameters.free_space_penalty);
-        Self { agreement, elsewhere, hypotheses }
+    fn of(verdict: &Verdict<'_>, hypotheses: usize) -> Self {
+        Self { agreement: verdict.candidate.agreement, elsewhere: verdict.elsewhere, hypotheses }
     }
 
     fn report(&self, (a, b): &Pair) -> serde_json::Value {
@@ -190,7 +186,8 @@ impl Evidence {
             "overlap_m2": overlap,
             "wall_on_wall_m": wall_on_wall,
             "wall_on_free_m": wall_on_free,
-            "elsewhere": self.elsewhere,
+            "evidence_elsewhere": self.elsewhere.evidence,
+            "agreement_elsewhere": self.elsewhere.agreement,
         })
     }
 }

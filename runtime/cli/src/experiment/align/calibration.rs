@@ -5,7 +5,7 @@ use crate::experiment::results::Results;
 use crate::experiment::statistics::{mean, wilson_interval};
 use crate::table::Table;
 use anyhow::Result;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix5, Vector5};
 
 /// Borders of the bins of scores.
 const BORDERS: [f64; 8] = [0.0, 0.1, 0.5, 0.9, 0.99, 0.999, 0.9999, 1.0];
@@ -36,20 +36,20 @@ impl Calibration {
         }
         results.table("align_score", "What the verifier's score means", &table)?;
         if fit {
-            let weights = self.fit();
+            let [intercept, length, agreement, evidence, elsewhere]: [f64; 5] = self.fit().into();
             println!(
-                "weights: intercept {:.3}, length {:.3}, agreement {:.3}, elsewhere {:.3}\n",
-                weights.x, weights.y, weights.z, weights.w
+                "weights: intercept {intercept:.3}, length {length:.3}, agreement {agreement:.3}, evidence elsewhere \
+                 {evidence:.3}, agreement elsewhere {elsewhere:.3}\n"
             );
         }
         Ok(())
     }
 
     /// Logistic regression by Newton's method.
-    fn fit(&self) -> Vector4<f64> {
-        let mut weights = Vector4::zeros();
+    fn fit(&self) -> Vector5<f64> {
+        let mut weights = Vector5::zeros();
         for _ in 0..50 {
-            let (mut gradient, mut hessian) = (weights * -RIDGE, Matrix4::identity() * RIDGE);
+            let (mut gradient, mut hessian) = (weights * -RIDGE, Matrix5::identity() * RIDGE);
             for judged in &self.0 {
                 let features = features(judged);
                 let probability = 1.0 / (1.0 + (-weights.dot(&features)).exp());
@@ -67,8 +67,9 @@ impl Calibration {
 }
 
 /// 1, and what the score is made from, as `merge_verifier` takes it.
-fn features(judged: &Judged) -> Vector4<f64> {
+fn features(judged: &Judged) -> Vector5<f64> {
     let seen = judged.wall_on_wall + judged.wall_on_free;
     let agreement = if seen > 0.0 { judged.wall_on_wall / seen } else { 0.0 };
-    Vector4::new(1.0, judged.wall_on_wall.max(1.0).ln(), agreement - 0.8, judged.elsewhere)
+    let length = judged.wall_on_wall.max(1.0).ln();
+    Vector5::new(1.0, length, agreement - 0.8, judged.evidence_elsewhere, judged.agreement_elsewhere)
 }

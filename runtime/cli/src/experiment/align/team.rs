@@ -55,7 +55,7 @@ pub(super) fn run(
             format!("height={height:.0}"),
             "tags=0".to_owned(),
             "snapshots=1".to_owned(),
-            "overlap=0.5".to_owned(),
+            "overlap=0.8".to_owned(),
         ];
         let world = World::simulate(&settings, seeds.seed(TEAM, u64::from(robots)), registry)?;
         let merge = world.merge(pipeline, &[], registry)?;

@@ -19,8 +19,10 @@ pub(super) struct Judged {
     pub(super) wall_on_wall: f64,
     /// Metres of wall on free space.
     pub(super) wall_on_free: f64,
-    /// The evidence elsewhere, as a share of that here.
-    pub(super) elsewhere: f64,
+    /// The most evidence elsewhere, as a share of that here.
+    pub(super) evidence_elsewhere: f64,
+    /// The largest share of the walls that agree elsewhere.
+    pub(super) agreement_elsewhere: f64,
     /// Whether it lies within 0.5 m and 1 degree of the truth, accepted or not.
     pub(super) is_right: bool,
 }
@@ -41,7 +43,7 @@ pub(super) struct PairTrial {
 }
 
 impl PairTrial {
-    pub(super) const HEADS: [&'static str; 13] = [
+    pub(super) const HEADS: [&'static str; 14] = [
         "set",
         "world",
         "outcome",
@@ -52,7 +54,8 @@ impl PairTrial {
         "score",
         "wall on wall m",
         "wall on free m",
-        "elsewhere",
+        "evidence elsewhere",
+        "agreement elsewhere",
         "best is right",
         "reason",
     ];
@@ -71,7 +74,8 @@ impl PairTrial {
             judged(|judged| judged.score),
             judged(|judged| judged.wall_on_wall),
             judged(|judged| judged.wall_on_free),
-            judged(|judged| judged.elsewhere),
+            judged(|judged| judged.evidence_elsewhere),
+            judged(|judged| judged.agreement_elsewhere),
             self.judged.map_or_else(String::new, |judged| judged.is_right.to_string()),
             self.reason.clone(),
         ]
@@ -118,7 +122,8 @@ fn judged(pair: &PairWorld, report: &RunReport) -> Result<Option<Judged>> {
         score: number(&alignment["score"]),
         wall_on_wall: number(&evidence["wall_on_wall_m"]),
         wall_on_free: number(&evidence["wall_on_free_m"]),
-        elsewhere: number(&evidence["elsewhere"]),
+        evidence_elsewhere: number(&evidence["evidence_elsewhere"]),
+        agreement_elsewhere: number(&evidence["agreement_elsewhere"]),
         is_right: evaluation.related && evaluation.right == 1,
     }))
 }
