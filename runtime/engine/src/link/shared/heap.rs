@@ -7,16 +7,18 @@
 
 use super::LinkError;
 use crate::message::Storage;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The payloads of a run that readers have yet to take, by link and sequence number.
+/// The payloads of a run that readers have yet to take, by the name of the link.
 #[derive(Clone, Debug, Default)]
-pub(super) struct HeapPayloads(Arc<Mutex<BTreeMap<(Arc<str>, u64), HeapPayload>>>);
+pub(super) struct HeapPayloads(Arc<Mutex<BTreeMap<String, Arc<Mutex<VecDeque<HeapPayload>>>>>>);
 
 #[derive(Debug)]
 struct HeapPayload {
+    /// The number of its first message.
+    sequence: u64,
     bytes: Arc<Vec<u8>>,
     /// How many readers have yet to take it.
     readers: usize,
@@ -25,19 +27,20 @@ struct HeapPayload {
 impl HeapPayloads {
     /// One end of the link with the given name.
     pub(super) fn link(&self, name: &str) -> HeapLink {
-        HeapLink { payloads: self.clone(), name: name.into() }
+        let payloads = Arc::clone(lock(&self.0).entry(name.to_owned()).or_default());
+        HeapLink { payloads, name: name.to_owned() }
     }
+}
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<(Arc<str>, u64), HeapPayload>> {
-        // No change of the map can be left half done.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // Nothing that is done under a lock here can be left half done.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// One end of a link whose large payloads travel on the heap.
 pub(super) struct HeapLink {
-    payloads: HeapPayloads,
-    name: Arc<str>,
+    payloads: Arc<Mutex<VecDeque<HeapPayload>>>,
+    name: String,
 }
 
 impl HeapLink {
@@ -45,29 +48,28 @@ impl HeapLink {
     pub(super) fn buffer(&self, length: usize) -> Result<Vec<u8>, LinkError> {
         let mut buffer = Vec::new();
         let reserved = buffer.try_reserve_exact(length);
-        reserved.map_err(|_| LinkError::Memory { link: self.name.to_string(), bytes: length })?;
+        reserved.map_err(|_| LinkError::Memory { link: self.name.clone(), bytes: length })?;
         Ok(buffer)
     }
 
     /// Leaves a payload whose first message has the number `sequence` for `readers` readers. Its sample must be sent
     /// after this.
     pub(super) fn leave(&self, sequence: u64, bytes: Vec<u8>, readers: usize) {
-        let payload = HeapPayload { bytes: Arc::new(bytes), readers };
-        self.payloads.lock().insert((Arc::clone(&self.name), sequence), payload);
+        lock(&self.payloads).push_back(HeapPayload { sequence, bytes: Arc::new(bytes), readers });
     }
 
     /// Takes the payload whose first message has the number `sequence`, once for each reader.
     pub(super) fn take(&self, sequence: u64) -> Result<Rc<dyn Storage>, LinkError> {
-        let key = (Arc::clone(&self.name), sequence);
-        let mut payloads = self.payloads.lock();
-        let Some(payload) = payloads.get_mut(&key) else {
+        let mut payloads = lock(&self.payloads);
+        let found = payloads.iter_mut().enumerate().find(|(_, payload)| payload.sequence == sequence);
+        let Some((place, payload)) = found else {
             let problem = format!("the bytes of its message {sequence} are not there");
-            return Err(LinkError::Sample { link: self.name.to_string(), problem });
+            return Err(LinkError::Sample { link: self.name.clone(), problem });
         };
         let bytes = Arc::clone(&payload.bytes);
         payload.readers = payload.readers.saturating_sub(1);
         if payload.readers == 0 {
-            payloads.remove(&key);
+            payloads.remove(place);
         }
         Ok(Rc::new(bytes))
     }
@@ -90,7 +92,7 @@ mod tests {
         let [one, two] = [link.take(7).unwrap(), link.take(7).unwrap()];
         assert_eq!((one.bytes().as_ptr(), two.bytes().as_ptr()), (place, place));
         assert_eq!(one.bytes(), [3; 5000]);
-        assert!(payloads.lock().is_empty());
+        assert!(lock(&link.payloads).is_empty());
         assert!(link.take(7).is_err());
     }
 
