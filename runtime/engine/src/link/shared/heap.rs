@@ -13,7 +13,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The payloads of a run that readers have yet to take, by the name of the link.
 #[derive(Clone, Debug, Default)]
-pub(super) struct HeapPayloads(Arc<Mutex<BTreeMap<String, Arc<Mutex<VecDeque<HeapPayload>>>>>>);
+pub(super) struct HeapPayloads(Arc<Mutex<BTreeMap<String, Queue>>>);
+
+/// The payloads of one link, in the order in which they were left.
+type Queue = Arc<Mutex<VecDeque<HeapPayload>>>;
 
 #[derive(Debug)]
 struct HeapPayload {
@@ -39,7 +42,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// One end of a link whose large payloads travel on the heap.
 pub(super) struct HeapLink {
-    payloads: Arc<Mutex<VecDeque<HeapPayload>>>,
+    payloads: Queue,
     name: String,
 }
 
