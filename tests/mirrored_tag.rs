@@ -18,7 +18,8 @@ fn json(path: &Path) -> Value {
 
 /// Merges `log` in `folder`. Gives what the tag filter said last, and the measured outcome.
 fn merge(folder: &Path, log: &str) -> (CommonTags, Value) {
-    let args = ["merge", log, "-o", "out.mcap", "--results-only", "--summary", "summary.json"];
+    let args =
+        ["run", "tag_merge", "--input", log, "--output", "out.mcap", "--results-only", "--summary", "summary.json"];
     gridweave(folder, &args).assert(0, &["merged 2 of 2"]);
     let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
     let output = fs::read(folder.join("out.mcap")).unwrap();

@@ -36,7 +36,17 @@ impl World {
 
     /// Merges a log of this folder. Gives how that ended, what is said of the pair, and the outcome.
     fn merge(&self, log: &Path, more: &[&str]) -> (Ended, Value, Value) {
-        let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--results-only", "--summary", "summary.json"];
+        let args = [
+            "run",
+            "tag_merge",
+            "--input",
+            log.to_str().unwrap(),
+            "--output",
+            "out.mcap",
+            "--results-only",
+            "--summary",
+            "summary.json",
+        ];
         let ended = gridweave(self.path(), &[&args, more].concat());
         let evaluated = gridweave(self.path(), &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
         let alignment = json(&self.path().join("summary.json"))["alignments"][0].clone();
@@ -79,7 +89,7 @@ fn two_tags_merge_and_the_summary_says_what_the_merge_rests_on() {
     assert_eq!(evaluation["right"], 1, "{evaluation}");
     assert_eq!(alignment["method"], "few tags+directions+icp");
     let reason = alignment["reason"].as_str().unwrap();
-    for part in ["2 common tags only", "of the maps' directions", "the walls confirm them", "the best of other places"]
+    for part in ["2 common tags only", "of the maps' directions", "the maps confirm it", "the best of other places"]
     {
         assert!(reason.contains(part), "{reason}");
     }
@@ -116,7 +126,7 @@ fn tags_that_have_both_moved_alike_are_refused_by_the_walls() {
     let world = World::new();
     for shift in [Vector2::new(0.0, 1.0), Vector2::new(0.0, 2.0), Vector2::new(-0.7, 0.7), Vector2::new(-1.4, 1.4)] {
         let log = world.with_tags_at(|tag, places| places[tag] + shift);
-        assert_refused(&world.merge(&log, &[]), "the walls do not confirm them");
+        assert_refused(&world.merge(&log, &[]), "the maps do not confirm it");
     }
 }
 
@@ -135,6 +145,6 @@ fn robots_of_two_buildings_whose_tags_bear_the_same_ids_are_refused() {
         }
     }
     strangers.finish();
-    let args = ["merge", "strangers.mcap", "-o", "out.mcap", "--results-only"];
+    let args = ["run", "tag_merge", "--input", "strangers.mcap", "--output", "out.mcap", "--results-only"];
     gridweave(world.path(), &args).assert(3, &["not merged: robot2"]);
 }

@@ -70,7 +70,7 @@ impl Default for MapAlignerParameters {
             max_hypotheses: 4,
             least_share: 0.5,
             tie_runner_up: 0.5,
-            tie_margin: 0.1,
+            tie_margin: 0.05,
             tie_least_share: 0.3,
             supporting_wall_length: 50.0,
             supporting_wall_agreement: 0.9,

@@ -60,8 +60,9 @@ impl Verdict<'_> {
 
 /// Judges the hypotheses of all sources for one pair. `None` if none of them has a place.
 ///
-/// The one with the most evidence that meets all that is asked of it is accepted. A provisional one must be the best by
-/// far of all places that anybody has proposed; one that rests on enough tags only must not be much worse than another.
+/// The first that meets all that is asked of it is accepted: those that rest on enough tags, and then the others, by their
+/// evidence. A provisional one must be the best by far of all places that anybody has proposed; one that rests on enough
+/// tags only must not be much worse than another.
 pub fn judge<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
@@ -76,8 +77,12 @@ pub fn judge<'a>(
             Candidate { alignment, agreement, evidence: agreement.evidence(parameters.free_space_penalty) }
         })
         .collect();
-    // The sort is stable, so that equals stay in the order of their sources and ranks.
-    candidates.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
+    // The sort is stable, so that equals stay in the order of their sources and ranks. What rests on enough tags is believed
+    // first, where the maps do not speak against it.
+    let is_provisional = |candidate: &Candidate<'_>| candidate.alignment.provisional;
+    candidates.sort_by(|one, other| {
+        is_provisional(one).cmp(&is_provisional(other)).then(other.evidence.total_cmp(&one.evidence))
+    });
     let mut first = None;
     for candidate in &candidates {
         let verdict = judge_one(a, b, candidate, &candidates, parameters);
@@ -111,8 +116,8 @@ fn judge_one<'a>(
         .filter(|other| other.alignment.accepted && other.alignment.source() != alignment.source())
         .find(|other| rival_of(other).is_none())
         .map(|other| other.alignment.source());
-    // The first elsewhere has the most evidence.
-    let another = all.iter().find_map(|other| Some((other, rival_of(other)?)));
+    let elsewhere = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
+    let another = elsewhere.max_by(|(one, _), (other, _)| one.evidence.total_cmp(&other.evidence));
     let is_strict = alignment.provisional && found_too_by.is_none();
     let mut rival = another.map(|(_, rival)| rival);
 

@@ -91,6 +91,8 @@ fn result_messages_agree_with_their_definitions() {
         method: "icp".into(),
         accepted: true,
         provisional: true,
+        rank: 1,
+        hypotheses: 3,
         reason: "it fits".into(),
     });
     let frame = |robot: &str| RobotFrame {

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 /// Merges the maps of logs or of map files.
 pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Outcome> {
     let pipeline = match Inputs::of(&args.inputs)? {
-        Inputs::Logs => "tag_merge",
+        Inputs::Logs => "auto_merge",
         Inputs::MapFiles => "map_file_merge",
     };
     let merge_to = |log: &Path, options: &RunOptions| {

@@ -51,7 +51,7 @@ impl PairOutcome {
     pub(super) fn refused_by(&self) -> &'static str {
         let says = |part: &str| self.reason.contains(part);
         match () {
-            () if says("the walls do not confirm") => "walls",
+            () if says("the maps do not confirm") => "walls",
             () if says("must confirm") && says("directions of both maps") => "directions",
             () if says("tag in common") || says("tags in common") || says("have no tag") => "tags",
             () => "walls",
