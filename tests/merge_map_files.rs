@@ -5,7 +5,7 @@
 mod support;
 
 use gridweave_logs::map_file::{self, GridMap};
-use gridweave_runtime::ros::{OccupancyGrid, Pose, RosMessage, decode};
+use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, Pose, RosMessage, decode};
 use nalgebra::{Isometry2, Vector2};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -138,6 +138,28 @@ fn maps_of_other_resolutions_and_turned_origins_are_merged() {
     // A cell of the coarser map is 0.1 m.
     assert!(error.translation.vector.norm() < 0.1 && error.rotation.angle().abs() < 0.01, "{error}");
     assert!((map_file::load(&folder.path().join("merged.yaml")).unwrap().info.resolution - 0.05).abs() < 1e-6);
+}
+
+#[test]
+fn maps_of_16_million_cells_are_merged_alike_on_every_engine() {
+    const SIDE: usize = 4000;
+    let (folder, _) = map_files("1001");
+    for robot in ["robot1.yaml", "robot2.yaml"] {
+        let path = folder.path().join(robot);
+        let map = map_file::load(&path).unwrap();
+        let mut cells = vec![-1; SIDE * SIDE];
+        for (row, known) in cells.chunks_exact_mut(SIDE).zip(map.cells.chunks_exact(map.info.width as usize)) {
+            row[..known.len()].copy_from_slice(known);
+        }
+        let info = MapMetaData { width: SIDE as u32, height: SIDE as u32, ..map.info };
+        map_file::save(&path, &GridMap { info, cells }).unwrap();
+    }
+    let merged = ["single", "threads", "processes"].map(|engine| {
+        let args = ["robot1.yaml", "robot2.yaml", "-o", "merged.yaml", "--engine", engine];
+        merge(folder.path(), &args).assert(0, &["merged 2 of 2 robots"]);
+        fs::read(folder.path().join("merged.pgm")).unwrap()
+    });
+    assert!(merged[0] == merged[1] && merged[0] == merged[2]);
 }
 
 #[test]

@@ -112,6 +112,21 @@ fn large_and_small_messages_keep_their_order() {
 }
 
 #[test]
+fn a_map_of_17_million_cells_takes_memory_for_what_is_in_flight_only() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 1\nlarge_every = 1\nlarge_size = 17_000_000", &[]);
+    for sink in ["a", "b", "c", "d", "e", "f"] {
+        builder.stage(sink, "recorder", "", &["source.a"]);
+    }
+    // A place for each sample that these readers could hold would take more than 100 GB at 8 bytes a cell.
+    let pipeline = builder.build(64);
+    let expected = seen(&pipeline, EngineKind::Single);
+    for engine in [EngineKind::Threads, EngineKind::ThreadsIpc] {
+        assert_eq!(seen(&pipeline, engine), expected, "{engine}");
+    }
+}
+
+#[test]
 fn a_stage_may_keep_more_messages_than_its_links_are_deep() {
     let mut builder = PipelineBuilder::new(registry());
     builder.stage("source", "counter", "count = 400\nlarge_every = 1\nlarge_size = 9000", &[]);

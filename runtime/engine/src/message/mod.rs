@@ -13,6 +13,7 @@ pub use time::LogTime;
 use std::fmt;
 use std::ops::Range;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Memory that holds the bytes of one or more messages: a sample in shared memory, or a buffer on the heap.
 pub trait Storage {
@@ -21,6 +22,13 @@ pub trait Storage {
 }
 
 impl Storage for Vec<u8> {
+    fn bytes(&self) -> &[u8] {
+        self
+    }
+}
+
+/// A buffer that readers in several threads share.
+impl Storage for Arc<Vec<u8>> {
     fn bytes(&self) -> &[u8] {
         self
     }

@@ -6,7 +6,6 @@ use crate::message::{Message, MessageFlags};
 use crate::pipeline::Overflow;
 use iceoryx2::node::Node;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
-use iceoryx2::prelude::Alignment;
 use iceoryx2::service::Service;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as E;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
@@ -59,10 +58,10 @@ impl LinkShape<'_> {
     ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {}", self.name()))(cause);
         let subscribers = self.readers + MAX_OBSERVERS + 1;
+        // Aligned as the user header is, like all links.
         node.service_builder(&names.link(self.stage, self.port)?)
             .publish_subscribe::<[u8]>()
             .user_header::<SampleHeader>()
-            .payload_alignment(Alignment::new(8).ok_or_else(|| failed(&"alignment"))?)
             .enable_safe_overflow(self.overflow == Overflow::DropOldest)
             .history_size(0)
             .subscriber_max_buffer_size((self.depth + REPEAT_ROOM).max(KEEPER_BUFFER))

@@ -33,6 +33,17 @@ pub enum LinkError {
         /// Readers there are.
         readers: usize,
     },
+    /// There is no memory for what is to be sent.
+    #[error(
+        "cannot send {bytes} bytes on {link}: there is no memory for it; a smaller `depth` or `--engine single` \
+         lets fewer messages wait at a time"
+    )]
+    Memory {
+        /// The link.
+        link: String,
+        /// Its size.
+        bytes: usize,
+    },
     /// As many programs as can send on a link, or look on at it, do so already.
     #[error("cannot {doing} {link}: {most} programs do so already, and no more can; end one of them")]
     Crowded {

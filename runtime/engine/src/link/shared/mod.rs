@@ -3,7 +3,7 @@
 //! # The protocol, version 2
 //!
 //! All names stand below the run's prefix. A link is a publish-subscribe service `PREFIX/link/STAGE/PORT` with one
-//! publisher and the output's readers as subscribers. Its payload is `[u8]`, aligned to 8, its user header a
+//! publisher and the output's readers as subscribers. Its payload is `[u8]`, aligned to 8 as its user header is, a
 //! [`SampleHeader`].
 //!
 //! Each stage has one event service, `PREFIX/wake/STAGE`, with one listener. iceoryx2 counts events, so that an event
@@ -17,19 +17,22 @@
 //!    blocks inside iceoryx2.
 //! 4. A reader gives credit back when the stage has taken all messages of a sample; the memory goes back when the last
 //!    of them is dropped. A reader that holds many samples copies those that come on top of them.
-//! 5. A sample is one message, or a batch of small ones. Before it sleeps, a stage sends what it has gathered, and a
+//! 5. A sample is one message, or a batch of small ones. Within one process, where other programs cannot look on, a
+//!    large payload travels on the heap, and its sample has none. Before it sleeps, a stage sends what it has gathered, and a
 //!    watermark on every link that has credit.
 //! 6. The sender's last message says that the stream has ended. A reader acknowledges it when its stage is done and has
 //!    dropped all it held; the sender keeps its publisher until then.
 
 mod activity;
 mod error;
+mod heap;
 mod held;
 mod names;
 mod outputs;
 mod receiver;
 mod sample;
 mod sender;
+mod service;
 mod wake;
 
 pub use activity::Activity;

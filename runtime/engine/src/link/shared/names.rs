@@ -1,6 +1,7 @@
 //! The names of a run's services.
 
 use super::LinkError;
+use super::heap::{HeapLink, HeapPayloads};
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, ServiceName, SignalHandlingMode};
 use iceoryx2::service::Service;
@@ -10,7 +11,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Clone, Debug)]
 pub struct RunNames {
     prefix: String,
-    root: Option<String>,
+    reach: Reach,
+}
+
+/// Who can see the services of a run.
+#[derive(Clone, Debug)]
+enum Reach {
+    /// The threads of this process, which hand large payloads over on the heap.
+    Process(HeapPayloads),
+    /// All processes of this machine that know the folder of its files.
+    Machine { root: String },
 }
 
 impl RunNames {
@@ -18,18 +28,26 @@ impl RunNames {
     pub fn unique() -> Self {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-        Self { prefix: format!("gw{}_{number}_", std::process::id()), root: None }
+        Self { prefix: format!("gw{}_{number}_", std::process::id()), reach: Reach::Process(HeapPayloads::default()) }
     }
 
     /// Names with the given prefix (letters, digits and `_`), whose files lie in the folder `root`: for a run of several
     /// processes, which must all be told the same.
     pub fn shared(prefix: impl Into<String>, root: impl Into<String>) -> Self {
-        Self { prefix: prefix.into(), root: Some(root.into()) }
+        Self { prefix: prefix.into(), reach: Reach::Machine { root: root.into() } }
     }
 
     /// Whether other processes can see the services.
     pub(crate) fn is_shared(&self) -> bool {
-        self.root.is_some()
+        matches!(self.reach, Reach::Machine { .. })
+    }
+
+    /// Where the large payloads of the link `name` travel; none if that is in its samples.
+    pub(super) fn heap_link(&self, name: &str) -> Option<HeapLink> {
+        match &self.reach {
+            Reach::Process(payloads) => Some(payloads.link(name)),
+            Reach::Machine { .. } => None,
+        }
     }
 
     /// The iceoryx2 node of one thread or process of the run.
@@ -40,7 +58,7 @@ impl RunNames {
         // The prefix is this run's own: there are no nodes of others to look for.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
-        if let Some(root) = &self.root {
+        if let Reach::Machine { root } = &self.reach {
             let root = Path::new(root.as_bytes()).map_err(|e| doing()(&e))?;
             config.global.set_root_path(&root);
         }

@@ -1,8 +1,9 @@
 //! The reading end of a link.
 
+use super::heap::HeapLink;
 use super::held::HeldSamples;
 use super::sample::unpack;
-use super::sender::{HELD_SAMPLES, link_service};
+use super::service::{HELD_SAMPLES, link_service};
 use super::{LinkError, RunNames, SampleHeader, WakeEvents, Waker};
 use crate::link::InputQueue;
 use iceoryx2::node::Node;
@@ -30,6 +31,8 @@ pub struct LinkReceiver<S: Service> {
     /// The credit that the sender has and may still spend.
     granted: usize,
     held: HeldSamples,
+    /// Where large payloads travel; none if that is in the samples.
+    heap: Option<HeapLink>,
 }
 
 /// The sending end of a wire, as its reader knows it.
@@ -69,6 +72,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
         Ok(Self {
             service,
             subscriber,
+            heap: names.heap_link(&name),
             name,
             events: WakeEvents::new(sender.stage_readers),
             reader: sender.reader,
@@ -97,7 +101,12 @@ impl<S: Service + 'static> LinkReceiver<S> {
         while let Some(sample) = self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
             self.granted = self.granted.saturating_sub(1);
             let header = *sample.user_header();
-            let storage = self.held.hold(sample, self.depth + HELD_SAMPLES - 2);
+            let storage = match &self.heap {
+                Some(heap) if header.has_payload() && sample.payload().is_empty() => {
+                    heap.take(header.message.sequence)?
+                }
+                _ => self.held.hold(sample, self.depth + HELD_SAMPLES - 2),
+            };
             let before = queue.len();
             unpack(&header, storage, &self.name, |message| queue.push(message.on_wire(self.wire)))?;
             self.waiting.push_back(queue.len() - before);

@@ -31,6 +31,13 @@ pub struct SampleHeader {
     pub message: MessageHeader,
 }
 
+impl SampleHeader {
+    /// Whether its messages have bytes, or headers of their own.
+    pub(super) fn has_payload(&self) -> bool {
+        self.count > 1 || self.message.length > 0
+    }
+}
+
 /// Small messages that are gathered to be sent in one sample.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {

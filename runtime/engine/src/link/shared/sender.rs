@@ -1,23 +1,20 @@
 //! The sending end of a link.
 
+use super::heap::HeapLink;
 use super::sample::Batch;
+use super::service::{FIRST_PLACE, link_publisher, link_service};
 use super::{LinkError, PROTOCOL_VERSION, RunNames, SampleHeader, Wake, WakeEvents, Waker};
 use crate::link::Sequence;
-use crate::link::live::{MAX_OBSERVERS, OBSERVER_BUFFER};
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use iceoryx2::node::Node;
 use iceoryx2::port::publisher::Publisher;
-use iceoryx2::prelude::{Alignment, AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::Service;
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::rc::Rc;
 
 /// Messages above this size are sent by themselves, written in place; smaller ones are gathered.
 const LARGEST_BATCHED: usize = 4 * 1024;
 /// A batch is sent when it has reached this size.
 const FULL_BATCH: usize = 64 * 1024;
-/// How many samples a reader may hold beside those that wait for it; what comes on top of that is copied.
-pub(super) const HELD_SAMPLES: usize = 64;
 
 /// One output port over shared memory.
 pub struct LinkSender<S: Service> {
@@ -29,6 +26,8 @@ pub struct LinkSender<S: Service> {
     sequence: Sequence,
     batch: Batch,
     gather: bool,
+    /// Where large payloads travel; none if that is in the samples.
+    heap: Option<HeapLink>,
 }
 
 impl<S: Service> LinkSender<S> {
@@ -46,18 +45,14 @@ impl<S: Service> LinkSender<S> {
         readers: Vec<(usize, Waker<S>)>,
         gather: bool,
     ) -> Result<Self, LinkError> {
-        let publisher = link_service(node, names, stage, port, readers.len(), depth)?
-            .publisher_builder()
-            .initial_max_slice_len(FULL_BATCH / 16)
-            .max_loaned_samples(1)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .create()
-            .map_err(|e| LinkError::shared(format!("publish {stage}.{port}"))(&e))?;
+        let name = format!("{stage}.{port}");
+        let service = link_service(node, names, stage, port, readers.len(), depth)?;
+        let publisher = link_publisher(&service).map_err(|e| LinkError::shared(format!("publish {name}"))(&e))?;
         readers.iter().try_for_each(|(_, waker)| waker.wake(WakeEvents::DATA))?;
         Ok(Self {
             publisher,
-            name: format!("{stage}.{port}"),
+            heap: names.heap_link(&name),
+            name,
             wake,
             readers,
             sequence: Sequence::default(),
@@ -100,20 +95,14 @@ impl<S: Service> LinkSender<S> {
     /// Sends what was gathered. Needs credit.
     pub(crate) fn send_batch(&mut self) -> Result<(), LinkError> {
         let (header, payload) = self.batch.sample();
-        let sample = self.publisher.loan_slice_uninit(payload.len()).map_err(|e| self.failed(&e))?;
-        let mut sample = sample.write_from_slice(payload);
-        *sample.user_header_mut() = header;
-        let reached = sample.send().map_err(|e| self.failed(&e))?;
+        let reached = self.send_payload(header, payload)?;
         self.batch.clear();
         self.sent(reached)
     }
 
     /// Sends one message by itself, copying its bytes once. Needs credit.
     pub(crate) fn send_bytes(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), LinkError> {
-        let sample = self.publisher.loan_slice_uninit(bytes.len()).map_err(|e| self.failed(&e))?;
-        let mut sample = sample.write_from_slice(bytes);
-        *sample.user_header_mut() = single(header);
-        let reached = sample.send().map_err(|e| self.failed(&e))?;
+        let reached = self.send_payload(single(header), bytes)?;
         self.sent(reached)
     }
 
@@ -123,7 +112,16 @@ impl<S: Service> LinkSender<S> {
         header: MessageHeader,
         write: impl FnOnce(&mut [u8]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let mut sample = self.publisher.loan_slice(header.length as usize).map_err(|e| self.failed(&e))?;
+        let length = header.length as usize;
+        if let Some(heap) = self.heap_for(length) {
+            let mut buffer = heap.buffer(length)?;
+            buffer.resize(length, 0);
+            write(&mut buffer)?;
+            heap.leave(header.sequence, buffer, self.readers.len());
+            let reached = self.send_sample(single(header), &[])?;
+            return Ok(self.sent(reached)?);
+        }
+        let mut sample = self.publisher.loan_slice(length).map_err(|e| self.failed(&e))?;
         *sample.user_header_mut() = single(header);
         write(sample.payload_mut())?;
         let reached = sample.send().map_err(|e| self.failed(&e))?;
@@ -157,6 +155,28 @@ impl<S: Service> LinkSender<S> {
         self.send_bytes(MessageHeader { flags, log_time, ..Default::default() }, &[])
     }
 
+    /// Where a payload of this size travels; none if that is in its sample.
+    fn heap_for(&self, length: usize) -> Option<&HeapLink> {
+        self.heap.as_ref().filter(|_| length > FIRST_PLACE)
+    }
+
+    /// Sends a sample, whose payload may travel on the heap. Gives how many have got it.
+    fn send_payload(&self, header: SampleHeader, payload: &[u8]) -> Result<usize, LinkError> {
+        let Some(heap) = self.heap_for(payload.len()) else { return self.send_sample(header, payload) };
+        let mut buffer = heap.buffer(payload.len())?;
+        buffer.extend_from_slice(payload);
+        heap.leave(header.message.sequence, buffer, self.readers.len());
+        self.send_sample(header, &[])
+    }
+
+    /// Sends a sample with its payload. Gives how many have got it.
+    fn send_sample(&self, header: SampleHeader, payload: &[u8]) -> Result<usize, LinkError> {
+        let sample = self.publisher.loan_slice_uninit(payload.len()).map_err(|e| self.failed(&e))?;
+        let mut sample = sample.write_from_slice(payload);
+        *sample.user_header_mut() = header;
+        sample.send().map_err(|e| self.failed(&e))
+    }
+
     fn sent(&mut self, reached: usize) -> Result<(), LinkError> {
         // Those that look on get it as well, if they have room.
         if reached < self.readers.len() {
@@ -176,31 +196,4 @@ impl<S: Service> LinkSender<S> {
 
 fn single(message: MessageHeader) -> SampleHeader {
     SampleHeader { version: PROTOCOL_VERSION, count: 1, message, ..Default::default() }
-}
-
-/// The service of a link, the same for its sender and its readers.
-pub(super) fn link_service<S: Service>(
-    node: &Node<S>,
-    names: &RunNames,
-    stage: &str,
-    port: &str,
-    readers: usize,
-    depth: usize,
-) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
-    let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {stage}.{port}"))(cause);
-    // Nobody sees a link from outside that does not leave the process.
-    let observers = if names.is_shared() { MAX_OBSERVERS } else { 0 };
-    node.service_builder(&names.link(stage, port)?)
-        .publish_subscribe::<[u8]>()
-        .user_header::<SampleHeader>()
-        .payload_alignment(Alignment::new(8).ok_or_else(|| failed(&"alignment"))?)
-        .enable_safe_overflow(false)
-        .history_size(0)
-        .subscriber_max_buffer_size(if names.is_shared() { (2 * depth).max(OBSERVER_BUFFER) } else { 2 * depth })
-        .subscriber_max_borrowed_samples(depth + HELD_SAMPLES)
-        .max_publishers(1)
-        .max_subscribers(readers.max(1) + observers)
-        .max_nodes(readers + 2 + observers)
-        .open_or_create()
-        .map_err(|e| failed(&e))
 }
