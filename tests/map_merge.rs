@@ -119,3 +119,19 @@ fn without_enough_tags_a_merge_goes_by_the_maps() {
         assert_eq!(evaluate(folder.path(), &truth)["right"], 1);
     }
 }
+
+#[test]
+fn robots_in_a_building_whose_parts_are_alike_are_not_merged_wrongly() {
+    let folder = TempDir::new().unwrap();
+    for layout in ["symmetric", "repeated"] {
+        let layout = format!("layout=\"{layout}\"");
+        let mut args = vec!["--robots", "3", "--seed", "901"];
+        for setting in ["tags=0", "snapshots=1", "overlap=0.6", "clutter=0.02", &layout] {
+            args.extend(["--set", setting]);
+        }
+        let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+        let (ended, summary) = merge(folder.path(), &[&log], &[]);
+        ended.assert(3, &["not merged: robot2", "it cannot be told which is right"]);
+        assert_eq!(evaluate(folder.path(), &truth)["wrong"], 0, "{summary}");
+    }
+}
