@@ -181,7 +181,7 @@ fn place(names: &[&str], edges: &[Edge], root: usize) -> BTreeMap<String, Uncert
 fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<UncertainPose, String> {
     if alignment.provisional {
         return Err(format!(
-            "it is provisional, and no stage between has confirmed it by the walls of the maps, as icp_refiner does ({})",
+            "it is provisional, and no stage between has confirmed it by the walls of the maps, as merge_verifier does ({})",
             alignment.reason
         ));
     }

@@ -23,7 +23,7 @@ pub struct MapAlignerParameters {
     /// Another place differs from the best by more than this in the middle of the walls in common, metres, or by
     /// `apart_yaw`.
     pub apart: f64,
-    /// About the least length of wall on which the maps must agree, metres. `icp_refiner` measures it exactly, and asks
+    /// About the least length of wall on which the maps must agree, metres. `merge_verifier` measures it exactly, and asks
     /// for more.
     pub min_wall_length: f64,
     /// At most so many guesses are made for a pair of maps, each away from the others.

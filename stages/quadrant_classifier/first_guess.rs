@@ -19,7 +19,7 @@ pub struct FirstGuess {
     pub covariance: Matrix3<f64>,
     /// The least common precision of the tags, 0 to 1.
     pub score: f64,
-    /// `tags+directions`, `tags`, or `few tags+directions`.
+    /// `tags+directions`, `tags`, `few tags+directions`, or `one tag+directions`.
     pub method: &'static str,
     /// What the guess rests on.
     pub reason: String,
@@ -137,7 +137,7 @@ pub(super) fn rotation_of_tags(
     }
 }
 
-fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
+pub(super) fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
     tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect()
 }
 

@@ -15,6 +15,7 @@ mod parameters;
 mod provisional;
 mod quadrant;
 mod rotation_by_directions;
+mod single_tag;
 mod stage;
 mod tag_rotation;
 mod translation;
@@ -27,4 +28,5 @@ pub use parameters::{Mean, QuadrantClassifierParameters, RotationFrom, TagRotati
 pub use provisional::provisional_guess;
 pub use quadrant::quadrant;
 pub use rotation_by_directions::MissingDirection;
+pub use single_tag::single_tag_guesses;
 pub use stage::kind;

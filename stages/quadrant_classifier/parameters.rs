@@ -119,6 +119,11 @@ pub struct QuadrantClassifierParameters {
     /// `contradiction_angle`) is at most this angle, radians. The next quarter turn then is dozens of standard
     /// deviations away.
     pub max_confirming_angle: f64,
+    /// Whether a single common tag proposes a place for each quarter turn that the directions leave open. What it proposes
+    /// is provisional: `merge_verifier` must find one of them right, or another source must have found it, too.
+    pub single_tag: bool,
+    /// The least certainty of a single tag in both maps, 0 to 1.
+    pub single_tag_certainty: f64,
     /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
@@ -146,6 +151,8 @@ impl Default for QuadrantClassifierParameters {
             contradiction_angle: 0.01,
             max_contradiction: 30_f64.to_radians(),
             max_confirming_angle: 0.12,
+            single_tag: false,
+            single_tag_certainty: 0.9,
             max_residual: 0.5,
             resend_distance: 0.001,
             resend_angle: 0.0001,
@@ -165,6 +172,7 @@ impl Parameters for QuadrantClassifierParameters {
         let not_below_zero = |value: f64| value.is_finite() && value >= 0.0;
         require(self.tolerance > 0.0 && self.tolerance <= 0.5, "tolerance", "must be above 0 and at most 0.5 rad");
         require((0.0..=1.0).contains(&self.min_agreement), "min_agreement", "must be from 0 to 1");
+        require((0.0..=1.0).contains(&self.single_tag_certainty), "single_tag_certainty", "must be from 0 to 1");
         for (field, value) in [("end_deviation", self.end_deviation), ("tag_deviation", self.tag_deviation)] {
             require(above_zero(value), field, "must be a number above 0 m");
         }

@@ -43,17 +43,24 @@ pub(super) fn rotation_by_directions(
     b: Option<&Direction>,
     parameters: &QuadrantClassifierParameters,
 ) -> Result<RotationByDirections, MissingDirection> {
-    let (Some(a), Some(b)) = (a, b) else { return Err(MissingDirection::Map) };
-    if !(a.valid && b.valid) {
-        return Err(MissingDirection::Direction);
-    }
-    let d_theta = a.angle - b.angle;
+    let TagRotation { angle: d_theta, deviation } = difference_of_directions(a, b)?;
     let angle = wrap_angle(d_theta + f64::from(quadrant(by_tags.angle, d_theta)) * FRAC_PI_2);
-    let deviation = a.deviation.hypot(b.deviation);
     let limit = 3.0 * deviation.hypot(by_tags.deviation) + parameters.contradiction_angle;
     Ok(RotationByDirections {
         rotation: TagRotation { angle, deviation },
         off: turn_difference(by_tags.angle, angle, TAU),
         limit: limit.min(parameters.max_contradiction),
     })
+}
+
+/// `d_theta`, the direction of map a less that of map b: the rotation of `T_a_b` but for quarter turns.
+pub(super) fn difference_of_directions(
+    a: Option<&Direction>,
+    b: Option<&Direction>,
+) -> Result<TagRotation, MissingDirection> {
+    let (Some(a), Some(b)) = (a, b) else { return Err(MissingDirection::Map) };
+    if !(a.valid && b.valid) {
+        return Err(MissingDirection::Direction);
+    }
+    Ok(TagRotation { angle: a.angle - b.angle, deviation: a.deviation.hypot(b.deviation) })
 }

@@ -1,9 +1,12 @@
 //! The stage `quadrant_classifier`.
 
-use super::{Direction, QuadrantClassifierParameters, RotationFrom, first_guess, map_direction, provisional_guess};
+use super::{
+    Direction, FirstGuess, QuadrantClassifierParameters, RotationFrom, first_guess, map_direction, provisional_guess,
+    single_tag_guesses,
+};
 use crate::geometry::{row_by_row, turn_difference};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Alignment, CommonTags, Header, MapDirection, Segments};
+use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, MapDirection, Segments};
 use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -52,7 +55,8 @@ struct QuadrantClassifier {
     parameters: QuadrantClassifierParameters,
     maps: BTreeMap<String, Map>,
     common: BTreeMap<Pair, CommonTags>,
-    sent: BTreeMap<Pair, Alignment>,
+    /// What was sent last for a pair, by rank.
+    sent: BTreeMap<Pair, Vec<Alignment>>,
 }
 
 impl Stage for QuadrantClassifier {
@@ -116,9 +120,8 @@ impl QuadrantClassifier {
         // What refines an alignment works on the maps, so each new map calls for it, changed or not.
         let pairs: Vec<Pair> = self.common.keys().filter(|(a, b)| *a == robot || *b == robot).cloned().collect();
         for pair in pairs {
-            if let Some(alignment) = self.align(&pair, output) {
-                self.send(pair, alignment, output)?;
-            }
+            let alignments = self.align(&pair, output);
+            self.send(pair, alignments, output)?;
         }
         Ok(())
     }
@@ -130,57 +133,78 @@ impl QuadrantClassifier {
         }
         let pair = (common.robot_a.clone(), common.robot_b.clone());
         self.common.insert(pair.clone(), common);
-        match self.align(&pair, output) {
-            Some(alignment) if self.differs(&pair, &alignment) => self.send(pair, alignment, output),
-            _ => Ok(()),
+        let alignments = self.align(&pair, output);
+        match self.differs(&pair, &alignments) {
+            true => self.send(pair, alignments, output),
+            false => Ok(()),
         }
     }
 
-    fn align(&self, pair: &Pair, output: &Output<'_>) -> Option<Alignment> {
-        let common = self.common.get(pair)?;
+    /// What the common tags of a pair come to: one alignment, or several from a single tag; accepted or refused.
+    fn align(&self, pair: &Pair, output: &Output<'_>) -> Vec<Alignment> {
+        let Some(common) = self.common.get(pair) else { return Vec::new() };
         let (a, b) = (self.maps.get(&pair.0), self.maps.get(&pair.1));
         let frame_id = a.map_or_else(|| format!("{}/map", pair.0), |map| map.frame_id.clone());
-        let mut alignment = Alignment {
+        let of_pair = Alignment {
             header: Header::new(output.log_time(), frame_id),
             a: pair.0.clone(),
             b: pair.1.clone(),
             method: "tags".into(),
             ..Default::default()
         };
-        if !common.accepted {
-            alignment.reason.clone_from(&common.reason);
-            return Some(alignment);
-        }
-        let direction = |map: Option<&Map>| map.map(|map| map.direction);
-        let guess = if common.provisional { provisional_guess } else { first_guess };
-        match guess(&common.tags, direction(a).as_ref(), direction(b).as_ref(), &self.parameters) {
-            Ok(guess) => {
-                alignment.set_transform_a_b(&guess.transform_a_b);
-                alignment.covariance = row_by_row(&guess.covariance);
-                alignment.score = guess.score;
-                alignment.method = guess.method.into();
-                alignment.reason = guess.reason;
-                alignment.accepted = true;
-                alignment.provisional = common.provisional;
-            }
-            Err(error) => alignment.reason = error.to_string(),
-        }
-        Some(alignment)
+        let refused = |reason: String| vec![Alignment { reason, ..of_pair.clone() }];
+        let (a, b) = (a.map(|map| &map.direction), b.map(|map| &map.direction));
+        let guesses = match (common.accepted, common.provisional, self.single_tag(common)) {
+            (true, false, _) => first_guess(&common.tags, a, b, &self.parameters).map(|guess| vec![guess]),
+            (true, true, _) => provisional_guess(&common.tags, a, b, &self.parameters).map(|guess| vec![guess]),
+            (false, _, Some(tag)) => single_tag_guesses(tag, a, b, &self.parameters),
+            (false, _, None) => return refused(common.reason.clone()),
+        };
+        let guesses = match guesses {
+            Ok(guesses) => guesses,
+            Err(error) => return refused(error.to_string()),
+        };
+        let count = guesses.len() as u32;
+        let alignment = |(rank, guess): (u32, FirstGuess)| {
+            let mut alignment = Alignment {
+                covariance: row_by_row(&guess.covariance),
+                score: guess.score,
+                method: guess.method.into(),
+                reason: guess.reason,
+                accepted: true,
+                provisional: common.provisional || !common.accepted,
+                rank,
+                hypotheses: if count > 1 { count } else { 0 },
+                ..of_pair.clone()
+            };
+            alignment.set_transform_a_b(&guess.transform_a_b);
+            alignment
+        };
+        (0..).zip(guesses).map(alignment).collect()
     }
 
-    fn differs(&self, pair: &Pair, alignment: &Alignment) -> bool {
-        let Some(sent) = self.sent.get(pair) else { return true };
-        let moved = (alignment.x - sent.x).hypot(alignment.y - sent.y);
-        let turned = turn_difference(alignment.yaw, sent.yaw, TAU).abs();
-        moved > self.parameters.resend_distance
-            || turned > self.parameters.resend_angle
-            || (alignment.accepted, alignment.provisional, &alignment.method, &alignment.reason)
-                != (sent.accepted, sent.provisional, &sent.method, &sent.reason)
+    /// The only common tag of a pair, if it may propose something.
+    fn single_tag<'a>(&self, common: &'a CommonTags) -> Option<&'a CommonTag> {
+        let [tag] = common.tags.as_slice() else { return None };
+        let is_certain = tag.common_precision() >= self.parameters.single_tag_certainty;
+        (self.parameters.single_tag && is_certain).then_some(tag)
     }
 
-    fn send(&mut self, pair: Pair, alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
-        output.send(ALIGNMENT, "", &alignment)?;
-        self.sent.insert(pair, alignment);
+    fn differs(&self, pair: &Pair, alignments: &[Alignment]) -> bool {
+        let Some(sent) = self.sent.get(pair).filter(|sent| sent.len() == alignments.len()) else { return true };
+        sent.iter().zip(alignments).any(|(sent, alignment)| {
+            let moved = (alignment.x - sent.x).hypot(alignment.y - sent.y);
+            let turned = turn_difference(alignment.yaw, sent.yaw, TAU).abs();
+            moved > self.parameters.resend_distance
+                || turned > self.parameters.resend_angle
+                || (alignment.accepted, alignment.provisional, &alignment.method, &alignment.reason)
+                    != (sent.accepted, sent.provisional, &sent.method, &sent.reason)
+        })
+    }
+
+    fn send(&mut self, pair: Pair, alignments: Vec<Alignment>, output: &mut Output<'_>) -> Result<(), StageError> {
+        alignments.iter().try_for_each(|alignment| output.send(ALIGNMENT, "", alignment))?;
+        self.sent.insert(pair, alignments);
         Ok(())
     }
 }
@@ -322,6 +346,30 @@ mod tests {
         assert!(sent[0].accepted, "directions that contradict three tags are left out");
         let sent = run.receive(COMMON, &two);
         assert!(!sent[0].accepted && sent[0].reason.contains("must confirm"), "{}", sent[0].reason);
+    }
+
+    #[test]
+    fn a_single_tag_proposes_every_quarter_turn_if_it_may() {
+        let truth = pose(4.0, -2.0, 2.5);
+        let all = common(&truth);
+        let one = CommonTags { tags: all.tags[..1].to_vec(), accepted: false, reason: "one tag".into(), ..all };
+        let mut run = Run::new();
+        run.receive(SEGMENTS, &segments("robot1", 2.5));
+        run.receive(SEGMENTS, &segments("robot2", 0.0));
+        assert_eq!(run.receive(COMMON, &one)[0].reason, "one tag", "it is not asked for");
+        let parameters = "single_tag = true".parse().unwrap();
+        let Node::Stage(stage) = kind().make(parameters, &Context::default()).unwrap() else { panic!("a stage") };
+        run.stage = stage;
+        run.receive(SEGMENTS, &segments("robot1", 2.5));
+        run.receive(SEGMENTS, &segments("robot2", 0.0));
+        let sent = run.receive(COMMON, &one);
+        let ranks: Vec<(u32, u32, bool, bool)> =
+            sent.iter().map(|one| (one.rank, one.hypotheses, one.accepted, one.provisional)).collect();
+        assert_eq!(ranks, [(0, 4, true, true), (1, 4, true, true), (2, 4, true, true), (3, 4, true, true)]);
+        assert!(sent.iter().all(|one| one.method == "one tag+directions" && one.source() == "tag"));
+        assert!(run.receive(COMMON, &one).is_empty(), "nothing has changed");
+        let vague = CommonTags { tags: vec![CommonTag { certainty_a: 0.8, ..one.tags[0].clone() }], ..one.clone() };
+        assert!(!run.receive(COMMON, &vague)[0].accepted);
     }
 
     #[test]
