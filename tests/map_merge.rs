@@ -135,3 +135,18 @@ fn robots_in_a_building_whose_parts_are_alike_are_not_merged_wrongly() {
         assert_eq!(evaluate(folder.path(), &truth)["wrong"], 0, "{summary}");
     }
 }
+
+#[test]
+fn one_tag_decides_between_two_places_that_look_the_same() {
+    let folder = TempDir::new().unwrap();
+    let mut args = vec!["--robots", "2", "--seed", "905"];
+    for setting in ["tags=1", "snapshots=1", "overlap=1.0", "clutter=0.0", "layout=\"symmetric\""] {
+        args.extend(["--set", setting]);
+    }
+    let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+    let (ended, _) = merge(folder.path(), &[&log], &[]);
+    ended.assert(3, &["it cannot be told which is right"]);
+    let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--summary", "summary.json"];
+    gridweave(folder.path(), &args).assert(0, &["found by the tags, too"]);
+    assert_eq!(evaluate(folder.path(), &truth)["right"], 1);
+}
