@@ -122,9 +122,13 @@ fn judge_one<'a>(
     let is_strict = alignment.provisional && found_too_by.is_none();
     let mut rival = another.map(|(_, rival)| rival);
 
+    let bounds = match is_strict {
+        true => parameters.provisional_bounds(alignment.hypotheses > 0),
+        false => parameters.bounds(),
+    };
     let refusal = match alignment.accepted {
         false => Some(Refusal::Before(alignment.reason.clone())),
-        true => Refusal::by_bounds(agreement, &parameters.bounds(is_strict))
+        true => Refusal::by_bounds(agreement, &bounds)
             .or_else(|| {
                 let (other, rival) = another?;
                 match is_strict {
@@ -181,7 +185,7 @@ fn contradiction(
     rival: &Rival,
     parameters: &MergeVerifierParameters,
 ) -> Option<Refusal> {
-    let is_sound = Refusal::by_bounds(&other.agreement, &parameters.bounds(true)).is_none();
+    let is_sound = Refusal::by_bounds(&other.agreement, &parameters.provisional_bounds(false)).is_none();
     let is_far_worse = candidate.evidence <= parameters.max_rival_evidence * other.evidence;
     (is_sound && is_far_worse).then(|| Refusal::Elsewhere {
         source_of_rival: other.alignment.source().to_owned(),
