@@ -96,9 +96,9 @@ fn copy(input: &Path, output: &Path) -> (f64, u64) {
 fn merge(input: &Path, output: &Path, engine: &str) -> (f64, u64) {
     let start = Instant::now();
     let mut child = Command::new(env!("CARGO_BIN_EXE_gridweave"))
-        .arg("merge")
+        .args(["run", "tag_merge", "--input"])
         .arg(input)
-        .arg("-o")
+        .arg("--output")
         .arg(output)
         .args(["--engine", engine])
         .stdout(Stdio::null())
