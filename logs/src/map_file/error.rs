@@ -50,7 +50,7 @@ pub enum MapFileError {
         problem: String,
     },
     /// A file cannot be written.
-    #[error("cannot write the map file {path}: {source}; see that its folder exists, may be written and has room")]
+    #[error("cannot write the map file {path}; see that its folder exists, may be written and has room")]
     Write {
         /// Which.
         path: PathBuf,

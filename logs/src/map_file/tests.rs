@@ -172,6 +172,21 @@ fn missing_and_broken_files_are_told() {
 }
 
 #[test]
+fn a_map_that_cannot_be_written_leaves_the_one_that_was_there() {
+    let (folder, path) = folder(&yaml(""));
+    let before = load(&path).unwrap();
+    let names = || fs::read_dir(folder.path()).unwrap().count();
+    // The image can be written, and the description cannot.
+    fs::create_dir(folder.path().join("map.yaml.part")).unwrap();
+    let other = GridMap { cells: vec![0; before.cells.len()], ..before.clone() };
+    assert!(save(&path, &other).unwrap_err().to_string().contains("map.yaml"));
+    assert_eq!((load(&path).unwrap(), names()), (before, 3));
+    fs::remove_dir(folder.path().join("map.yaml.part")).unwrap();
+    save(&path, &other).unwrap();
+    assert_eq!((load(&path).unwrap().cells, names()), (other.cells, 2));
+}
+
+#[test]
 fn what_is_no_map_is_not_saved() {
     let folder = tempfile::tempdir().unwrap();
     let info = MapMetaData { resolution: 0.05, width: 2, height: 2, ..Default::default() };
