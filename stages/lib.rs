@@ -16,6 +16,8 @@ pub mod quadrant_classifier;
 pub mod simulator;
 pub mod tag_filter;
 pub mod tag_localizer;
+#[cfg(test)]
+mod test_world;
 
 use gridweave_runtime::stage::StageKind;
 

@@ -16,8 +16,6 @@ mod stage;
 mod wall_map;
 
 #[cfg(test)]
-pub(crate) mod floor_plan;
-#[cfg(test)]
 mod stage_tests;
 #[cfg(test)]
 mod tests;

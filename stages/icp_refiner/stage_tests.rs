@@ -1,51 +1,13 @@
 //! The stage from outside: messages in, messages out.
 
-use super::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::geometry::{Pose2, pose};
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid, RosMessage, encode};
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
-use serde::Serialize;
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::test_world::stage_bench::StageBench;
+use gridweave_runtime::message::{LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid};
 
 const MAP: usize = 0;
 const ALIGNMENT: usize = 1;
-
-/// The stage, and what it sends.
-struct Bench {
-    stage: Box<dyn Stage>,
-    outputs: CollectedOutputs,
-    time: u64,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let kind = super::kind();
-        let Ok(Node::Stage(stage)) = kind.make(Default::default(), &Context::default()) else { panic!("no stage") };
-        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
-    }
-
-    fn give<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Vec<Alignment> {
-        self.time += 1;
-        let log_time = LogTime(self.time * 1_000_000_000);
-        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
-        let message = Message::from_vec(header, encode(message).unwrap());
-        self.stage.receive(port, &message, &mut self.outputs.output(log_time)).unwrap();
-        self.sent()
-    }
-
-    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
-        self.give(MAP, robot, &OccupancyGrid { info: map.info(), data: &map.bytes(), ..Default::default() })
-    }
-
-    fn finish(&mut self) -> Vec<Alignment> {
-        self.stage.finish(&mut self.outputs.output(LogTime(self.time))).unwrap();
-        self.sent()
-    }
-
-    fn sent(&mut self) -> Vec<Alignment> {
-        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
-    }
-}
 
 fn first_guess(transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
@@ -76,7 +38,7 @@ fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
 fn a_first_guess_is_refined_once_both_maps_are_there() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.1, -0.1, 0.02)))), []);
     assert_eq!(bench.give_map("robot1", &a), []);
     let sent = bench.give_map("robot2", &b);
@@ -96,7 +58,7 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
 fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
     let (a, b, more_of_b) = maps();
     let truth = a.transform_to(&b);
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&truth)).len(), 1);
@@ -113,7 +75,7 @@ fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
 fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     bench.give(ALIGNMENT, "", &first_guess(&truth));
@@ -126,7 +88,7 @@ fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
 
 #[test]
 fn a_refused_first_guess_passes_through_unchanged() {
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     let refused = Alignment { accepted: false, reason: "two tags only".into(), ..first_guess(&Pose2::identity()) };
     assert_eq!(bench.give(ALIGNMENT, "", &refused), std::slice::from_ref(&refused));
     assert_eq!(bench.give(ALIGNMENT, "", &refused), []);
@@ -137,7 +99,7 @@ fn a_refused_first_guess_passes_through_unchanged() {
 fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     let sent = bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(2.0, 1.5, 0.5))));
@@ -149,7 +111,7 @@ fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
 #[test]
 fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
     let (a, ..) = maps();
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give(ALIGNMENT, "", &first_guess(&Pose2::identity()));
     let sent = bench.finish();
@@ -161,7 +123,7 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
 #[test]
 fn what_is_no_map_or_no_transform_is_warned_of() {
     let (a, b, _) = maps();
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     let info = MapMetaData { resolution: f32::NAN, width: 2, height: 2, ..Default::default() };
     bench.give(MAP, "robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
@@ -180,7 +142,7 @@ fn what_is_no_map_or_no_transform_is_warned_of() {
 fn ranked_guesses_are_refined_and_sent_together() {
     let (a, b, more_of_b) = maps();
     let truth = a.transform_to(&b);
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     let ranked =

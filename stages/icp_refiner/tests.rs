@@ -1,8 +1,8 @@
 //! Registration and judgement on drawn floor plans.
 
-use super::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
 use super::{FirstGuess, IcpParameters, Metric, Refusal, WallMap, Weighting, refine, register};
 use crate::geometry::{Grid, GridGeometry, Pose2, pose};
+use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
 use gridweave_runtime::stage::Parameters;
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

@@ -27,6 +27,7 @@ mod raster;
 mod refusal;
 mod search;
 mod stage;
+mod statement;
 
 #[cfg(test)]
 mod plan_tests;
@@ -43,11 +44,12 @@ pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
 pub use peak_shape::covariance;
 pub use peaks::Peaks;
-pub use plan::{MergePlan, Statement};
+pub use plan::MergePlan;
 pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::Refusal;
 pub use search::{Place, search};
+pub use statement::Statement;
 
 use gridweave_runtime::ros::{Alignment, OccupancyGrid};
 use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};

@@ -1,6 +1,7 @@
 //! Which maps of many robots are searched, so that not every pair of them must be.
 
 use super::peaks::{JUDGED, is_near, overlay};
+use super::statement::{Statement, with_reasons};
 use super::{
     CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, Raster, Refusal, align_near,
     align_prepared,
@@ -14,20 +15,6 @@ const GROUPS_TRIED: usize = 3;
 const LAST_ROUNDS: usize = 3;
 /// Guesses are kept for a map that has grown a little if they score at least this share of what they did.
 const KEPT_SCORE: f64 = 0.9;
-
-/// What is to be told of a pair of robots.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Statement {
-    /// The robot whose map stays, the first of the two by name.
-    pub a: String,
-    /// The robot whose map is moved.
-    pub b: String,
-    /// Guesses, the best first, each with what speaks for it; or why there are none.
-    pub found: Result<Vec<(MapAlignment, String)>, String>,
-    /// Whether the guess stands out on the maps of more robots than these two, and on more wall than the two have in
-    /// common.
-    pub is_supported: bool,
-}
 
 /// Robots whose maps are searched, and those that are laid together.
 ///
@@ -170,14 +157,14 @@ impl MergePlan {
         let found = match found {
             Ok(found) => found,
             Err(refusal) => {
-                statements.push(statement_of(pair, Err(refusal.to_string())));
+                statements.push(Statement::of(pair, Err(refusal.to_string())));
                 return None;
             }
         };
         let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && !self.has_alike(&found);
         let best = found.hypotheses.first()?.transform_a_b;
         if count_a + count_b == 2 {
-            statements.push(statement_of(pair, Ok(with_reasons(&found))));
+            statements.push(Statement::of(pair, Ok(with_reasons(&found))));
             return if is_clear { self.unite(first, second, &best) } else { None };
         }
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
@@ -197,7 +184,7 @@ impl MergePlan {
                 count_a + count_b - 1,
                 found.reason(0)
             );
-            statements.extend(pairs.first().map(|pair| statement_of((pair.a.clone(), pair.b.clone()), Err(reason))));
+            statements.extend(pairs.first().map(|pair| Statement::of((pair.a.clone(), pair.b.clone()), Err(reason))));
             return None;
         }
         // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
@@ -230,7 +217,7 @@ impl MergePlan {
         let found = align_prepared(self.map(a)?, self.map(b)?, &self.parameters);
         self.searches += 1;
         let found = found.map(|found| with_reasons(&found)).map_err(|refusal| refusal.to_string());
-        Some(statement_of((a.clone(), b.clone()), found))
+        Some(Statement::of((a.clone(), b.clone()), found))
     }
 
     /// The guess for a pair of robots where their groups put it.
@@ -248,7 +235,7 @@ impl MergePlan {
              together",
             found.wall_in_common
         );
-        Some(statement_of((a.clone(), b.clone()), Ok(vec![(found, reason)])))
+        Some(Statement::of((a.clone(), b.clone()), Ok(vec![(found, reason)])))
     }
 
     /// The pairs of a robot of each group, those with the most wall in common first, if the groups lie so.
@@ -295,7 +282,7 @@ impl MergePlan {
         let refusals = others.filter_map(|(other, known)| {
             let (first, second) = if robot < other.as_str() { (mine, known) } else { (known, mine) };
             let refusal = first.map.as_ref().err().or(second.map.as_ref().err())?;
-            Some(statement_of((robot.to_owned(), other.clone()), Err(refusal.to_string())))
+            Some(Statement::of((robot.to_owned(), other.clone()), Err(refusal.to_string())))
         });
         refusals.collect()
     }
@@ -404,14 +391,4 @@ struct PairInCommon {
     transform_a_b: Pose2,
     /// About the length of wall in common, metres.
     length: f64,
-}
-
-/// A statement on a pair, of which the first by name becomes robot a if there is no guess that says which it is.
-fn statement_of(pair: (String, String), found: Result<Vec<(MapAlignment, String)>, String>) -> Statement {
-    let (a, b) = if pair.0 < pair.1 { pair } else { (pair.1, pair.0) };
-    Statement { a, b, found, is_supported: false }
-}
-
-fn with_reasons(found: &MapAlignments) -> Vec<(MapAlignment, String)> {
-    found.hypotheses.iter().enumerate().map(|(rank, found_at)| (found_at.clone(), found.reason(rank))).collect()
 }

@@ -3,7 +3,7 @@
 use super::tests::angular_office;
 use super::{MapAlignerParameters, MergePlan, Statement};
 use crate::geometry::Grid;
-use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A plan that is given maps one by one.

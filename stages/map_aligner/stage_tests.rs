@@ -1,52 +1,9 @@
 //! The stage from outside: messages in, messages out.
 
 use super::tests::angular_office;
-use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid, encode};
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
-
-/// The stage, and what it sends.
-struct Bench {
-    stage: Box<dyn Stage>,
-    outputs: CollectedOutputs,
-    time: u64,
-}
-
-impl Bench {
-    fn new(parameters: &str) -> Self {
-        let kind = super::kind();
-        let made = kind.make(parameters.parse().unwrap(), &Context::default());
-        let Ok(Node::Stage(stage)) = made else { panic!("no stage") };
-        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
-    }
-
-    fn give(&mut self, robot: &str, bytes: Vec<u8>) -> Vec<Alignment> {
-        self.time += 1;
-        let log_time = LogTime(self.time * 1_000_000_000);
-        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
-        let message = Message::from_vec(header, bytes);
-        self.stage.receive(0, &message, &mut self.outputs.output(log_time)).unwrap();
-        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
-    }
-
-    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
-        let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
-        let info = MapMetaData {
-            resolution: map.geometry.resolution as f32,
-            width: map.geometry.width as u32,
-            height: map.geometry.height as u32,
-            origin: map.geometry.origin.into(),
-            ..Default::default()
-        };
-        let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
-        self.give(robot, encode(&OccupancyGrid { header, info, data: &data }).unwrap())
-    }
-
-    fn searches(&self) -> u64 {
-        self.stage.report().unwrap()["searches"].as_u64().unwrap()
-    }
-}
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
+use crate::test_world::stage_bench::StageBench;
+use gridweave_runtime::stage::Context;
 
 /// West, east, and more of the east.
 fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
@@ -60,7 +17,7 @@ fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
 #[test]
 fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     let (a, b, more_of_b) = maps();
-    let mut bench = Bench::new("");
+    let mut bench = StageBench::new(&super::kind(), "");
     assert_eq!(bench.give_map("robot2", &b), []);
     let first = bench.give_map("robot1", &a);
     assert_eq!((first[0].a.as_str(), first[0].b.as_str()), ("robot1", "robot2"));
@@ -72,17 +29,17 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     assert!(metres < 0.15 && radians < 0.015, "{metres} m, {radians} rad");
 
     assert_eq!(bench.give_map("robot1", &a), [], "the same map again");
-    assert_eq!(bench.searches(), 1);
+    assert_eq!(bench.reported("searches"), 1);
     let second = bench.give_map("robot2", &more_of_b);
     assert!(second[0].accepted && second.len() == second[0].hypotheses as usize, "{second:?}");
-    assert_eq!(bench.searches(), 2);
+    assert_eq!(bench.reported("searches"), 2);
 }
 
 #[test]
 fn what_is_refused_says_why() {
     let (a, b, _) = maps();
     let corner = angular_office().draw(seen(-0.2, -0.2, 3.0, 3.0), drawing(1.0, 1.0, 1.0));
-    let mut bench = Bench::new("");
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     let first = bench.give_map("robot3", &b);
     assert!(first.iter().all(|one| one.accepted && one.reason.contains("m of walls in common")), "{first:?}");
@@ -100,7 +57,7 @@ fn hypotheses_are_ranked_and_counted_and_their_scores_fall() {
         [0.0, 12.0, 0.0, 0.0],
     ]);
     let all = seen(-0.2, -0.2, 20.2, 12.2);
-    let mut bench = Bench::new("max_hypotheses = 3\nleast_share = 0.0");
+    let mut bench = StageBench::new(&super::kind(), "max_hypotheses = 3\nleast_share = 0.0");
     bench.give_map("robot1", &hall.draw(all, drawing(3.0, 2.0, 0.4)));
     let sent = bench.give_map("robot2", &hall.draw(all, drawing(12.0, 6.0, -2.1)));
     assert!((2..=3).contains(&sent.len()), "{sent:?}");
@@ -119,7 +76,7 @@ fn the_parameters_decide() {
         ("min_wall_length = 1000.0", false, false),
         ("max_extent = 10.0", false, false),
     ] {
-        let mut bench = Bench::new(parameters);
+        let mut bench = StageBench::new(&super::kind(), parameters);
         bench.give_map("robot1", &a);
         let sent = bench.give_map("robot2", &b);
         let said = (sent[0].accepted, sent[0].provisional);
@@ -131,10 +88,10 @@ fn the_parameters_decide() {
 #[test]
 fn what_cannot_be_read_is_left_out_with_a_warning() {
     let (a, b, _) = maps();
-    let mut bench = Bench::new("");
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    assert_eq!(bench.give("robot2", vec![0, 1, 0, 0, 9]), []);
+    assert_eq!(bench.give_bytes(0, "robot2", vec![0, 1, 0, 0, 9]), []);
     assert_eq!(bench.outputs.warnings().len(), 1);
     assert_eq!(bench.give_map("robot2", &b), [], "the map before it is still the last");
 }

@@ -2,7 +2,7 @@
 
 use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, Refusal, align_maps};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
-use crate::icp_refiner::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
+use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -58,7 +58,7 @@ pub(super) fn angular_office() -> FloorPlan {
     ])
 }
 
-fn all() -> crate::icp_refiner::floor_plan::Seen {
+fn all() -> crate::test_world::floor_plan::Seen {
     seen(-0.2, -0.2, 20.2, 12.2)
 }
 

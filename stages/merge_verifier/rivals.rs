@@ -103,7 +103,7 @@ fn starts(centre: &Point2, reach: f64, icp: &IcpParameters) -> impl Iterator<Ite
 mod tests {
     use super::*;
     use crate::geometry::pose;
-    use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+    use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use std::f64::consts::PI;
 
     fn rival(a: &DrawnMap, b: &DrawnMap, transform_a_b: &Pose2) -> Option<Rival> {

@@ -1,51 +1,13 @@
 //! The stage from outside: messages in, messages out.
 
 use crate::geometry::{Pose2, pose};
-use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RosMessage, encode};
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage};
-use serde::Serialize;
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::test_world::stage_bench::StageBench;
+use gridweave_runtime::message::{LogTime, Message, MessageHeader};
+use gridweave_runtime::ros::{Alignment, Header};
 
 const MAP: usize = 0;
 const ALIGNMENT: usize = 1;
-
-/// The stage, and what it sends.
-struct Bench {
-    stage: Box<dyn Stage>,
-    outputs: CollectedOutputs,
-    time: u64,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let kind = super::kind();
-        let Ok(Node::Stage(stage)) = kind.make(Default::default(), &Context::default()) else { panic!("no stage") };
-        Self { stage, outputs: CollectedOutputs::new(&kind), time: 0 }
-    }
-
-    fn give<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Vec<Alignment> {
-        self.time += 1;
-        let log_time = LogTime(self.time * 1_000_000_000);
-        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
-        let message = Message::from_vec(header, encode(message).unwrap());
-        self.stage.receive(port, &message, &mut self.outputs.output(log_time)).unwrap();
-        self.sent()
-    }
-
-    fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
-        self.give(MAP, robot, &OccupancyGrid { info: map.info(), data: &map.bytes(), ..Default::default() })
-    }
-
-    fn finish(&mut self) -> Vec<Alignment> {
-        self.stage.finish(&mut self.outputs.output(LogTime(self.time))).unwrap();
-        self.sent()
-    }
-
-    fn sent(&mut self) -> Vec<Alignment> {
-        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
-    }
-}
 
 /// West and east.
 fn maps() -> (DrawnMap, DrawnMap) {
@@ -74,7 +36,7 @@ fn proposed(method: &str, transform_a_b: &Pose2) -> Alignment {
 #[test]
 fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map() {
     let (a, b) = maps();
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     let truth = a.transform_to(&b);
     assert_eq!(bench.give(ALIGNMENT, "", &Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
     assert_eq!(bench.give_map("robot1", &a), []);
@@ -94,7 +56,7 @@ fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map(
 #[test]
 fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_last() {
     let (a, b) = maps();
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     let truth = a.transform_to(&b);
@@ -113,7 +75,7 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
 
 #[test]
 fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     let nothing = |method: &str, reason: &str| Alignment {
         accepted: false,
         covariance: [0.0; 9],
@@ -130,7 +92,7 @@ fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
 #[test]
 fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
     let (a, _) = maps();
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give(ALIGNMENT, "", &proposed("tags", &Pose2::identity()));
     let sent = bench.finish();
@@ -139,7 +101,7 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
 
 #[test]
 fn what_cannot_be_read_is_warned_of() {
-    let mut bench = Bench::new();
+    let mut bench = StageBench::new(&super::kind(), "");
     for port in [MAP, ALIGNMENT] {
         let message = Message::from_vec(MessageHeader::default(), vec![0, 1, 0, 0]);
         bench.stage.receive(port, &message, &mut bench.outputs.output(LogTime(9))).unwrap();

@@ -2,7 +2,7 @@
 
 use super::{Agreement, MergeVerifierParameters, Refusal, Verdict, compare, compare_sampled, judge};
 use crate::geometry::{Pose2, pose, row_by_row};
-use crate::icp_refiner::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use gridweave_runtime::ros::Alignment;
 use gridweave_runtime::stage::Parameters;
 use nalgebra::Matrix3;

@@ -1,7 +1,7 @@
 //! Floor plans for tests, and maps of them as robots would draw them.
 
-use super::{FirstGuess, IcpParameters, WallMap};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN};
+use crate::icp_refiner::{FirstGuess, IcpParameters, WallMap};
 use crate::merge_verifier::MapView;
 use gridweave_runtime::ros::MapMetaData;
 use nalgebra::{Matrix3, Vector2, Vector3};
