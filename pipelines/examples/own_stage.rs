@@ -1,0 +1,83 @@
+//! A stage of one's own, without a fork: the command `gridweave` with one more stage kind, `map_inflater`.
+//!
+//!     cargo run --example own_stage -- kinds map_inflater
+//!     cargo run --example own_stage -- golden --partial --cases pipelines/examples/own_stage_golden
+
+use gridweave_runtime::message::Message;
+use gridweave_runtime::ros::cell::is_occupied;
+use gridweave_runtime::ros::{GridPrefix, OccupancyGrid};
+use gridweave_runtime::stage::*;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+fn main() -> std::process::ExitCode {
+    gridweave::command([kind()])
+}
+
+/// The doc comments are what `kinds` shows.
+#[derive(Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct InflaterParameters {
+    /// Cells nearer to an obstacle than this become occupied, metres: the radius of the robot.
+    radius: f64,
+}
+
+impl Default for InflaterParameters {
+    fn default() -> Self {
+        Self { radius: 0.2 }
+    }
+}
+
+impl Parameters for InflaterParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let usable = self.radius > 0.0 && self.radius <= 10.0;
+        (!usable).then(|| ParameterError::new("radius", "must be above 0 m, up to 10 m")).into_iter().collect()
+    }
+}
+
+/// Grows the obstacles of maps by the radius of a robot, so that its centre can be planned for as a point.
+struct Inflater(InflaterParameters);
+
+impl Stage for Inflater {
+    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+        let Ok(map) = message.decode::<OccupancyGrid<'_>>() else {
+            output.warn("messages that are no map are left out");
+            return Ok(());
+        };
+        let (width, height) = (map.info.width as usize, map.info.height as usize);
+        let resolution = f64::from(map.info.resolution);
+        if width.checked_mul(height) != Some(map.cells().len()) || resolution.is_nan() || resolution <= 0.0 {
+            output.warn("maps without width x height cells or without a resolution are left out");
+            return Ok(());
+        }
+        let reach = ((self.0.radius / resolution) as usize).min(width.max(height)) as isize;
+        let within = |x: isize, y: isize| ((x * x + y * y) as f64).sqrt() * resolution <= self.0.radius;
+        let disc: Vec<(isize, isize)> = (-reach..=reach)
+            .flat_map(|y| (-reach..=reach).map(move |x| (x, y)))
+            .filter(|&(x, y)| within(x, y))
+            .collect();
+        let prefix = GridPrefix { header: map.header.clone(), info: map.info };
+        output.send_grid(0, message.robot(), &prefix, |cells| {
+            cells.copy_from_slice(map.cells());
+            for (at, _) in map.cells().iter().enumerate().filter(|(_, cell)| is_occupied(**cell)) {
+                for (x, y) in &disc {
+                    let (column, row) = ((at % width).checked_add_signed(*x), (at / width).checked_add_signed(*y));
+                    if let (Some(column), Some(row)) = (column.filter(|&c| c < width), row.filter(|&r| r < height)) {
+                        cells[row * width + column] = 100;
+                    }
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+fn kind() -> StageKind {
+    StageKind::stage(
+        "map_inflater",
+        "Grows the obstacles of maps by the radius of a robot.",
+        vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps")],
+        vec![OutputPort::new("inflated", PortType::of::<OccupancyGrid<'_>>(), "the maps with grown obstacles")],
+        |parameters: InflaterParameters, _context: &Context| Ok(Inflater(parameters)),
+    )
+}

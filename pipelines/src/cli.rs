@@ -1,0 +1,97 @@
+//! What the command line may say, and who does it.
+
+use crate::commands::{check, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate};
+use crate::status::Status;
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use gridweave_runtime::stage::Registry;
+use std::io::IsTerminal;
+
+/// Merges the maps of several robots that explore one building, each with a map frame of its own.
+///
+/// Exit status: 0 done, 1 failed, 2 bad use, 3 done but something could not be merged.
+#[derive(Debug, Parser)]
+#[command(name = "gridweave", version, max_term_width = 110)]
+pub(crate) struct Cli {
+    /// Say more on standard error.
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run a pipeline.
+    Run(run::RunArgs),
+    /// Merge the maps in logs, or map files, by the shipped pipeline that fits.
+    Merge(merge::MergeArgs),
+    /// Check pipeline files and show everything that is wrong with them.
+    Check(check::CheckArgs),
+    /// Show which stages a pipeline has and how they are wired.
+    Graph(graph::GraphArgs),
+    /// List the stage kinds with their ports and parameters.
+    Kinds(kinds::KindsArgs),
+    /// Show what is in logs: topics, types, counts, times, robots.
+    Info(info::InfoArgs),
+    /// Compare a summary with the truth.
+    Evaluate(evaluate::EvaluateArgs),
+    /// Simulate robots in a building, and write a log and its truth.
+    Simulate(simulate::SimulateArgs),
+    /// Simulate three robots, merge their maps, and compare with the truth.
+    Demo(demo::DemoArgs),
+    /// Run every stage alone on stored input, and compare what it sends with what is expected.
+    Golden(golden::GoldenArgs),
+    /// Play logs into a live pipeline, as the robots would send them.
+    Play(live::PlayArgs),
+    /// Record links of a run that is going on.
+    Record(live::RecordArgs),
+    /// Print the messages of a link of a run that is going on, as they pass.
+    Tap(live::TapArgs),
+    /// Show what the stages of a run that is going on do.
+    Top(live::TopArgs),
+    /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
+    Clean,
+    /// Run one process of a pipeline on the engine `processes`, which starts it.
+    #[command(hide = true)]
+    Stage(processes::StageArgs),
+}
+
+impl Cli {
+    /// Does what the command line says, with the given stage kinds.
+    pub(crate) fn execute(self, registry: &Registry) -> Result<Status> {
+        start_log(self.verbose);
+        match self.command {
+            Command::Run(args) => run::run(&args, registry),
+            Command::Merge(args) => merge::merge(&args, registry),
+            Command::Check(args) => check::check(&args, registry),
+            Command::Graph(args) => graph::graph(&args, registry),
+            Command::Kinds(args) => kinds::kinds(&args, registry),
+            Command::Info(args) => info::info(&args, registry),
+            Command::Evaluate(args) => evaluate::command(&args),
+            Command::Simulate(args) => simulate::simulate(&args, registry),
+            Command::Demo(args) => demo::demo(&args, registry),
+            Command::Golden(args) => golden::golden(&args, registry),
+            Command::Play(args) => live::play(&args, registry),
+            Command::Record(args) => live::record(&args, registry),
+            Command::Tap(args) => live::tap(&args, registry),
+            Command::Top(args) => live::top(&args, registry),
+            Command::Clean => processes::clean(),
+            Command::Stage(args) => processes::stage(&args, registry),
+        }
+    }
+}
+
+/// Sends what the libraries log to standard error: warnings, or all that `RUST_LOG` asks for.
+fn start_log(verbose: bool) {
+    let default = if verbose { "info" } else { "warn" };
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(default));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .with_target(false)
+        .init();
+}

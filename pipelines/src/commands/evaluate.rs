@@ -1,0 +1,30 @@
+//! `gridweave evaluate`: how far a merge is from the truth.
+
+use crate::evaluate::evaluate;
+use crate::status::Status;
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+
+/// What `gridweave evaluate` is told.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// What `--summary` has written.
+    pub(crate) summary: PathBuf,
+    /// The true frames, as `gridweave simulate` writes them.
+    #[arg(long)]
+    pub(crate) truth: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Compares a summary with the truth, and prints how they differ.
+pub(crate) fn command(args: &EvaluateArgs) -> Result<Status> {
+    let evaluation = evaluate(&args.summary, &args.truth)?;
+    match args.json {
+        true => println!("{}", serde_json::to_string_pretty(&evaluation)?),
+        false => print!("{}", evaluation.to_text()),
+    }
+    Ok(Status::Done)
+}

@@ -1,0 +1,142 @@
+//! `gridweave info`: what is in logs.
+
+use crate::shipped;
+use crate::status::Status;
+use crate::table::Table;
+use anyhow::Result;
+use clap::Args;
+use gridweave_logs::info::{self, LogInfo, TopicInfo};
+use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
+use gridweave_runtime::stage::RobotTopics;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// What `gridweave info` is told.
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// Logs (MCAP files or rosbag2 folders).
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Take the topic patterns of this pipeline to tell robots apart.
+    #[arg(long)]
+    pub(crate) pipeline: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Shows what is in logs.
+pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
+    let robots = match &args.pipeline {
+        None => RobotTopics::default(),
+        Some(path) => shipped::load(path, &Overrides::default(), registry)?.robots,
+    };
+    let found = info::inspect(&args.logs, &robots)?;
+    match args.json {
+        true => println!("{}", serde_json::to_string_pretty(&found)?),
+        false => print!("{}", to_text(&found)),
+    }
+    Ok(Status::Done)
+}
+
+fn to_text(found: &LogInfo) -> String {
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_text(found, &mut text);
+    text
+}
+
+fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
+    for file in &found.files {
+        let packed = match file.chunks {
+            0 => "no chunks".to_owned(),
+            chunks => format!("{chunks} chunks ({})", file.compression.join(", ")),
+        };
+        writeln!(text, "{}  {}, {packed}", file.path.display(), size(file.size))?;
+    }
+    let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
+    writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;
+    if !found.topics.is_empty() {
+        write!(text, "\n{}", topic_table(&found.topics, found.start.unwrap_or(0.0)))?;
+    }
+    if !found.robots.is_empty() {
+        let mut table = Table::new(["robot", "maps", "poses", "readings", "tags"]);
+        for (name, robot) in &found.robots {
+            let counts = [robot.maps, robot.poses, robot.readings, robot.tags.len() as u64];
+            table.row(std::iter::once(name.clone()).chain(counts.map(|count| count.to_string())));
+        }
+        write!(text, "\n{table}")?;
+    }
+    if !found.problems.is_empty() {
+        writeln!(text, "\nproblems")?;
+    }
+    found.problems.iter().try_for_each(|problem| writeln!(text, "  - {problem}"))
+}
+
+/// The topics; their times are seconds from `origin` on.
+fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
+    let mut table = Table::new(["topic", "type", "messages", "size", "first s", "last s"]);
+    for topic in topics {
+        table.row([
+            topic.topic.clone(),
+            if topic.type_name.is_empty() { "(no schema)".into() } else { topic.type_name.clone() },
+            topic.messages.to_string(),
+            size(topic.bytes),
+            format!("{:.1}", topic.first - origin),
+            format!("{:.1}", topic.last - origin),
+        ]);
+    }
+    table
+}
+
+/// A number of bytes with a fitting unit.
+fn size(bytes: u64) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} B"),
+        1_000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn the_text_names_topics_robots_and_problems() {
+        let topic = TopicInfo {
+            topic: "/robot1/map".into(),
+            messages: 3,
+            bytes: 1_234_567,
+            first: 10.0,
+            last: 12.5,
+            ..Default::default()
+        };
+        let found = LogInfo {
+            messages: 3,
+            start: Some(10.0),
+            duration: 2.5,
+            topics: vec![topic],
+            robots: BTreeMap::from([("robot1".into(), info::RobotInfo { maps: 3, ..Default::default() })]),
+            problems: vec!["there is no pose of robot1".into()],
+            ..Default::default()
+        };
+        let expected = "\
+3 messages over 2.5 s, from 10.000 s
+
+  topic        type         messages    size  first s  last s
+  /robot1/map  (no schema)         3  1.2 MB      0.0     2.5
+
+  robot   maps  poses  readings  tags
+  robot1     3      0         0     0
+
+problems
+  - there is no pose of robot1
+";
+        assert_eq!(to_text(&found), expected);
+        assert_eq!(to_text(&LogInfo::default()), "0 messages over 0.0 s\n");
+    }
+}

@@ -1,0 +1,37 @@
+//! `gridweave kinds`: the stage kinds with their ports and parameters.
+
+use crate::status::{BadUse, Status};
+use anyhow::Result;
+use clap::Args;
+use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text};
+use gridweave_runtime::stage::Registry;
+
+/// What `gridweave kinds` is told.
+#[derive(Debug, Args)]
+pub(crate) struct KindsArgs {
+    /// Only this kind.
+    pub(crate) kind: Option<String>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Lists the stage kinds.
+pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Status> {
+    let registry = match &args.kind {
+        None => registry.clone(),
+        Some(name) => {
+            let kind = registry.get(name).cloned().ok_or_else(|| {
+                let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
+                BadUse(format!("there is no stage kind `{name}`; the kinds are {}", names.join(", ")))
+            })?;
+            Registry::new([kind])
+        }
+    };
+    match (args.json, &args.kind) {
+        (true, _) => println!("{}", serde_json::to_string_pretty(&kinds_json(&registry))?),
+        (false, Some(_)) => registry.kinds().for_each(|kind| print!("{}", kind_text(kind))),
+        (false, None) => print!("{}", kinds_text(&registry)),
+    }
+    Ok(Status::Done)
+}

@@ -1,0 +1,13 @@
+//! Commands that meet a run that is going on: play into it, record and print what passes, show what it does.
+
+mod link_choice;
+mod play;
+mod record;
+mod running;
+mod tap;
+mod top;
+
+pub(crate) use play::{PlayArgs, play};
+pub(crate) use record::{RecordArgs, record};
+pub(crate) use tap::{TapArgs, tap};
+pub(crate) use top::{TopArgs, top};

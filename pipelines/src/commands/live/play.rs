@@ -1,0 +1,341 @@
+//! `gridweave play`: sends the messages of logs into a live pipeline at their own pace.
+
+use super::running::{RunChoice, Running, find_run};
+use crate::job::progress;
+use crate::status::{BadUse, Status};
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use gridweave_runtime::engine::Feed;
+use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader};
+use gridweave_runtime::stage::{Context, Node, Output, OutputSink, Registry, Sent, Source, StageError};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// What `gridweave play` is told.
+#[derive(Debug, Args)]
+pub(crate) struct PlayArgs {
+    /// The logs: MCAP files, and folders of ROS 2 bags. Several are merged by log time.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) logs: Vec<PathBuf>,
+    /// How much faster than they were recorded; 0 is as fast as the pipeline takes them.
+    #[arg(long, default_value_t = 1.0)]
+    pub(crate) rate: f64,
+    /// Begin again at the end, with later log times, until interrupted.
+    #[arg(long = "loop")]
+    pub(crate) repeat: bool,
+    /// Seconds from the first message at which to begin. The last map of each robot before that is sent first.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    pub(crate) start: f64,
+    /// Seconds from the first message at which to end.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) end: Option<f64>,
+    /// The stage of the pipeline to send as, if it has several whose messages come from outside.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) stage: Option<String>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// The kind of source that reads logs.
+const SOURCE: &str = "mcap_source";
+/// So long the stages of the run may take to connect, and to take what was sent last.
+const READY_TIMEOUT: Duration = Duration::from_secs(10);
+/// While it waits for its time, the player looks so often whether it is to end.
+const LOOK_INTERVAL: Duration = Duration::from_millis(20);
+/// Between the last message and the first of the next turn of a loop, nanoseconds.
+const TURN_GAP: u64 = 100_000_000;
+
+/// Plays logs.
+pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
+    if !(args.rate.is_finite() && args.rate >= 0.0) {
+        return Err(BadUse("--rate must be 0 or more".to_owned()).into());
+    }
+    let player = Player { args, registry, context: Context { stage: "play".to_owned(), ..Default::default() } };
+    // Logs that cannot be read are known before there is a run to play into.
+    player.source()?;
+    let running = find_run(&args.run, registry)?;
+    let stage = external_stage(&running, args.stage.as_deref())?;
+    let player = Player { context: running.pipeline.context(stage), ..player };
+    let stop = progress::stop_on_interrupt("no more is sent");
+    let stopped = Arc::new(AtomicBool::new(false));
+    let feed = Feed::join(&running.run, &running.pipeline, stage, Arc::clone(&stopped))?;
+    if !feed.wait_for_readers(READY_TIMEOUT) {
+        bail!("the stages that read `{}` do not connect", running.pipeline.stages[stage].name);
+    }
+    let is_over = || stop.load(Ordering::Relaxed) || !running.run.is_running();
+    let pace = Rc::new(RefCell::new(Pace::new(args.rate)));
+    let mut sent = player.outputs(&running, stage, &feed, &pace)?;
+    let result = watch_while(&is_over, &stopped, || player.play_all(&mut sent, &pace, &stopped));
+    let messages = pace.borrow().messages;
+    match result {
+        Err(_) if stopped.load(Ordering::Relaxed) => {}
+        other => other?,
+    }
+    let is_taken = feed.wait_until_taken(READY_TIMEOUT);
+    println!("played {messages} messages into {}", running.name());
+    if !running.run.is_running() {
+        bail!("the run ended before the log did");
+    }
+    if !is_taken {
+        bail!("the run has not taken the last of them within {} s", READY_TIMEOUT.as_secs());
+    }
+    Ok(Status::Done)
+}
+
+/// The stage of a run whose messages come from outside.
+fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
+    let stages = running.pipeline.stages.iter().enumerate();
+    let external: Vec<(usize, &str)> = stages
+        .filter(|(_, stage)| stage.kind.is_external())
+        .map(|(index, stage)| (index, stage.name.as_str()))
+        .collect();
+    let names = || external.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(", ");
+    match (name, external.as_slice()) {
+        (_, []) => bail!("{} takes no messages from outside: it has no `live_source`", running.name()),
+        (None, [(stage, _)]) => Ok(*stage),
+        (None, _) => Err(BadUse(format!("choose one of the stages {} with --stage", names())).into()),
+        (Some(name), _) => match external.iter().find(|(_, other)| *other == name) {
+            Some((stage, _)) => Ok(*stage),
+            None => Err(BadUse(format!("no stage `{name}` takes messages from outside; there are {}", names())).into()),
+        },
+    }
+}
+
+/// Does some work while another thread sets `stopped` once `is_over` says so.
+fn watch_while<T>(is_over: &(impl Fn() -> bool + Sync), stopped: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) {
+                if is_over() {
+                    stopped.store(true, Ordering::Relaxed);
+                }
+                thread::sleep(LOOK_INTERVAL);
+            }
+        });
+        let result = work();
+        done.store(true, Ordering::Relaxed);
+        result
+    })
+}
+
+struct Player<'a> {
+    args: &'a PlayArgs,
+    registry: &'a Registry,
+    /// What the pipeline says of robots and topics.
+    context: Context,
+}
+
+impl Player<'_> {
+    /// A source that reads the logs from their beginning.
+    fn source(&self) -> Result<Box<dyn Source>> {
+        let mut parameters = toml::Table::new();
+        let files = self.args.logs.iter().map(|path| {
+            let text = path.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", path.display())))?;
+            Ok(toml::Value::from(text))
+        });
+        parameters.insert("files".into(), files.collect::<Result<Vec<_>, BadUse>>()?.into());
+        parameters.insert("start".into(), self.args.start.into());
+        if let Some(end) = self.args.end {
+            parameters.insert("end".into(), end.into());
+        }
+        let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
+        match kind.make(parameters, &self.context)? {
+            Node::Source(source) => Ok(source),
+            Node::Stage(_) | Node::External => bail!("`{SOURCE}` is no source"),
+        }
+    }
+
+    /// The outputs of the source: each the one of the same name of the stage that it plays for.
+    fn outputs(&self, running: &Running, stage: usize, feed: &Feed, pace: &Rc<RefCell<Pace>>) -> Result<Vec<Sent>> {
+        let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
+        let spec = &running.pipeline.stages[stage];
+        let sent = kind.outputs.iter().map(|output| {
+            let port = spec.kind.outputs.iter().position(|port| port.name == output.name);
+            let link = port.and_then(|port| feed.output(port));
+            let paced = link.map(|link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link }) });
+            let topic = port.and_then(|port| spec.topics.get(port)).cloned().unwrap_or_default();
+            Sent::new(output.name, topic, paced)
+        });
+        Ok(sent.collect())
+    }
+
+    fn play_all(&self, sent: &mut [Sent], pace: &Rc<RefCell<Pace>>, stopped: &Arc<AtomicBool>) -> Result<()> {
+        pace.borrow_mut().stopped = Arc::clone(stopped);
+        loop {
+            let mut source = self.source()?;
+            let (mut warnings, mut log_time) = (BTreeMap::new(), LogTime::MIN);
+            loop {
+                let mut output = Output::new(sent, log_time, &mut warnings);
+                let more = source.next(&mut output)?;
+                log_time = output.log_time();
+                if !more || stopped.load(Ordering::Relaxed) {
+                    break;
+                }
+            }
+            // Another turn has the same to warn of.
+            for (warning, count) in warnings.iter().filter(|_| !pace.borrow().is_repeated()) {
+                tracing::warn!("{count} times: {warning}");
+            }
+            if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_next_turn() {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// When each message is to be sent.
+struct Pace {
+    rate: f64,
+    start: Option<(Instant, LogTime)>,
+    /// The first and the last log time of the logs.
+    span: Option<(LogTime, LogTime)>,
+    /// How much later than in the logs the messages of this turn of a loop are, nanoseconds.
+    later: u64,
+    /// Numbers of channels begin here, so that those of several players are not the same.
+    first_channel: u32,
+    /// How many messages were sent.
+    messages: u64,
+    stopped: Arc<AtomicBool>,
+}
+
+impl Pace {
+    fn new(rate: f64) -> Self {
+        let first_channel = (std::process::id() & 0xf_ffff) << 12;
+        Self { rate, start: None, span: None, later: 0, first_channel, messages: 0, stopped: Arc::default() }
+    }
+
+    /// Waits until it is time for a message.
+    fn wait(&mut self, log_time: LogTime) -> Result<(), StageError> {
+        let (first, last) = self.span.get_or_insert((log_time, log_time));
+        (*first, *last) = ((*first).min(log_time), (*last).max(log_time));
+        let shifted = LogTime(log_time.0.saturating_add(self.later));
+        let (start, first) = *self.start.get_or_insert((Instant::now(), shifted));
+        if self.rate > 0.0 {
+            let after = Duration::try_from_secs_f64(shifted.seconds_since(first).max(0.0) / self.rate);
+            let at = start + after.unwrap_or(Duration::MAX / 4);
+            while let Some(left) = at.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
+                self.check()?;
+                thread::sleep(left.min(LOOK_INTERVAL));
+            }
+        }
+        self.check()
+    }
+
+    fn check(&self) -> Result<(), StageError> {
+        match self.stopped.load(Ordering::Relaxed) {
+            true => Err(StageError::new("play on", "the player was stopped, or the run has ended")),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether the logs have been played before.
+    fn is_repeated(&self) -> bool {
+        self.later > 0
+    }
+
+    /// The logs are to be played again, later. `false` if there was nothing to play, or no more than
+    /// one moment.
+    fn begin_next_turn(&mut self) -> bool {
+        let Some((first, last)) = self.span.filter(|(first, last)| last > first) else { return false };
+        self.later += last.0 - first.0 + TURN_GAP;
+        true
+    }
+}
+
+/// An output that sends each message when its time has come.
+struct Paced {
+    pace: Rc<RefCell<Pace>>,
+    link: Box<dyn OutputSink>,
+}
+
+impl Paced {
+    fn prepare(&self, header: &mut MessageHeader) -> Result<u64, StageError> {
+        let mut pace = self.pace.borrow_mut();
+        if header.flags.contains(MessageFlags::DATA) {
+            pace.wait(header.log_time)?;
+            pace.messages += 1;
+        }
+        header.log_time.0 = header.log_time.0.saturating_add(pace.later);
+        header.publish_time = header.publish_time.saturating_add(pace.later);
+        if header.channel != 0 {
+            header.channel += pace.first_channel;
+        }
+        Ok(pace.later)
+    }
+}
+
+impl OutputSink for Paced {
+    fn send(&mut self, mut header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
+        // What is logged on a channel of its own is of any type, and stays as it is.
+        let has_stamp = header.flags.contains(MessageFlags::DATA) && header.channel == 0;
+        match self.prepare(&mut header)? {
+            later if later > 0 && has_stamp => {
+                let mut bytes = bytes.to_vec();
+                make_later(&mut bytes, later);
+                self.link.send(header, &bytes)
+            }
+            _ => self.link.send(header, bytes),
+        }
+    }
+
+    fn send_in_place(
+        &mut self,
+        mut header: MessageHeader,
+        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
+    ) -> Result<(), StageError> {
+        let later = self.prepare(&mut header)?;
+        self.link.send_in_place(header, &mut |bytes| {
+            write(bytes)?;
+            make_later(bytes, later);
+            Ok(())
+        })
+    }
+}
+
+/// Makes the stamp of a message with a header later, so that the stages do not see time go back. The header is the first
+/// thing in CDR after four bytes that tell the encoding, and the stamp (seconds, nanoseconds) the first thing in it.
+fn make_later(bytes: &mut [u8], nanoseconds: u64) {
+    let Some((seconds, nanos)) = bytes.get_mut(4..12).and_then(|stamp| stamp.split_first_chunk_mut::<4>()) else {
+        return;
+    };
+    let Ok(nanos) = <&mut [u8; 4]>::try_from(nanos) else { return };
+    let stamp = i64::from(i32::from_le_bytes(*seconds)) * 1_000_000_000 + i64::from(u32::from_le_bytes(*nanos));
+    let later = stamp.saturating_add(i64::try_from(nanoseconds).unwrap_or(i64::MAX));
+    *seconds = i32::try_from(later.div_euclid(1_000_000_000)).unwrap_or(i32::MAX).to_le_bytes();
+    *nanos = u32::try_from(later.rem_euclid(1_000_000_000)).unwrap_or_default().to_le_bytes();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::{Header, PoseStamped, decode, encode};
+
+    #[test]
+    fn a_stamp_becomes_later_and_nothing_else_changes() {
+        let message = |time| PoseStamped { header: Header::new(LogTime(time), "robot1/map"), ..Default::default() };
+        let mut bytes = encode(&message(1_999_999_999)).unwrap();
+        make_later(&mut bytes, 1_000_000_002);
+        assert_eq!(decode::<PoseStamped>(&bytes).unwrap(), message(3_000_000_001));
+        make_later(&mut [1, 2, 3], 1);
+    }
+
+    #[test]
+    fn without_a_rate_nothing_waits_and_turns_come_one_after_the_other() {
+        let mut pace = Pace::new(0.0);
+        assert!(!pace.begin_next_turn());
+        for time in [5_000_000_000, 1_000_000_000, 9_000_000_000] {
+            pace.wait(LogTime(time)).unwrap();
+        }
+        assert!(pace.begin_next_turn());
+        assert_eq!(pace.later, 8_000_000_000 + TURN_GAP);
+        pace.stopped.store(true, Ordering::Relaxed);
+        assert!(pace.wait(LogTime(1)).is_err());
+    }
+}

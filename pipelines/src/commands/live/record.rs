@@ -1,0 +1,164 @@
+//! `gridweave record`: writes what passes on links of a run to a log.
+
+use super::link_choice::{Link, all_links, named_links};
+use super::running::{RunChoice, Running, find_run};
+use super::tap::LOOK_INTERVAL;
+use crate::job::progress;
+use crate::status::Status;
+use anyhow::{Result, bail};
+use clap::Args;
+use gridweave_logs::schemas::schema_text;
+use gridweave_logs::sink::{LogOptions, LogWriter};
+use gridweave_runtime::engine::WatchedLink;
+use gridweave_runtime::message::{Channel, Message, MessageFlags};
+use gridweave_runtime::stage::{PortType, Registry};
+use mcap::records::MessageHeader;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// What `gridweave record` is told.
+#[derive(Debug, Args)]
+pub(crate) struct RecordArgs {
+    /// The MCAP file to write.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Which links: STAGE.PORT, or STAGE for all its outputs; all links of the run if none is named.
+    #[arg(value_name = "LINK")]
+    pub(crate) links: Vec<String>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// What has passed is on disk after so long: more is not lost in a crash.
+const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Records links.
+pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
+    LogWriter::check_path(&args.output)?;
+    let running = find_run(&args.run, registry)?;
+    let mut links = Vec::new();
+    for name in &args.links {
+        links.extend(named_links(name, &running.pipeline)?);
+    }
+    if args.links.is_empty() {
+        links = all_links(&running.pipeline);
+    }
+    links.sort_by_key(|link| (link.stage, link.port));
+    links.dedup();
+    let stop = progress::stop_on_interrupt("the recording is being closed");
+    let mut recorders = links.iter().map(|&link| Recorder::new(&running, link)).collect::<Result<Vec<_>>>()?;
+    let mut writer = LogWriter::create(&args.output, LogOptions::default())?;
+    let mut flushed = Instant::now();
+    let mut messages = 0;
+    loop {
+        // What has passed before the run ended is still there after it.
+        let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
+        for recorder in &mut recorders {
+            messages += recorder.record(&mut writer)?;
+        }
+        if is_last_look {
+            break;
+        }
+        if flushed.elapsed() >= FLUSH_INTERVAL {
+            writer.flush()?;
+            flushed = Instant::now();
+        }
+        thread::sleep(LOOK_INTERVAL);
+    }
+    let missed: u64 = recorders.iter().map(|recorder| recorder.link.missed()).sum();
+    let untyped: u64 = recorders.iter().map(|recorder| recorder.untyped).sum();
+    let reason = match (missed, untyped) {
+        (0, 0) => None,
+        (missed, 0) => Some(format!("{missed} messages were missed, as the recorder was too slow for them")),
+        (_, untyped) => Some(format!("{missed} messages were missed, and {untyped} were of an unknown type")),
+    };
+    writer.finish(
+        reason.as_deref().map_or(gridweave_logs::sink::Outcome::Complete, |reason| {
+            gridweave_logs::sink::Outcome::Incomplete(reason)
+        }),
+    )?;
+    println!("recorded {messages} messages of {} links to {}", links.len(), args.output.display());
+    match reason {
+        Some(reason) => bail!("{}: {reason}", args.output.display()),
+        None => Ok(Status::Done),
+    }
+}
+
+/// One link that is recorded.
+struct Recorder {
+    link: WatchedLink,
+    /// The type of its messages, but for those that come on channels of their own.
+    port_type: Option<&'static str>,
+    announced: BTreeMap<u32, Channel>,
+    /// The channels of the log: by the number that was announced, and the topic.
+    channels: BTreeMap<(u32, String), u16>,
+    /// Messages on channels that were announced before it began, which it cannot write.
+    untyped: u64,
+}
+
+impl Recorder {
+    fn new(running: &Running, link: Link) -> Result<Self> {
+        let port_type = match running.pipeline.stages[link.stage].kind.outputs[link.port].port_type {
+            PortType::Ros(name) => Some(name),
+            PortType::Any => None,
+        };
+        let link = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
+        Ok(Self { link, port_type, announced: BTreeMap::new(), channels: BTreeMap::new(), untyped: 0 })
+    }
+
+    /// Writes what has passed. Gives how many messages these were.
+    fn record(&mut self, writer: &mut LogWriter) -> Result<u64> {
+        let mut passed = Vec::new();
+        self.link.take(|_, message| passed.push(message))?;
+        let mut count = 0;
+        for message in &passed {
+            count += u64::from(self.write(message, writer)?);
+        }
+        Ok(count)
+    }
+
+    /// `false` if it is the announcement of a channel, or of no known type.
+    fn write(&mut self, message: &Message, writer: &mut LogWriter) -> Result<bool> {
+        let header = message.header();
+        if header.flags.contains(MessageFlags::CHANNEL) {
+            self.announced.insert(header.channel, Channel::decode(message.bytes())?);
+            return Ok(false);
+        }
+        let topic = header.topic.as_str();
+        let key = (header.channel, topic.to_owned());
+        let channel_id = match self.channels.get(&key) {
+            Some(id) => *id,
+            None => {
+                let Some(channel) = self.channel(header.channel, topic) else {
+                    self.untyped += 1;
+                    return Ok(false);
+                };
+                let id = writer.channel(&channel)?;
+                self.channels.insert(key, id);
+                id
+            }
+        };
+        let (log_time, publish_time) = (header.log_time.0, header.publish_time);
+        let header = MessageHeader { channel_id, sequence: header.log_sequence, log_time, publish_time };
+        writer.write(&header, message.bytes())?;
+        Ok(true)
+    }
+
+    fn channel(&self, number: u32, topic: &str) -> Option<Channel> {
+        if let Some(channel) = self.announced.get(&number) {
+            return Some(channel.clone());
+        }
+        let name = self.port_type?;
+        Some(Channel {
+            topic: topic.to_owned(),
+            message_encoding: "cdr".to_owned(),
+            schema_name: name.to_owned(),
+            schema_encoding: "ros2msg".to_owned(),
+            schema: schema_text(name)?.into_bytes(),
+            ..Default::default()
+        })
+    }
+}

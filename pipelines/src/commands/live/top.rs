@@ -1,0 +1,246 @@
+//! `gridweave top`: what the stages of a run do, redrawn in place.
+
+use super::running::{RunChoice, Running, find_run};
+use crate::job::progress;
+use crate::status::{BadUse, Status};
+use anyhow::Result;
+use clap::Args;
+use gridweave_runtime::engine::{memory_of_process, watch_stages};
+use gridweave_runtime::link::Histogram;
+use gridweave_runtime::link::board::{StageBoard, StageNumber, StageState, WireNumber};
+use gridweave_runtime::pipeline::{Mode, Pipeline, Wire};
+use gridweave_runtime::stage::Registry;
+use serde_json::{Value, json};
+use std::io::IsTerminal;
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// What `gridweave top` is told.
+#[derive(Debug, Args)]
+pub(crate) struct TopArgs {
+    /// Measure for one interval, print that, and end.
+    #[arg(long)]
+    pub(crate) once: bool,
+    /// Print JSON, an object for each interval.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Seconds from one measurement to the next.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    pub(crate) interval: f64,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// So often it is looked whether the user has had enough.
+const LOOK_INTERVAL: Duration = Duration::from_millis(20);
+/// To the upper left corner, and away with what is there.
+const CLEAR: &str = "\x1b[H\x1b[J";
+
+/// Shows what the stages do.
+pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
+    let interval = Duration::try_from_secs_f64(args.interval).ok().filter(|interval| !interval.is_zero());
+    let Some(interval) = interval else { return Err(BadUse("--interval must be above 0 s".to_owned()).into()) };
+    let running = find_run(&args.run, registry)?;
+    let stop = progress::stop_on_interrupt("the display ends");
+    let boards = watch_stages(&running.run, &running.pipeline)?;
+    let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
+    let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
+    let (mut before, mut since) = (look(), Instant::now());
+    loop {
+        while since.elapsed() < interval && !stop.load(Ordering::Relaxed) && running.run.is_running() {
+            thread::sleep(LOOK_INTERVAL.min(interval));
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Ok(Status::Done);
+        }
+        let is_over = !running.run.is_running();
+        let now = look();
+        let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
+        match args.json {
+            true => println!("{}", to_json(&running, &stages)),
+            false => {
+                if is_redrawn {
+                    print!("{CLEAR}");
+                }
+                print!("{}", to_text(&running, &stages));
+            }
+        }
+        if args.once || is_over {
+            if is_over {
+                eprintln!("the run has ended");
+            }
+            return Ok(Status::Done);
+        }
+        (before, since) = (now, Instant::now());
+    }
+}
+
+/// The numbers of a stage at one moment.
+#[derive(Clone, Debug)]
+struct Snapshot {
+    state: StageState,
+    process: u64,
+    messages_in: u64,
+    sent: Vec<u64>,
+    busy: u64,
+    restarts: u64,
+    warnings: u64,
+    /// For each wire: taken, dropped, waiting in the stage.
+    wires: Vec<[u64; 3]>,
+    latency: Histogram,
+}
+
+impl Snapshot {
+    fn new(board: &StageBoard) -> Self {
+        let wire = |wire: usize| {
+            [WireNumber::Taken, WireNumber::Dropped, WireNumber::Waiting].map(|number| board.get_wire(wire, number))
+        };
+        Self {
+            state: board.state(),
+            process: board.get(StageNumber::Process),
+            messages_in: board.get(StageNumber::MessagesIn),
+            sent: (0..board.ports()).map(|port| board.sent(port)).collect(),
+            busy: board.get(StageNumber::Busy),
+            restarts: board.get(StageNumber::Restarts),
+            warnings: board.get(StageNumber::Warnings),
+            wires: (0..board.wires()).map(wire).collect(),
+            latency: board.latency(),
+        }
+    }
+}
+
+/// What a stage has done in an interval.
+#[derive(Clone, Debug)]
+struct StageRates {
+    name: String,
+    state: &'static str,
+    messages_in: u64,
+    messages_out: u64,
+    /// Messages a second.
+    rate_in: f64,
+    rate_out: f64,
+    queue: u64,
+    dropped: u64,
+    /// Seconds from when a message was sent to when it was handled, that 50, 95 and 99 % do not exceed.
+    latency: [Option<f64>; 3],
+    /// 0 to 1.
+    busy: f64,
+    /// Bytes.
+    memory: Option<u64>,
+    restarts: u64,
+    warnings: u64,
+}
+
+fn rates(pipeline: &Pipeline, before: &[Snapshot], now: &[Snapshot], seconds: f64) -> Vec<StageRates> {
+    let sent_on =
+        |wire: &Wire| now.get(wire.from_stage).and_then(|from| from.sent.get(wire.from_port)).copied().unwrap_or(0);
+    let stages = pipeline.stages.iter().zip(before.iter().zip(now));
+    let rates = stages.map(|(spec, (before, now))| {
+        let out = |snapshot: &Snapshot| snapshot.sent.iter().sum::<u64>();
+        let rate = |before: u64, now: u64| now.saturating_sub(before) as f64 / seconds;
+        let wires = spec.inputs.iter().zip(&now.wires);
+        let queue = wires.map(|(wire, [taken, dropped, waiting])| match pipeline.mode {
+            Mode::Replay => *waiting,
+            Mode::Live => waiting + sent_on(wire).saturating_sub(taken + dropped),
+        });
+        let latency = now.latency.since(&before.latency);
+        StageRates {
+            name: spec.name.clone(),
+            state: state(now.state),
+            messages_in: now.messages_in,
+            messages_out: out(now),
+            rate_in: rate(before.messages_in, now.messages_in),
+            rate_out: rate(out(before), out(now)),
+            queue: queue.sum(),
+            dropped: now.wires.iter().map(|[_, dropped, _]| dropped).sum(),
+            latency: [0.5, 0.95, 0.99].map(|share| latency.quantile(share)),
+            busy: (rate(before.busy, now.busy) * 1e-9).min(1.0),
+            memory: u32::try_from(now.process)
+                .ok()
+                .filter(|_| now.state == StageState::Running)
+                .and_then(memory_of_process),
+            restarts: now.restarts,
+            warnings: now.warnings,
+        }
+    });
+    rates.collect()
+}
+
+fn state(state: StageState) -> &'static str {
+    match state {
+        StageState::Absent => "absent",
+        StageState::Starting => "starting",
+        StageState::Running => "running",
+        StageState::Ended => "ended",
+    }
+}
+
+fn to_json(running: &Running, stages: &[StageRates]) -> Value {
+    let stage = |stage: &StageRates| {
+        json!({
+            "name": stage.name,
+            "state": stage.state,
+            "messages_in": stage.messages_in,
+            "messages_out": stage.messages_out,
+            "in_per_s": stage.rate_in,
+            "out_per_s": stage.rate_out,
+            "queue": stage.queue,
+            "dropped": stage.dropped,
+            "latency_s": { "p50": stage.latency[0], "p95": stage.latency[1], "p99": stage.latency[2] },
+            "busy": stage.busy,
+            "memory": stage.memory,
+            "restarts": stage.restarts,
+            "warnings": stage.warnings,
+        })
+    };
+    json!({
+        "run": running.run.prefix,
+        "pipeline": running.pipeline.name,
+        "stages": stages.iter().map(stage).collect::<Vec<_>>(),
+    })
+}
+
+fn to_text(running: &Running, stages: &[StageRates]) -> String {
+    let heads = [
+        "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB", "STARTS",
+        "WARNINGS",
+    ];
+    let mut rows = vec![heads.map(str::to_owned)];
+    for stage in stages {
+        let milliseconds =
+            |seconds: Option<f64>| seconds.map_or_else(|| "-".to_owned(), |time| format!("{:.2}", time * 1e3));
+        let [p50, p95, p99] = stage.latency.map(milliseconds);
+        rows.push([
+            stage.name.clone(),
+            stage.state.to_owned(),
+            format!("{:.1}", stage.rate_in),
+            format!("{:.1}", stage.rate_out),
+            stage.queue.to_string(),
+            stage.dropped.to_string(),
+            p50,
+            p95,
+            p99,
+            format!("{:.1} %", stage.busy * 100.0),
+            stage.memory.map_or_else(|| "-".to_owned(), |bytes| format!("{:.1}", bytes as f64 * 1e-6)),
+            (stage.restarts + u64::from(stage.state != "absent")).to_string(),
+            stage.warnings.to_string(),
+        ]);
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
+    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+    let mut page = format!("{}\n", running.name());
+    for row in &rows {
+        for (column, cell) in row.iter().enumerate() {
+            let width = widths[column];
+            // Names to the left, numbers to the right.
+            match column {
+                0 => page.push_str(&format!("{cell:width$}")),
+                1 => page.push_str(&format!("  {cell:width$}")),
+                _ => page.push_str(&format!("  {cell:>width$}")),
+            }
+        }
+        page.push('\n');
+    }
+    page
+}

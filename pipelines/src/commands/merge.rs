@@ -1,0 +1,63 @@
+//! `gridweave merge`: maps are merged by the shipped pipeline that fits the inputs.
+
+use crate::job::Job;
+use crate::job::RunOptions;
+use crate::job::{Inputs, is_yaml};
+use crate::status::{BadUse, Status};
+use anyhow::{Context, Result};
+use clap::Args;
+use gridweave_runtime::stage::Registry;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// What `gridweave merge` is told.
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// Logs (MCAP files or rosbag2 folders), or map files (map_server YAML), each the map of a robot that is called as the
+    /// file.
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// What to write: a log or, when it is called FILE.yaml, the merged map alone (map_server YAML, with the image beside
+    /// it).
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+/// Merges the maps of logs or of map files.
+pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
+    let pipeline = match Inputs::of(&args.inputs)? {
+        Inputs::Logs => "auto_merge",
+        Inputs::MapFiles => "map_file_merge",
+    };
+    let merge_to = |log: &Path, options: &RunOptions| {
+        let job = Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output: Some(log), options, registry };
+        job.run_and_print()
+    };
+    if !is_yaml(&args.output) {
+        return merge_to(&args.output, &args.options);
+    }
+    // A map alone is asked for: the log that it is taken from goes when that is done.
+    let folder = TempDir::with_prefix("gridweave-merge-").context("cannot make a folder for the log of the merge")?;
+    merge_to(&folder.path().join("merge.mcap"), &with_map(args)?)
+}
+
+/// The options of a merge whose output is the map. An error if they speak of a log, which there is none of.
+fn with_map(args: &MergeArgs) -> Result<RunOptions, BadUse> {
+    let output = args.output.display();
+    if let Some(map) = &args.options.map {
+        let text = format!("{output} and {} would be the same map: leave --map out, or give -o a log", map.display());
+        return Err(BadUse(text));
+    }
+    if args.options.results_only {
+        let text = format!("--results-only says what to leave out of a log, and {output} is a map: leave it out");
+        return Err(BadUse(text));
+    }
+    Ok(RunOptions {
+        map: Some(args.output.clone()),
+        // A picture is drawn from the maps that were merged; nothing else needs them.
+        results_only: args.options.picture.is_none(),
+        ..args.options.clone()
+    })
+}

@@ -1,0 +1,14 @@
+//! The commands of `gridweave`: a file or a folder each, with what it is told and what it does.
+
+pub(crate) mod check;
+pub(crate) mod demo;
+pub(crate) mod evaluate;
+pub(crate) mod golden;
+pub(crate) mod graph;
+pub(crate) mod info;
+pub(crate) mod kinds;
+pub(crate) mod live;
+pub(crate) mod merge;
+pub(crate) mod processes;
+pub(crate) mod run;
+pub(crate) mod simulate;

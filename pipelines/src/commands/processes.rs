@@ -1,0 +1,41 @@
+//! Runs of several processes: the process that a supervisor starts, and what killed runs leave behind.
+
+use crate::shipped;
+use crate::status::Status;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use gridweave_runtime::engine::{self, processes};
+use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
+use std::path::PathBuf;
+
+/// What `gridweave stage` is told.
+#[derive(Debug, Args)]
+pub(crate) struct StageArgs {
+    /// The folder of the run.
+    pub(crate) folder: PathBuf,
+    /// The process: a name that stages of the pipeline have in `process`, or a stage's name.
+    pub(crate) process: String,
+}
+
+/// Runs one process of a run that a supervisor has started.
+pub(crate) fn stage(args: &StageArgs, registry: &Registry) -> Result<Status> {
+    let load = |path: &std::path::Path, registry: &Registry| {
+        shipped::load(path, &Overrides::default(), registry).map_err(|error| error.to_string())
+    };
+    processes::run_process(&args.folder, &args.process, registry, load).map_err(|error| anyhow!(error))?;
+    Ok(Status::Done)
+}
+
+/// Removes what killed runs have left.
+pub(crate) fn clean() -> Result<Status> {
+    let cleaned = engine::clean()?;
+    for left in &cleaned {
+        let megabytes = left.bytes as f64 / 1e6;
+        println!("removed {} with {} files of shared memory ({megabytes:.1} MB)", left.folder.display(), left.files);
+    }
+    if cleaned.is_empty() {
+        println!("nothing is left over");
+    }
+    Ok(Status::Done)
+}

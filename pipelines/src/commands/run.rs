@@ -1,0 +1,40 @@
+//! `gridweave run`: a pipeline file, or one that ships.
+
+use crate::job::{Job, RunOptions, is_yaml};
+use crate::status::{BadUse, Status};
+use anyhow::Result;
+use clap::Args;
+use gridweave_runtime::stage::Registry;
+use std::path::PathBuf;
+
+/// What `gridweave run` is told.
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// A pipeline file, or the name of a shipped pipeline such as `tag_merge`.
+    pub(crate) pipeline: PathBuf,
+    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time. Or, for a pipeline that reads map files,
+    /// the map of a robot (map_server YAML).
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) input: Vec<PathBuf>,
+    /// The log to write.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+/// Runs a pipeline file.
+pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Status> {
+    if let Some(output) = args.output.as_deref().filter(|output| is_yaml(output)) {
+        let text = format!("`run` writes a log to {0}: for the merged map say --map {0}", output.display());
+        return Err(BadUse(text).into());
+    }
+    let job = Job {
+        pipeline: &args.pipeline,
+        inputs: &args.input,
+        output: args.output.as_deref(),
+        options: &args.options,
+        registry,
+    };
+    job.run_and_print()
+}

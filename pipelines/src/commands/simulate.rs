@@ -1,0 +1,69 @@
+//! `gridweave simulate`.
+
+use crate::job::progress::Progress;
+use crate::shipped;
+use crate::status::{BadUse, Status};
+use anyhow::{Context, Result};
+use clap::Args;
+use gridweave_runtime::engine::{self, EngineKind, RunReport};
+use gridweave_runtime::pipeline::{Mode, Overrides};
+use gridweave_runtime::stage::Registry;
+use std::path::{Path, PathBuf};
+
+/// What `gridweave simulate` is told.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// The log to write.
+    #[arg(short, long, value_name = "LOG")]
+    pub(crate) output: PathBuf,
+    /// Write the truth here; by default beside the log, as LOG.truth.json.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
+    /// How many robots.
+    #[arg(long)]
+    pub(crate) robots: Option<u32>,
+    /// Another seed makes another building and other drives.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Set a parameter of the simulation; `gridweave kinds simulator` lists them.
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
+}
+
+/// Simulates robots, and writes a log and its truth.
+pub(crate) fn simulate(args: &SimulateArgs, registry: &Registry) -> Result<Status> {
+    let mut overrides = Overrides::default();
+    overrides.seed = Some(args.seed);
+    if let Some(robots) = args.robots {
+        overrides.set_for_kind("simulator", "robots", i64::from(robots));
+    }
+    for setting in &args.set {
+        overrides.set(&format!("simulator.{setting}")).map_err(|error| BadUse(error.to_string()))?;
+    }
+    let truth = args.truth.clone().unwrap_or_else(|| beside(&args.output));
+    let report = write_log(&args.output, &truth, overrides, registry)?;
+    let messages: u64 = report.stages.iter().map(|stage| stage.messages_in).sum();
+    println!("wrote {messages} messages to {} and the truth to {}", args.output.display(), truth.display());
+    Ok(Status::Done)
+}
+
+/// Writes a simulated log and its truth.
+pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, registry: &Registry) -> Result<RunReport> {
+    let path = log.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", log.display())))?;
+    overrides.set_for_kind("mcap_sink", "file", path);
+    let pipeline = shipped::load(Path::new("simulate"), &overrides, registry)?;
+    let progress = Progress::new(Mode::Replay);
+    let report = engine::run(&pipeline, EngineKind::Threads, &progress);
+    progress.finish();
+    let report = report?;
+    for (_, result) in report.results("simulator") {
+        let text = serde_json::to_string_pretty(result)? + "\n";
+        std::fs::write(truth, text).with_context(|| format!("cannot write the truth {}", truth.display()))?;
+    }
+    Ok(report)
+}
+
+/// `a/b.mcap` -> `a/b.truth.json`.
+fn beside(log: &Path) -> PathBuf {
+    log.with_extension("truth.json")
+}

@@ -1,0 +1,367 @@
+//! The summary of a run against the truth.
+//!
+//! A robot counts as **right** if its map lies within 0.5 m and 1 degree of the truth, the distance taken at the middle
+//! of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. In a log of robots
+//! that have nothing to do with each other (the truth has no frames) to refuse is right, and every merged
+//! robot is wrong. The reference robot is not counted.
+
+use crate::table::Table;
+use anyhow::{Context, Result, bail};
+use nalgebra::{Isometry2, Point2, Vector2};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Metres. A robot is right below this error at the middle of its map.
+const RIGHT_METRES: f64 = 0.5;
+/// Degrees. A robot is right below this error of its direction.
+const RIGHT_DEGREES: f64 = 1.0;
+
+/// What became of one robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It is merged, and where it belongs.
+    Right,
+    /// It is merged, and not where it belongs.
+    Wrong,
+    /// It is not merged, though it belongs to the others.
+    Refused,
+    /// It is not merged, and does not belong to the others.
+    RightlyRefused,
+    /// The truth says nothing of it.
+    NoTruth,
+}
+
+/// One robot of the summary, measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RobotResult {
+    /// The robot.
+    pub robot: String,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Error at the middle of its map, metres; none if there is nothing to compare.
+    pub error_m: Option<f64>,
+    /// Error of its direction, degrees, 0 to 180; none if there is nothing to compare.
+    pub error_deg: Option<f64>,
+    /// Why it is not merged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// `T_true_found`: where its map frame was found to be, in the frame where it is in truth; none if there is nothing
+    /// to compare. It takes a point of the map from its true place to its found one.
+    #[serde(skip)]
+    pub transform_true_found: Option<Isometry2<f64>>,
+}
+
+/// A run, measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The robot that the others are placed by; none if the run had no robots.
+    pub reference: Option<String>,
+    /// Whether the truth says that the robots belong together.
+    pub related: bool,
+    /// All other robots, by name.
+    pub robots: Vec<RobotResult>,
+    /// How many robots are right.
+    pub right: usize,
+    /// How many are wrong.
+    pub wrong: usize,
+    /// How many are not merged, rightly or not.
+    pub refused: usize,
+}
+
+#[derive(Deserialize)]
+struct Summary {
+    reference: Option<String>,
+    frames: BTreeMap<String, Frame>,
+    #[serde(default)]
+    unmerged: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+struct Truth {
+    /// None if the robots have nothing to do with each other.
+    frames: BTreeMap<String, Frame>,
+    /// The middle of each robot's last map, in its map frame.
+    #[serde(default)]
+    centres: BTreeMap<String, [f64; 2]>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Frame {
+    x: f64,
+    y: f64,
+    yaw: f64,
+}
+
+impl Frame {
+    fn pose(self) -> Isometry2<f64> {
+        Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
+    }
+}
+
+/// Measures the summary that `gridweave run --summary` wrote against a truth file. Where the truth has no frames, the
+/// robots are taken as unrelated. A robot for which the truth gives no middle is measured at its map's origin.
+///
+/// # Errors
+/// A file cannot be read or is not what it should be; or the truth knows robots, but not the summary's reference.
+pub fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
+    let run: Summary = read(summary, "the summary of a run")?;
+    let truth_file: Truth = read(truth, "a truth file")?;
+    measure(&run, &truth_file).with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
+}
+
+/// A JSON file.
+fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
+    let text = std::fs::read(path).with_context(|| format!("cannot read {what}: {}", path.display()))?;
+    serde_json::from_slice(&text).with_context(|| format!("{} is not {what}", path.display()))
+}
+
+fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
+    let related = !truth.frames.is_empty();
+    let transform_reference_truth = match &run.reference {
+        Some(reference) if related => match truth.frames.get(reference) {
+            Some(frame) => frame.pose().inverse(),
+            None => {
+                let known: Vec<&str> = truth.frames.keys().map(String::as_str).collect();
+                bail!("the run's reference `{reference}` is not in the truth, which has {}", known.join(", "));
+            }
+        },
+        _ => Isometry2::identity(),
+    };
+    let names: BTreeSet<&String> = run.frames.keys().chain(run.unmerged.keys()).chain(truth.frames.keys()).collect();
+    let one = |robot: &&String| {
+        let found = run.frames.get(*robot).map(|frame| frame.pose());
+        let expected = truth.frames.get(*robot).map(|frame| transform_reference_truth * frame.pose());
+        let errors = found.zip(expected).map(|(found, expected)| {
+            let [x, y] = truth.centres.get(*robot).copied().unwrap_or_default();
+            let metres = (found * Point2::new(x, y) - expected * Point2::new(x, y)).norm();
+            (metres, (expected.inverse() * found).rotation.angle().abs().to_degrees())
+        });
+        let outcome = match (found, errors) {
+            (Some(_), Some((metres, degrees))) if metres < RIGHT_METRES && degrees < RIGHT_DEGREES => Outcome::Right,
+            (Some(_), Some(_)) => Outcome::Wrong,
+            (Some(_), None) if related => Outcome::NoTruth,
+            (Some(_), None) => Outcome::Wrong,
+            (None, _) if expected.is_some() => Outcome::Refused,
+            (None, _) if related => Outcome::NoTruth,
+            (None, _) => Outcome::RightlyRefused,
+        };
+        let reason = match found {
+            Some(_) => None,
+            None => Some(run.unmerged.get(*robot).cloned().unwrap_or_else(|| "it is not in the summary".into())),
+        };
+        RobotResult {
+            robot: (*robot).clone(),
+            outcome,
+            error_m: errors.map(|(metres, _)| metres),
+            error_deg: errors.map(|(_, degrees)| degrees),
+            reason,
+            transform_true_found: found.zip(expected).map(|(found, expected)| expected.inverse() * found),
+        }
+    };
+    let robots: Vec<RobotResult> =
+        names.iter().filter(|robot| Some(**robot) != run.reference.as_ref()).map(one).collect();
+    let count = |outcomes: &[Outcome]| robots.iter().filter(|robot| outcomes.contains(&robot.outcome)).count();
+    Ok(Evaluation {
+        reference: run.reference.clone(),
+        related,
+        right: count(&[Outcome::Right]),
+        wrong: count(&[Outcome::Wrong]),
+        refused: count(&[Outcome::Refused, Outcome::RightlyRefused]),
+        robots,
+    })
+}
+
+impl Outcome {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Wrong => "wrong",
+            Self::Refused => "refused",
+            Self::RightlyRefused => "rightly refused",
+            Self::NoTruth => "no truth",
+        }
+    }
+}
+
+impl Evaluation {
+    /// A table for people: a line for every robot, and the counts.
+    pub fn to_text(&self) -> String {
+        let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+        let mut table = Table::new(["robot", "outcome", "error m", "error deg", ""]);
+        for robot in &self.robots {
+            table.row([
+                robot.robot.clone(),
+                robot.outcome.words().to_owned(),
+                number(robot.error_m),
+                number(robot.error_deg),
+                robot.reason.clone().unwrap_or_default(),
+            ]);
+        }
+        let unrelated = if self.related { "" } else { "; the truth has no frames: the robots are taken as unrelated" };
+        let reference = self.reference.as_deref().unwrap_or("none");
+        let Self { right, wrong, refused, .. } = self;
+        format!("{table}right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn run(summary: &Value, truth: &Value) -> Result<Evaluation> {
+        let folder = tempfile::tempdir().unwrap();
+        let (summary_path, truth_path) = (folder.path().join("summary.json"), folder.path().join("truth.json"));
+        std::fs::write(&summary_path, summary.to_string()).unwrap();
+        std::fs::write(&truth_path, truth.to_string()).unwrap();
+        evaluate(&summary_path, &truth_path)
+    }
+
+    fn outcomes(evaluation: &Evaluation) -> Vec<(&str, Outcome)> {
+        evaluation.robots.iter().map(|robot| (robot.robot.as_str(), robot.outcome)).collect()
+    }
+
+    fn frame(x: f64, y: f64, yaw: f64) -> Value {
+        json!({"x": x, "y": y, "yaw": yaw})
+    }
+
+    fn truth() -> Value {
+        json!({
+            "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.0), "robot3": frame(-4.0, 2.0, -2.0)},
+            "centres": {"robot1": [0.0, 0.0], "robot2": [20.0, 0.0], "robot3": [0.0, 0.0]},
+            "tags": {"tag1": [1.0, 2.0]},
+        })
+    }
+
+    #[test]
+    fn errors_are_taken_at_the_middle_of_the_map() {
+        let summary = json!({
+            "reference": "robot1",
+            "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.01), "robot3": frame(-4.0, 2.3, -2.0)},
+            "unmerged": {}, "alignments": [], "stages": {},
+        });
+        let evaluation = run(&summary, &truth()).unwrap();
+        assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Right), ("robot3", Outcome::Right)]);
+        let robot2 = &evaluation.robots[0];
+        assert!((robot2.error_m.unwrap() - 0.2).abs() < 1e-3, "0.01 rad over 20 m");
+        assert!((robot2.error_deg.unwrap() - 0.573).abs() < 1e-3);
+        assert!((evaluation.robots[1].error_m.unwrap() - 0.3).abs() < 1e-9);
+        assert_eq!((evaluation.right, evaluation.wrong, evaluation.refused), (2, 0, 0));
+    }
+
+    #[test]
+    fn too_far_or_too_much_turned_is_wrong_and_unmerged_is_refused() {
+        for wrong in [frame(10.5, 5.0, 1.0), frame(10.0, 5.0, 1.02), frame(10.0, 5.0, -2.0)] {
+            let summary = json!({
+                "reference": "robot1",
+                "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": wrong},
+                "unmerged": {"robot3": "no tags in common"},
+            });
+            let evaluation = run(&summary, &truth()).unwrap();
+            assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Wrong), ("robot3", Outcome::Refused)]);
+            assert_eq!(evaluation.robots[1].reason.as_deref(), Some("no tags in common"));
+            assert_eq!((evaluation.right, evaluation.wrong, evaluation.refused), (0, 1, 1));
+        }
+    }
+
+    #[test]
+    fn the_truth_is_turned_to_the_reference_of_the_run() {
+        let place = |x, y, yaw| Isometry2::new(Vector2::new(x, y), yaw);
+        let (robot2, robot3) = (place(10.0, 5.0, 1.0), place(-4.0, 2.0, -2.0));
+        let seen = |pose: Isometry2<f64>| frame(pose.translation.x, pose.translation.y, pose.rotation.angle());
+        let summary = json!({
+            "reference": "robot2",
+            "frames": {
+                "robot1": seen(robot2.inverse()), "robot2": frame(0.0, 0.0, 0.0), "robot3": seen(robot2.inverse() * robot3),
+            },
+        });
+        let evaluation = run(&summary, &truth()).unwrap();
+        assert_eq!(outcomes(&evaluation), [("robot1", Outcome::Right), ("robot3", Outcome::Right)]);
+        assert!(evaluation.robots.iter().all(|robot| robot.error_m.unwrap() < 1e-9));
+    }
+
+    #[test]
+    fn unrelated_robots_are_rightly_refused_and_wrongly_merged() {
+        let refused = json!({
+            "reference": "robot1", "frames": {"robot1": frame(0.0, 0.0, 0.0)}, "unmerged": {"robot2": "other tags"},
+        });
+        let merged = json!({
+            "reference": "robot1", "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(1.0, 0.0, 0.0)},
+        });
+        let truth = json!({"frames": {}});
+        let evaluation = run(&refused, &truth).unwrap();
+        assert_eq!(outcomes(&evaluation), [("robot2", Outcome::RightlyRefused)]);
+        assert!(!evaluation.related);
+        assert_eq!(outcomes(&run(&merged, &truth).unwrap()), [("robot2", Outcome::Wrong)]);
+    }
+
+    #[test]
+    fn robots_that_only_one_of_the_files_knows_are_listed() {
+        let summary = json!({
+            "reference": "robot1",
+            "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot7": frame(1.0, 0.0, 0.0)},
+            "unmerged": {"robot8": "no tags"},
+        });
+        let evaluation = run(&summary, &truth()).unwrap();
+        let expected = [
+            ("robot2", Outcome::Refused),
+            ("robot3", Outcome::Refused),
+            ("robot7", Outcome::NoTruth),
+            ("robot8", Outcome::NoTruth),
+        ];
+        assert_eq!(outcomes(&evaluation), expected);
+        assert_eq!(evaluation.refused, 2);
+    }
+
+    #[test]
+    fn a_reference_that_the_truth_does_not_know_is_an_error() {
+        let summary = json!({"reference": "robot9", "frames": {"robot9": frame(0.0, 0.0, 0.0)}});
+        let error = format!("{:#}", run(&summary, &truth()).unwrap_err());
+        assert!(error.contains("`robot9` is not in the truth, which has robot1, robot2, robot3"), "{error}");
+    }
+
+    #[test]
+    fn files_that_are_none_are_clear_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let (good, bad) = (folder.path().join("good.json"), folder.path().join("bad.json"));
+        std::fs::write(&good, r#"{"reference": null, "frames": {}}"#).unwrap();
+        for (text, part) in [
+            ("{", "EOF"),
+            ("[]", "invalid"),
+            (r#"{"reference": "robot1"}"#, "missing field `frames`"),
+            (r#"{"reference": "a", "frames": {"a": {"x": null, "y": 0, "yaw": 0}}}"#, "null"),
+        ] {
+            std::fs::write(&bad, text).unwrap();
+            let error = format!("{:#}", evaluate(&bad, &good).unwrap_err());
+            assert!(error.contains("bad.json is not the summary of a run") && error.contains(part), "{error}");
+        }
+        std::fs::write(&bad, r#"{"frames": 3}"#).unwrap();
+        let error = format!("{:#}", evaluate(&good, &bad).unwrap_err());
+        assert!(error.contains("bad.json is not a truth file"), "{error}");
+        let none = folder.path().join("none.json");
+        for (summary, truth) in [(&none, &good), (&good, &none)] {
+            let error = format!("{:#}", evaluate(summary, truth).unwrap_err());
+            assert!(error.contains("none.json"), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_table_has_a_line_for_every_robot() {
+        let summary = json!({
+            "reference": "robot1",
+            "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.0)},
+            "unmerged": {"robot3": "no tags in common"},
+        });
+        let text = run(&summary, &truth()).unwrap().to_text();
+        let expected = "  robot   outcome  error m  error deg
+  robot2  right      0.000      0.000
+  robot3  refused        -          -  no tags in common
+right 1, wrong 0, refused 1 (reference robot1)
+";
+        assert_eq!(text, expected);
+    }
+}

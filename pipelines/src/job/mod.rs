@@ -1,0 +1,116 @@
+//! One run of a pipeline, as the commands put it together from what the user says.
+
+mod export;
+mod inputs;
+mod options;
+mod outputs;
+pub(crate) mod progress;
+
+pub(crate) use inputs::{Inputs, is_yaml};
+pub(crate) use options::RunOptions;
+
+use crate::shipped;
+use crate::status::{BadUse, Status};
+use crate::summary::Summary;
+use anyhow::{Context, Result};
+use export::Exports;
+use gridweave_logs::sink::close_log;
+use gridweave_runtime::engine::{self, EngineKind};
+use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
+use gridweave_runtime::stage::Registry;
+use progress::Progress;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// One run of a pipeline, put together from what the command line says.
+pub(crate) struct Job<'a> {
+    /// A pipeline file, or the name of a shipped pipeline.
+    pub(crate) pipeline: &'a Path,
+    /// What the only source of logs, or of map files, reads; if none, what the pipeline says.
+    pub(crate) inputs: &'a [PathBuf],
+    /// What the only sink writes; if none, what the pipeline says.
+    pub(crate) output: Option<&'a Path>,
+    pub(crate) options: &'a RunOptions,
+    /// The stage kinds that the pipeline may name.
+    pub(crate) registry: &'a Registry,
+}
+
+impl Job<'_> {
+    /// Runs the pipeline, writes all that was asked for, and prints the summary.
+    pub(crate) fn run_and_print(&self) -> Result<Status> {
+        let summary = self.run()?;
+        match self.options.json {
+            true => println!("{}", summary.to_json()),
+            false => print!("{}", summary.to_text()),
+        }
+        Ok(match summary.has_unmerged() {
+            true => Status::NotAllMerged,
+            false => Status::Done,
+        })
+    }
+
+    /// Runs the pipeline and writes all that was asked for.
+    pub(crate) fn run(&self) -> Result<Summary> {
+        let exports = Exports::new(self.options, self.output)?;
+        let pipeline = shipped::load(self.pipeline, &self.overrides()?, self.registry)?;
+        outputs::check(&pipeline, self.options)?;
+        let progress = Progress::new(pipeline.mode);
+        let start = SystemTime::now();
+        let by_mode = match pipeline.mode {
+            Mode::Replay => EngineKind::default(),
+            Mode::Live => EngineKind::Processes,
+        };
+        let report = engine::run(&pipeline, self.options.engine.unwrap_or(by_mode), &progress);
+        progress.finish();
+        if let Err(error) = &report {
+            close_outputs(&pipeline, start, &error.to_string());
+        }
+        let report = report?;
+        let summary = Summary::new(&report);
+        if let Some(path) = &self.options.summary {
+            std::fs::write(path, summary.to_json() + "\n")
+                .with_context(|| format!("cannot write the summary {}", path.display()))?;
+        }
+        if pipeline.mode == Mode::Replay {
+            summary.check_for_maps()?;
+        }
+        exports.write(&summary, &pipeline.robots)?;
+        Ok(summary)
+    }
+
+    fn overrides(&self) -> Result<Overrides> {
+        let mut overrides = Overrides::default();
+        overrides.reference.clone_from(&self.options.reference);
+        overrides.seed = self.options.seed;
+        if !self.inputs.is_empty() {
+            let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
+            overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);
+        }
+        if let Some(output) = self.output {
+            overrides.set_for_kind("mcap_sink", "file", text_of(output)?);
+        }
+        if self.options.results_only {
+            overrides.set_for_kind("mcap_sink", "pass_input", false);
+        }
+        for setting in &self.options.set {
+            overrides.set(setting).map_err(|error| BadUse(error.to_string()))?;
+        }
+        Ok(overrides)
+    }
+}
+
+fn text_of(path: &Path) -> Result<String> {
+    let text = path.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", path.display())))?;
+    Ok(text.to_owned())
+}
+
+/// A sink whose process was killed has not closed its output: it is closed here, and says why it is not complete.
+fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
+    for stage in pipeline.stages.iter().filter(|stage| stage.kind.name == "mcap_sink") {
+        let Some(file) = stage.parameters.get("file").and_then(|file| file.as_str()).map(Path::new) else { continue };
+        let is_of_this_run = file.metadata().and_then(|file| file.modified()).is_ok_and(|time| time >= start);
+        if is_of_this_run && let Err(error) = close_log(file, reason) {
+            tracing::warn!("the output {} has no end: {error}", file.display());
+        }
+    }
+}

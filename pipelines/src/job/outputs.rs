@@ -1,0 +1,87 @@
+//! What a run would write, checked before it begins: no input is overwritten, no file is written twice, and every folder
+//! is there.
+
+use super::options::RunOptions;
+use crate::status::BadUse;
+use anyhow::{Result, bail};
+use gridweave_logs::map_file;
+use gridweave_runtime::pipeline::Pipeline;
+use std::path::{Path, PathBuf, absolute};
+
+/// Checks all files that the sinks of a pipeline and the options name.
+///
+/// # Errors
+///
+/// One of them is an input, under whatever name, or lies in one; two are the same; the folder of one is not there.
+pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
+    let inputs = inputs(pipeline);
+    let outputs = outputs(pipeline, options);
+    for (index, output) in outputs.iter().enumerate() {
+        if inputs.iter().any(|input| is_or_holds(input, output)) {
+            let text = format!("{} is an input, and would be overwritten: choose another output", output.display());
+            return Err(BadUse(text).into());
+        }
+        if outputs[..index].iter().any(|other| is_same_name(other, output)) {
+            let text = format!("{} would be written twice: choose another name for one of them", output.display());
+            return Err(BadUse(text).into());
+        }
+        let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            bail!("cannot write {}: there is no folder {}; make it first", output.display(), folder.display());
+        }
+    }
+    Ok(())
+}
+
+/// All that the sources read.
+fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
+    let mut inputs = files_of(pipeline, "mcap_source", "files");
+    for map in files_of(pipeline, "map_file_source", "files") {
+        // A map that cannot be read is an error of the run.
+        inputs.extend(map_file::image_of(&map));
+        inputs.push(map);
+    }
+    inputs
+}
+
+/// All that the sinks and the command write.
+fn outputs(pipeline: &Pipeline, options: &RunOptions) -> Vec<PathBuf> {
+    let mut outputs = files_of(pipeline, "mcap_sink", "file");
+    let image = options.map.as_deref().map(map_file::image_beside);
+    outputs.extend([&options.map, &image, &options.picture, &options.summary].into_iter().flatten().cloned());
+    outputs
+}
+
+/// The files that the stages of a kind have in a parameter: one, or a list.
+fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
+    let stages = pipeline.stages.iter().filter(|stage| stage.kind.name == kind);
+    let values = stages.filter_map(|stage| stage.parameters.get(parameter));
+    let texts = values.flat_map(|value| match value {
+        toml::Value::Array(values) => values.iter().filter_map(|value| value.as_str()).collect(),
+        value => Vec::from_iter(value.as_str()),
+    });
+    texts.filter(|text| !text.is_empty()).map(PathBuf::from).collect()
+}
+
+/// Whether two paths lead to the same file, or the first to a folder that holds the second, through links as well.
+fn is_or_holds(input: &Path, output: &Path) -> bool {
+    let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
+    output.starts_with(&input) || same_file(&input, &output)
+}
+
+/// Whether two paths name the same file, which may not be there.
+fn is_same_name(one: &Path, other: &Path) -> bool {
+    matches!((absolute(one), absolute(other)), (Ok(one), Ok(other)) if one == other)
+}
+
+#[cfg(unix)]
+fn same_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let (Ok(a), Ok(b)) = (a.metadata(), b.metadata()) else { return false };
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+#[cfg(not(unix))]
+fn same_file(a: &Path, b: &Path) -> bool {
+    a == b
+}

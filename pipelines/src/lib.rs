@@ -1,0 +1,51 @@
+//! The command `gridweave`, and the library behind it: the place where all stages and pipelines of Gridweave come together.
+//!
+//! A program with stages of its own is the same command with more kinds:
+//!
+//! ```no_run
+//! # use gridweave_runtime::stage::StageKind;
+//! # fn my_kind() -> StageKind { unimplemented!() }
+//! fn main() -> std::process::ExitCode {
+//!     gridweave::command([my_kind()])
+//! }
+//! ```
+
+#![forbid(unsafe_code)]
+// A command prints its results.
+#![allow(clippy::print_stdout)]
+
+mod cli;
+mod commands;
+pub mod evaluate;
+mod job;
+pub mod shipped;
+mod status;
+pub mod summary;
+pub mod table;
+
+use clap::Parser;
+use gridweave_runtime::pipeline::PipelineErrors;
+use gridweave_runtime::stage::StageKind;
+use status::{BadUse, Status};
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+/// Does what the command line says, with the stage kinds of Gridweave and the given ones; of two kinds with one name the
+/// given one counts. The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be
+/// merged.
+pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
+    let registry = shipped::registry(kinds);
+    match cli::Cli::parse().execute(&registry) {
+        Ok(Status::Done) => ExitCode::SUCCESS,
+        Ok(Status::BadUse) => ExitCode::from(2),
+        Ok(Status::Failed) => ExitCode::from(1),
+        Ok(Status::NotAllMerged) => ExitCode::from(3),
+        Err(error) => {
+            match error.downcast_ref::<PipelineErrors>() {
+                Some(errors) => eprintln!("{}", errors.render(std::io::stderr().is_terminal())),
+                None => eprintln!("error: {error:#}"),
+            }
+            ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })
+        }
+    }
+}

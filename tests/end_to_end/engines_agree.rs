@@ -1,0 +1,63 @@
+//! The same log, pipeline and seed give the same output, byte for byte, on every engine and any number of cores.
+
+use crate::support::{gridweave_with, logs_in, real_logs, simulate};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Every way to run that must not matter.
+const WAYS: [(&str, &str); 7] = [
+    ("single", "1"),
+    ("single", "4"),
+    ("threads", "1"),
+    ("threads", "2"),
+    ("threads", "4"),
+    ("threads-ipc", "2"),
+    ("processes", "2"),
+];
+
+/// Merges `log` in every way, and fails the test where the outputs differ.
+fn assert_same_output(log: &Path) {
+    let folder = TempDir::new().unwrap();
+    let mut first: Option<(Vec<u8>, String)> = None;
+    for (engine, threads) in WAYS {
+        let output = folder.path().join("out.mcap");
+        let args = ["merge", log.to_str().unwrap(), "-o", output.to_str().unwrap(), "--engine", engine];
+        let ended = gridweave_with(folder.path(), &args, &[("RAYON_NUM_THREADS", threads)]);
+        assert!(ended.status == 0 || ended.status == 3, "{ended:#?}");
+        let bytes = std::fs::read(&output).unwrap();
+        let (expected, way) = first.get_or_insert_with(|| (bytes.clone(), format!("{engine} {threads}")));
+        let differs = expected.iter().zip(&bytes).position(|(a, b)| a != b);
+        assert!(
+            *expected == bytes,
+            "{}: {way} and {engine} {threads} differ at byte {differs:?}; lengths {} and {}",
+            log.display(),
+            expected.len(),
+            bytes.len()
+        );
+    }
+}
+
+#[test]
+fn on_a_simulated_log() {
+    let folder = TempDir::new().unwrap();
+    let (log, _) = simulate(folder.path(), "robots.mcap", &["--robots", "3", "--seed", "5"]);
+    assert_same_output(&log);
+}
+
+#[test]
+fn on_real_logs() {
+    let Some(folder) = real_logs() else { return };
+    let logs: Vec<PathBuf> = logs_in(&folder);
+    logs.iter().for_each(|log| assert_same_output(log));
+}
+
+#[test]
+fn a_simulation_depends_on_its_seed_only() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, seed: &str| {
+        let (log, truth) = simulate(folder.path(), name, &["--robots", "2", "--seed", seed]);
+        (std::fs::read(log).unwrap(), std::fs::read(truth).unwrap())
+    };
+    assert!(write("a.mcap", "3") == write("b.mcap", "3"));
+    assert!(write("a.mcap", "3") != write("c.mcap", "4"));
+}

@@ -1,0 +1,70 @@
+//! When there is no room left in shared memory, a run of processes ends with the stage's name and the cause.
+use crate::support::{Ended, gridweave_program, outcome, processes, run_folder, start_program};
+use std::fs;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Poses with long names of frames, a megabyte each. The sink takes all in order, and so keeps them in shared
+/// memory when the stage hangs.
+const LARGE: &str = r#"
+[pipeline]
+name = "large"
+batch = false
+
+[stages.source]
+kind = "troubled_source"
+count = 200
+size = 1_000_000
+pause = 500_000
+
+[stages.hangs]
+kind = "troubled_stage"
+inputs = ["source"]
+what = "hang"
+at = 2
+
+[stages.output]
+kind = "mcap_sink"
+inputs = ["source", "hangs"]
+"#;
+
+/// Mounts a small file system at /dev/shm, for this program and those it starts only, and then does what it is told.
+const SMALL: &str = "mount -t tmpfs -o size=4m tmpfs /dev/shm && exec \"$0\" \"$@\"";
+/// The same, and nothing fits into it.
+const FULL: &str =
+    "mount -t tmpfs -o size=64k tmpfs /dev/shm && { cat /dev/zero >/dev/shm/zeros 2>&-; exec \"$0\" \"$@\"; }";
+
+/// A run with such a /dev/shm, in a folder of its own: how it ended, and its number. None if this machine does not let a
+/// program have one.
+fn run_with(shared_memory: &str) -> Option<(TempDir, Ended, u32)> {
+    let own = ["--user", "--map-root-user", "--mount"];
+    if !Command::new("unshare").args(own).arg("true").status().is_ok_and(|status| status.success()) {
+        eprintln!("skipped: this machine does not let a program have a /dev/shm of its own");
+        return None;
+    }
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("large.toml"), LARGE).unwrap();
+    let program = gridweave_program();
+    let run = ["run", "large.toml", "-o", "out.mcap", "--engine", "processes"];
+    let args = [&own, &["sh", "-c", shared_memory, program.to_str().unwrap()][..], &run].concat();
+    let run = start_program("unshare".as_ref(), folder.path(), &args, &[]);
+    let id = run.id();
+    let ended = run.wait();
+    assert_eq!(processes(id), []);
+    assert!(!run_folder(id).exists());
+    Some((folder, ended, id))
+}
+
+#[test]
+fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
+    let Some((folder, ended, _)) = run_with(SMALL) else { return };
+    ended.assert(1, &["stage `source`", "/dev/shm"]);
+    let (reason, _) = outcome(&folder.path().join("out.mcap"));
+    assert!(reason.contains("/dev/shm"), "{reason}");
+}
+
+#[test]
+fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
+    let Some((_, ended, id)) = run_with(FULL) else { return };
+    ended.assert(1, &["cannot make the board of the run", &format!("/dev/shm/gw{id}_0_board"), "No space left"]);
+}

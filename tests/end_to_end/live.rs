@@ -1,0 +1,171 @@
+//! Live runs: what is sent arrives, what is dropped is counted, and an interrupt loses nothing.
+use crate::support::{Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, read, signal, start, wait_until};
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn an_interrupt_ends_a_live_run_when_all_that_was_sent_is_handled() {
+    let run = Run::start("live", &[]);
+    let (log, truth) = run.simulate();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages into live"]);
+    let done = run.interrupt();
+    done.assert_done();
+    done.ended.assert(0, &["merged 2 of 2 robots"]);
+    done.assert_right(&truth);
+    let (sent, output) = (read(&log), done.output());
+    for topic in ["/robot1/map", "/robot2/map", "/robot1/tag_ranges", "/robot2/tag_ranges"] {
+        assert!(sent[topic] == output[topic], "{topic}");
+    }
+    assert_eq!(counts(&sent), counts(&output));
+    assert!(output.contains_key("/map") && output.contains_key("/tf_static"), "{:?}", output.keys());
+}
+
+#[test]
+fn players_that_are_killed_leave_room_for_others_and_the_run_goes_on() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    for _ in 0..11 {
+        let before = run.number("output", "messages_in");
+        let player = run.command(&["play", LOG, "--rate", "20"]);
+        wait_until("messages", || run.number("output", "messages_in") > before);
+        signal(player.id(), "KILL");
+        player.wait();
+    }
+    let before = run.number("output", "messages_in");
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
+    assert_eq!(run.number("output", "messages_in"), before + 7857);
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+}
+
+#[test]
+fn a_run_can_be_ended_while_robots_send() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let players = [(); 2].map(|()| run.command(&["play", LOG, "--rate", "0", "--loop"]));
+    wait_until("messages", || run.number("output", "messages_in") > 5000);
+    let done = run.interrupt();
+    done.assert_done();
+    players.into_iter().for_each(|player| player.wait().assert(1, &["the run ended before the log did"]));
+    let [given] = done.numbers("output", ["messages_in"]);
+    assert_eq!(done.output().values().map(Vec::len).sum::<usize>() as u64, given);
+}
+
+/// Numbers of a stage that is slow, at its start as well: messages sent to it, given to it, and dropped.
+fn slow_stage(overflow: &str, count: u64) -> [u64; 3] {
+    let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000", "pause = 100");
+    let settings = [&format!("source.count={count}"), "middle.pause=3000", "middle.start_pause=500000"];
+    let run = Run::start(&text, &settings.map(|setting| ["--set", setting]).concat());
+    let done = run.wait();
+    done.assert_done();
+    let [sent] = done.numbers("source", ["messages_out"]);
+    let [given, dropped] = done.numbers("middle", ["messages_in", "dropped"]);
+    let written: usize = done.output().values().map(Vec::len).sum();
+    assert_eq!(written as u64, given);
+    [sent, given, dropped]
+}
+
+#[test]
+fn a_link_that_drops_the_oldest_does_not_slow_its_sender_and_counts_every_drop() {
+    let [sent, given, dropped] = slow_stage("\"drop_oldest\"", 3000);
+    assert_eq!((sent, given + dropped), (3000, 3000), "{given} were given, {dropped} dropped");
+    // A sender that waited would give its reader all of them.
+    assert!(dropped > given, "{given} were given, {dropped} dropped");
+}
+
+#[test]
+fn a_link_that_waits_drops_nothing() {
+    assert_eq!(slow_stage("\"wait\"", 400), [400, 400, 0]);
+}
+
+#[test]
+fn what_two_players_send_at_once_all_arrives() {
+    let run = Run::start(RECEIVE, &[]);
+    let (log, _) = run.simulate();
+    let players = [("--end", "80.0137"), ("--start", "80.0137")]
+        .map(|(name, value)| run.command(&["play", LOG, "--rate", "0", name, value]));
+    players.into_iter().for_each(|player| player.wait().assert(0, &["played"]));
+    let done = run.interrupt();
+    done.assert_done();
+    assert_eq!(done.numbers("output", ["dropped"]), [0]);
+    let (sent, mut output) = (read(&log), done.output());
+    assert_eq!(counts(&sent), counts(&output));
+    for topic in ["/robot1/tag_ranges", "/robot2/tag_ranges"] {
+        let arrived = output.get_mut(topic).unwrap();
+        arrived.sort();
+        let mut sent = sent[topic].clone();
+        sent.sort();
+        assert!(sent == *arrived, "{topic}");
+    }
+    // Three of each robot, and again the last one before the second player began.
+    assert_eq!(output["/robot1/map"].len() + output["/robot2/map"].len(), 8);
+}
+
+#[test]
+fn a_log_that_is_played_in_a_loop_goes_on_in_time_until_interrupted() {
+    let run = Run::start(RECEIVE, &[]);
+    let (log, _) = run.simulate();
+    let player = run.command(&["play", LOG, "--rate", "0", "--loop"]);
+    wait_until("third turn", || run.number("robots", "messages_out") > 2 * 7857);
+    signal(player.id(), "INT");
+    player.wait().assert(0, &["played"]);
+    let done = run.interrupt();
+    done.assert_done();
+    let (sent, output) = (read(&log), done.output());
+    for (topic, messages) in &output {
+        let back = |messages: &[(u64, Vec<u8>)]| {
+            messages.windows(2).map(|pair| pair[0].0.saturating_sub(pair[1].0)).max().unwrap_or_default()
+        };
+        assert!(messages.len() > 2 * sent[topic].len() - 1, "{topic}: {}", messages.len());
+        assert!(back(messages) <= back(&sent[topic]), "{topic} goes back by {} ns", back(messages));
+    }
+    // The stamps in the messages go on as well: seconds, after the encoding.
+    let stamp = |(_, bytes): &(u64, Vec<u8>)| i32::from_le_bytes(bytes[4..8].try_into().unwrap());
+    let poses = &output[POSES];
+    assert!(stamp(&poses[poses.len() - 1]) > stamp(&poses[0]) + 170);
+}
+
+#[test]
+fn a_pipeline_that_takes_nothing_from_outside_cannot_be_played_into() {
+    let run = Run::start(TROUBLED, &[]);
+    run.simulate();
+    run.command(&["play", LOG]).wait().assert(1, &["takes no messages from outside: it has no `live_source`"]);
+    run.command(&["play", "nothing.mcap"]).wait().assert(1, &["nothing.mcap"]);
+    run.command(&["play", LOG, "--rate=-1"]).wait().assert(2, &["--rate must be 0 or more"]);
+    run.interrupt().assert_done();
+}
+
+#[test]
+fn a_live_pipeline_runs_as_processes_only() {
+    for engine in ["single", "threads", "threads-ipc"] {
+        let done = Run::start(RECEIVE, &["--engine", engine]).wait();
+        assert!(done.ended.status == 1 || done.ended.status == 2, "{:#?}", done.ended);
+        done.ended.assert(done.ended.status, &["live", "processes"]);
+    }
+}
+
+/// What `check` says of the live pipeline with something else in the place of a text.
+fn check(from: &str, to: &str) -> Ended {
+    let folder = TempDir::new().unwrap();
+    let text = TROUBLED.replacen(from, to, 1);
+    assert_ne!(text, TROUBLED);
+    fs::write(folder.path().join("pipeline.toml"), text).unwrap();
+    start(folder.path(), &["check", "pipeline.toml"], &[]).wait()
+}
+
+#[test]
+fn settings_of_live_pipelines_are_checked() {
+    check("mode = \"live\"\n", "")
+        .assert(2, &["`overflow` is for live pipelines", "`restart` is for live pipelines", "write `mode = \"live\"`"]);
+    let words = ["wrong value of `overflow`", "expected one of `wait`, `drop_oldest`", "did you mean `drop_oldest`?"];
+    check("\"wait\"", "\"drop_oldst\"").assert(2, &words);
+    let words = ["`troubled_source` has no output `ou`", "did you mean `out`?"];
+    check("\"wait\"", "{ ou = \"wait\" }").assert(2, &words);
+    check("\"wait\"", "{ out = \"drop_oldest\" }").assert(0, &["no errors"]);
+    check("\"wait\"", "3").assert(2, &["`overflow`", "text in quotes, or a table by output port"]);
+    let words = ["wrong value of `restart`", "expected one of `never`, `on_failure`"];
+    check("\"on_failure\"", "\"always\"").assert(2, &words);
+    let words = ["wrong value of `mode`", "expected one of `replay`, `live`", "did you mean `live`?"];
+    check("\"live\"", "\"life\"").assert(2, &words);
+}

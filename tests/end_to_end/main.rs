@@ -1,0 +1,26 @@
+//! The command as a user runs it, from its arguments to the files and the shared memory that it leaves.
+//!
+//! All tests run one program: the command with the stages that ship, and with `troubled_stages` that get into trouble when
+//! they are told to.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
+mod bad_input;
+mod engines_agree;
+mod full_shared_memory;
+mod golden;
+mod golden_mistakes;
+mod golden_runner;
+mod interrupted;
+mod live;
+mod live_restarts;
+mod looking_on;
+mod map_merge;
+mod merge_map_files;
+mod merge_output;
+mod methods;
+mod mirrored_tag;
+mod processes;
+mod real_logs;
+mod support;
+mod two_tags;

@@ -1,0 +1,148 @@
+//! Maps are merged by the maps alone, rightly or not at all.
+
+use crate::support::{Ended, gridweave, gridweave_with, logs_in, real_logs, simulate};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Merges logs by their maps alone. Gives how that ended, and the summary.
+fn merge(folder: &Path, logs: &[&Path], more: &[&str]) -> (Ended, Value) {
+    let mut args = vec!["run", "map_merge", "--output", "out.mcap", "--summary", "summary.json"];
+    args.extend(logs.iter().flat_map(|log| ["--input", log.to_str().unwrap()]));
+    args.extend(more);
+    let ended = gridweave(folder, &args);
+    (ended, serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap())
+}
+
+fn evaluate(folder: &Path, truth: &Path) -> Value {
+    let args = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap(), "--json"];
+    serde_json::from_str(&gridweave(folder, &args).stdout).unwrap()
+}
+
+/// A part of a log: the maps of one robot.
+fn maps_of(robot: &str, folder: &Path, seed: &str) -> std::path::PathBuf {
+    let (log, _) = simulate(folder, &format!("{seed}.mcap"), &["--robots", "2", "--seed", seed]);
+    let part = folder.join(format!("{robot}-{seed}.mcap"));
+    let topics = format!("out.only_topics=[\"/{robot}/map\"]");
+    let args = ["run", "cut", "--input", log.to_str().unwrap(), "--output", part.to_str().unwrap(), "--set", &topics];
+    gridweave(folder, &args).assert(0, &[]);
+    part
+}
+
+#[test]
+fn simulated_maps_are_merged_without_tags() {
+    let folder = TempDir::new().unwrap();
+    let args = ["--robots", "2", "--seed", "1001", "--set", "tags=0"];
+    let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+    let (ended, summary) = merge(folder.path(), &[&log], &[]);
+    ended.assert(0, &["merged 2 of 2"]);
+    let evaluation = evaluate(folder.path(), &truth);
+    assert_eq!((&evaluation["right"], &evaluation["wrong"]), (&Value::from(1), &Value::from(0)), "{evaluation}");
+    let alignment = &summary["alignments"][0];
+    assert_eq!(alignment["method"], "maps+icp");
+    let reason = alignment["reason"].as_str().unwrap();
+    for part in ["the maps alone", "m of walls in common", "the maps confirm it"] {
+        assert!(reason.contains(part), "{reason}");
+    }
+}
+
+#[test]
+fn maps_of_two_buildings_are_not_merged() {
+    let folder = TempDir::new().unwrap();
+    for (seed_a, seed_b) in [("1001", "1002"), ("1012", "1013")] {
+        let (a, b) = (maps_of("robot1", folder.path(), seed_a), maps_of("robot2", folder.path(), seed_b));
+        let (ended, summary) = merge(folder.path(), &[&a, &b], &[]);
+        ended.assert(3, &["not merged: robot2"]);
+        let said = summary["unmerged"]["robot2"].as_str().unwrap();
+        let reasons = ["the maps do not confirm it", "the maps have too little in common"];
+        assert!(reasons.iter().any(|reason| said.contains(reason)), "{said}");
+    }
+}
+
+#[test]
+fn the_output_is_the_same_on_every_engine_and_any_number_of_cores() {
+    let folder = TempDir::new().unwrap();
+    let args = ["--robots", "2", "--seed", "1003", "--set", "snapshots=1"];
+    let (log, _) = simulate(folder.path(), "in.mcap", &args);
+    let mut first: Option<Vec<u8>> = None;
+    for (engine, threads) in [("single", "1"), ("threads", "2"), ("processes", "4")] {
+        let args = ["run", "map_merge", "--input", log.to_str().unwrap(), "--output", "out.mcap", "--engine", engine];
+        gridweave_with(folder.path(), &args, &[("RAYON_NUM_THREADS", threads)]).assert(0, &[]);
+        let bytes = fs::read(folder.path().join("out.mcap")).unwrap();
+        assert!(*first.get_or_insert_with(|| bytes.clone()) == bytes, "{engine} with {threads} threads differs");
+    }
+}
+
+#[test]
+fn every_pair_of_the_real_logs_is_right_and_no_other_is_merged() {
+    let Some(logs) = real_logs() else { return };
+    let folder = TempDir::new().unwrap();
+    for log in logs_in(&logs) {
+        let name = log.file_stem().unwrap().to_str().unwrap();
+        let (ended, summary) = merge(folder.path(), &[&log], &["--results-only"]);
+        let truth = log.with_extension("truth.json");
+        if !truth.exists() {
+            ended.assert(3, &["not merged"]);
+            println!("{name}: not merged: {}", summary["unmerged"]["robot2"]);
+            assert_eq!(summary["frames"].as_object().unwrap().len(), 1);
+            continue;
+        }
+        assert_eq!(ended.status, 0, "{name}: {ended:#?}");
+        let evaluation = evaluate(folder.path(), &truth);
+        println!("{name}: {evaluation}");
+        assert_eq!((&evaluation["wrong"], &evaluation["refused"]), (&Value::from(0), &Value::from(0)), "{name}");
+    }
+}
+
+#[test]
+fn without_enough_tags_a_merge_goes_by_the_maps() {
+    let folder = TempDir::new().unwrap();
+    for tags in ["0", "36"] {
+        let args = ["--robots", "2", "--seed", "1001", "--set", &format!("tags={tags}")];
+        let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+        let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--summary", "summary.json", "--results-only"];
+        gridweave(folder.path(), &args).assert(0, &["merged 2 of 2"]);
+        let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+        let alignment = &summary["alignments"][0];
+        let method = if tags == "0" { "maps+icp" } else { "tags+directions+icp" };
+        assert_eq!(alignment["method"], method, "{alignment}");
+        assert_eq!(
+            alignment["reason"].as_str().unwrap().contains("found by the maps, too"),
+            tags != "0",
+            "{alignment}"
+        );
+        assert_eq!(evaluate(folder.path(), &truth)["right"], 1);
+    }
+}
+
+#[test]
+fn robots_in_a_building_whose_parts_are_alike_are_not_merged_wrongly() {
+    let folder = TempDir::new().unwrap();
+    for layout in ["symmetric", "repeated"] {
+        let layout = format!("layout=\"{layout}\"");
+        let mut args = vec!["--robots", "3", "--seed", "901"];
+        for setting in ["tags=0", "snapshots=1", "overlap=0.6", "clutter=0.02", &layout] {
+            args.extend(["--set", setting]);
+        }
+        let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+        let (ended, summary) = merge(folder.path(), &[&log], &[]);
+        ended.assert(3, &["not merged: robot2", "it cannot be told which is right"]);
+        assert_eq!(evaluate(folder.path(), &truth)["wrong"], 0, "{summary}");
+    }
+}
+
+#[test]
+fn one_tag_decides_between_two_places_that_look_the_same() {
+    let folder = TempDir::new().unwrap();
+    let mut args = vec!["--robots", "2", "--seed", "905"];
+    for setting in ["tags=1", "snapshots=1", "overlap=1.0", "clutter=0.0", "layout=\"symmetric\""] {
+        args.extend(["--set", setting]);
+    }
+    let (log, truth) = simulate(folder.path(), "in.mcap", &args);
+    let (ended, _) = merge(folder.path(), &[&log], &[]);
+    ended.assert(3, &["it cannot be told which is right"]);
+    let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--summary", "summary.json"];
+    gridweave(folder.path(), &args).assert(0, &["found by the tags, too"]);
+    assert_eq!(evaluate(folder.path(), &truth)["right"], 1);
+}

@@ -1,0 +1,88 @@
+//! Merging by the maps alone: how often it is right, whether it is ever wrong, and what the verifier's score means.
+//!
+//! - **random**: pairs of robots of one simulated building, with any overlap, drift, noise, furniture and resolution.
+//! - **unrelated**: robots of two buildings.
+//! - **alike**: buildings that look the same after half a turn, or all of whose rooms are alike.
+//! - **recorded**: logs with their truth.
+//! - **teams**: many robots in one building.
+//!
+//! The parameters and weights of the stages were chosen on the tuning seeds. What is published is measured on others.
+
+mod calibration;
+mod pairs;
+mod team;
+mod trial;
+mod worlds;
+
+use super::results::Results;
+use anyhow::Result;
+use calibration::Calibration;
+use clap::Args;
+use gridweave::table::Table;
+use gridweave_runtime::stage::Registry;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use trial::PairTrial;
+use worlds::Seeds;
+
+/// What `gridweave experiment align` is told.
+#[derive(Debug, Args)]
+pub(super) struct AlignArgs {
+    /// Random pairs of one building.
+    #[arg(long, default_value_t = 500)]
+    pairs: u64,
+    /// Pairs of two buildings.
+    #[arg(long, default_value_t = 200)]
+    unrelated: u64,
+    /// Pairs in buildings whose parts are alike.
+    #[arg(long, default_value_t = 50)]
+    alike: u64,
+    /// Numbers of robots in one building.
+    #[arg(long, value_delimiter = ',', default_values_t = [4, 8, 16, 32, 64])]
+    teams: Vec<u32>,
+    /// A folder with recorded logs: LOG.mcap, each with its LOG.truth.json if its robots belong together.
+    #[arg(long, value_name = "FOLDER")]
+    logs: Option<PathBuf>,
+    /// The pipeline that merges.
+    #[arg(long, default_value = "map_merge")]
+    pipeline: String,
+    /// Use the seeds on which the parameters were chosen.
+    #[arg(long)]
+    tuning: bool,
+    /// Fit the weights of the verifier's score to the outcomes, and print them. They must not be taken from seeds that are to
+    /// be judged by.
+    #[arg(long, requires = "tuning")]
+    calibrate: bool,
+}
+
+/// Does the experiment.
+pub(super) fn run(args: &AlignArgs, registry: &Registry, results: &mut Results) -> Result<()> {
+    let seeds = if args.tuning { Seeds::Tuning } else { Seeds::HeldOut };
+    let all = |count: u64, one: &(dyn Fn(u64) -> Result<Vec<PairTrial>> + Sync)| -> Result<Vec<PairTrial>> {
+        let trials: Vec<Vec<PairTrial>> = (0..count).into_par_iter().map(one).collect::<Result<_>>()?;
+        Ok(trials.into_iter().flatten().collect())
+    };
+    let merge = |world: &worlds::PairWorld| trial::merge(world, &args.pipeline, registry);
+    let random = all(args.pairs, &|number| merge(&worlds::random(seeds, number, registry)?))?;
+    if !random.is_empty() {
+        pairs::report_random(&random, results)?;
+    }
+    let unrelated = all(args.unrelated, &|number| merge(&worlds::unrelated(seeds, number, registry)?))?;
+    let alike = all(args.alike, &|number| merge(&worlds::alike(seeds, number, registry)?))?;
+    let mut recorded = Vec::new();
+    for log in args.logs.iter().map(|folder| worlds::recorded(folder)).collect::<Result<Vec<_>>>()?.iter().flatten() {
+        recorded.extend(merge(log)?);
+    }
+    let sets = [("random", &random), ("two buildings", &unrelated), ("parts alike", &alike), ("recorded", &recorded)];
+    if sets.iter().any(|(_, trials)| !trials.is_empty()) {
+        results.table("align", "Merging by the maps alone", &pairs::totals(&sets))?;
+        let mut table = Table::new(PairTrial::HEADS);
+        for (set, trial) in sets.iter().flat_map(|(set, trials)| trials.iter().map(move |trial| (*set, trial))) {
+            table.row(trial.cells(set));
+        }
+        results.data("align_trials", &table)?;
+        let judged: Vec<&PairTrial> = sets.iter().flat_map(|(_, trials)| trials.iter()).collect();
+        Calibration::of(&judged).report(args.calibrate, results)?;
+    }
+    team::run(&args.teams, seeds, &args.pipeline, registry, results)
+}

@@ -1,0 +1,165 @@
+//! What became of one pair of robots.
+
+use super::worlds::PairWorld;
+use crate::log::last_maps;
+use anyhow::{Context, Result};
+use gridweave::evaluate::{Evaluation, Outcome, evaluate};
+use gridweave_logs::map_file::GridMap;
+use gridweave_runtime::engine::RunReport;
+use gridweave_runtime::stage::Registry;
+use nalgebra::{Isometry2, Point2, Vector2};
+use serde_json::{Value, json};
+
+/// What the verifier went by, and whether what it judged best is right.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Judged {
+    /// Its score.
+    pub(super) score: f64,
+    /// Metres of wall that agree.
+    pub(super) wall_on_wall: f64,
+    /// Metres of wall on free space.
+    pub(super) wall_on_free: f64,
+    /// The most evidence elsewhere, as a share of that here.
+    pub(super) evidence_elsewhere: f64,
+    /// Whether it lies within 0.5 m and 1 degree of the truth, accepted or not.
+    pub(super) is_right: bool,
+}
+
+/// One pair of robots.
+#[derive(Clone, Debug)]
+pub(super) struct PairTrial {
+    name: String,
+    pub(super) outcome: Outcome,
+    pub(super) error_m: Option<f64>,
+    pub(super) error_deg: Option<f64>,
+    reason: String,
+    /// Share of the smaller map's known area that the other map knows, too; none if the truth does not tell.
+    pub(super) overlap: Option<f64>,
+    pub(super) drift: Option<f64>,
+    /// None if no place was proposed.
+    pub(super) judged: Option<Judged>,
+}
+
+impl PairTrial {
+    pub(super) const HEADS: [&'static str; 13] = [
+        "set",
+        "world",
+        "outcome",
+        "overlap",
+        "drift",
+        "error m",
+        "error deg",
+        "score",
+        "wall on wall m",
+        "wall on free m",
+        "evidence elsewhere",
+        "best is right",
+        "reason",
+    ];
+
+    pub(super) fn cells(&self, set: &str) -> Vec<String> {
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.5}"));
+        let judged = |value: fn(&Judged) -> f64| number(self.judged.as_ref().map(value));
+        vec![
+            set.to_owned(),
+            self.name.clone(),
+            self.outcome.words().to_owned(),
+            number(self.overlap),
+            number(self.drift),
+            number(self.error_m),
+            number(self.error_deg),
+            judged(|judged| judged.score),
+            judged(|judged| judged.wall_on_wall),
+            judged(|judged| judged.wall_on_free),
+            judged(|judged| judged.evidence_elsewhere),
+            self.judged.map_or_else(String::new, |judged| judged.is_right.to_string()),
+            self.reason.clone(),
+        ]
+    }
+}
+
+/// Merges a world. Gives a trial for every robot but the reference; what was judged is known where there is one pair.
+pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Result<Vec<PairTrial>> {
+    let merge = pair.world.merge(pipeline, &[], registry)?;
+    let is_pair = merge.evaluation.robots.len() == 1;
+    let judged = if is_pair { judged(pair, &merge.report)? } else { None };
+    let overlap = if is_pair && merge.evaluation.related { overlap(pair)? } else { None };
+    let Evaluation { robots, .. } = merge.evaluation;
+    let trial = |robot: gridweave::evaluate::RobotResult| PairTrial {
+        name: format!("{}, {}", pair.name, robot.robot),
+        outcome: robot.outcome,
+        error_m: robot.error_m,
+        error_deg: robot.error_deg,
+        reason: robot.reason.unwrap_or_default(),
+        overlap,
+        drift: pair.drift,
+        judged,
+    };
+    Ok(robots.into_iter().map(trial).collect())
+}
+
+/// What the verifier has said of the only pair, and whether its best hypothesis is right, even where it was refused.
+fn judged(pair: &PairWorld, report: &RunReport) -> Result<Option<Judged>> {
+    let evidence = report.results("merge_verifier").find_map(|(_, report)| report["pairs"].get(0).cloned());
+    let alignment = report.results("frame_solver").find_map(|(_, report)| report["alignments"].get(0).cloned());
+    let Some((evidence, alignment)) = evidence.zip(alignment) else { return Ok(None) };
+    let number = |value: &Value| value.as_f64().unwrap_or_default();
+    let pose = json!({ "x": alignment["x"], "y": alignment["y"], "yaw": alignment["yaw"] });
+    let origin = json!({ "x": 0.0, "y": 0.0, "yaw": 0.0 });
+    let frames = json!({
+        alignment["a"].as_str().unwrap_or_default(): origin,
+        alignment["b"].as_str().unwrap_or_default(): pose,
+    });
+    let path = pair.world.output().with_extension("judged.json");
+    std::fs::write(&path, json!({ "reference": alignment["a"], "frames": frames }).to_string())
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    let evaluation = evaluate(&path, &pair.world.truth)?;
+    Ok(Some(Judged {
+        score: number(&alignment["score"]),
+        wall_on_wall: number(&evidence["wall_on_wall_m"]),
+        wall_on_free: number(&evidence["wall_on_free_m"]),
+        evidence_elsewhere: number(&evidence["evidence_elsewhere"]),
+        is_right: evaluation.related && evaluation.right == 1,
+    }))
+}
+
+/// The share of the smaller map's known area that the other one knows, too, by the truth.
+fn overlap(pair: &PairWorld) -> Result<Option<f64>> {
+    let maps = last_maps(&pair.world.log)?;
+    let truth =
+        std::fs::read(&pair.world.truth).with_context(|| format!("cannot read {}", pair.world.truth.display()))?;
+    let truth: Value = serde_json::from_slice(&truth)?;
+    let frame = |robot: &str| {
+        let number = |field: &str| truth["frames"][robot][field].as_f64();
+        Some(Isometry2::new(Vector2::new(number("x")?, number("y")?), number("yaw")?))
+    };
+    let mut members = maps.iter().filter_map(|(topic, map)| {
+        let robot = topic.strip_prefix('/')?.strip_suffix("/map")?;
+        Some((frame(robot)?, map))
+    });
+    let (Some((frame_a, a)), Some((frame_b, b))) = (members.next(), members.next()) else { return Ok(None) };
+    let (known_a, known_b) = (known_area(a), known_area(b));
+    let (common, least) = (common_area(a, b, &(frame_a.inverse() * frame_b)), known_a.min(known_b));
+    Ok((least > 0.0).then(|| common / least))
+}
+
+fn known_area(map: &GridMap) -> f64 {
+    let side = f64::from(map.info.resolution);
+    map.cells.iter().filter(|cell| **cell >= 0).count() as f64 * side * side
+}
+
+/// The area of map b's known cells that map a knows, too.
+fn common_area(a: &GridMap, b: &GridMap, transform_a_b: &Isometry2<f64>) -> f64 {
+    let (origin_a, origin_b) = (a.info.origin.planar(), b.info.origin.planar());
+    let (side_a, side_b) = (f64::from(a.info.resolution), f64::from(b.info.resolution));
+    let transform = origin_a.inverse() * transform_a_b * origin_b;
+    let known_to_a = |(number, _): &(usize, &i8)| {
+        let (column, row) = (number % b.info.width as usize, number / b.info.width as usize);
+        let point = transform * Point2::new((column as f64 + 0.5) * side_b, (row as f64 + 0.5) * side_b) / side_a;
+        let inside =
+            point.x >= 0.0 && point.y >= 0.0 && point.x < f64::from(a.info.width) && point.y < f64::from(a.info.height);
+        inside && a.cells[point.y as usize * a.info.width as usize + point.x as usize] >= 0
+    };
+    let common = b.cells.iter().enumerate().filter(|(_, cell)| **cell >= 0).filter(known_to_a).count();
+    common as f64 * side_b * side_b
+}

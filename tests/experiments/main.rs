@@ -1,0 +1,69 @@
+//! The papers' experiments repeated, and how far the stages hold:
+//!
+//!     cargo run --release -p gridweave-tests --bin experiments -- align --help
+//!
+//! Each experiment is a file or a folder here. It prints its tables and writes them as CSV, and its curves as SVG, to a folder.
+//! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
+
+#![allow(clippy::print_stdout)]
+
+mod align;
+mod cut;
+mod direction;
+mod few_tags;
+mod localization;
+mod log;
+mod methods;
+mod noise;
+mod plot;
+mod processor_time;
+mod results;
+mod statistics;
+mod trial;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use results::Results;
+use std::path::PathBuf;
+
+/// Repeats the experiments of the papers, and measures how far the stages hold.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// The folder for the tables (CSV) and the curves (SVG).
+    #[arg(long, global = true, default_value = "tests/experiments/results", value_name = "FOLDER")]
+    out: PathBuf,
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Debug, Subcommand)]
+enum Experiment {
+    /// How exactly the direction of a map's walls is found (Tsardoulias et al., section 5.1).
+    Direction(direction::DirectionArgs),
+    /// Merging by tags, by tags and directions, and by both and ICP (Tsardoulias et al., section 5.2).
+    Methods(methods::MethodsArgs),
+    /// How certain a tag's place is, and how wrong, after how many readings (Tsardoulias et al., figure 4).
+    Localization(localization::LocalizationArgs),
+    /// Merging with few common tags, and whether robots of two buildings are ever merged by chance.
+    FewTags(few_tags::FewTagsArgs),
+    /// Merging by the maps alone: random pairs, pairs of two buildings, buildings whose parts are alike, and teams.
+    Align(align::AlignArgs),
+    /// How often a merge succeeds as tags, odometry and overlap get worse.
+    Noise(noise::NoiseArgs),
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let registry = gridweave::shipped::registry([]);
+    let mut results = Results::new(&arguments.out)?;
+    match &arguments.experiment {
+        Experiment::Direction(args) => direction::run(args, &mut results),
+        Experiment::Methods(args) => methods::run(args, &registry, &mut results),
+        Experiment::Localization(args) => localization::run(args, &mut results),
+        Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
+        Experiment::Align(args) => align::run(args, &registry, &mut results),
+        Experiment::Noise(args) => noise::run(args, &registry, &mut results),
+    }?;
+    results.say_where();
+    Ok(())
+}

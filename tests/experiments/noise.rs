@@ -1,0 +1,243 @@
+//! How often a merge succeeds as the world gets worse: the question that Tsardoulias et al. leave open in section 6.
+//!
+//! Two robots explore one simulated building; one property of the world at a time is varied, all others keep the
+//! simulator's defaults. A merge is right below 0.5 m and 1 degree, wrong above, and refused if the robots were not
+//! merged.
+
+use super::plot::{Axis, Plot, Series, Shape};
+use super::results::Results;
+use super::statistics::{median, quantile, wilson_interval};
+use super::trial::World;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use gridweave::evaluate::Outcome;
+use gridweave::table::Table;
+use gridweave_runtime::stage::Registry;
+use rayon::prelude::*;
+
+/// What `gridweave experiment noise` is told.
+#[derive(Debug, Args)]
+pub(super) struct NoiseArgs {
+    /// How many worlds for each value, each with a seed of its own.
+    #[arg(long, default_value_t = 50)]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// The pipeline that merges.
+    #[arg(long, default_value = "tag_merge")]
+    pipeline: String,
+    /// Vary only this; all if none is given.
+    #[arg(long, value_enum)]
+    only: Vec<Property>,
+}
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Property {
+    /// Standard deviation of the tags' ranges.
+    TagNoise,
+    /// The same, with the paper's read-out window of 6 cm whatever the noise.
+    TagNoiseFixedWindow,
+    /// Share of the readings that are lost.
+    LostReadings,
+    /// Share of the readings that come over a reflection.
+    Reflections,
+    /// Drift of the poses.
+    Drift,
+    /// Share of its rooms that a robot has in common with the other.
+    Overlap,
+    /// How many tags there are in the building.
+    Tags,
+}
+
+/// One way to vary the world.
+struct Sweep {
+    name: &'static str,
+    title: &'static str,
+    axis: &'static str,
+    values: &'static [f64],
+    /// Parameters of the simulator for a value.
+    world: fn(f64) -> Vec<String>,
+    /// Parameters of the pipeline's stages for a value.
+    merge: fn(f64) -> Vec<String>,
+}
+
+const NOISES: &[f64] = &[0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0];
+
+impl Property {
+    fn sweep(self) -> Sweep {
+        let nothing: fn(f64) -> Vec<String> = |_| Vec::new();
+        match self {
+            Self::TagNoise => Sweep {
+                name: "tag_noise",
+                title: "Noise of the tags' ranges",
+                axis: "standard deviation of a range, m",
+                values: NOISES,
+                world: |value| vec![format!("tag_noise={value}")],
+                merge: nothing,
+            },
+            Self::TagNoiseFixedWindow => Sweep {
+                name: "tag_noise_fixed_window",
+                title: "Noise of the tags' ranges, read-out window of 6 cm",
+                axis: "standard deviation of a range, m",
+                values: NOISES,
+                world: |value| vec![format!("tag_noise={value}")],
+                merge: |_| vec!["tags.window_deviations=0".to_owned()],
+            },
+            Self::LostReadings => Sweep {
+                name: "lost_readings",
+                title: "Lost readings of tags",
+                axis: "share of the readings that are lost",
+                values: &[0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95],
+                world: |value| vec![format!("lost_readings={value}")],
+                merge: nothing,
+            },
+            Self::Reflections => Sweep {
+                name: "reflections",
+                title: "Readings over a reflection, 0.3 m to 2 m too long",
+                axis: "share of the readings that are reflected",
+                values: &[0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
+                world: |value| vec![format!("reflections={value}")],
+                merge: nothing,
+            },
+            Self::Drift => Sweep {
+                name: "drift",
+                title: "Drift of the poses, loop closures every 10 m",
+                axis: "standard deviation after one metre, rad and m",
+                values: &[0.0, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02],
+                world: |value| vec![format!("drift={value}")],
+                merge: nothing,
+            },
+            Self::Overlap => Sweep {
+                name: "overlap",
+                title: "Overlap of the maps",
+                axis: "share of a robot's rooms that the other has as well",
+                values: &[0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0],
+                world: |value| vec![format!("overlap={value}")],
+                merge: nothing,
+            },
+            Self::Tags => Sweep {
+                name: "tags",
+                title: "Tags in the building (20 m x 15 m)",
+                axis: "number of tags",
+                values: &[4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0],
+                world: |value| vec![format!("tags={value}")],
+                merge: nothing,
+            },
+        }
+    }
+}
+
+/// What became of one world.
+struct Trial {
+    seed: u64,
+    outcome: Outcome,
+    error_m: Option<f64>,
+    error_deg: Option<f64>,
+    reason: String,
+}
+
+/// Does the experiment.
+pub(super) fn run(args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
+    let all = Property::value_variants();
+    let properties = if args.only.is_empty() { all } else { &args.only };
+    properties.iter().try_for_each(|property| sweep(&property.sweep(), args, registry, results))
+}
+
+fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
+    let heads =
+        ["right", "wrong", "refused", "right, 95 % interval", "error m, median", "95 %", "error deg, median", "95 %"];
+    let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
+    let mut data = Table::new([sweep.axis, "seed", "outcome", "error m", "error deg", "reason"]);
+    let mut shares: [Vec<(f64, f64)>; 3] = Default::default();
+    let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
+    for &value in sweep.values {
+        let trials = trials(sweep, value, args, registry)?;
+        let outcomes = [Outcome::Right, Outcome::Wrong, Outcome::Refused];
+        let counts = outcomes.map(|outcome| trials.iter().filter(|trial| trial.outcome == outcome).count());
+        for ((share, band), count) in shares.iter_mut().zip(&mut bands).zip(counts) {
+            let (low, high) = wilson_interval(count, trials.len());
+            share.push((value, count as f64 / trials.len() as f64));
+            band.push((value, low, high));
+        }
+        let (low, high) = wilson_interval(counts[0], trials.len());
+        let errors = |error: fn(&Trial) -> Option<f64>| trials.iter().filter_map(error).collect::<Vec<f64>>();
+        let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
+        let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
+        table.row(
+            [format!("{value}")]
+                .into_iter()
+                .chain(counts.map(|count| count.to_string()))
+                .chain([format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high)])
+                .chain(
+                    [median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number),
+                ),
+        );
+        for trial in trials {
+            let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
+            let Trial { seed, outcome, error_m, error_deg, reason } = trial;
+            let words = outcome.words().to_owned();
+            data.row([value.to_string(), seed.to_string(), words, number(error_m), number(error_deg), reason]);
+        }
+    }
+    let name = format!("noise_{}", sweep.name);
+    results.table(&name, &format!("## {}", sweep.title), &table)?;
+    results.data(&format!("{name}_trials"), &data)?;
+    let series = ["right", "wrong", "refused"].into_iter().zip(shares).zip(bands);
+    let plot = Plot {
+        title: sweep.title.to_owned(),
+        x: Axis::new(sweep.axis),
+        y: Axis::new("share of the worlds, with the 95 % interval").range(0.0, 1.0),
+        shape: Shape::Lines(series.map(|((name, share), band)| Series::new(name, share).with_band(band)).collect()),
+    };
+    results.plot(&name, &plot)
+}
+
+fn trials(sweep: &Sweep, value: f64, args: &NoiseArgs, registry: &Registry) -> Result<Vec<Trial>> {
+    let mut world_settings = vec!["robots=2".to_owned()];
+    world_settings.extend((sweep.world)(value));
+    let merge_settings = (sweep.merge)(value);
+    let seeds: Vec<u64> = (args.first_seed..args.first_seed.saturating_add(args.seeds)).collect();
+    let one = |&seed: &u64| {
+        let world = World::simulate(&world_settings, seed, registry)?;
+        let merge = world.merge(&args.pipeline, &merge_settings, registry)?;
+        Ok(merge.evaluation.robots.into_iter().map(move |robot| Trial {
+            seed,
+            outcome: robot.outcome,
+            error_m: robot.error_m,
+            error_deg: robot.error_deg,
+            reason: robot.reason.unwrap_or_default(),
+        }))
+    };
+    let trials: Result<Vec<_>> = seeds.par_iter().map(one).collect();
+    Ok(trials?.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::pipeline::Overrides;
+
+    #[test]
+    fn every_sweep_sets_parameters_that_there_are() {
+        let registry = gridweave::shipped::registry([]);
+        for property in Property::value_variants() {
+            let sweep = property.sweep();
+            for &value in sweep.values {
+                for (pipeline, prefix, settings) in
+                    [("simulate", "simulator.", (sweep.world)(value)), ("tag_merge", "", (sweep.merge)(value))]
+                {
+                    let mut overrides = Overrides::default();
+                    overrides.set_for_kind("mcap_sink", "file", "out.mcap");
+                    if pipeline != "simulate" {
+                        overrides.set_for_kind("mcap_source", "files", vec!["in.mcap".to_owned()]);
+                    }
+                    settings.iter().for_each(|setting| overrides.set(&format!("{prefix}{setting}")).unwrap());
+                    let loaded = gridweave::shipped::load(pipeline.as_ref(), &overrides, &registry);
+                    assert!(loaded.is_ok(), "{} {value}", sweep.name);
+                }
+            }
+        }
+    }
+}

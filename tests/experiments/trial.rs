@@ -1,0 +1,102 @@
+//! One log, merged by any pipeline and compared with the truth.
+
+use anyhow::{Context, Result};
+use gridweave::evaluate::{Evaluation, evaluate};
+use gridweave::shipped;
+use gridweave::summary::Summary;
+use gridweave_runtime::engine::{self, EngineKind, RunReport};
+use gridweave_runtime::pipeline::Overrides;
+use gridweave_runtime::stage::Registry;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// The pipeline that makes worlds.
+const SIMULATE: &str = "simulate";
+
+/// Logs of robots, and what is true of them. Simulated logs are gone with it.
+pub(super) struct World {
+    /// The log.
+    pub(super) log: PathBuf,
+    /// Its truth.
+    pub(super) truth: PathBuf,
+    /// What the merges of this world write to.
+    folder: TempDir,
+}
+
+/// What a pipeline has made of a world.
+pub(super) struct Merge {
+    /// What it has found.
+    pub(super) summary: Summary,
+    /// How far that is from the truth.
+    pub(super) evaluation: Evaluation,
+    /// What each stage has done.
+    pub(super) report: RunReport,
+}
+
+impl World {
+    /// A simulated world. `settings` are parameters of the simulator, `PARAMETER=VALUE`.
+    pub(super) fn simulate(settings: &[String], seed: u64, registry: &Registry) -> Result<Self> {
+        let folder = TempDir::new().context("cannot make a folder for a simulated log")?;
+        let world =
+            Self { log: folder.path().join("world.mcap"), truth: folder.path().join("world.truth.json"), folder };
+        let settings: Vec<String> = settings.iter().map(|setting| format!("simulator.{setting}")).collect();
+        let report = world.run(SIMULATE, &settings, Some(seed), &world.log, registry)?;
+        for (_, truth) in report.results("simulator") {
+            std::fs::write(&world.truth, truth.to_string())
+                .with_context(|| format!("cannot write {}", world.truth.display()))?;
+        }
+        Ok(world)
+    }
+
+    /// A log that is there, with its truth.
+    pub(super) fn recorded(log: &Path, truth: &Path) -> Result<Self> {
+        let folder = TempDir::new().context("cannot make a folder for the output of a merge")?;
+        Ok(Self { log: log.to_owned(), truth: truth.to_owned(), folder })
+    }
+
+    /// A log of robots that have nothing to do with each other.
+    pub(super) fn unrelated(log: &Path) -> Result<Self> {
+        let folder = TempDir::new().context("cannot make a folder for the output of a merge")?;
+        let truth = folder.path().join("unrelated.truth.json");
+        std::fs::write(&truth, r#"{"frames": {}}"#).with_context(|| format!("cannot write {}", truth.display()))?;
+        Ok(Self { log: log.to_owned(), truth, folder })
+    }
+
+    /// What the last merge has written, but the input's messages.
+    pub(super) fn output(&self) -> PathBuf {
+        self.folder.path().join("merged.mcap")
+    }
+
+    /// Merges the world's log by a shipped pipeline, in one thread. `settings` are `STAGE.PARAMETER=VALUE`.
+    pub(super) fn merge(&self, pipeline: &str, settings: &[String], registry: &Registry) -> Result<Merge> {
+        let report = self.run(pipeline, settings, None, &self.output(), registry)?;
+        let summary = Summary::new(&report);
+        let path = self.folder.path().join("summary.json");
+        std::fs::write(&path, summary.to_json()).with_context(|| format!("cannot write {}", path.display()))?;
+        let evaluation = evaluate(&path, &self.truth)?;
+        Ok(Merge { summary, evaluation, report })
+    }
+
+    fn run(
+        &self,
+        pipeline: &str,
+        settings: &[String],
+        seed: Option<u64>,
+        output: &Path,
+        registry: &Registry,
+    ) -> Result<RunReport> {
+        let mut overrides = Overrides::default();
+        overrides.seed = seed;
+        for setting in settings {
+            overrides.set(setting).with_context(|| format!("cannot set {setting}"))?;
+        }
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        overrides.set_for_kind("mcap_sink", "file", text(output));
+        if pipeline != SIMULATE {
+            overrides.set_for_kind("mcap_source", "files", vec![text(&self.log)]);
+            overrides.set_for_kind("mcap_sink", "pass_input", false);
+        }
+        let pipeline = shipped::load(Path::new(pipeline), &overrides, registry)?;
+        Ok(engine::run(&pipeline, EngineKind::Single, &())?)
+    }
+}
