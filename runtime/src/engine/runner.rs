@@ -28,7 +28,8 @@ impl Runner {
     ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
         let context = pipeline.context(stage);
-        let ends = spec.topics.iter().enumerate().map(|(port, topic)| OutputEnd { topic: topic.clone(), sink: sink(port) });
+        let ends =
+            spec.topics.iter().enumerate().map(|(port, topic)| OutputEnd { topic: topic.clone(), sink: sink(port) });
         let ends = ends.collect();
         let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context, ends))?;
         let report = StageReport { name: spec.name.clone(), kind: spec.kind.name.to_owned(), ..Default::default() };

@@ -137,9 +137,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             )?);
         }
         let outputs = SharedOutputs::new(senders, Rc::clone(&wake));
-        let sink = |port: usize| {
-            places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link))
-        };
+        let sink = |port: usize| places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link));
         let working = wake.working();
         let runner = Runner::new(pipeline, stage, sink)?;
         drop(working);

@@ -94,7 +94,8 @@ impl LoneStage {
     /// There is no such input, or the stage fails.
     pub fn give_message(&mut self, input: &str, message: Message) -> Result<(), StageError> {
         let port = self.kind.inputs.iter().position(|port| port.name == input);
-        let port = port.ok_or_else(|| StageError::new(format!("give a message to `{input}`"), "there is no such input"))?;
+        let port =
+            port.ok_or_else(|| StageError::new(format!("give a message to `{input}`"), "there is no such input"))?;
         self.node.set_log_time(message.header().log_time);
         self.node.receive(port, &message)
     }

@@ -1,7 +1,7 @@
 //! A stage, ready to run, as the engines see it: without its types.
 
-use super::output::SentCounts;
 use super::StageError;
+use super::output::SentCounts;
 use crate::message::{Channel, LogTime, Message};
 use std::collections::BTreeMap;
 
