@@ -85,6 +85,7 @@ mod tests {
             port: "messages",
             ros_type: ros_type.into(),
             topic: topic.into(),
+            ..Default::default()
         };
         ResultTopics::new(&Context { inputs: wires.map(wire).to_vec(), ..Default::default() })
     }

@@ -48,6 +48,7 @@
 //! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
 //! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
 
+mod attach;
 mod binding;
 mod diagnostic;
 mod document;
@@ -185,7 +186,7 @@ impl Pipeline {
             false => from.topics.get(wire.from_port).cloned().unwrap_or_default(),
         };
         let ros_type = from.kind.outputs[wire.from_port].port_type.name().to_owned();
-        InputWire { port: spec.kind.inputs[wire.port].name, ros_type, topic }
+        InputWire { port: spec.kind.inputs[wire.port].name, from: from.name.clone(), ros_type, topic }
     }
 }
 

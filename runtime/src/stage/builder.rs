@@ -85,16 +85,39 @@ impl<P: Parameters, S: 'static, O: Outputs> StageBuilder<P, S, O> {
         self.typed(port, receive)
     }
 
+    /// The same, but it may be left unwired.
+    #[must_use]
+    pub fn optional_inputs<T: RosMessage + 'static>(
+        self,
+        name: &'static str,
+        summary: &'static str,
+        receive: impl Fn(&mut S, Received<'_, T>, &Output<O>) -> Result<(), StageError> + Send + Sync + 'static,
+    ) -> Self {
+        let port = InputPort { name, port_type: PortType::of::<T>(), many: true, optional: true, summary };
+        self.typed(port, receive)
+    }
+
     /// An input that any number of outputs of any type may be wired to, but at least one. Its messages come as they are;
     /// [`Message::wire`] tells the outputs apart, and [`Context::inputs`] what they are.
     #[must_use]
     pub fn any_inputs(
-        mut self,
+        self,
         name: &'static str,
         summary: &'static str,
         receive: impl Fn(&mut S, &Message, &Output<O>) -> Result<(), StageError> + Send + Sync + 'static,
     ) -> Self {
-        self.inputs.push(InputPort { name, port_type: PortType::Any, many: true, optional: false, summary });
+        let port = InputPort { name, port_type: PortType::Any, many: true, optional: false, summary };
+        self.encoded_input(port, receive)
+    }
+
+    /// An input whose messages come as they are, encoded.
+    #[must_use]
+    pub fn encoded_input(
+        mut self,
+        port: InputPort,
+        receive: impl Fn(&mut S, &Message, &Output<O>) -> Result<(), StageError> + Send + Sync + 'static,
+    ) -> Self {
+        self.inputs.push(port);
         self.handlers.receive.push(Box::new(receive));
         self
     }
@@ -145,20 +168,18 @@ impl<P: Parameters, S: 'static, O: Outputs> StageBuilder<P, S, O> {
     }
 
     fn typed<T: RosMessage + 'static>(
-        mut self,
+        self,
         port: InputPort,
         receive: impl Fn(&mut S, Received<'_, T>, &Output<O>) -> Result<(), StageError> + Send + Sync + 'static,
     ) -> Self {
         let name = port.name;
-        self.inputs.push(port);
-        self.handlers.receive.push(Box::new(move |state, message, output| match message.decode::<T::Borrowed<'_>>() {
+        self.encoded_input(port, move |state, message, output| match message.decode::<T::Borrowed<'_>>() {
             Ok(content) => receive(state, Received::new(message, content), output),
             Err(error) => {
                 output.warn(format!("messages on the input `{name}` that cannot be read are left out: {error}"));
                 Ok(())
             }
-        }));
-        self
+        })
     }
 }
 

@@ -29,6 +29,8 @@ impl Context {
 pub struct InputWire {
     /// The input port that it is wired to.
     pub port: &'static str,
+    /// The stage that the output belongs to.
+    pub from: String,
     /// The ROS 2 type of its messages; empty for any.
     pub ros_type: String,
     /// The topic that its messages get in a log, with `{robot}` for the robot's name; empty if they bring topics of their

@@ -26,6 +26,11 @@ impl<'a, T: RosMessage> Received<'a, T> {
         self.message.header().log_time
     }
 
+    /// Which of the stage's wires it came on, as an index into [`Context::inputs`](super::Context::inputs).
+    pub fn wire(&self) -> usize {
+        self.message.wire()
+    }
+
     /// The message as it came. A clone of it keeps the bytes where they are, without copying them.
     pub fn message(&self) -> &'a Message {
         self.message
