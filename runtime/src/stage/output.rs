@@ -94,7 +94,7 @@ impl OutputPorts {
     /// An output whose messages get the topic `/{robot}/{stage}/{name}` or, if they are about no robot in particular,
     /// `/{stage}/{name}`.
     pub fn output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
-        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, summary })
+        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: false, summary })
     }
 
     /// An output whose messages have a topic of their own, with `{robot}` and `{stage}` for the names of these.
@@ -104,7 +104,13 @@ impl OutputPorts {
         name: &'static str,
         summary: &'static str,
     ) -> Out<T> {
-        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: Some(topic), summary })
+        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: Some(topic), side: false, summary })
+    }
+
+    /// The same as [`output`](Self::output), for what is beside what the stage is for, such as what it went by: where a
+    /// pipeline names the stage alone, this output is not meant.
+    pub fn side_output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
+        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: true, summary })
     }
 
     /// An output for messages of any type, each of a channel that is [announced](Out::announce) before it.
@@ -119,7 +125,7 @@ impl OutputPorts {
         name: &'static str,
         summary: &'static str,
     ) -> Out<AnyMessage> {
-        self.add(OutputPort { name, port_type, topic: None, summary })
+        self.add(OutputPort { name, port_type, topic: None, side: false, summary })
     }
 
     fn add<T>(&mut self, port: OutputPort) -> Out<T> {

@@ -61,6 +61,8 @@ pub struct OutputPort {
     /// The topic that its messages get in a log, where it is not `/{robot}/{stage}/{port}` or, for messages about no robot in
     /// particular, `/{stage}/{port}`; `{robot}` and `{stage}` are put in.
     pub topic: Option<&'static str>,
+    /// Whether it is beside what the stage is for: the name of a stage alone stands for its only output that is not.
+    pub side: bool,
     /// What it carries.
     pub summary: &'static str,
 }
