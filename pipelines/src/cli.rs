@@ -5,7 +5,7 @@ use crate::status::Status;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
-use std::io::IsTerminal;
+use log::{LevelFilter, Log, Metadata, Record};
 
 /// Merges the maps of several robots that explore one building, each with a map frame of its own.
 ///
@@ -82,16 +82,26 @@ impl Cli {
     }
 }
 
-/// Sends what the libraries log to standard error: warnings, or all that `RUST_LOG` asks for.
+/// Sends what the libraries log to standard error: warnings, and more if that is wanted.
 fn start_log(verbose: bool) {
-    let default = if verbose { "info" } else { "warn" };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(default));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .with_target(false)
-        .init();
+    struct Lines;
+
+    impl Log for Lines {
+        fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+            metadata.level() <= log::max_level()
+        }
+
+        fn log(&self, record: &Record<'_>) {
+            if self.enabled(record.metadata()) {
+                eprintln!("{}: {}", record.level().as_str().to_lowercase(), record.args());
+            }
+        }
+
+        fn flush(&self) {}
+    }
+
+    // Fails only where a program has a log of its own.
+    if log::set_logger(&Lines).is_ok() {
+        log::set_max_level(if verbose { LevelFilter::Info } else { LevelFilter::Warn });
+    }
 }

@@ -11,10 +11,9 @@ use std::path::{Path, PathBuf};
 /// Reads the map that the YAML file at `yaml` describes.
 pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
     let Description { image: path, resolution, origin: [x, y, yaw], reading } = describe(yaml)?;
-    let shades =
-        fs::read(&path).map_err(image::ImageError::from).and_then(|bytes| Shades::decode(&bytes)).map_err(|error| {
-            MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message: error.to_string() }
-        })?;
+    let image_error = |message: String| MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message };
+    let file = fs::read(&path).map_err(|error| image_error(error.to_string()))?;
+    let shades = Shades::decode(&file).map_err(|error| image_error(error.to_string()))?;
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };

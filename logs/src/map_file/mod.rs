@@ -6,6 +6,8 @@
 mod description;
 mod error;
 mod load;
+mod netpbm;
+mod raster;
 mod save;
 mod shades;
 

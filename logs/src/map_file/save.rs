@@ -2,8 +2,6 @@
 
 use super::{GridMap, MapFileError};
 use gridweave_runtime::ros::cell::{is_free, is_occupied};
-use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
-use image::{ExtendedColorType, ImageEncoder, ImageError};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -25,10 +23,8 @@ const FREE_THRESHOLD: f64 = 0.196;
 pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     let (text, image, pixels) = describe(yaml, map)
         .map_err(|problem| MapFileError::Map { path: yaml.to_owned(), problem: problem.to_owned() })?;
-    let mut file = Vec::with_capacity(pixels.len() + 32);
-    let encoder = PnmEncoder::new(&mut file).with_subtype(PnmSubtype::Graymap(SampleEncoding::Binary));
-    let encoded = encoder.write_image(&pixels, map.info.width, map.info.height, ExtendedColorType::L8);
-    encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
+    let mut file = format!("P5\n{} {}\n255\n", map.info.width, map.info.height).into_bytes();
+    file.extend_from_slice(&pixels);
 
     // Both are written beside before either is replaced, so that a full disk leaves the map that was there.
     let parts = [Part::write(&image, &file)?, Part::write(yaml, text.as_bytes())?];

@@ -2,53 +2,49 @@
 
 use super::Mode;
 use super::description::Reading;
-use image::{DynamicImage, ImageReader, ImageResult};
-use std::io::Cursor;
+use super::raster::{Raster, RasterError, Samples};
 
 /// An image, and the value that stands for white in it.
 pub(super) struct Shades {
-    image: DynamicImage,
+    raster: Raster,
     white: f64,
 }
 
 impl Shades {
     /// Decodes an image file: PGM, PPM, PBM or PNG, told by its first bytes.
-    pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
-        let image = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?;
-        let bytes_a_channel = image.color().bytes_per_pixel() / image.color().channel_count();
-        Ok(Self { image, white: if bytes_a_channel == 1 { 255.0 } else { 65535.0 } })
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, RasterError> {
+        let raster = Raster::decode(bytes)?;
+        let white = match raster.samples {
+            Samples::Eight(_) => f64::from(u8::MAX),
+            Samples::Sixteen(_) => f64::from(u16::MAX),
+        };
+        Ok(Self { raster, white })
     }
 
     /// Columns and rows.
     pub(super) fn size(&self) -> (u32, u32) {
-        (self.image.width(), self.image.height())
+        (self.raster.width, self.raster.height)
     }
 
     /// The cells, row by row from the image's last row to its first.
     pub(super) fn cells(&self, reading: &Reading) -> Vec<i8> {
         let white = self.white;
-        let channels = usize::from(self.image.color().channel_count());
-        match &self.image {
+        match &self.raster.samples {
             // Most maps: 256 shades, each of which is read once.
-            DynamicImage::ImageLuma8(grey) => {
+            Samples::Eight(samples) if self.raster.channels == 1 => {
                 let table: Vec<i8> = (0..=255u8).map(|value| reading.cell(&[f64::from(value)], None, white)).collect();
-                self.rows_upward(grey.as_raw(), 1, |pixel| table[usize::from(pixel[0])])
+                self.rows_upward(samples, |pixel| table[usize::from(pixel[0])])
             }
-            image => match image.as_flat_samples_u8() {
-                Some(flat) => self.rows_upward(flat.samples, channels, |pixel| reading.pixel(pixel, white)),
-                None => {
-                    let flat = image.as_flat_samples_u16();
-                    let samples = flat.as_ref().map(|flat| flat.samples).unwrap_or_default();
-                    self.rows_upward(samples, channels, |pixel| reading.pixel(pixel, white))
-                }
-            },
+            Samples::Eight(samples) => self.rows_upward(samples, |pixel| reading.pixel(pixel, white)),
+            Samples::Sixteen(samples) => self.rows_upward(samples, |pixel| reading.pixel(pixel, white)),
         }
     }
 
-    fn rows_upward<T: Copy>(&self, samples: &[T], channels: usize, cell: impl Fn(&[T]) -> i8) -> Vec<i8> {
-        let row = (self.image.width() as usize * channels).max(1);
+    fn rows_upward<T: Copy>(&self, samples: &[T], cell: impl Fn(&[T]) -> i8) -> Vec<i8> {
+        let channels = self.raster.channels.max(1);
+        let row = (self.raster.width as usize * channels).max(1);
         let rows = samples.chunks_exact(row).rev();
-        rows.flat_map(|row| row.chunks_exact(channels.max(1))).map(cell).collect()
+        rows.flat_map(|row| row.chunks_exact(channels)).map(cell).collect()
     }
 }
 

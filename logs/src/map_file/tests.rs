@@ -1,6 +1,6 @@
 use super::*;
 use gridweave_runtime::ros::{Point, Pose, Quaternion};
-use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgba, RgbaImage};
+use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 use std::fs;
 use std::path::PathBuf;
@@ -64,28 +64,41 @@ fn plain_text_and_other_depths_are_read_alike() {
     assert_eq!(read("deep.pgm", b"P5\n2 1\n65535\n\x00\x00\xff\xff"), [100, 0]);
     assert_eq!(read("bits.pbm", b"P1\n2 1\n1 0\n"), [100, 0]);
     assert_eq!(read("packed.pbm", b"P4\n2 1\n\x80"), [100, 0]);
+    assert_eq!(read("many.pbm", b"P4\n9 2\n\x80\x80\x00\x00"), [[0; 9], [100, 0, 0, 0, 0, 0, 0, 0, 100]].concat());
     assert_eq!(read("colour.ppm", b"P3\n2 1\n255\n0 0 255  255 255 255\n"), [100, 0]);
+    assert_eq!(read("binary.ppm", b"P6 2 1 255\n\x00\x00\xff\xff\xff\xff"), [100, 0]);
+    assert_eq!(read("twelve.pgm", b"P5\n2 1 # twelve bits\n4095\n\x00\x00\x0f\xff"), [100, 0]);
 }
 
 #[test]
 fn png_is_read_with_its_opacity() {
     let (folder, path) = folder("");
-    let read = |image: DynamicImage, more: &str| {
-        image.save(folder.path().join("map.png")).unwrap();
+    let read = |colour: ColorType, depth: BitDepth, samples: &[u8], more: &str| {
+        let width = samples.len() / (colour.samples() * if depth == BitDepth::Sixteen { 2 } else { 1 });
+        let file = fs::File::create(folder.path().join("map.png")).unwrap();
+        let mut encoder = png::Encoder::new(file, width as u32, 1);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        encoder.write_header().unwrap().write_image_data(samples).unwrap();
         fs::write(&path, yaml(more).replace("map.pgm", "map.png")).unwrap();
         load(&path).unwrap().cells
     };
-    let rgba = RgbaImage::from_fn(3, 1, |x, _| [[0, 0, 0, 255], [255; 4], [0, 0, 0, 0]].map(Rgba)[x as usize]);
+    let rgba = |more: &str| {
+        let pixels = [[0, 0, 0, 255], [255; 4], [0, 0, 0, 0]];
+        read(ColorType::Rgba, BitDepth::Eight, pixels.as_flattened(), more)
+    };
     // Black and opaque: (0 + 0 + 0 + 255) / 4 is a shade of 0.25.
-    assert_eq!(read(rgba.clone().into(), ""), [100, 0, 100]);
-    assert_eq!(read(rgba.clone().into(), "mode: scale"), [100, 0, -1]);
-    assert_eq!(read(rgba.into(), "mode: raw"), [0, -1, 0]);
-    let grey = ImageBuffer::from_fn(3, 1, |x, _| [[100, 255], [255, 255], [100, 254]].map(LumaA)[x as usize]);
+    assert_eq!(rgba(""), [100, 0, 100]);
+    assert_eq!(rgba("mode: scale"), [100, 0, -1]);
+    assert_eq!(rgba("mode: raw"), [0, -1, 0]);
+    let grey = |more: &str| {
+        let pixels = [[100, 255], [255, 255], [100, 254]];
+        read(ColorType::GrayscaleAlpha, BitDepth::Eight, pixels.as_flattened(), more)
+    };
     // Three times grey and once opacity: (3 * 100 + 255) / 4 is a shade of 0.54.
-    assert_eq!(read(DynamicImage::ImageLumaA8(grey.clone()), ""), [-1, 0, -1]);
-    assert_eq!(read(DynamicImage::ImageLumaA8(grey), "mode: scale"), [89, 0, -1]);
-    let deep = ImageBuffer::from_fn(2, 1, |x, _| Luma([x as u16 * 65535]));
-    assert_eq!(read(DynamicImage::ImageLuma16(deep), ""), [100, 0]);
+    assert_eq!(grey(""), [-1, 0, -1]);
+    assert_eq!(grey("mode: scale"), [89, 0, -1]);
+    assert_eq!(read(ColorType::Grayscale, BitDepth::Sixteen, &[0, 0, 255, 255], ""), [100, 0]);
 }
 
 #[test]
@@ -162,7 +175,19 @@ fn missing_and_broken_files_are_told() {
     let (folder, path) = folder(&yaml(""));
     let text = load(&folder.path().join("other.yaml")).unwrap_err().to_string();
     assert!(text.starts_with("cannot read the map file") && text.contains("other.yaml: No such file"), "{text}");
-    for bytes in [b"P5\n3 2\n255\n\x00".as_slice(), b"no image", b""] {
+    let broken = [
+        b"P5\n3 2\n255\n\x00".as_slice(),
+        b"P5\n4000000000 4000000000\n255\n\x00",
+        b"P5\n3 2\n0\n",
+        b"P5\n3 2\n65536\n",
+        b"P5\n3",
+        b"P2\n1 1\n255\nblack",
+        b"P4\n9 1\n\x80",
+        b"\x89PNG\r\n\x1a\n",
+        b"no image",
+        b"",
+    ];
+    for bytes in broken {
         fs::write(folder.path().join("map.pgm"), bytes).unwrap();
         let text = load(&path).unwrap_err().to_string();
         assert!(text.contains("map.pgm, the image of the map"), "{text}");

@@ -1,17 +1,17 @@
 //! The colours of a picture.
 
+use super::image::Rgb;
 use super::layer::Coverage;
-use image::Rgb;
 
-pub(super) const UNKNOWN: Rgb<u8> = Rgb([205, 205, 205]);
-pub(super) const FREE: Rgb<u8> = Rgb([255, 255, 255]);
-pub(super) const OCCUPIED: Rgb<u8> = Rgb([0, 0, 0]);
+pub(super) const UNKNOWN: Rgb = Rgb([205, 205, 205]);
+pub(super) const FREE: Rgb = Rgb([255, 255, 255]);
+pub(super) const OCCUPIED: Rgb = Rgb([0, 0, 0]);
 /// What lies behind the maps of an overlay: lighter, so that the tints stand out.
-const BACKGROUND: Rgb<u8> = Rgb([218, 218, 218]);
+const BACKGROUND: Rgb = Rgb([218, 218, 218]);
 
 /// Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008), those that are dark enough
 /// for lines on white first.
-const PALETTE: [Rgb<u8>; 6] = [
+const PALETTE: [Rgb; 6] = [
     Rgb([0, 114, 178]),
     Rgb([213, 94, 0]),
     Rgb([0, 158, 115]),
@@ -30,13 +30,13 @@ pub fn robot_colour(index: usize) -> [u8; 3] {
 }
 
 /// `share`, 0 to 1, of the way from one colour to another.
-pub(super) fn mix(from: Rgb<u8>, to: Rgb<u8>, share: f64) -> Rgb<u8> {
+pub(super) fn mix(from: Rgb, to: Rgb, share: f64) -> Rgb {
     let share = share.clamp(0.0, 1.0);
     Rgb(std::array::from_fn(|i| (f64::from(from.0[i]) * (1.0 - share) + f64::from(to.0[i]) * share).round() as u8))
 }
 
 /// The mean of the maps' colours, each with its weight, and the sum of the weights.
-fn weighted_mean(weights: impl Iterator<Item = f64>) -> Option<(Rgb<u8>, f64)> {
+fn weighted_mean(weights: impl Iterator<Item = f64>) -> Option<(Rgb, f64)> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (index, weight) in weights.enumerate() {
         let colour = robot_colour(index);
@@ -47,7 +47,7 @@ fn weighted_mean(weights: impl Iterator<Item = f64>) -> Option<(Rgb<u8>, f64)> {
 }
 
 /// The colour of a pixel of an overlay.
-pub(super) fn overlay(shares: &[Coverage]) -> Rgb<u8> {
+pub(super) fn overlay(shares: &[Coverage]) -> Rgb {
     let mut colour = BACKGROUND;
     if let Some((tint, total)) = weighted_mean(shares.iter().map(|share| share.free)) {
         // What one map knows has its colour; what several know is nearly white, so that the overlap shows.

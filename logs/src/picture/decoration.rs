@@ -1,13 +1,13 @@
 //! Axes, margin and scale bar.
 
 use super::colour::{OCCUPIED, mix};
+use super::image::{Rgb, RgbImage};
 use super::view::View;
-use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};
 
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
-const X_AXIS: Rgb<u8> = Rgb([200, 30, 30]);
-const Y_AXIS: Rgb<u8> = Rgb([30, 150, 30]);
+const PAPER: Rgb = Rgb([255, 255, 255]);
+const X_AXIS: Rgb = Rgb([200, 30, 30]);
+const Y_AXIS: Rgb = Rgb([30, 150, 30]);
 
 /// A length for lines and gaps that suits the size of the picture, pixels.
 fn unit(view: &View) -> f64 {
@@ -32,7 +32,7 @@ pub(super) fn draw_axes(image: &mut RgbImage, view: &View) {
 }
 
 /// A line with round ends, its edges smoothed.
-fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness: f64, colour: Rgb<u8>) {
+fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness: f64, colour: Rgb) {
     let reach = thickness / 2.0 + 1.0;
     let low = |a: f64, b: f64| (a.min(b) - reach).max(0.0) as u32;
     let high = |a: f64, b: f64, limit: u32| ((a.max(b) + reach).max(0.0) as u32).min(limit);
@@ -42,8 +42,8 @@ fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness
             let offset = Point2::new(f64::from(u) + 0.5, f64::from(v) + 0.5) - from;
             let share = (offset.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             let distance = (offset - along * share).norm();
-            let pixel = image.get_pixel_mut(u, v);
-            *pixel = mix(*pixel, colour, thickness / 2.0 + 0.5 - distance);
+            let painted = mix(image.pixel(u, v), colour, thickness / 2.0 + 0.5 - distance);
+            image.put_pixel(u, v, painted);
         }
     }
 }
@@ -67,7 +67,7 @@ pub(super) fn frame_with_scale_bar(map: &RgbImage, view: &View) -> (RgbImage, f6
     let foot = 2 * margin + thickness;
     let (width, height) = (map.width() + 2 * margin, map.height() + margin + foot);
     let mut image = RgbImage::from_pixel(width, height, PAPER);
-    image::imageops::replace(&mut image, map, i64::from(margin), i64::from(margin));
+    image.put_image(margin, margin, map);
 
     let (length, parts) = round_length(f64::from(map.width()) * view.metres_per_pixel / 3.0);
     let (left, top) = (margin, margin + map.height() + margin);

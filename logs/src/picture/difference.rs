@@ -2,15 +2,15 @@
 
 use super::PictureError;
 use super::colour::{FREE, OCCUPIED, UNKNOWN, mix};
+use super::image::{Rgb, RgbImage};
 use gridweave_runtime::ros::cell::{is_free, is_known, is_occupied};
-use image::{Rgb, RgbImage};
 
 /// An occupied cell of the first grid alone: orange.
-const ONLY_FIRST: Rgb<u8> = Rgb([213, 94, 0]);
+const ONLY_FIRST: Rgb = Rgb([213, 94, 0]);
 /// An occupied cell of the second grid alone: blue.
-const ONLY_SECOND: Rgb<u8> = Rgb([0, 114, 178]);
+const ONLY_SECOND: Rgb = Rgb([0, 114, 178]);
 /// A cell that differs in another way: purple.
-const OTHERWISE: Rgb<u8> = Rgb([204, 121, 167]);
+const OTHERWISE: Rgb = Rgb([204, 121, 167]);
 /// How pale cells are that do not differ.
 const PALENESS: f64 = 0.6;
 /// Small grids are drawn larger, up to this side, pixels.
@@ -44,7 +44,7 @@ pub fn render_difference(width: usize, first: &[i8], second: &[i8]) -> Result<Rg
     }))
 }
 
-fn colour(first: i8, second: i8) -> Rgb<u8> {
+fn colour(first: i8, second: i8) -> Rgb {
     if first == second {
         let own = match first {
             cell if is_occupied(cell) => OCCUPIED,
@@ -69,7 +69,7 @@ mod tests {
     fn every_cell_that_differs_has_the_colour_of_its_change() {
         let image = render_difference(2, &[100, 0, -1, 0], &[0, 100, 0, 0]).unwrap();
         assert_eq!(image.dimensions(), (32, 32));
-        let cell = |column: u32, row: u32| *image.get_pixel(column * 16 + 8, (1 - row) * 16 + 8);
+        let cell = |column: u32, row: u32| image.pixel(column * 16 + 8, (1 - row) * 16 + 8);
         assert_eq!([cell(0, 0), cell(1, 0), cell(0, 1)], [ONLY_FIRST, ONLY_SECOND, OTHERWISE]);
         assert_eq!(cell(1, 1), FREE);
     }

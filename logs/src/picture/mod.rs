@@ -8,19 +8,19 @@ mod colour;
 mod decoration;
 mod difference;
 mod error;
+mod image;
 mod layer;
 mod view;
 
 pub use colour::robot_colour;
 pub use difference::render_difference;
 pub use error::PictureError;
+pub use image::{Rgb, RgbImage};
 pub use layer::MapLayer;
 
 use colour::{FREE, OCCUPIED, UNKNOWN};
-use image::{ImageFormat, Rgb, RgbImage};
 use layer::{Coverage, PlacedLayer};
 use rayon::prelude::*;
-use std::io::Cursor;
 use std::path::Path;
 use view::View;
 
@@ -38,14 +38,12 @@ pub struct Picture {
 impl Picture {
     /// The picture as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, PictureError> {
-        let mut bytes = Cursor::new(Vec::new());
-        self.image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| PictureError::Png(error.to_string()))?;
-        Ok(bytes.into_inner())
+        self.image.png()
     }
 
     /// Writes the picture as a PNG file.
     pub fn save_png(&self, path: &Path) -> Result<(), PictureError> {
-        std::fs::write(path, self.png()?).map_err(|source| PictureError::Write { path: path.to_owned(), source })
+        self.image.save_png(path)
     }
 }
 
@@ -64,7 +62,7 @@ pub fn render_overlay(maps: &[MapLayer<'_>]) -> Result<Picture, PictureError> {
 }
 
 /// Draws the maps; `paint` gives the colour of a pixel from the share of walls and free space that each map has in it.
-fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync) -> Result<Picture, PictureError> {
+fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb + Sync) -> Result<Picture, PictureError> {
     let layers: Vec<PlacedLayer<'_>> = maps
         .iter()
         .enumerate()
@@ -73,14 +71,14 @@ fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync) 
     let view = View::of(&layers).ok_or(PictureError::Empty)?;
 
     let mut image = RgbImage::from_pixel(view.width, view.height, UNKNOWN);
-    let row = view.width as usize * 3;
-    image.par_chunks_exact_mut(row.max(1)).enumerate().for_each(|(v, pixels)| {
+    let row = view.width.max(1) as usize;
+    image.pixels_mut().par_chunks_exact_mut(row).enumerate().for_each(|(v, pixels)| {
         let mut shares = vec![Coverage::default(); layers.len()];
-        for (u, pixel) in pixels.chunks_exact_mut(3).enumerate() {
+        for (u, pixel) in pixels.iter_mut().enumerate() {
             for (share, layer) in shares.iter_mut().zip(&layers) {
                 *share = layer.coverage(&view, u, v);
             }
-            pixel.copy_from_slice(&paint(&shares).0);
+            *pixel = paint(&shares);
         }
     });
     decoration::draw_axes(&mut image, &view);

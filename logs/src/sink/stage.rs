@@ -200,7 +200,7 @@ impl Stage for McapSink {
         if self.log.is_some()
             && let Err(error) = self.end(Outcome::Incomplete(reason))
         {
-            tracing::warn!("{error}");
+            log::warn!("{error}");
         }
     }
 

@@ -110,7 +110,7 @@ fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
         let Some(file) = stage.parameters.get("file").and_then(|file| file.as_str()).map(Path::new) else { continue };
         let is_of_this_run = file.metadata().and_then(|file| file.modified()).is_ok_and(|time| time >= start);
         if is_of_this_run && let Err(error) = close_log(file, reason) {
-            tracing::warn!("the output {} has no end: {error}", file.display());
+            log::warn!("the output {} has no end: {error}", file.display());
         }
     }
 }

@@ -4,10 +4,9 @@ use super::super::results::Results;
 use super::drive::{Drive, REACH, READINGS};
 use super::trial::{Conditions, Likelihood, Recording};
 use anyhow::{Context, Result};
+use gridweave_logs::picture::{Rgb, RgbImage};
 use gridweave_stages::geometry::Point2;
 use gridweave_stages::tag_localizer::{GridSize, Posterior, Reading, ReadingGroups, Readout, RingProduct};
-use image::{ImageFormat, Rgb, RgbImage};
-use std::io::Cursor;
 
 /// The numbers of readings of figure 4.
 const COUNTS: [usize; 4] = [30, 100, 200, READINGS];
@@ -17,10 +16,10 @@ const SEED: u64 = 4;
 const CELLS: usize = 300;
 /// Pixels between grids.
 const GAP: u32 = 8;
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
-const FRAME: Rgb<u8> = Rgb([208, 208, 208]);
-const WAY: Rgb<u8> = Rgb([0, 158, 115]);
-const TAG: Rgb<u8> = Rgb([213, 94, 0]);
+const PAPER: Rgb = Rgb([255, 255, 255]);
+const FRAME: Rgb = Rgb([208, 208, 208]);
+const WAY: Rgb = Rgb([0, 158, 115]);
+const TAG: Rgb = Rgb([213, 94, 0]);
 
 /// Draws the grids of a straight and of a circling drive below each other.
 pub(super) fn run(results: &mut Results) -> Result<()> {
@@ -34,9 +33,8 @@ pub(super) fn run(results: &mut Results) -> Result<()> {
             draw(&mut image, corner, &recording, count);
         }
     }
-    let mut png = Cursor::new(Vec::new());
-    image.write_to(&mut png, ImageFormat::Png).context("cannot make a PNG file of the grids")?;
-    results.file("localization_grids.png", &png.into_inner())
+    let png = image.png().context("cannot make a PNG file of the grids")?;
+    results.file("localization_grids.png", &png)
 }
 
 /// Draws the grid after `count` readings, its upper left pixel at `corner`. The y axis points up.
@@ -54,7 +52,7 @@ fn draw(image: &mut RgbImage, corner: (u32, u32), recording: &Recording, count: 
         masses[leaf.row * CELLS + leaf.column] += leaf.mass;
     }
     let most = masses.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let mut paint = |column: usize, row: usize, colour: Rgb<u8>| {
+    let mut paint = |column: usize, row: usize, colour: Rgb| {
         image.put_pixel(corner.0 + column as u32, corner.1 + (CELLS - 1 - row) as u32, colour);
     };
     for (index, mass) in masses.iter().enumerate() {

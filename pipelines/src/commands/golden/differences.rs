@@ -44,6 +44,6 @@ fn draw(folder: &Path, at: usize, grid: &GridDifference) -> Result<PathBuf, Stri
     let topic = grid.topic.trim_start_matches('/').replace(['/', '\\'], "_");
     let path = folder.join(format!("{topic}-{}.png", at + 1));
     let image = render_difference(grid.width, &grid.expected, &grid.got).map_err(|error| error.to_string())?;
-    image.save(&path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+    image.save_png(&path).map_err(|error| error.to_string())?;
     Ok(path)
 }

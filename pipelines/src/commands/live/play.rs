@@ -181,7 +181,7 @@ impl Player<'_> {
             }
             // Another turn has the same to warn of.
             for (warning, count) in warnings.iter().filter(|_| !pace.borrow().is_repeated()) {
-                tracing::warn!("{count} times: {warning}");
+                log::warn!("{count} times: {warning}");
             }
             if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_next_turn() {
                 return Ok(());
