@@ -2,8 +2,7 @@
 
 use crate::commands::simulate;
 use crate::evaluate::evaluate;
-use crate::job::{Job, Output};
-use crate::job::{Output, RunOptions};
+use crate::job::{Job, Output, RunOptions};
 use crate::status::Status;
 use anyhow::{Context, Result};
 use clap::Args;

@@ -40,6 +40,13 @@ fn failure(error: impl std::fmt::Display) -> StageError {
 /// An output for each of the feeds.
 struct Feeds(Vec<Out<AnyMessage>>);
 
+/// The ports are those of a case; see [`kind`].
+impl Outputs for Feeds {
+    fn declare(_: &mut OutputPorts) -> Self {
+        Self(Vec::new())
+    }
+}
+
 struct CaseSource {
     reader: LogReader,
     feeds: Arc<[Feed]>,
