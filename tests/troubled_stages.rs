@@ -9,6 +9,7 @@ use gridweave_runtime::stage::{
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -26,8 +27,8 @@ struct Trouble {
     at: u64,
     /// fail, panic, hang, abort, eat, print, nothing_passes.
     what: String,
-    /// How long it takes to start, microseconds.
-    start_pause: u64,
+    /// Wait before these messages, each time for a file `gate_NUMBER` in the folder in which the run was started.
+    gates: Vec<u64>,
     /// Fail before the first message.
     at_start: bool,
     /// Bytes of each message beside the pose.
@@ -45,6 +46,12 @@ impl Trouble {
             let random = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407) >> 33;
             if random.is_multiple_of(16) {
                 std::thread::sleep(Duration::from_micros(random % self.stall));
+            }
+        }
+        if self.gates.contains(&number) {
+            let gate = PathBuf::from(format!("gate_{number}"));
+            while !gate.exists() {
+                std::thread::sleep(Duration::from_millis(1));
             }
         }
         if self.at == 0 || number != self.at {
@@ -72,7 +79,6 @@ impl Trouble {
     }
 
     fn start(self) -> Result<Self, StageError> {
-        std::thread::sleep(Duration::from_micros(self.start_pause));
         match self.at_start {
             true => Err(StageError::new("start", "it was told so")),
             false => Ok(self),
