@@ -4,7 +4,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 use std::fmt;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -30,7 +31,12 @@ impl Input {
 
     /// Writes its files to a folder.
     pub(crate) fn write(&self, folder: &Path, names: &[&str]) {
-        names.iter().zip(&self.0).for_each(|(name, bytes)| fs::write(folder.join(name), bytes).unwrap());
+        for (name, bytes) in names.iter().zip(&self.0) {
+            // Not emptied first: some file systems then write to the disk at once, which takes longer than all else.
+            let mut file = File::options().write(true).create(true).truncate(false).open(folder.join(name)).unwrap();
+            file.write_all(bytes).unwrap();
+            file.set_len(bytes.len() as u64).unwrap();
+        }
     }
 
     /// Bytes of all files.

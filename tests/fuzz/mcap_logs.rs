@@ -64,7 +64,7 @@ fn every_log_is_read_or_refused() {
 /// A log of each kind of message that is looked into, in two chunks if it has chunks.
 pub(crate) fn small_log(options: WriteOptions) -> Vec<u8> {
     let mut log = mcap::Writer::with_options(Cursor::new(Vec::new()), options.profile("ros2")).unwrap();
-    let mut write = |log: &mut mcap::Writer<_>, topic: &str, name: &str, time: u64, bytes: &[u8]| {
+    let write = |log: &mut mcap::Writer<_>, topic: &str, name: &str, time: u64, bytes: &[u8]| {
         let schema = log.add_schema(name, "ros2msg", schema_text(name).unwrap().as_bytes()).unwrap();
         let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), "".to_owned())]);
         let channel_id = log.add_channel(schema, topic, "cdr", &metadata).unwrap();

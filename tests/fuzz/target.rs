@@ -5,8 +5,10 @@ use super::input::{Input, inputs};
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestError, TestRunner};
 use rustix::process::{Resource, Rlimit, setrlimit};
 use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -22,6 +24,26 @@ const MEMORY_AT_ALL: u64 = 6 << 30;
 
 /// Targets take turns, as memory is counted for all threads together.
 static TURN: Mutex<()> = Mutex::new(());
+
+/// How many inputs were answered.
+static ANSWERED: AtomicU64 = AtomicU64::new(0);
+
+/// Ends this program if a reader hangs, until what it gives is dropped. A thread cannot be ended, and what it reads must
+/// stay as it is.
+fn watch(name: &'static str, folder: PathBuf) -> Sender<()> {
+    let (done, end) = mpsc::channel();
+    thread::spawn(move || {
+        let mut answered = u64::MAX;
+        while end.recv_timeout(WATCHDOG) == Err(RecvTimeoutError::Timeout) {
+            if answered == ANSWERED.load(Ordering::Relaxed) {
+                eprintln!("{name} hangs on the input in {}", folder.display());
+                std::process::abort();
+            }
+            answered = ANSWERED.load(Ordering::Relaxed);
+        }
+    });
+    done
+}
 
 /// Something that reads what others have written.
 pub(crate) struct Target {
@@ -48,6 +70,7 @@ impl Target {
         setrlimit(Resource::As, limit).unwrap();
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz").join(self.name);
         fs::create_dir_all(&folder).unwrap();
+        let _watch = watch(self.name, folder.clone());
         for regression in self.regressions() {
             let input = Input::read(&regression, self.files);
             self.answer(&input, &folder).unwrap_or_else(|fault| panic!("{}: {fault}", regression.display()));
@@ -93,18 +116,9 @@ impl Target {
         input.write(folder, self.files);
         MEMORY.reset_peak_usage();
         let before = MEMORY.current_usage();
-        let (ended, end) = mpsc::channel::<()>();
-        let (read, place) = (self.read, folder.to_owned());
-        let reader = thread::spawn(move || {
-            let _ended = ended;
-            read(&place);
-        });
-        if end.recv_timeout(WATCHDOG) == Err(RecvTimeoutError::Timeout) {
-            // A thread cannot be ended, and what it reads must stay as it is.
-            eprintln!("{} hangs on the input in {}", self.name, folder.display());
-            std::process::abort();
-        }
-        if let Err(panic) = reader.join() {
+        let read = catch_unwind(AssertUnwindSafe(|| (self.read)(folder)));
+        ANSWERED.fetch_add(1, Ordering::Relaxed);
+        if let Err(panic) = read {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             return Err(format!("panic: {}", text.or(panic.downcast_ref::<&str>().copied()).unwrap_or_default()));
         }

@@ -95,7 +95,7 @@ pub(crate) fn start_program(program: &Path, folder: &Path, args: &[&str], variab
     let stderr = Printed::read(child.stderr.take().unwrap());
     let (ended, end) = mpsc::channel();
     // The test may have gone when it ends.
-    thread::spawn(move || drop(ended.send(child.wait().unwrap())));
+    thread::spawn(move || ended.send(child.wait().unwrap()).ok());
     Running { id, command: format!("{} {args:?}", program.display()), end: Some(end), stdout, stderr }
 }
 
