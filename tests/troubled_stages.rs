@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
-use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, PoseStamped};
 use gridweave_runtime::stage::{
-    InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
+    Context, Out, Output, OutputPorts, Outputs, Parameters, Received, Source, StageError, StageKind,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -26,8 +27,8 @@ struct Trouble {
     at: u64,
     /// fail, panic, hang, abort, eat, print, nothing_passes.
     what: String,
-    /// How long it takes to start, microseconds.
-    start_pause: u64,
+    /// Wait before these messages, each time for a file `gate_NUMBER` in the folder in which the run was started.
+    gates: Vec<u64>,
     /// Fail before the first message.
     at_start: bool,
     /// Bytes of each message beside the pose.
@@ -45,6 +46,12 @@ impl Trouble {
             let random = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407) >> 33;
             if random.is_multiple_of(16) {
                 std::thread::sleep(Duration::from_micros(random % self.stall));
+            }
+        }
+        if self.gates.contains(&number) {
+            let gate = PathBuf::from(format!("gate_{number}"));
+            while !gate.exists() {
+                std::thread::sleep(Duration::from_millis(1));
             }
         }
         if self.at == 0 || number != self.at {
@@ -72,7 +79,6 @@ impl Trouble {
     }
 
     fn start(self) -> Result<Self, StageError> {
-        std::thread::sleep(Duration::from_micros(self.start_pause));
         match self.at_start {
             true => Err(StageError::new("start", "it was told so")),
             false => Ok(self),
@@ -84,10 +90,21 @@ impl Trouble {
     }
 }
 
+/// The poses that a stage sends.
+struct Poses(Out<PoseStamped>);
+
+impl Outputs for Poses {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("out", "poses"))
+    }
+}
+
 struct TroubledSource(Trouble, u64);
 
 impl Source for TroubledSource {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Poses;
+
+    fn next(&mut self, output: &Output<Poses>) -> Result<bool, StageError> {
         let Self(trouble, number) = self;
         if *number == trouble.count {
             return Ok(false);
@@ -96,39 +113,34 @@ impl Source for TroubledSource {
         trouble.happen(*number)?;
         let log_time = LogTime(1_000_000_000 + *number * 1_000_000);
         output.set_log_time(log_time);
-        output.send(0, "robot1", &trouble.pose(log_time))?;
+        output.0.send("robot1", &trouble.pose(log_time))?;
         Ok(true)
     }
 }
 
 struct TroubledStage(Trouble, u64);
 
-impl Stage for TroubledStage {
-    fn receive(&mut self, _port: usize, _message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+impl TroubledStage {
+    fn receive(&mut self, _: Received<'_, PoseStamped>, output: &Output<Poses>) -> Result<(), StageError> {
         let Self(trouble, number) = self;
         *number += 1;
         trouble.happen(*number)?;
         if trouble.what == "nothing_passes" {
             return Ok(());
         }
-        let pose = trouble.pose(output.log_time());
-        output.send(0, "robot1", &pose)
+        output.0.send("robot1", &trouble.pose(output.log_time()))
     }
 }
 
 fn main() -> ExitCode {
-    let pose = PortType::of::<PoseStamped>();
-    let outputs = || vec![OutputPort::new("out", pose, "poses")];
     gridweave::command([
-        StageKind::source("troubled_source", "Sends poses.", outputs(), |trouble: Trouble, _| {
+        StageKind::source("troubled_source", "Sends poses.", |trouble: Trouble, _: &Context| {
             Ok(TroubledSource(trouble.start()?, 0))
         }),
-        StageKind::stage(
-            "troubled_stage",
-            "Sends a pose for each message.",
-            vec![InputPort::many("in", pose, "poses")],
-            outputs(),
-            |trouble: Trouble, _| Ok(TroubledStage(trouble.start()?, 0)),
-        ),
+        StageKind::stage("troubled_stage", "Sends a pose for each message.", |trouble: Trouble, _| {
+            Ok(TroubledStage(trouble.start()?, 0))
+        })
+        .inputs("in", "poses", TroubledStage::receive)
+        .build(),
     ])
 }

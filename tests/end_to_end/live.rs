@@ -1,5 +1,5 @@
 //! Live runs: what is sent arrives, what is dropped is counted, and an interrupt loses nothing.
-use crate::support::{Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, read, signal, start, wait_until};
+use crate::support::{Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, read, signal, simulate, start, wait_until};
 use std::fs;
 use tempfile::TempDir;
 
@@ -23,20 +23,26 @@ fn an_interrupt_ends_a_live_run_when_all_that_was_sent_is_handled() {
 #[test]
 fn players_that_are_killed_leave_room_for_others_and_the_run_goes_on() {
     let run = Run::start(RECEIVE, &[]);
-    run.simulate();
+    let (log, _) = run.simulate();
+    simulate(run.folder.path(), "one.mcap", &["--robots", "1", "--set", "duration=10"]);
     for _ in 0..11 {
         let before = run.number("output", "messages_in");
-        let player = run.command(&["play", LOG, "--rate", "20"]);
-        wait_until("messages", || run.number("output", "messages_in") > before);
+        let player = run.command(&["play", "one.mcap", "--rate", "0", "--loop"]);
+        // More than may still be under way of what others have sent.
+        wait_until("messages", || run.number("output", "messages_in") > before + 1000);
         signal(player.id(), "KILL");
         player.wait();
     }
-    let before = run.number("output", "messages_in");
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
-    assert_eq!(run.number("output", "messages_in"), before + 7857);
     let done = run.interrupt();
     done.assert_done();
     assert_eq!(done.numbers("output", ["dropped"]), [0]);
+    // The killed ones have sent nothing of robot 2.
+    let (sent, output) = (read(&log), done.output());
+    for topic in ["/robot2/map", "/robot2/tag_ranges"] {
+        assert!(sent[topic] == output[topic], "{topic}");
+    }
+    assert_eq!(sent["/robot2/pose"].len(), output["/robot2/pose"].len());
 }
 
 #[test]
@@ -52,11 +58,14 @@ fn a_run_can_be_ended_while_robots_send() {
     assert_eq!(done.output().values().map(Vec::len).sum::<usize>() as u64, given);
 }
 
-/// Numbers of a stage that is slow, at its start as well: messages sent to it, given to it, and dropped.
-fn slow_stage(overflow: &str, count: u64) -> [u64; 3] {
-    let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000", "pause = 100");
-    let settings = [&format!("source.count={count}"), "middle.pause=3000", "middle.start_pause=500000"];
+/// Numbers of a stage that stands still at its first message until its source has sent `sent` messages: those sent to it,
+/// given to it, and dropped.
+fn standing_stage(overflow: &str, count: u64, sent: u64) -> [u64; 3] {
+    let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000\n", "");
+    let settings = [&format!("source.count={count}"), "middle.gates=[1]"];
     let run = Run::start(&text, &settings.map(|setting| ["--set", setting]).concat());
+    wait_until("messages", || run.number("source", "messages_out") >= sent);
+    run.open_gate(1);
     let done = run.wait();
     done.assert_done();
     let [sent] = done.numbers("source", ["messages_out"]);
@@ -68,15 +77,15 @@ fn slow_stage(overflow: &str, count: u64) -> [u64; 3] {
 
 #[test]
 fn a_link_that_drops_the_oldest_does_not_slow_its_sender_and_counts_every_drop() {
-    let [sent, given, dropped] = slow_stage("\"drop_oldest\"", 3000);
+    let [sent, given, dropped] = standing_stage("\"drop_oldest\"", 3000, 3000);
     assert_eq!((sent, given + dropped), (3000, 3000), "{given} were given, {dropped} dropped");
-    // A sender that waited would give its reader all of them.
-    assert!(dropped > given, "{given} were given, {dropped} dropped");
+    // The one at which the stage stood, and what there is room for on a link of depth 16.
+    assert!((1..=64).contains(&given), "{given} were given, {dropped} dropped");
 }
 
 #[test]
 fn a_link_that_waits_drops_nothing() {
-    assert_eq!(slow_stage("\"wait\"", 400), [400, 400, 0]);
+    assert_eq!(standing_stage("\"wait\"", 400, 8), [400, 400, 0]);
 }
 
 #[test]

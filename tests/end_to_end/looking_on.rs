@@ -7,8 +7,6 @@ use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
-use std::thread;
-use std::time::Duration;
 use tempfile::TempDir;
 
 #[test]
@@ -19,6 +17,7 @@ fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
         let (file, path) = (format!("{turn}.mcap"), run.path(&format!("{turn}.mcap")));
         let recorder = run.command(&["record", "-o", &file, "middle"]);
         wait_until("recording", || path.exists());
+        tap.wait_for_lines(1);
         [&tap, &recorder].into_iter().for_each(|program| signal(program.id(), "KILL"));
         tap.wait();
         recorder.wait();
@@ -29,11 +28,12 @@ fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
 
 #[test]
 fn a_halted_tap_does_not_hold_up_a_live_run_with_large_messages() {
-    let settings = ["source.count=1500", "source.size=50000", "middle.size=50000"];
+    let settings = ["source.count=1500", "source.gates=[200]", "source.size=50000", "middle.size=50000"];
     let run = Run::start(TROUBLED, &settings.map(|setting| ["--set", setting]).concat());
     let taps = ["source", "middle"].map(|link| run.command(&["tap", link, "--json"]));
-    wait_until("messages", || run.number("output", "messages_in") > 100);
+    taps.iter().for_each(|tap| tap.wait_for_lines(1));
     taps.iter().for_each(|tap| signal(tap.id(), "STOP"));
+    run.open_gate(200);
     let done = run.wait();
     done.assert_done();
     for stage in ["middle", "output"] {
@@ -82,19 +82,20 @@ fn of_several_runs_of_one_name_one_must_be_chosen() {
 fn a_recording_holds_what_the_log_of_the_run_holds() {
     let run = Run::start("live", &[]);
     run.simulate();
-    let links = ["robots.map", "robots.tags", "lines", "quadrants", "icp", "frames"];
+    // Each of them has fewer messages than are kept for one who looks on, so none can be missed.
+    let links = ["robots.map", "lines", "quadrants", "icp", "frames"];
     let recorder = run.command(&[&["record", "-o", "recorded.mcap"], &links[..]].concat());
     wait_until("recording", || run.path("recorded.mcap").exists());
-    run.command(&["play", LOG, "--rate", "10", "--start", "50", "--end", "75"]).wait().assert(0, &["played"]);
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
     let done = run.interrupt();
     assert_eq!(outcome(&done.path(OUTPUT)).0, "");
     recorder.wait().assert(0, &["recorded", "links to recorded.mcap"]);
     assert_eq!(outcome(&done.path("recorded.mcap")).0, "");
     let (recorded, output) = (read(&done.path("recorded.mcap")), done.output());
-    assert!(recorded.len() > 8, "{:?}", recorded.keys());
+    assert!(recorded.len() > 6, "{:?}", recorded.keys());
     for (topic, messages) in &recorded {
         let sizes = (messages.len(), output[topic].len());
-        assert!(*messages == output[topic], "{topic}: {sizes:?}");
+        assert!(messages.len() <= 64 && *messages == output[topic], "{topic}: {sizes:?}");
     }
 }
 
@@ -137,19 +138,20 @@ fn eight_players_and_four_taps_of_each_link_can_be_there_at_once() {
 #[test]
 fn of_a_killed_recorder_all_but_the_last_moment_can_be_read() {
     let run = Run::start(RECEIVE, &[]);
-    run.simulate();
-    let recorder = run.command(&["record", "-o", "recorded.mcap", "robots.tags"]);
+    let (log, _) = run.simulate();
+    let recorder = run.command(&["record", "-o", "recorded.mcap", "robots.map"]);
     wait_until("recording", || run.path("recorded.mcap").exists());
-    run.command(&["play", LOG, "--rate", "20", "--start", "60", "--end", "80"]).wait().assert(0, &["played"]);
-    thread::sleep(Duration::from_secs(2));
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
+    let sent = read(&log);
+    let sent = ["/robot1/map", "/robot2/map"].map(|topic| sent[topic].len()).iter().sum::<usize>();
+    let words = format!("{sent} messages");
+    let info = || start(run.folder.path(), &["info", "recorded.mcap"], &[]).wait();
+    // A moment later it is on disk, though nothing more comes.
+    wait_until("recorded maps", || info().stdout.contains(&words));
     signal(recorder.id(), "KILL");
     recorder.wait();
-    let info = start(run.folder.path(), &["info", "recorded.mcap"], &[]).wait();
-    let done = run.interrupt();
-    done.assert_done();
-    let output = done.output();
-    let sent = ["/robot1/tag_ranges", "/robot2/tag_ranges"].map(|topic| output[topic].len()).iter().sum::<usize>();
-    info.assert(0, &[&format!("{sent} messages")]);
+    info().assert(0, &[&words]);
+    run.interrupt().assert_done();
 }
 
 #[test]
@@ -213,26 +215,37 @@ fn without_a_run_the_commands_say_what_to_do() {
 
 #[test]
 fn whoever_looks_on_at_a_replay_and_however_he_ends_its_result_is_the_same() {
-    // Slow enough to look on.
-    let settings = ["--engine", "processes", "--set", "source.count=15000", "--set", "source.pause=150"];
-    let alone = Run::start(DIAMOND, &settings);
-    let watched = Run::start(DIAMOND, &settings);
+    let text = DIAMOND.replace("stall_timeout = 2.0\n", "");
+    let gates: Vec<u64> = (1000..9000).step_by(10).collect();
+    let settings = ["source.count=9000".to_owned(), format!("source.gates={gates:?}")];
+    let settings = settings.each_ref().map(|setting| ["--set", setting]).concat();
+    let settings = [&["--engine", "processes"], &settings[..]].concat();
+    let [alone, watched] = [(); 2].map(|()| Run::start(&text, &settings));
+    gates.iter().for_each(|gate| alone.open_gate(*gate));
     wait_until("start", || processes(watched.id()).len() == 5);
     let killed = watched.command(&["tap", "source", "--json"]);
     let halted = watched.command(&["tap", "middle.out", "--json"]);
     let tap = watched.command(&["tap", "join", "--json", "--count", "20"]);
     let recorder = watched.command(&["record", "-o", "recorded.mcap", "source", "join"]);
     let top = watched.command(&["top", "--json", "--interval", "0.1"]);
-    wait_until("recording", || fs::metadata(watched.path("recorded.mcap")).is_ok_and(|file| file.len() > 1000));
+    // A few messages pass, and another one has a look, until all have seen some.
+    let recorded = watched.path("recorded.mcap");
+    let mut closed = gates.into_iter();
+    while killed.lines() < 10 || halted.lines() < 10 || tap.lines() < 20 || !recorded.exists() {
+        watched.open_gate(closed.next().unwrap());
+        watched.top();
+    }
     tap.wait().assert(0, &[]);
     signal(killed.id(), "KILL");
     signal(halted.id(), "STOP");
+    top.wait_for_lines(3);
+    watched.open_gate(closed.next().unwrap());
+    wait_until("record", || fs::metadata(&recorded).is_ok_and(|file| file.len() > 1000));
+    closed.for_each(|gate| watched.open_gate(gate));
     let watched = watched.wait();
     watched.assert_done();
     signal(halted.id(), "KILL");
-    let (killed, _) = (killed.wait(), halted.wait());
-    assert!(killed.stdout.lines().count() > 10);
-    assert!(top.wait().stdout.lines().count() > 2);
+    (killed.wait(), halted.wait(), top.wait());
     // The recorder says so if it was too slow.
     assert!([0, 1].contains(&recorder.wait().status));
     assert!(!read(&watched.path("recorded.mcap")).is_empty());

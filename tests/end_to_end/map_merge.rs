@@ -75,10 +75,10 @@ fn the_output_is_the_same_on_every_engine_and_any_number_of_cores() {
 }
 
 #[test]
+#[ignore = "needs GRIDWEAVE_LOGS: the folder of real logs"]
 fn every_pair_of_the_real_logs_is_right_and_no_other_is_merged() {
-    let Some(logs) = real_logs() else { return };
     let folder = TempDir::new().unwrap();
-    for log in logs_in(&logs) {
+    for log in logs_in(&real_logs()) {
         let name = log.file_stem().unwrap().to_str().unwrap();
         let (ended, summary) = merge(folder.path(), &[&log], &["--results-only"]);
         let truth = log.with_extension("truth.json");

@@ -3,7 +3,7 @@
 use super::definition::{Count, FieldLine, Primitive, TypeName, fields};
 use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Types may use each other to this depth. Those of ROS reach 6 or so.
 const DEEPEST: usize = 64;
@@ -62,6 +62,14 @@ pub enum SchemaError {
         name: String,
         /// The line.
         line: String,
+    },
+    /// Two fields of a type have one name, so that neither can be asked for.
+    #[error("the definition of {name} has two fields called `{field}`")]
+    Twice {
+        /// The type.
+        name: String,
+        /// The name of both fields.
+        field: String,
     },
     /// A type contains itself, or types contain each other to no end.
     #[error("the definition of {0} contains itself, or is nested too deeply")]
@@ -153,7 +161,11 @@ impl Builder {
         let text = self.sections.get(name).ok_or_else(|| SchemaError::Undefined(name.to_owned()))?;
         let lines = fields(text).map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
         let mut made = MessageType { fields: Vec::with_capacity(lines.len()), least_size: 0 };
+        let mut names = BTreeSet::new();
         for FieldLine { name: field, of, count } in lines {
+            if !names.insert(field.clone()) {
+                return Err(SchemaError::Twice { name: name.to_owned(), field });
+            }
             let (of, size) = match of {
                 TypeName::Primitive(primitive) => (Element::Primitive(primitive), primitive.least_size()),
                 TypeName::Message(used) => {

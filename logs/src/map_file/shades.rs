@@ -2,8 +2,15 @@
 
 use super::Mode;
 use super::description::Reading;
-use image::{DynamicImage, ImageReader, ImageResult};
-use std::io::Cursor;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
+use std::io::{self, Cursor};
+
+/// What a byte of a file stands for at the most, bytes of the image: eight pixels in a PBM.
+const DENSEST_PNM: u64 = 8;
+/// The same for a PNG: its compression, deflate, makes at most 1032 bytes of one, and each may be eight pixels.
+const DENSEST_PNG: u64 = 8 * 1032;
+/// No image takes more, bytes.
+const LARGEST: u64 = 512 << 20;
 
 /// An image, and the value that stands for white in it.
 pub(super) struct Shades {
@@ -14,7 +21,16 @@ pub(super) struct Shades {
 impl Shades {
     /// Decodes an image file: PGM, PPM, PBM or PNG, told by its first bytes.
     pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
-        let image = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?;
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        let densest = if reader.format() == Some(ImageFormat::Png) { DENSEST_PNG } else { DENSEST_PNM };
+        let decoder = reader.into_decoder()?;
+        // The size is the file's word only.
+        if decoder.total_bytes() > densest.saturating_mul(bytes.len() as u64).min(LARGEST) {
+            let (width, height) = decoder.dimensions();
+            let text = format!("its {} bytes cannot hold the {width} x {height} pixels that it claims", bytes.len());
+            return Err(io::Error::new(io::ErrorKind::InvalidData, text).into());
+        }
+        let image = DynamicImage::from_decoder(decoder)?;
         let bytes_a_channel = image.color().bytes_per_pixel() / image.color().channel_count();
         Ok(Self { image, white: if bytes_a_channel == 1 { 255.0 } else { 65535.0 } })
     }

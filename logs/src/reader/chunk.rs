@@ -26,7 +26,7 @@ impl Chunk {
     /// Reads a chunk record. `None` if its lengths contradict each other.
     pub(crate) fn parse(record: &Record<'_>) -> Option<Self> {
         let (mut chunk, length) = Self::parse_header(record.body, record.position + HEAD)?;
-        chunk.data.end = chunk.data.start + usize::try_from(length).ok()?;
+        chunk.data.end = chunk.data.start.checked_add(usize::try_from(length).ok()?)?;
         (chunk.data.end == record.end()).then_some(chunk)
     }
 
@@ -54,9 +54,9 @@ impl Chunk {
         let data = file.get(self.data.clone()).ok_or(ChunkFault::Records)?;
         let contents = match (self.compression.as_str(), self.cut) {
             ("", _) => Cow::Borrowed(data),
-            ("zstd", false) => Cow::Owned(decompress_zstd(data, reserve(self.size)?)?),
+            ("zstd", false) => Cow::Owned(decompress_zstd(data, self.size)?),
             ("zstd", true) => Cow::Owned(decompress_cut(zstd::stream::read::Decoder::new(data))),
-            ("lz4", false) => Cow::Owned(decompress_lz4(data, reserve(self.size)?)?),
+            ("lz4", false) => Cow::Owned(decompress_lz4(data, self.size)?),
             ("lz4", true) => Cow::Owned(decompress_cut(lz4::Decoder::new(data))),
             (other, _) => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };
@@ -72,28 +72,40 @@ impl Chunk {
     }
 }
 
-/// An empty buffer with room for `size` bytes. The size is the file's word only, so it may be absurd.
-fn reserve(size: u64) -> Result<Vec<u8>, ChunkFault> {
+/// A byte of a log rarely stands for more.
+const USUAL_RATIO: u64 = 256;
+
+/// An empty buffer with room for `size` bytes, or for what `data` can be expected to become. The size is the file's word
+/// only, so it may be absurd.
+fn reserve(size: u64, data: &[u8]) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = Vec::new();
-    let size = usize::try_from(size).map_err(|_| ChunkFault::TooLarge)?;
+    let size = usize::try_from(size.min(USUAL_RATIO * data.len() as u64)).map_err(|_| ChunkFault::TooLarge)?;
     buffer.try_reserve_exact(size).map_err(|_| ChunkFault::TooLarge)?;
     Ok(buffer)
 }
 
-fn decompress_zstd(data: &[u8], mut buffer: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
-    let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
-    decompressor.decompress_to_buffer(data, &mut buffer).map_err(|_| ChunkFault::Decompression)?;
+fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = reserve(size, data)?;
+    if buffer.capacity() as u64 >= size {
+        let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
+        decompressor.decompress_to_buffer(data, &mut buffer).map_err(|_| ChunkFault::Decompression)?;
+    } else {
+        // The buffer grows with what there really is.
+        let decoder = zstd::stream::read::Decoder::with_buffer(data).map_err(|_| ChunkFault::Decompression)?;
+        decoder.take(size.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
+    }
     Ok(buffer)
 }
 
-fn decompress_lz4(data: &[u8], mut buffer: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = reserve(size, data)?;
     let mut rest = data;
     // The data may be several frames; a decoder reads one, and stops behind it.
     while !rest.is_empty() {
-        let room = (buffer.capacity() - buffer.len()) as u64;
+        let room = size.saturating_sub(buffer.len() as u64);
         let decoder = lz4::Decoder::new(&mut rest).map_err(|_| ChunkFault::Decompression)?;
         // One byte more than there is room for shows that the header's size is wrong.
-        decoder.take(room + 1).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
+        decoder.take(room.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
     }
     Ok(buffer)
 }

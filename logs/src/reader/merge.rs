@@ -81,7 +81,9 @@ impl LogReader {
     /// Reads all messages of `files`.
     pub fn new(files: Vec<LogFile>) -> Self {
         let files: Arc<[LogFile]> = files.into();
-        let bytes_total = files.iter().flat_map(|file| &file.layout.blocks).map(|block| block.size()).sum();
+        let sizes = files.iter().flat_map(|file| &file.layout.blocks).map(|block| block.size());
+        // Sizes are the files' word only.
+        let bytes_total = sizes.fold(0, u64::saturating_add);
         Self {
             ahead: Ahead::new(Arc::clone(&files)),
             files,

@@ -11,9 +11,14 @@ pub(crate) use readings::{change_readings, moved_reading, place_in_map_2};
 pub(crate) use run_files::{DIAMOND, left_over, outcome, processes, run_folder, run_name, signal, wait_until};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::sync::{Arc, Condvar, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// A command that runs for longer hangs.
+const WATCHDOG: Duration = Duration::from_secs(240);
 
 /// How a command ended.
 #[derive(Debug)]
@@ -54,10 +59,12 @@ pub(crate) fn gridweave_with(folder: &Path, args: &[&str], variables: &[(&str, &
 
 /// A command that runs.
 pub(crate) struct Running {
-    child: Child,
+    id: u32,
     command: String,
-    stdout: Option<JoinHandle<String>>,
-    stderr: Option<JoinHandle<String>>,
+    /// None once its end was waited for.
+    end: Option<Receiver<ExitStatus>>,
+    stdout: Printed,
+    stderr: Printed,
 }
 
 /// The command, with stages that get into trouble beside those that ship.
@@ -83,40 +90,79 @@ pub(crate) fn start_program(program: &Path, folder: &Path, args: &[&str], variab
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let read = |mut pipe: Box<dyn Read + Send>| {
-        Some(std::thread::spawn(move || {
-            let mut bytes = Vec::new();
-            pipe.read_to_end(&mut bytes).unwrap();
-            String::from_utf8_lossy(&bytes).into_owned()
-        }))
-    };
-    let stdout = read(Box::new(child.stdout.take().unwrap()));
-    let stderr = read(Box::new(child.stderr.take().unwrap()));
-    Running { child, command: format!("{} {args:?}", program.display()), stdout, stderr }
+    let id = child.id();
+    let stdout = Printed::read(child.stdout.take().unwrap());
+    let stderr = Printed::read(child.stderr.take().unwrap());
+    let (ended, end) = mpsc::channel();
+    // The test may have gone when it ends.
+    thread::spawn(move || ended.send(child.wait().unwrap()).ok());
+    Running { id, command: format!("{} {args:?}", program.display()), end: Some(end), stdout, stderr }
+}
+
+fn lines_of(text: &[u8]) -> usize {
+    text.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// What a program prints, as it prints it.
+struct Printed {
+    text: Arc<(Mutex<Vec<u8>>, Condvar)>,
+    /// Ends when nobody prints any more.
+    reader: Option<JoinHandle<()>>,
+}
+
+impl Printed {
+    fn read(mut pipe: impl Read + Send + 'static) -> Self {
+        let text = Arc::new((Mutex::new(Vec::new()), Condvar::new()));
+        let (shared, mut part) = (Arc::clone(&text), [0; 4096]);
+        let reader = thread::spawn(move || {
+            while let Ok(count @ 1..) = pipe.read(&mut part) {
+                shared.0.lock().unwrap().extend_from_slice(&part[..count]);
+                shared.1.notify_all();
+            }
+        });
+        Self { text, reader: Some(reader) }
+    }
+
+    /// Waits until there are so many lines. `false` if there are not, for as long as a command may run.
+    fn wait_for_lines(&self, count: usize) -> bool {
+        let (text, more) = &*self.text;
+        let text = text.lock().unwrap();
+        !more.wait_timeout_while(text, WATCHDOG, |text| lines_of(text) < count).unwrap().1.timed_out()
+    }
+
+    /// All of it, once nobody prints any more.
+    fn all(&mut self) -> String {
+        self.reader.take().unwrap().join().unwrap();
+        String::from_utf8_lossy(&self.text.0.lock().unwrap()).into_owned()
+    }
 }
 
 impl Running {
     /// The number of its process.
     pub(crate) fn id(&self) -> u32 {
-        self.child.id()
+        self.id
+    }
+
+    /// How many lines it has printed to standard output so far.
+    pub(crate) fn lines(&self) -> usize {
+        lines_of(&self.stdout.text.0.lock().unwrap())
+    }
+
+    /// Waits until it has printed so many lines to standard output.
+    #[track_caller]
+    pub(crate) fn wait_for_lines(&self, count: usize) {
+        assert!(self.stdout.wait_for_lines(count), "{} has not printed {count} lines", self.command);
     }
 
     /// Waits for its end. A command that hangs is killed and fails the test.
     #[track_caller]
     pub(crate) fn wait(mut self) -> Ended {
-        let start = Instant::now();
-        let status = loop {
-            match self.child.try_wait().unwrap() {
-                Some(status) => break status,
-                None if start.elapsed() > Duration::from_secs(240) => {
-                    self.child.kill().unwrap();
-                    panic!("{} hangs", self.command);
-                }
-                None => std::thread::sleep(Duration::from_millis(5)),
-            }
+        let end = self.end.take().unwrap();
+        let Ok(status) = end.recv_timeout(WATCHDOG) else {
+            signal(self.id, "KILL");
+            panic!("{} hangs", self.command);
         };
-        let [stdout, stderr] =
-            [&mut self.stdout, &mut self.stderr].map(|output| output.take().unwrap().join().unwrap());
+        let [stdout, stderr] = [&mut self.stdout, &mut self.stderr].map(Printed::all);
         Ended { status: status.code().unwrap_or(-1), stdout, stderr }
     }
 }
@@ -124,15 +170,11 @@ impl Running {
 impl Drop for Running {
     /// What a test that fails has started does not go on after it.
     fn drop(&mut self) {
-        if !matches!(self.child.try_wait(), Ok(None)) {
-            return;
+        let Some(end) = self.end.take().filter(|end| end.try_recv().is_err()) else { return };
+        signal(self.id, "TERM");
+        if end.recv_timeout(Duration::from_secs(15)).is_err() {
+            signal(self.id, "KILL");
         }
-        signal(self.id(), "TERM");
-        let start = Instant::now();
-        while matches!(self.child.try_wait(), Ok(None)) && start.elapsed() < Duration::from_secs(15) {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        let _ = self.child.kill();
     }
 }
 
@@ -148,13 +190,10 @@ pub(crate) fn simulate(folder: &Path, name: &str, args: &[&str]) -> (PathBuf, Pa
     (log, truth)
 }
 
-/// The folder with real logs that the environment names, if it does.
-pub(crate) fn real_logs() -> Option<PathBuf> {
-    let folder = std::env::var_os("GRIDWEAVE_LOGS").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("SKIPPED: GRIDWEAVE_LOGS does not name a folder with real logs");
-    }
-    folder
+/// The folder with real logs, which the environment must name.
+pub(crate) fn real_logs() -> PathBuf {
+    let folder = std::env::var_os("GRIDWEAVE_LOGS");
+    PathBuf::from(folder.unwrap_or_else(|| panic!("GRIDWEAVE_LOGS names no folder with real logs")))
 }
 
 /// The logs of a folder, by name.

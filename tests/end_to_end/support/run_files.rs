@@ -6,7 +6,7 @@ use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A source, a diamond of two stages, one that joins them with the source itself, and a log. It takes some seconds.
+/// A source, a diamond of two stages, one that joins them with the source itself, and a log. It does not end by itself.
 pub(crate) const DIAMOND: &str = r#"
 [pipeline]
 name = "diamond"
@@ -16,7 +16,7 @@ memory_limit = 300_000_000
 
 [stages.source]
 kind = "troubled_source"
-count = 40_000
+count = 1_000_000_000
 pause = 100
 
 [stages.middle]
@@ -74,13 +74,13 @@ pub(crate) fn signal(process: u32, signal: &str) {
     assert!(Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).status().unwrap().success());
 }
 
-/// Waits until something is so.
+/// Waits until something is so that nothing tells of: files grow, and runs go on, without a word to others.
 #[track_caller]
 pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
     while !condition() {
         assert!(start.elapsed() < Duration::from_secs(60), "no {what}");
-        thread::sleep(Duration::from_millis(2));
+        thread::park_timeout(Duration::from_millis(2));
     }
 }
 
