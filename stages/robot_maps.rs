@@ -126,7 +126,7 @@ mod tests {
         for (robot, map) in given {
             stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(1), map).unwrap();
         }
-        (MAPS.take().take(), stage.warnings().len())
+        (MAPS.with(|maps| maps.take()), stage.warnings().len())
     }
 
     fn map(cells: &[u8]) -> OccupancyGrid<'_> {

@@ -61,7 +61,7 @@ pub struct PointIndex {
 pub struct Neighbour {
     /// Its place in [`PointIndex::points`].
     pub index: usize,
-    /// Square of the distance to it, square metres.
+    /// Square of the distance to it.
     pub squared_distance: f64,
 }
 
@@ -119,7 +119,7 @@ impl PointIndex {
         self.starts[start + first] as usize..self.starts[start + last + 1] as usize
     }
 
-    /// The point nearest to `point`, if one lies within `radius` metres of it. Of several that are equally near it is
+    /// The point nearest to `point`, if one lies within `radius` of it. Of several that are equally near it is
     /// the first.
     pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
         let Buckets { corner, side, columns, rows } = self.buckets;
