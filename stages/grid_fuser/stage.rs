@@ -56,22 +56,16 @@ impl Outputs for FusedMap {
 struct GridFuser {
     table: EvidenceTable,
     parameters: GridFuserParameters,
-    maps: BTreeMap<String, StoredMap>,
+    maps: RobotMaps<KnownArea>,
     frames: RobotFrames,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
 }
 
-/// A robot's latest map, where it came in: its bytes are not copied.
-struct StoredMap {
-    message: Message,
-    area: KnownArea,
-}
-
 impl GridFuser {
     fn new(parameters: GridFuserParameters) -> Self {
         let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
-        Self { table, parameters, maps: BTreeMap::new(), frames: RobotFrames::default(), fused: None }
+        Self { table, parameters, maps: RobotMaps::default(), frames: RobotFrames::default(), fused: None }
     }
 
     /// A map of a robot that is not placed waits for its frame, which mostly follows at the same log time.
@@ -80,16 +74,10 @@ impl GridFuser {
         map: Received<'_, OccupancyGrid<'_>>,
         output: &Output<FusedMap>,
     ) -> Result<(), StageError> {
-        let robot = map.robot();
-        let area = match Grid::from_message(&map) {
-            Ok(grid) => KnownArea::of(&grid),
-            Err(error) => {
-                output.warn(format!("a map of {robot} was left out: {error}"));
-                return Ok(());
-            }
-        };
-        self.maps.insert(robot.to_owned(), StoredMap { message: map.message().clone(), area });
-        let is_placed = self.frames.frames.iter().any(|frame| frame.robot == robot);
+        if !self.maps.keep(&map, output, KnownArea::of) {
+            return Ok(());
+        }
+        let is_placed = self.frames.frames.iter().any(|frame| frame.robot == map.robot());
         if is_placed { self.fuse(output) } else { Ok(()) }
     }
 
@@ -124,7 +112,7 @@ impl GridFuser {
     /// The frames of robots that have sent a map, the reference first and then by name.
     fn placed<'a>(&self, frames: &'a RobotFrames) -> Vec<&'a RobotFrame> {
         let mut placed: Vec<&RobotFrame> =
-            frames.frames.iter().filter(|frame| self.maps.contains_key(&frame.robot)).collect();
+            frames.frames.iter().filter(|frame| self.maps.get(&frame.robot).is_some()).collect();
         placed.sort_by_key(|frame| (frame.robot != frames.reference, frame.robot.as_str()));
         placed
     }
@@ -138,9 +126,8 @@ impl GridFuser {
         let mut maps = Vec::with_capacity(placed.len());
         for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let (_, grid) = read_map(&map.message)
-                .map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
-            maps.push((PlacedGrid { grid, transform_world_map: frame.transform_reference_robot() }, &map.area));
+            let placed = PlacedGrid { grid: map.grid(), transform_world_map: frame.transform_reference_robot() };
+            maps.push((placed, &map.own));
         }
 
         let finest = maps.iter().map(|(map, _)| map.grid.geometry.resolution).min_by(f64::total_cmp);

@@ -22,7 +22,7 @@ impl Outputs for Judgements {
                 "alignment",
                 "One alignment for each pair of robots, accepted or refused; its score is the probability that it is right.",
             ),
-            evidence: ports.output(
+            evidence: ports.side_output(
                 "evidence",
                 "What the maps say of the place that was judged for each pair of robots, and of the best of other places.",
             ),

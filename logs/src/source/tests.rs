@@ -77,7 +77,7 @@ fn try_run(files: Vec<PathBuf>, more: &str, robots: RobotTopics) -> Result<Run, 
     let ends = kind.outputs.iter().map(end).collect();
     let context = Context { stage: "log".into(), robots, ..Default::default() };
     let mut source = kind.make(parameters, &context, ends)?;
-    while source.next()? {}
+    while source.advance()? {}
     Ok(Run { sent: everything.0.take(), warnings: source.warnings() })
 }
 
@@ -334,6 +334,6 @@ fn a_source_that_is_done_has_done_all_its_work() {
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
     });
     let mut source = LoneStage::new(&kind(), &format!("files = [{:?}]", files[0])).unwrap();
-    while source.node().next().unwrap() {}
+    while source.node().advance().unwrap() {}
     assert_eq!(source.node().progress(), Some(1.0));
 }

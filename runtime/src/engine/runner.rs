@@ -49,7 +49,7 @@ impl Runner {
     /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
     pub(super) fn advance(&mut self) -> Result<bool, Failure> {
         let start = Instant::now();
-        let more = guarded(|| self.node.next());
+        let more = guarded(|| self.node.advance());
         self.report.busy += start.elapsed();
         more
     }

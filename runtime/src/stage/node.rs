@@ -45,7 +45,7 @@ impl Node {
     }
 
     /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
-    pub fn next(&mut self) -> Result<bool, StageError> {
+    pub fn advance(&mut self) -> Result<bool, StageError> {
         match &mut self.role {
             Role::Source(source) => source.next(),
             Role::Stage(_) | Role::External => Ok(false),

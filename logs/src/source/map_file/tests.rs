@@ -25,9 +25,9 @@ fn run(files: Vec<PathBuf>, robots: RobotTopics) -> Result<Vec<Message>, StageEr
     let context = Context { stage: "maps".into(), robots, ..Default::default() };
     let files: Vec<&str> = files.iter().map(|file| file.to_str().unwrap()).collect();
     let mut source = LoneStage::with_context(&kind(), &format!("files = {files:?}"), &context)?;
-    while source.node().next()? {}
+    while source.node().advance()? {}
     assert_eq!(source.node().progress(), Some(1.0));
-    assert!(!source.node().next()?, "it stays at its end");
+    assert!(!source.node().advance()?, "it stays at its end");
     let sent = source.take_messages("map").into_iter();
     Ok(sent.filter(|message| message.header().flags.contains(MessageFlags::DATA)).collect())
 }

@@ -170,7 +170,7 @@ impl Player<'_> {
         pace.borrow_mut().stopped = Arc::clone(stopped);
         loop {
             let mut source = self.source(links()?)?;
-            while source.next()? && !stopped.load(Ordering::Relaxed) {}
+            while source.advance()? && !stopped.load(Ordering::Relaxed) {}
             // Another turn has the same to warn of.
             for (warning, count) in source.warnings().iter().filter(|_| !pace.borrow().is_repeated()) {
                 tracing::warn!("{count} times: {warning}");
