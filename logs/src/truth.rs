@@ -49,7 +49,7 @@ impl TruthSink {
 /// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note` and `centres` (robot to x, y).
 fn to_json(truth: &SimulationTruth) -> Value {
     fn object<T>(entries: &[T], entry: impl Fn(&T) -> (&String, Value)) -> Value {
-        entries.iter().map(|one| entry(one)).map(|(name, value)| (name.clone(), value)).collect::<Map<_, _>>().into()
+        entries.iter().map(entry).map(|(name, value)| (name.clone(), value)).collect::<Map<_, _>>().into()
     }
     json!({
         "resolution": truth.resolution,

@@ -4,11 +4,10 @@ use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
-use crate::geometry::{Grid, GridGeometry, Point2, read_map};
-use gridweave_runtime::message::Message;
+use crate::geometry::{GridGeometry, Point2};
+use crate::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{GridPrefix, Header, MapAgreement, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
-use std::collections::BTreeMap;
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {

@@ -201,11 +201,11 @@ mod tests {
     fn run(parameters: &str, seed: u64) -> Result<[Vec<Message>; 5], StageError> {
         let context = Context { stage: "world".into(), seed, ..Default::default() };
         let mut stage = LoneStage::with_context(&kind(), parameters, &context)?;
-        while stage.node().next()? {
+        while stage.node().advance()? {
             assert!((0.0..1.0).contains(&stage.node().progress().unwrap()));
         }
         assert_eq!(stage.node().progress(), Some(1.0));
-        assert!(!stage.node().next()?, "it stays at its end");
+        assert!(!stage.node().advance()?, "it stays at its end");
         Ok(["map", "pose", "tags", "tf", "truth"].map(|port| stage.take_messages(port)))
     }
 
