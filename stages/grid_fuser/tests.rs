@@ -200,8 +200,8 @@ fn an_output_is_the_same_if_nothing_else_is_read() {
     };
     let all = sent([true; 3]);
     assert!(all.iter().all(|messages| messages.len() == 1));
-    for port in 0..3 {
-        assert_eq!(sent(std::array::from_fn(|other| other == port))[port], all[port]);
+    for (port, messages) in all.iter().enumerate() {
+        assert_eq!(&sent(std::array::from_fn(|other| other == port))[port], messages);
     }
 }
 
