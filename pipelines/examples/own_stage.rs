@@ -57,8 +57,9 @@ impl Stage for Inflater {
             .filter(|&(x, y)| within(x, y))
             .collect();
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
-        output.send_grid(0, message.robot(), &prefix, |cells| {
-            cells.copy_from_slice(map.cells());
+        output.send_grid(0, message.robot(), &prefix, |blank| {
+            let mut filled = blank.copy_cells(map.cells())?;
+            let cells = filled.cells_mut();
             for (at, _) in map.cells().iter().enumerate().filter(|(_, cell)| is_occupied(**cell)) {
                 for (x, y) in &disc {
                     let (column, row) = ((at % width).checked_add_signed(*x), (at / width).checked_add_signed(*y));
@@ -67,7 +68,7 @@ impl Stage for Inflater {
                     }
                 }
             }
-            Ok(())
+            Ok(filled)
         })
     }
 }

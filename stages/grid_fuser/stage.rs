@@ -183,17 +183,15 @@ impl GridFuser {
         };
         let mut agreement = Agreement::default();
         match output.is_read(FUSED) {
-            true => output.send_grid(FUSED, "", &prefix, |cells| {
-                agreement = fuse(cells);
-                Ok(())
+            true => output.send_grid(FUSED, "", &prefix, |blank| {
+                let mut filled = blank.fill_with(0);
+                agreement = fuse(filled.cells_mut());
+                Ok(filled)
             })?,
             false => agreement = fuse(&mut vec![0; geometry.cell_count()]),
         }
         if output.is_read(CONFLICTS) {
-            output.send_grid(CONFLICTS, "", &prefix, |cells| {
-                cells.copy_from_slice(&conflicts);
-                Ok(())
-            })?;
+            output.send_grid(CONFLICTS, "", &prefix, |blank| blank.copy_cells(&conflicts))?;
         }
         self.agreement = Some((agreement, geometry.resolution.powi(2)));
         Ok(())

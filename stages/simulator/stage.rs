@@ -170,10 +170,7 @@ fn send_map(output: &mut Output<'_>, log: &RobotLog, index: usize) -> Result<(),
         ..Default::default()
     };
     let prefix = GridPrefix { header: Header::new(output.log_time(), map_frame(log)), info };
-    output.send_grid(MAP, &log.name, &prefix, |cells| {
-        cells.copy_from_slice(&map.cells);
-        Ok(())
-    })
+    output.send_grid(MAP, &log.name, &prefix, |blank| blank.copy_cells(&map.cells))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Running a stage by itself: what it sends is kept in lists.
 
 use super::{Output, OutputSink, Sent, StageError, StageKind};
-use crate::message::{LogTime, Message, MessageHeader};
+use crate::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -21,13 +21,8 @@ impl OutputSink for List {
         Ok(())
     }
 
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
-        let mut bytes = vec![0; header.length as usize];
-        write(&mut bytes)?;
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
+        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
         self.0.borrow_mut().push(Message::from_vec(header, bytes));
         Ok(())
     }

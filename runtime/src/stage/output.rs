@@ -1,7 +1,7 @@
 //! What a stage sends through.
 
 use super::StageError;
-use crate::message::{Channel, FixedText, LogTime, MessageFlags, MessageHeader};
+use crate::message::{Blank, Channel, Filled, FixedText, LogTime, MessageFlags, MessageHeader, Write};
 use crate::ros::{self, GridPrefix, RosMessage};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -11,12 +11,8 @@ pub trait OutputSink {
     /// Sends a message of which the bytes are there already; they are copied once.
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError>;
 
-    /// Sends a message of `header.length` bytes that `write` fills in place. `write` gets zeros.
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError>;
+    /// Sends a message of `header.length` bytes that `write` writes in place, each once.
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError>;
 }
 
 /// What a stage sends through while it handles one message.
@@ -105,25 +101,21 @@ impl<'a> Output<'a> {
         self.send_encoded(port, header, bytes)
     }
 
-    /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. The
-    /// cells are zero before.
+    /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. A port that
+    /// nothing reads does not ask for them.
     pub fn send_grid(
         &mut self,
         port: usize,
         robot: &str,
         prefix: &GridPrefix,
-        mut fill: impl FnMut(&mut [i8]) -> Result<(), StageError>,
+        mut fill: impl for<'b> FnMut(Blank<'b>) -> Result<Filled<'b>, StageError>,
     ) -> Result<(), StageError> {
         let head = prefix.encode().map_err(|error| StageError::new("send a grid", error))?;
         let header = self.header(port, robot, head.len() + prefix.cell_count())?;
         let sent = self.port(port)?;
         sent.messages += 1;
         let Some(sink) = &mut sent.sink else { return Ok(()) };
-        sink.send_in_place(header, &mut |bytes| {
-            let (place, cells) = bytes.split_at_mut(head.len());
-            place.copy_from_slice(&head);
-            fill(bytemuck::cast_slice_mut(cells))
-        })
+        sink.send_in_place(header, &mut |blank| blank.copy_then(&head, &mut fill))
     }
 
     /// Sends a message that is encoded already, with a header of its own: for sources, which bring topics and times.

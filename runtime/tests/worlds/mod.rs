@@ -198,10 +198,10 @@ impl Source for Writer {
     fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
         let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
         output.set_log_time(LogTime(self.places.len() as u64));
-        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
-            self.places.push(cells.as_ptr() as usize);
-            cells.fill(7);
-            Ok(())
+        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |blank| {
+            let filled = blank.fill_with(7);
+            self.places.push(filled.as_ptr() as usize);
+            Ok(filled)
         })?;
         Ok(self.places.len() < 5)
     }
