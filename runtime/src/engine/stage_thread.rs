@@ -53,8 +53,25 @@ pub(super) struct StageThread<'a, S: Service> {
 }
 
 impl<'a, S: Service + 'static> StageThread<'a, S> {
+    /// Makes the stage, runs it to its end, and tells the run how it went.
+    pub(super) fn start(
+        links: &Links<'_>,
+        stage: usize,
+        control: Arc<Control>,
+        stop_reason: &OnceLock<String>,
+        events: &'a Sender<Event>,
+    ) {
+        match Self::connect(links, stage, control, events) {
+            Ok(thread) => thread.run(stop_reason),
+            Err(failure) => {
+                links.board.stage(stage).clear();
+                tell(events, Event::Ended { stage, result: Err(failure) });
+            }
+        }
+    }
+
     /// Makes the ends of all links of the stage, and the stage.
-    pub(super) fn connect(
+    fn connect(
         links: &Links<'_>,
         stage: usize,
         control: Arc<Control>,
@@ -89,7 +106,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     }
 
     /// Runs the stage to its end and tells the run how it went.
-    pub(super) fn run(mut self, stop_reason: &OnceLock<String>) {
+    fn run(mut self, stop_reason: &OnceLock<String>) {
         let (events, stage) = (self.events, self.stage);
         let result = match (self.runner.is_source(), self.runner.is_external()) {
             (true, _) => self.drive_source(),

@@ -1,7 +1,7 @@
 //! The engine `threads`: a thread a stage, with links over shared memory.
 
 use super::links::{Links, board_shape};
-use super::stage_thread::{Event, StageThread, tell};
+use super::stage_thread::{Event, StageThread};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::board::{Board, StageState};
 use crate::link::{Control, LinkError, RunNames};
@@ -30,10 +30,7 @@ pub(super) fn run<S: Service + 'static>(
         for stage in 0..pipeline.stages.len() {
             let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
             let control = Arc::clone(&control);
-            scope.spawn(move || match StageThread::<S>::connect(links, stage, control, &sender) {
-                Ok(thread) => thread.run(stop_reason),
-                Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
-            });
+            scope.spawn(move || StageThread::<S>::start(links, stage, control, stop_reason, &sender));
         }
         drop(sender);
         let stop = |error: &RunError| {

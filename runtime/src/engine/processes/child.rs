@@ -93,10 +93,7 @@ impl Process<'_> {
             for &stage in self.stages {
                 let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
                 let control = Arc::clone(&self.control);
-                scope.spawn(move || match StageThread::<Service>::connect(links, stage, control, &sender) {
-                    Ok(thread) => thread.run(stop_reason),
-                    Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
-                });
+                scope.spawn(move || StageThread::<Service>::start(links, stage, control, stop_reason, &sender));
             }
             drop(sender);
             self.report(&mut supervisor, &receiver, &stop_reason);
