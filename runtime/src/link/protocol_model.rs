@@ -161,6 +161,7 @@ fn a_sender_never_takes_the_window_of_another_for_its_own() {
             move || {
                 link.window().give(SENDER, 1);
                 link.window().give(OTHER, 200);
+                link.window().set_limit(300);
             }
         });
         let limit = link.window().limit_of(SENDER);
