@@ -60,8 +60,9 @@ impl Inflater {
             .filter(|&(x, y)| within(x, y))
             .collect();
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
-        output.0.send_grid(map.robot(), &prefix, |cells| {
-            cells.copy_from_slice(map.cells());
+        output.0.send_grid(map.robot(), &prefix, |blank| {
+            let mut filled = blank.copy_cells(map.cells())?;
+            let cells = filled.cells_mut();
             for (at, _) in map.cells().iter().enumerate().filter(|(_, cell)| is_occupied(**cell)) {
                 for (x, y) in &disc {
                     let (column, row) = ((at % width).checked_add_signed(*x), (at / width).checked_add_signed(*y));
@@ -70,7 +71,7 @@ impl Inflater {
                     }
                 }
             }
-            Ok(())
+            Ok(filled)
         })
     }
 }

@@ -89,10 +89,10 @@ impl Source for Writer {
         self.clock.wait_for(self.sent);
         let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
         output.set_log_time(LogTime(self.sent));
-        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
-            cells.fill(1);
+        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |blank| {
+            let filled = blank.fill_with(1);
             self.clock.note_written();
-            Ok(())
+            Ok(filled)
         })?;
         self.sent += 1;
         Ok(self.sent < HOPS)

@@ -111,10 +111,10 @@ impl Source for Writer {
         output.set_log_time(LogTime(*sent));
         if load.pause {
             let info = MapMetaData { width: load.size as u32, height: 1, ..Default::default() };
-            output.grids.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
-                cells.fill(1);
-                stamp(bytemuck::cast_slice_mut(cells));
-                Ok(())
+            output.grids.send_grid("", &GridPrefix { info, ..Default::default() }, |blank| {
+                let mut filled = blank.fill_with(1);
+                stamp(&mut filled);
+                Ok(filled)
             })?;
         } else {
             let mut bytes = [1; SMALL];

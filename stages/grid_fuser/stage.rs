@@ -161,17 +161,15 @@ impl GridFuser {
             agreement = output.agreement.is_read().then(|| Agreement::of(cells, &conflicts));
         };
         match output.map.is_read() {
-            true => output.map.send_grid("", &prefix, |cells| {
-                fuse(cells);
-                Ok(())
+            true => output.map.send_grid("", &prefix, |blank| {
+                let mut filled = blank.fill_with(0);
+                fuse(filled.cells_mut());
+                Ok(filled)
             })?,
             false => fuse(&mut vec![0; geometry.cell_count()]),
         }
         if output.conflicts.is_read() {
-            output.conflicts.send_grid("", &prefix, |cells| {
-                cells.copy_from_slice(&conflicts);
-                Ok(())
-            })?;
+            output.conflicts.send_grid("", &prefix, |blank| blank.copy_cells(&conflicts))?;
         }
         match agreement {
             Some(agreement) => output.agreement.send("", &agreement.message(header, geometry.resolution.powi(2))),

@@ -1,7 +1,7 @@
 //! The stage from outside.
 
 use super::kind;
-use gridweave_runtime::message::{LogTime, Message, MessageHeader};
+use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use gridweave_runtime::ros::{
     Header, MapAgreement, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames, UnmergedRobot, encode,
 };
@@ -172,13 +172,8 @@ impl OutputSink for List {
         Ok(())
     }
 
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
-        let mut bytes = vec![0; header.length as usize];
-        write(&mut bytes)?;
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
+        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
         self.send(header, &bytes)
     }
 }

@@ -182,10 +182,7 @@ fn send_map(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Resu
         ..Default::default()
     };
     let prefix = GridPrefix { header: Header::new(output.log_time(), map_frame(log)), info };
-    output.map.send_grid(&log.name, &prefix, |cells| {
-        cells.copy_from_slice(&map.cells);
-        Ok(())
-    })
+    output.map.send_grid(&log.name, &prefix, |blank| blank.copy_cells(&map.cells))
 }
 
 #[cfg(test)]

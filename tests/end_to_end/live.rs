@@ -1,5 +1,7 @@
 //! Live runs: what is sent arrives, what is dropped is counted, and an interrupt loses nothing.
-use crate::support::{Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, read, signal, simulate, start, wait_until};
+use crate::support::{
+    Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, processes, read, signal, simulate, start, wait_until,
+};
 use std::fs;
 use tempfile::TempDir;
 
@@ -56,6 +58,25 @@ fn a_run_can_be_ended_while_robots_send() {
     players.into_iter().for_each(|player| player.wait().assert(1, &["the run ended before the log did"]));
     let [given] = done.numbers("output", ["messages_in"]);
     assert_eq!(done.output().values().map(Vec::len).sum::<usize>() as u64, given);
+}
+
+#[test]
+fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
+    let run = Run::start(TROUBLED, &[]);
+    wait_until("messages", || run.number("output", "messages_in") > 0);
+    for _ in 0..3 {
+        for (process, _) in processes(run.id()) {
+            signal(process, "STOP");
+            signal(process, "CONT");
+        }
+    }
+    let before = run.number("output", "messages_in");
+    wait_until("more messages", || run.number("output", "messages_in") > before);
+    let done = run.interrupt();
+    done.assert_done();
+    for stage in ["middle", "output"] {
+        assert_eq!(done.numbers(stage, ["dropped", "restarts"]), [0, 0], "{stage}");
+    }
 }
 
 /// Numbers of a stage that stands still at its first message until its source has sent `sent` messages: those sent to it,

@@ -1,7 +1,7 @@
 use super::*;
 use crate::schemas::full_type_name;
 use crate::test_log::{Folder, TestLog, layouts};
-use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader};
+use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader, Write};
 use gridweave_runtime::ros::{
     Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
@@ -31,11 +31,7 @@ impl OutputSink for Port {
         Ok(())
     }
 
-    fn send_in_place(
-        &mut self,
-        _: MessageHeader,
-        _: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
+    fn send_in_place(&mut self, _: MessageHeader, _: &mut Write<'_>) -> Result<(), StageError> {
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! How a run fails.
 
 use super::RunFolderError;
-use crate::link::shared::LinkError;
+use crate::link::LinkError;
 use crate::stage::StageError;
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -1,38 +1,49 @@
 //! Sending into a live run from outside of it.
 
-use super::live_links::{LiveLinks, SharedSender};
-use super::plan::Plan;
+use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::{Failure, RunError};
-use crate::link::board::StageBoard;
-use crate::link::live::{LiveSender, Pause};
+use crate::link::board::Board;
+use crate::link::{Control, LinkError, LinkSender, Outputs, SenderRole, Sleeper};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::OutputSink;
 use iceoryx2::node::Node;
 use iceoryx2::service::ipc::Service;
+use std::cell::RefCell;
+use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::{Duration, Instant};
-
-/// So often a feed looks whether its readers are ready.
-const LOOK_INTERVAL: Duration = Duration::from_millis(2);
 
 /// A program that sends on the outputs of a stage of a live run whose messages come from outside.
 pub struct Feed {
-    senders: Vec<Option<SharedSender<Service>>>,
+    ports: Vec<usize>,
+    outputs: Rc<RefCell<Outputs<Service>>>,
+    sleeper: Rc<Sleeper>,
+    stopper: FeedStopper,
     run: RunningRun,
-    stop: Arc<AtomicBool>,
     _node: Node<Service>,
 }
 
+/// Stops a [`Feed`] from another thread.
+#[derive(Clone)]
+pub struct FeedStopper {
+    control: Arc<Control>,
+    board: Arc<Board>,
+}
+
+impl FeedStopper {
+    /// A sender of the feed that waits for room gives up, and so does one that is to wait later.
+    pub fn stop(&self) {
+        self.control.stop(&self.board);
+    }
+}
+
 impl Feed {
-    /// Joins a run of the given pipeline as a sender on the outputs of the stage with the given index. A sender that waits
-    /// for room gives up when `stop` is set.
+    /// Joins a run of the given pipeline as a sender on the outputs of the stage with the given index.
     ///
     /// # Errors
     /// The stage makes its messages itself, the run has gone, or too many send already.
-    pub fn join(run: &RunningRun, pipeline: &Pipeline, stage: usize, stop: Arc<AtomicBool>) -> Result<Self, RunError> {
+    pub fn join(run: &RunningRun, pipeline: &Pipeline, stage: usize) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         if pipeline.mode != Mode::Live || !spec.kind.is_external() {
             let text = format!("takes no messages from outside, as it is a `{}`", spec.kind.name);
@@ -40,17 +51,25 @@ impl Feed {
         }
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
         let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
-        let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
-        let (names, plan) = (run.names(), Plan::new(pipeline));
-        let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
-        let links = LiveLinks { pipeline, plan: &plan, names: &names, boards: &boards };
-        let senders = links.senders(&node, stage, &Pause::Program(Arc::clone(&stop)), false);
-        Ok(Self { senders: senders.map_err(|error| of_stage(error.into()))?, run: run.clone(), stop, _node: node })
+        let (names, control) = (run.names(), Arc::new(Control::default()));
+        let links = Links::new(pipeline, &names, &board);
+        let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
+        let senders = links.senders(&node, stage, SenderRole::Guest).map_err(|error| of_stage(error.into()))?;
+        let (ports, senders) = senders.into_iter().unzip();
+        let sleeper = Rc::new(Sleeper::new(board.stage(stage), Arc::clone(&control)));
+        let outputs = Outputs::new(senders, Rc::clone(&sleeper));
+        let stopper = FeedStopper { control, board };
+        Ok(Self { ports, outputs, sleeper, stopper, run: run.clone(), _node: node })
+    }
+
+    /// What stops it from another thread.
+    pub fn stopper(&self) -> FeedStopper {
+        self.stopper.clone()
     }
 
     /// The output port with the given index; none if nothing reads it.
     pub fn output(&self, port: usize) -> Option<Box<dyn OutputSink>> {
-        Some(self.senders.get(port)?.as_ref()?.sink())
+        Some(Outputs::sink(&self.outputs, self.ports.binary_search(&port).ok()?))
     }
 
     /// Waits until every reader is connected, so that none misses the first messages. `false` if it takes too long.
@@ -61,17 +80,16 @@ impl Feed {
     /// Waits until every reader has taken all that was sent. What is sent is lost with its sender where it has not been
     /// taken. `false` if it takes too long.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
-        self.wait(longest, LiveSender::is_taken)
+        self.wait(longest, LinkSender::is_taken)
     }
 
-    fn wait(&self, longest: Duration, is_ready: impl Fn(&mut LiveSender<Service>) -> bool) -> bool {
-        let start = Instant::now();
-        while !self.senders.iter().flatten().all(|sender| is_ready(&mut sender.get())) {
-            if start.elapsed() > longest || self.stop.load(Ordering::Relaxed) || !self.run.is_running() {
-                return false;
+    fn wait(&self, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
+        let are_ready = || {
+            if !self.run.is_running() {
+                return Err(LinkError::Stopped);
             }
-            thread::sleep(LOOK_INTERVAL);
-        }
-        true
+            Ok(self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
+        };
+        self.sleeper.wait_until(Some(Instant::now() + longest), are_ready).unwrap_or(false)
     }
 }

@@ -4,9 +4,7 @@
 
 mod error;
 mod feed;
-mod live_links;
-mod live_stage;
-mod plan;
+mod links;
 pub mod processes;
 mod report;
 mod run_folder;
@@ -15,15 +13,16 @@ mod single;
 mod stage_thread;
 mod threads;
 mod watch;
+mod work;
 
 pub use error::{Failure, RunError};
-pub use feed::Feed;
+pub use feed::{Feed, FeedStopper};
 pub use processes::memory_of_process;
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
 pub use watch::{WatchedLink, watch_stages};
 
-use crate::link::shared::RunNames;
+use crate::link::RunNames;
 use crate::message::LogTime;
 use crate::pipeline::{Mode, Pipeline};
 use std::fmt;

@@ -5,9 +5,9 @@
 //! lives. The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has locked
 //! is left over, and so is all that bears its prefix in `/dev/shm`.
 
-use super::plan::board_shape;
+use super::links::board_shape;
+use crate::link::RunNames;
 use crate::link::board::Board;
-use crate::link::shared::RunNames;
 use crate::pipeline::Pipeline;
 use std::fs::{self, File, TryLockError};
 use std::io;

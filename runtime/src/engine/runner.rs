@@ -1,7 +1,6 @@
 //! One running stage, whatever its links are.
 
 use super::{Failure, StageReport};
-use crate::link::board::{StageBoard, StageNumber};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
 use crate::pipeline::Pipeline;
@@ -52,21 +51,6 @@ impl Runner {
         let more = guarded(|| self.node.advance());
         self.report.busy += start.elapsed();
         more
-    }
-
-    /// Shows on the board what the stage has done. Of the time it worked, `waited` was spent waiting for others.
-    pub(super) fn show(&self, waited: Duration, board: &StageBoard) {
-        board.set(StageNumber::MessagesIn, self.report.messages_in);
-        board.set(StageNumber::Busy, self.report.busy.saturating_sub(waited).as_nanos() as u64);
-        board.set(StageNumber::Warnings, self.warnings());
-        for (port, messages) in self.node.messages_sent().enumerate() {
-            board.set_sent(port, messages);
-        }
-    }
-
-    /// The log time that the stage has come to.
-    pub(super) fn log_time(&self) -> LogTime {
-        self.node.log_time()
     }
 
     /// How often the stage has warned.

@@ -1,18 +1,23 @@
 //! One stage with its links over shared memory: receives, handles, sends, sleeps.
 
-use super::plan::Plan;
+use super::links::Links;
 use super::runner::Runner;
+use super::work::Work;
 use super::{Failure, StageReport};
 use crate::link::board::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
-use crate::link::shared::{Activity, LinkError, LinkReceiver, LinkSender, RunNames, SenderEnd, SharedOutputs, Wake};
-use crate::link::{InputQueue, latest, lower_bound};
-use crate::message::LogTime;
-use crate::pipeline::Pipeline;
+use crate::link::{
+    Control, InputQueue, LinkError, LinkReceiver, Order, Outputs, SenderRole, Sleeper, latest, lower_bound,
+};
+use crate::message::{LogTime, MessageFlags};
 use iceoryx2::service::Service;
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::sync::OnceLock;
 use std::sync::mpsc::Sender;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// After so many messages a source tells how far it is.
+const REPORT_INTERVAL: usize = 256;
 
 /// What a stage's thread tells the run.
 pub(super) enum Event {
@@ -36,27 +41,82 @@ pub(super) struct StageThread<'a, S: Service> {
     runner: Runner,
     queues: Vec<InputQueue>,
     receivers: Vec<LinkReceiver<S>>,
-    outputs: Rc<RefCell<SharedOutputs<S>>>,
-    wake: Rc<Wake<S>>,
+    outputs: Rc<RefCell<Outputs<S>>>,
+    sleeper: Rc<Sleeper>,
+    board: StageBoard,
+    work: Work,
+    order: Order,
+    /// After so many samples the stage looks at its links, and tells its readers how far it is.
+    look_interval: usize,
     stage: usize,
-    /// After so many samples, the readers are told how far the stage is.
-    flush_interval: usize,
-    /// What the stage shows of itself, in a run of processes.
-    board: Option<StageBoard>,
     events: &'a Sender<Event>,
 }
 
 impl<'a, S: Service + 'static> StageThread<'a, S> {
+    /// Makes the stage, runs it to its end, and tells the run how it went.
+    pub(super) fn start(
+        links: &Links<'_>,
+        stage: usize,
+        control: Arc<Control>,
+        stop_reason: &OnceLock<String>,
+        events: &'a Sender<Event>,
+    ) {
+        match Self::connect(links, stage, control, events) {
+            Ok(thread) => thread.run(stop_reason),
+            Err(failure) => {
+                links.board.stage(stage).clear();
+                tell(events, Event::Ended { stage, result: Err(failure) });
+            }
+        }
+    }
+
+    /// Makes the ends of all links of the stage, and the stage.
+    fn connect(
+        links: &Links<'_>,
+        stage: usize,
+        control: Arc<Control>,
+        events: &'a Sender<Event>,
+    ) -> Result<Self, Failure> {
+        let (pipeline, board) = (links.pipeline, links.board.stage(stage));
+        let spec = &pipeline.stages[stage];
+        board.set(StageNumber::Started, monotonic_nanoseconds());
+        board.set(StageNumber::Process, u64::from(std::process::id()));
+        board.set_state(StageState::Starting);
+        let sleeper = Rc::new(Sleeper::new(board.clone(), control));
+        let node = links.node::<S>()?;
+        let receivers = links.receivers(&node, stage)?;
+        let role = if spec.kind.is_external() { SenderRole::FedOwner } else { SenderRole::Owner };
+        let (ports, senders): (Vec<usize>, Vec<_>) = links.senders(&node, stage, role)?.into_iter().unzip();
+        let outputs = Outputs::new(senders, Rc::clone(&sleeper));
+        let sink = |port: usize| Some(Outputs::sink(&outputs, ports.binary_search(&port).ok()?));
+        let mut work = Work::new(board.clone(), Rc::clone(&sleeper));
+        work.begin();
+        let runner = Runner::new(pipeline, stage, sink)?;
+        work.note();
+        work.end();
+        board.set_state(StageState::Running);
+        let order = Order::from(pipeline.mode);
+        let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
+        let look_interval = match order {
+            Order::LogTime => (spec.depth / 2).max(1),
+            // The next may be one that has just come.
+            Order::Arrival => 1,
+        };
+        Ok(Self { runner, queues, receivers, outputs, sleeper, board, work, order, look_interval, stage, events })
+    }
+
     /// Runs the stage to its end and tells the run how it went.
-    pub(super) fn run(mut self, stop_reason: &OnceLock<String>) {
+    fn run(mut self, stop_reason: &OnceLock<String>) {
         let (events, stage) = (self.events, self.stage);
-        let result = match self.runner.is_source() {
-            true => self.drive_source(),
-            false => self.drive_stage(),
+        let result = match (self.runner.is_source(), self.runner.is_external()) {
+            (true, _) => self.drive_source(),
+            (_, true) => self.drive_external(),
+            _ => self.drive_stage(),
         };
         match result {
             Ok(()) => tell(events, Event::Ended { stage, result: self.close() }),
             Err(failure) => {
+                self.board.clear();
                 // Told before the links go, so that the peers' complaints about lost links come after the cause.
                 let own_reason = failure.to_string();
                 tell(events, Event::Ended { stage, result: Err(failure) });
@@ -65,169 +125,165 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         }
     }
 
-    /// Drops the stage, and then acknowledges the end of its inputs: it holds nothing of them any more.
+    /// Drops the stage and all that it holds of its inputs, and so acknowledges their end.
     fn close(self) -> Result<StageReport, Failure> {
-        let waited = self.outputs.borrow().waited();
         self.show();
-        if let Some(board) = &self.board {
-            board.set_state(StageState::Ended);
-        }
-        let report = self.runner.into_report(waited)?;
+        let is_external = self.runner.is_external();
+        let mut report = self.runner.into_report(self.sleeper.waited())?;
         drop(self.queues);
-        self.receivers.iter().try_for_each(LinkReceiver::acknowledge)?;
+        let dropped = (0..self.board.wires()).map(|wire| self.board.get_wire(wire, WireNumber::Dropped));
+        report.dropped = dropped.sum();
+        report.restarts = self.board.get(StageNumber::Restarts);
+        if is_external || report.restarts > 0 {
+            // With what the processes before this one have done.
+            report.messages_in = self.board.get(StageNumber::MessagesIn);
+            report.messages_out = self.board.all_sent();
+            report.busy = Duration::from_nanos(self.board.get(StageNumber::Busy));
+        }
+        self.board.set_state(StageState::Ended);
         Ok(report)
     }
 
-    /// Makes the ends of all links of the stage, and the stage.
-    pub(super) fn connect(
-        pipeline: &Pipeline,
-        plan: &Plan,
-        names: &RunNames,
-        stage: usize,
-        activity: Activity,
-        board: Option<StageBoard>,
-        events: &'a Sender<Event>,
-    ) -> Result<Self, Failure> {
-        let spec = &pipeline.stages[stage];
-        if let Some(board) = &board {
-            board.set(StageNumber::Process, u64::from(std::process::id()));
-            board.set(StageNumber::Started, monotonic_nanoseconds());
-            board.set_state(StageState::Running);
-        }
-        let node = names.node::<S>()?;
-        let wake = Wake::new(&node, names, &spec.name, plan.stage_readers[stage], plan.peers[stage], activity)?;
-        let mut receivers = Vec::new();
-        for (wire, input) in spec.inputs.iter().enumerate() {
-            let (from, port) = (input.from_stage, input.from_port);
-            let sender = SenderEnd {
-                stage: &pipeline.stages[from].name,
-                port: pipeline.stages[from].kind.outputs[port].name,
-                port_readers: plan.readers(from, port).len(),
-                port_depth: plan.port_depth(pipeline, from, port),
-                stage_readers: plan.stage_readers[from],
-                reader: plan.reader_number(from, port, (stage, wire)),
-                waker: plan.waker(&node, names, pipeline, from)?,
-            };
-            receivers.push(LinkReceiver::new(&node, names, sender, wire, spec.depth)?);
-        }
-        let mut senders = Vec::new();
-        let mut places = vec![None; spec.kind.outputs.len()];
-        for (port, place) in places.iter_mut().enumerate() {
-            let readers = plan.readers(stage, port);
-            if readers.is_empty() {
-                continue;
-            }
-            let ends = readers.iter().map(|&reader| {
-                let number = plan.reader_number(stage, port, reader);
-                Ok((number, plan.waker(&node, names, pipeline, reader.0)?))
-            });
-            let ends = ends.collect::<Result<Vec<_>, LinkError>>()?;
-            let depth = plan.port_depth(pipeline, stage, port);
-            let name = spec.kind.outputs[port].name;
-            *place = Some(senders.len());
-            senders.push(LinkSender::new(
-                &node,
-                names,
-                &spec.name,
-                name,
-                depth,
-                Rc::clone(&wake),
-                ends,
-                pipeline.batch,
-            )?);
-        }
-        let outputs = SharedOutputs::new(senders, Rc::clone(&wake));
-        let sink = |port: usize| places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link));
-        let working = wake.working();
-        let runner = Runner::new(pipeline, stage, sink)?;
-        drop(working);
-        let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
-        let flush_interval = (spec.depth / 2).max(1);
-        Ok(Self { runner, queues, receivers, outputs, wake, stage, flush_interval, board, events })
-    }
-
     fn drive_source(&mut self) -> Result<(), Failure> {
-        /// After so many messages a source tells how far it is.
-        const REPORT_INTERVAL: usize = 256;
+        let sleeper = Rc::clone(&self.sleeper);
+        // So that none misses the first messages.
+        let is_connected = || self.outputs.borrow_mut().links().iter().all(|link| link.is_connected());
+        sleeper.wait(|| Ok(sleeper.control().is_draining() || is_connected()))?;
         let mut count = 0;
-        loop {
-            let working = self.wake.working();
-            if !self.runner.advance()? {
+        while !sleeper.control().is_draining() {
+            self.work.begin();
+            let more = self.runner.advance()?;
+            self.work.note();
+            if !more {
                 break;
             }
-            drop(working);
+            self.look()?;
             count += 1;
             if count % REPORT_INTERVAL == 0 {
-                self.wake.poll()?;
-                let reached = self.outputs.borrow().reached();
-                self.outputs.borrow_mut().flush(reached)?;
-                self.show();
-                if let Some(share) = self.runner.progress()? {
-                    tell(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
-                }
+                self.report_progress()?;
             }
         }
-        let mut outputs = self.outputs.borrow_mut();
-        let reached = outputs.reached();
-        Ok(outputs.end(reached)?)
+        self.work.end();
+        let reached = self.outputs.borrow().reached();
+        Ok(self.outputs.borrow_mut().end(reached)?)
     }
 
-    fn drive_stage(&mut self) -> Result<(), Failure> {
-        loop {
-            self.wake.look_at_inputs()?;
-            self.receive()?;
-            let mut handled = 0;
-            loop {
-                let working = self.wake.working();
-                let Some(wire) = self.runner.handle_next(&mut self.queues)? else { break };
-                drop(working);
-                if !self.receivers[wire].taken()? {
-                    continue;
-                }
-                handled += 1;
-                if handled % self.flush_interval == 0 {
-                    // Looks for a stop, too: a stage whose input never dries up would not see it otherwise.
-                    self.wake.poll()?;
-                    self.receive()?;
-                    self.flush()?;
-                    self.show();
-                }
-            }
-            if self.queues.iter().all(InputQueue::is_done) {
-                let time = latest(&self.queues);
-                let working = self.wake.working();
-                self.runner.finish(time)?;
-                drop(working);
-                return Ok(self.outputs.borrow_mut().end(time)?);
-            }
-            self.flush()?;
-            for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
-                receiver.relieve(queue)?;
-            }
-            self.show();
-            self.wake.sleep_for_input()?;
-        }
-    }
-
-    /// Shows on the board how far the stage is.
-    fn show(&self) {
-        let Some(board) = &self.board else { return };
-        self.runner.show(self.outputs.borrow().waited(), board);
-        for (wire, queue) in self.queues.iter().enumerate() {
-            board.set_wire(wire, WireNumber::Waiting, queue.len() as u64);
-        }
-    }
-
-    fn receive(&mut self) -> Result<(), LinkError> {
-        for (receiver, queue) in self.receivers.iter_mut().zip(&mut self.queues) {
-            if receiver.connect()? {
-                receiver.receive(queue)?;
-            }
+    fn report_progress(&mut self) -> Result<(), Failure> {
+        let reached = self.outputs.borrow().reached();
+        self.outputs.borrow_mut().flush(reached)?;
+        self.show();
+        if let Some(share) = self.runner.progress()? {
+            tell(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), LinkError> {
+    /// A source whose messages come from outside keeps the last of them for readers that come late.
+    fn drive_external(&mut self) -> Result<(), Failure> {
+        loop {
+            self.outputs.borrow_mut().links().iter_mut().try_for_each(|link| link.look())?;
+            self.look()?;
+            if self.sleeper.control().is_draining() {
+                let reached = self.outputs.borrow().reached();
+                return Ok(self.outputs.borrow_mut().end(reached)?);
+            }
+            self.sleep()?;
+        }
+    }
+
+    fn drive_stage(&mut self) -> Result<(), Failure> {
+        loop {
+            self.look()?;
+            self.receive()?;
+            self.handle_all()?;
+            if self.queues.iter().all(InputQueue::is_done) {
+                let time = latest(&self.queues);
+                self.work.begin();
+                self.runner.finish(time)?;
+                self.work.note();
+                self.work.end();
+                return Ok(self.outputs.borrow_mut().end(time)?);
+            }
+            self.flush()?;
+            for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
+                receiver.relieve(queue);
+            }
+            self.show();
+            self.receivers.iter_mut().for_each(LinkReceiver::ring_for_room);
+            self.sleep()?;
+        }
+    }
+
+    /// Handles the messages that are there, as far as it can be told which is the next.
+    fn handle_all(&mut self) -> Result<(), Failure> {
+        let mut handled = 0;
+        while let Some(wire) = self.order.next(&self.queues) {
+            let Some(message) = self.queues[wire].pop() else { break };
+            let is_data = message.header().flags.contains(MessageFlags::DATA);
+            self.work.begin();
+            self.runner.take(wire, message)?;
+            let time = self.work.note();
+            if is_data {
+                self.board.add(StageNumber::MessagesIn, 1);
+                if self.order == Order::Arrival {
+                    self.board.add_latency(time.saturating_sub(self.queues[wire].sent_at()));
+                }
+            }
+            handled += usize::from(self.receivers[wire].taken());
+            if handled >= self.look_interval {
+                handled = 0;
+                // A stage whose input never dries up would not see a stop otherwise.
+                self.look()?;
+                self.receive()?;
+                self.flush()?;
+                self.show();
+            }
+        }
+        self.work.end();
+        Ok(())
+    }
+
+    /// Sees whether the run is being stopped, or somebody has come who is to be sent what he has missed.
+    fn look(&self) -> Result<(), LinkError> {
+        self.sleeper.check()?;
+        self.outputs.borrow_mut().answer_greetings()
+    }
+
+    /// Sleeps until there is something to receive or to send.
+    fn sleep(&self) -> Result<(), LinkError> {
+        let watermark = lower_bound(&self.queues);
+        self.sleeper.wait(|| {
+            let mut outputs = self.outputs.borrow_mut();
+            if outputs.is_greeted() || watermark.is_some_and(|watermark| outputs.can_flush(watermark)) {
+                return Ok(true);
+            }
+            for link in outputs.links() {
+                if link.has_news()? {
+                    return Ok(true);
+                }
+            }
+            for (receiver, queue) in self.receivers.iter().zip(&self.queues) {
+                if receiver.has_news(queue)? {
+                    return Ok(true);
+                }
+            }
+            Ok(self.receivers.is_empty() && self.sleeper.control().is_draining())
+        })
+    }
+
+    /// Shows on the board how far the stage is.
+    fn show(&self) {
+        self.board.set(StageNumber::Warnings, self.runner.warnings());
+        for (wire, queue) in self.queues.iter().enumerate() {
+            self.board.set_wire(wire, WireNumber::Waiting, queue.len() as u64);
+        }
+    }
+
+    fn receive(&mut self) -> Result<(), LinkError> {
+        self.receivers.iter_mut().zip(&mut self.queues).try_for_each(|(receiver, queue)| receiver.receive(queue))
+    }
+
+    fn flush(&self) -> Result<(), LinkError> {
         match lower_bound(&self.queues) {
             Some(watermark) => self.outputs.borrow_mut().flush(watermark),
             None => Ok(()),

@@ -1,13 +1,14 @@
 //! The engine `threads`: a thread a stage, with links over shared memory.
 
-use super::plan::Plan;
-use super::stage_thread::{Event, StageThread, tell};
+use super::links::{Links, board_shape};
+use super::stage_thread::{Event, StageThread};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::shared::{Activity, LinkError, RunNames, WakeEvents, Waker};
+use crate::link::board::{Board, StageState};
+use crate::link::{Control, LinkError, RunNames};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;
-use std::sync::OnceLock;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Duration;
 
@@ -20,47 +21,37 @@ pub(super) fn run<S: Service + 'static>(
     names: &RunNames,
     observer: &dyn Observer,
 ) -> Result<RunReport, RunError> {
-    let plan = Plan::new(pipeline);
-    let stop_reason = OnceLock::new();
-    let node = names.node::<S>().map_err(RunError::of_run)?;
-    // Made before the stages, so that a stage that fails at once finds the others stoppable.
-    let wakers: Vec<Waker<S>> = (0..pipeline.stages.len())
-        .map(|stage| plan.waker(&node, names, pipeline, stage))
-        .collect::<Result<_, LinkError>>()
-        .map_err(RunError::of_run)?;
+    let board = Board::new(&board_shape(pipeline));
+    (0..pipeline.stages.len()).for_each(|stage| board.stage(stage).set_state(StageState::Starting));
+    let links = Links::new(pipeline, names, &board);
+    let (control, stop_reason) = (Arc::new(Control::default()), OnceLock::new());
     let (sender, receiver) = channel();
     thread::scope(|scope| {
         for stage in 0..pipeline.stages.len() {
-            let (sender, names, plan, stop_reason) = (sender.clone(), names, &plan, &stop_reason);
-            scope.spawn(move || {
-                match StageThread::<S>::connect(pipeline, plan, names, stage, Activity::default(), None, &sender) {
-                    Ok(thread) => thread.run(stop_reason),
-                    Err(failure) => tell(&sender, Event::Ended { stage, result: Err(failure) }),
-                }
-            });
+            let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
+            let control = Arc::clone(&control);
+            scope.spawn(move || StageThread::<S>::start(links, stage, control, stop_reason, &sender));
         }
         drop(sender);
-        supervise(pipeline, &wakers, &receiver, &stop_reason, observer)
+        let stop = |error: &RunError| {
+            stop_reason.get_or_init(|| error.to_string());
+            control.stop(&board);
+        };
+        supervise(pipeline, &receiver, &stop, observer)
     })
 }
 
 /// Waits for all stages. When one fails, stops the others.
-fn supervise<S: Service>(
+fn supervise(
     pipeline: &Pipeline,
-    wakers: &[Waker<S>],
     events: &Receiver<Event>,
-    stop_reason: &OnceLock<String>,
+    stop_others: &dyn Fn(&RunError),
     observer: &dyn Observer,
 ) -> Result<RunReport, RunError> {
     let name = |stage: usize| pipeline.stages[stage].name.clone();
     let mut reports: Vec<StageReport> = vec![StageReport::default(); pipeline.stages.len()];
     let mut first_error: Option<RunError> = None;
-    let stop = |first_error: &mut Option<RunError>, error: RunError| {
-        let error = first_error.get_or_insert(error);
-        stop_reason.get_or_init(|| error.to_string());
-        // A stage that has ended cannot be woken and need not be.
-        wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
-    };
+    let stop = |first_error: &mut Option<RunError>, error: RunError| stop_others(first_error.get_or_insert(error));
     loop {
         match events.recv_timeout(STOP_INTERVAL) {
             Ok(Event::Progress { stage, share, log_time }) => observer.progress(&name(stage), share, log_time),
@@ -71,12 +62,7 @@ fn supervise<S: Service>(
             Ok(Event::Ended { stage, result: Err(failure) }) => {
                 stop(&mut first_error, RunError::of_stage(&name(stage), failure));
             }
-            Err(RecvTimeoutError::Timeout) => {
-                if first_error.is_some() {
-                    // A stage that was not listening yet when the stop was sent gets it again.
-                    wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
-                }
-            }
+            Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
         // After every event, as a fast source tells of its progress without a pause.

@@ -1,11 +1,10 @@
 //! Looking on at a run that is going on.
 
-use super::plan::Plan;
+use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::{Failure, RunError};
 use crate::link::board::StageBoard;
-use crate::link::live::Observer;
-use crate::link::shared::{SampleHeader, WakeEvents, Waker};
+use crate::link::{Observer, SampleHeader};
 use crate::message::Message;
 use crate::pipeline::{Mode, Pipeline};
 use iceoryx2::node::Node;
@@ -26,7 +25,6 @@ pub struct WatchedLink {
     /// For each sender the number of its next message.
     next: BTreeMap<u64, u64>,
     missed: u64,
-    _owner: Option<Waker<Service>>,
     _node: Node<Service>,
 }
 
@@ -39,14 +37,15 @@ impl WatchedLink {
     pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
-        let plan = Plan::new(pipeline);
+        let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
+        let names = run.names();
+        let links = Links::new(pipeline, &names, &board);
         let name = spec.kind.outputs[port].name;
-        if plan.readers(stage, port).is_empty() {
+        if !links.is_read(stage, port) {
             let text = format!("has an output `{name}` that nothing reads, and so it is no link");
             return Err(of_stage(Failure::Outside(text)));
         }
-        let names = run.names();
-        let node = names.node::<Service>().map_err(|error| of_stage(error.into()))?;
+        let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
         let start = Instant::now();
         let observer = loop {
             match Observer::new(&node, &names, &spec.name, name).map_err(|error| of_stage(error.into()))? {
@@ -58,16 +57,10 @@ impl WatchedLink {
                 }
             }
         };
-        let owner = match pipeline.mode {
-            Mode::Replay => None,
-            Mode::Live => {
-                let owner = plan.waker(&node, &names, pipeline, stage).map_err(|error| of_stage(error.into()))?;
-                // An owner that is not there has nothing to repeat.
-                let _ = owner.wake(WakeEvents::new(plan.stage_readers[stage]).credit(0));
-                Some(owner)
-            }
-        };
-        Ok(Self { observer, next: BTreeMap::new(), missed: 0, _owner: owner, _node: node })
+        if pipeline.mode == Mode::Live {
+            board.stage(stage).greet();
+        }
+        Ok(Self { observer, next: BTreeMap::new(), missed: 0, _node: node })
     }
 
     /// Takes the messages that have passed since the last call: each once, with the header of its sample.

@@ -1,7 +1,7 @@
 //! Links between stages of one thread: a message goes straight into its readers' queues.
 
 use super::{InputQueue, Sequence};
-use crate::message::{LogTime, Message, MessageHeader};
+use crate::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use crate::stage::{OutputSink, StageError};
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -59,14 +59,9 @@ impl OutputSink for DirectLink {
         Ok(())
     }
 
-    fn send_in_place(
-        &mut self,
-        mut header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
+    fn send_in_place(&mut self, mut header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
         self.sequence.borrow_mut().stamp(&mut header)?;
-        let mut bytes = vec![0; header.length as usize];
-        write(&mut bytes)?;
+        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
         self.deliver(header, bytes);
         Ok(())
     }

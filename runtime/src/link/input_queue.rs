@@ -9,6 +9,7 @@ pub struct InputQueue {
     messages: VecDeque<Message>,
     bound: LogTime,
     ended: bool,
+    sent_at: u64,
 }
 
 impl InputQueue {
@@ -33,6 +34,17 @@ impl InputQueue {
     pub fn end(&mut self, time: LogTime) {
         self.raise(time);
         self.ended = true;
+    }
+
+    /// Notes when the messages that wait were sent, nanoseconds on the monotonic clock. Those of a live link wait one at a
+    /// time.
+    pub(crate) fn note_sent_at(&mut self, sent_at: u64) {
+        self.sent_at = sent_at;
+    }
+
+    /// When the messages that wait were sent.
+    pub(crate) fn sent_at(&self) -> u64 {
+        self.sent_at
     }
 
     /// The log time to which the stream has come: no message that is still to come lies before it.
@@ -65,6 +77,11 @@ impl InputQueue {
     /// Whether no message waits.
     pub fn is_empty(&self) -> bool {
         self.messages.is_empty()
+    }
+
+    /// Whether none will come.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.ended
     }
 
     /// Whether no message waits and none will come.

@@ -1,9 +1,46 @@
-//! The order in which a stage gets its inputs: by log time, then by wire, then as sent.
+//! The order in which a stage gets its inputs.
 //!
-//! It depends on the messages only, so every engine comes to the same order.
+//! In a replay it is by log time, then by wire, then as sent. It depends on the messages only, so every engine comes to the
+//! same order. In a live run it is that in which messages were sent.
 
 use super::InputQueue;
 use crate::message::LogTime;
+use crate::pipeline::Mode;
+
+/// What decides which message of a stage is the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// The least log time, once nothing before it can follow.
+    #[default]
+    LogTime,
+    /// When it was sent, of what is there.
+    Arrival,
+}
+
+impl From<Mode> for Order {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::Replay => Self::LogTime,
+            Mode::Live => Self::Arrival,
+        }
+    }
+}
+
+impl Order {
+    /// The wire whose head is the next message of the stage, if that can be told yet.
+    pub fn next(self, queues: &[InputQueue]) -> Option<usize> {
+        match self {
+            Self::LogTime => next_input(queues),
+            Self::Arrival => next_sent(queues),
+        }
+    }
+}
+
+/// The wire whose head was sent first.
+fn next_sent(queues: &[InputQueue]) -> Option<usize> {
+    let waiting = queues.iter().enumerate().filter(|(_, queue)| !queue.is_empty());
+    waiting.min_by_key(|(wire, queue)| (queue.sent_at(), *wire)).map(|(wire, _)| wire)
+}
 
 /// The wire whose head is the next message of the stage, if that can be told yet.
 ///
@@ -64,6 +101,22 @@ mod tests {
         let mut silent = queue(&[]);
         silent.raise(LogTime(6));
         assert_eq!(next_input(&[silent, queue(&[5])]), Some(1));
+    }
+
+    #[test]
+    fn of_live_wires_the_head_that_was_sent_first_comes_first() {
+        let sent = |time: u64, sent_at: u64| {
+            let mut queue = queue(&[time]);
+            queue.note_sent_at(sent_at);
+            queue
+        };
+        assert_eq!(Order::Arrival.next(&[queue(&[]), sent(1, 8), sent(2, 7)]), Some(2));
+        assert_eq!(
+            Order::Arrival.next(&[sent(1, 7), sent(0, 7)]),
+            Some(0),
+            "at equal times the lower wire comes first"
+        );
+        assert_eq!(Order::Arrival.next(&[queue(&[])]), None);
     }
 
     #[test]

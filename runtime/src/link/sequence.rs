@@ -1,20 +1,28 @@
-//! The numbering of a link's messages, and the rule that log time never goes back.
+//! The numbering of a link's messages, and the rule that log time never goes back in a replay.
 
+use super::Order;
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use crate::stage::StageError;
 
 /// Numbers the messages of one link and watches their log times.
 #[derive(Debug, Default)]
 pub(crate) struct Sequence {
+    order: Order,
     next: u64,
-    /// The readers know that nothing before this will follow.
+    /// The latest log time. In a replay the readers know that nothing before it will follow.
     reached: LogTime,
 }
 
 impl Sequence {
-    /// Gives a message its number. An error if its log time lies before that of the message before it.
+    pub(crate) fn new(order: Order) -> Self {
+        Self { order, ..Self::default() }
+    }
+
+    /// Gives a message its number. An error if it lies before that of the message before it in a replay.
     pub(crate) fn stamp(&mut self, header: &mut MessageHeader) -> Result<(), StageError> {
-        if header.flags.contains(MessageFlags::DATA) {
+        if self.order == Order::Arrival {
+            // Each message has a time of its own, and the next may be earlier.
+        } else if header.flags.contains(MessageFlags::DATA) {
             if header.log_time < self.reached {
                 let cause = format!(
                     "its log time {} lies before {}, which the stream has reached",
@@ -26,7 +34,7 @@ impl Sequence {
         } else {
             header.log_time = header.log_time.max(self.reached);
         }
-        self.reached = header.log_time;
+        self.reached = self.reached.max(header.log_time);
         header.sequence = self.next;
         self.next += 1;
         Ok(())

@@ -1,10 +1,13 @@
 //! Messages: a header, and the bytes of a ROS 2 message in CDR that may lie in shared memory.
 
+mod blank;
 mod channel;
 mod header;
 mod text;
 mod time;
 
+pub(crate) use blank::write_all;
+pub use blank::{Blank, Filled, Write, write_vec};
 pub use channel::Channel;
 pub use header::{MessageFlags, MessageHeader};
 pub use text::{FixedText, TextTooLong};

@@ -1,7 +1,7 @@
 //! Running a stage by itself, for its tests and benches: messages in, and what it sends kept in lists.
 
 use super::{Context, Node, OutputEnd, OutputSink, StageError, StageKind};
-use crate::message::{FixedText, LogTime, Message, MessageHeader};
+use crate::message::{FixedText, LogTime, Message, MessageHeader, Write, write_vec};
 use crate::ros::{RosMessage, encode};
 use serde::de::DeserializeOwned;
 use std::cell::RefCell;
@@ -23,13 +23,8 @@ impl OutputSink for List {
         Ok(())
     }
 
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
-        let mut bytes = vec![0; header.length as usize];
-        write(&mut bytes)?;
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
+        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
         self.0.borrow_mut().push(Message::from_vec(header, bytes));
         Ok(())
     }

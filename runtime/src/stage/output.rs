@@ -1,7 +1,7 @@
 //! What a stage sends through: an [`Out`] for each port, in a struct of the stage's own.
 
 use super::{OutputPort, PortType, StageError};
-use crate::message::{Channel, FixedText, LogTime, MessageFlags, MessageHeader};
+use crate::message::{Blank, Channel, Filled, FixedText, LogTime, MessageFlags, MessageHeader, Write};
 use crate::ros::{self, GridPrefix, OccupancyGrid, RosMessage};
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -14,12 +14,8 @@ pub trait OutputSink {
     /// Sends a message of which the bytes are there already; they are copied once.
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError>;
 
-    /// Sends a message of `header.length` bytes that `write` fills in place. `write` gets zeros.
-    fn send_in_place(
-        &mut self,
-        header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError>;
+    /// Sends a message of `header.length` bytes that `write` writes in place, each once.
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError>;
 }
 
 /// The output ports of a stage: a struct with an [`Out`] for each, or `()` for none.
@@ -242,8 +238,8 @@ impl<T: RosMessage> Out<T> {
 }
 
 impl Out<OccupancyGrid<'static>> {
-    /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. The
-    /// cells are zero before.
+    /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. A port that
+    /// nothing reads does not ask for them.
     ///
     /// # Errors
     /// The grid is too large for the message, the robot's name too long, `fill` fails, or the link has failed.
@@ -251,18 +247,14 @@ impl Out<OccupancyGrid<'static>> {
         &self,
         robot: &str,
         prefix: &GridPrefix,
-        mut fill: impl FnMut(&mut [i8]) -> Result<(), StageError>,
+        mut fill: impl for<'b> FnMut(Blank<'b>) -> Result<Filled<'b>, StageError>,
     ) -> Result<(), StageError> {
         let head = prefix.encode().map_err(|error| StageError::new("send a grid", error))?;
         let header = self.header(robot, head.len() + prefix.cell_count())?;
         let port = &mut *self.port.borrow_mut();
         port.messages += 1;
         let Some(sink) = &mut port.sink else { return Ok(()) };
-        sink.send_in_place(header, &mut |bytes| {
-            let (place, cells) = bytes.split_at_mut(head.len());
-            place.copy_from_slice(&head);
-            fill(bytemuck::cast_slice_mut(cells))
-        })
+        sink.send_in_place(header, &mut |blank| blank.copy_then(&head, &mut fill))
     }
 }
 

@@ -230,10 +230,10 @@ impl Source for Writer {
     fn next(&mut self, output: &Output<Written>) -> Result<bool, StageError> {
         let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
         output.set_log_time(LogTime(self.sent));
-        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
-            note_place(cells, output);
-            cells.fill(7);
-            Ok(())
+        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |blank| {
+            let mut filled = blank.fill_with(7);
+            note_place(filled.cells_mut(), output);
+            Ok(filled)
         })?;
         self.sent += 1;
         Ok(self.sent < 5)

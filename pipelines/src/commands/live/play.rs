@@ -5,8 +5,8 @@ use crate::job::progress;
 use crate::status::{BadUse, Status};
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use gridweave_runtime::engine::Feed;
-use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader};
+use gridweave_runtime::engine::{Feed, FeedStopper};
+use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader, Write};
 use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, Registry, StageError};
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -63,14 +63,14 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let player = Player { context: running.pipeline.context(stage), ..player };
     let stop = progress::stop_on_interrupt("no more is sent");
     let stopped = Arc::new(AtomicBool::new(false));
-    let feed = Feed::join(&running.run, &running.pipeline, stage, Arc::clone(&stopped))?;
+    let feed = Feed::join(&running.run, &running.pipeline, stage)?;
     if !feed.wait_for_readers(READY_TIMEOUT) {
         bail!("the stages that read `{}` do not connect", running.pipeline.stages[stage].name);
     }
     let is_over = || stop.load(Ordering::Relaxed) || !running.run.is_running();
     let pace = Rc::new(RefCell::new(Pace::new(args.rate)));
     let links = || player.links(&running, stage, &feed, &pace);
-    let result = watch_while(&is_over, &stopped, || player.play_all(&links, &pace, &stopped));
+    let result = watch_while(&is_over, &stopped, &feed.stopper(), || player.play_all(&links, &pace, &stopped));
     let messages = pace.borrow().messages;
     match result {
         Err(_) if stopped.load(Ordering::Relaxed) => {}
@@ -106,14 +106,20 @@ fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
     }
 }
 
-/// Does some work while another thread sets `stopped` once `is_over` says so.
-fn watch_while<T>(is_over: &(impl Fn() -> bool + Sync), stopped: &AtomicBool, work: impl FnOnce() -> T) -> T {
+/// Does some work while another thread sets `stopped`, and stops the feed, once `is_over` says so.
+fn watch_while<T>(
+    is_over: &(impl Fn() -> bool + Sync),
+    stopped: &AtomicBool,
+    feed: &FeedStopper,
+    work: impl FnOnce() -> T,
+) -> T {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
         scope.spawn(|| {
             while !done.load(Ordering::Relaxed) {
                 if is_over() {
                     stopped.store(true, Ordering::Relaxed);
+                    feed.stop();
                 }
                 thread::sleep(LOOK_INTERVAL);
             }
@@ -277,16 +283,12 @@ impl OutputSink for Paced {
         }
     }
 
-    fn send_in_place(
-        &mut self,
-        mut header: MessageHeader,
-        write: &mut dyn FnMut(&mut [u8]) -> Result<(), StageError>,
-    ) -> Result<(), StageError> {
+    fn send_in_place(&mut self, mut header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
         let later = self.prepare(&mut header)?;
-        self.link.send_in_place(header, &mut |bytes| {
-            write(bytes)?;
-            make_later(bytes, later);
-            Ok(())
+        self.link.send_in_place(header, &mut |blank| {
+            let mut filled = write(blank)?;
+            make_later(&mut filled, later);
+            Ok(filled)
         })
     }
 }

@@ -1,20 +1,18 @@
 //! One process of a run: its stages in threads, and its words with the supervisor.
 
 use super::words::{Said, Told, say};
-use crate::engine::live_links::LiveLinks;
-use crate::engine::live_stage::LiveStage;
-use crate::engine::plan::Plan;
+use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
 use crate::engine::stage_thread::{Event, StageThread, tell};
+use crate::engine::work::working_for;
 use crate::engine::{Failure, RunError};
-use crate::link::board::StageBoard;
-use crate::link::shared::{Activity, LinkError, WakeEvents, Waker};
-use crate::pipeline::{Mode, Pipeline};
+use crate::link::board::Board;
+use crate::link::{Control, LinkError};
+use crate::pipeline::Pipeline;
 use crate::stage::Registry;
 use iceoryx2::service::ipc::Service;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -43,9 +41,8 @@ pub fn run_process(
     }
     let supervisor = Supervisor { output: &mut io::stdout(), told: Instant::now() };
     let board = folder.board(&pipeline).map_err(|error| error.to_string())?;
-    let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
-    let drain = Arc::new(AtomicBool::new(false));
-    Process { pipeline: &pipeline, folder: &folder, stages: &stages, boards: &boards, drain }.run(supervisor);
+    let control = Arc::new(Control::default());
+    Process { pipeline: &pipeline, folder: &folder, stages: &stages, board: &board, control }.run(supervisor);
     Ok(())
 }
 
@@ -79,67 +76,32 @@ struct Process<'a> {
     folder: &'a RunFolder,
     /// The indexes of its stages.
     stages: &'a [usize],
-    /// What each stage of the run shows of itself.
-    boards: &'a [StageBoard],
-    /// Set when a live run is to come to its end.
-    drain: Arc<AtomicBool>,
+    /// What the stages of the run show of themselves.
+    board: &'a Arc<Board>,
+    /// What its stages are told.
+    control: Arc<Control>,
 }
 
 impl Process<'_> {
     fn run(&self, mut supervisor: Supervisor<'_>) {
-        let (plan, names) = (Plan::new(self.pipeline), self.folder.names());
+        let names = self.folder.names();
+        let links = Links::new(self.pipeline, &names, self.board);
         let stop_reason = OnceLock::new();
         let (sender, receiver) = channel();
-        let wakers = names.node::<Service>().and_then(|node| {
-            let wakers = self.stages.iter().map(|&stage| plan.waker(&node, &names, self.pipeline, stage));
-            Ok((wakers.collect::<Result<Vec<_>, LinkError>>()?, node))
-        });
-        let (wakers, _node) = match wakers {
-            Ok(wakers) => wakers,
-            Err(error) => {
-                let stage = self.name(self.stages[0]);
-                return supervisor.tell(&Said::Failed { stage, failure: error.into() });
-            }
-        };
-        let activities: Vec<Activity> = self.stages.iter().map(|_| Activity::default()).collect();
         listen(sender.clone());
         thread::scope(|scope| {
-            for (&stage, activity) in self.stages.iter().zip(&activities) {
-                let (sender, names, plan, stop_reason) = (sender.clone(), &names, &plan, &stop_reason);
-                let (pipeline, boards, drain) = (self.pipeline, self.boards, Arc::clone(&self.drain));
-                let activity = activity.clone();
-                scope.spawn(move || {
-                    let connected = match pipeline.mode {
-                        Mode::Replay => {
-                            let board = Some(boards[stage].clone());
-                            StageThread::<Service>::connect(pipeline, plan, names, stage, activity, board, &sender)
-                                .map(|thread| thread.run(stop_reason))
-                        }
-                        Mode::Live => {
-                            let links = LiveLinks { pipeline, plan, names, boards };
-                            LiveStage::<Service>::connect(&links, stage, activity, drain, &sender)
-                                .map(|thread| thread.run(stop_reason))
-                        }
-                    };
-                    if let Err(failure) = connected {
-                        tell(&sender, Event::Ended { stage, result: Err(failure) });
-                    }
-                });
+            for &stage in self.stages {
+                let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
+                let control = Arc::clone(&self.control);
+                scope.spawn(move || StageThread::<Service>::start(links, stage, control, stop_reason, &sender));
             }
             drop(sender);
-            self.report(&mut supervisor, &wakers, &activities, &receiver, &stop_reason);
+            self.report(&mut supervisor, &receiver, &stop_reason);
         });
     }
 
     /// Tells the supervisor how the stages go until all have ended.
-    fn report(
-        &self,
-        supervisor: &mut Supervisor<'_>,
-        wakers: &[Waker<Service>],
-        activities: &[Activity],
-        events: &Receiver<Event>,
-        stop_reason: &OnceLock<String>,
-    ) {
+    fn report(&self, supervisor: &mut Supervisor<'_>, events: &Receiver<Event>, stop_reason: &OnceLock<String>) {
         let mut running = self.stages.len();
         let mut hung = false;
         while running > 0 {
@@ -156,21 +118,17 @@ impl Process<'_> {
                     })
                 }
                 Ok(Event::Drain) => {
-                    self.drain.store(true, Ordering::Relaxed);
-                    wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::DATA)));
+                    self.control.drain(self.board);
                     None
                 }
                 Ok(Event::Stop { reason }) => {
                     stop_reason.get_or_init(|| reason);
+                    self.control.stop(self.board);
                     None
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
             };
-            if stop_reason.get().is_some() {
-                // Again and again, for a stage that was not listening yet. One that has ended need not be woken.
-                wakers.iter().for_each(|waker| drop(waker.wake(WakeEvents::STOP)));
-            }
-            if !hung && let Some(words) = self.hung(activities) {
+            if !hung && let Some(words) = self.hung() {
                 hung = true;
                 supervisor.tell(&words);
             }
@@ -182,12 +140,12 @@ impl Process<'_> {
     }
 
     /// The first stage that has worked on one message for longer than the pipeline allows.
-    fn hung(&self, activities: &[Activity]) -> Option<Said> {
+    fn hung(&self) -> Option<Said> {
         let longest = self.pipeline.stall_timeout?;
-        let is_hung = |activity: &Activity| activity.working_for().is_some_and(|time| time > longest);
-        let place = activities.iter().position(is_hung)?;
+        let is_hung = |stage: usize| working_for(&self.board.stage(stage)).is_some_and(|time| time > longest);
+        let stage = self.stages.iter().copied().find(|&stage| is_hung(stage))?;
         let failure = Failure::Hung { seconds: longest.as_secs_f64() };
-        Some(Said::Failed { stage: self.name(self.stages[place]), failure })
+        Some(Said::Failed { stage: self.name(stage), failure })
     }
 
     fn name(&self, stage: usize) -> String {

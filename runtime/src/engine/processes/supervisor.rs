@@ -8,7 +8,7 @@ use super::words::{Said, Told, say};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::board::{StageBoard, StageNumber, StageState};
-use crate::link::shared::{LinkError, RunNames};
+use crate::link::{LinkError, RunNames};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;

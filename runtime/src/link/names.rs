@@ -74,11 +74,6 @@ impl RunNames {
         self.service(&format!("link/{stage}/{port}"))
     }
 
-    /// The service that wakes a stage.
-    pub(crate) fn wake(&self, stage: &str) -> Result<ServiceName, LinkError> {
-        self.service(&format!("wake/{stage}"))
-    }
-
     fn service(&self, name: &str) -> Result<ServiceName, LinkError> {
         let name = format!("{}/{name}", self.prefix);
         ServiceName::new(&name).map_err(|e| LinkError::shared(format!("name the service {name}"))(&e))

@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use std::rc::Rc;
 
 /// The version of the link protocol. A reader refuses samples of another one.
-pub const PROTOCOL_VERSION: u32 = 2;
+pub const PROTOCOL_VERSION: u32 = 3;
 
 /// Where each message of a batch begins.
 const RECORD_ALIGNMENT: usize = 8;
@@ -16,7 +16,7 @@ const RECORD_ALIGNMENT: usize = 8;
 /// With `count` 1 the payload is the bytes of `message`. With more, `message` is the header of the first, and the
 /// payload is for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
-#[type_name("gridweave_sample_header_2")]
+#[type_name("gridweave_sample_header_3")]
 #[repr(C)]
 pub struct SampleHeader {
     /// [`PROTOCOL_VERSION`].
@@ -25,13 +25,20 @@ pub struct SampleHeader {
     pub count: u32,
     /// When it was sent, nanoseconds on the monotonic clock of the machine; 0 in a replay.
     pub sent_at: u64,
-    /// Who numbers the messages of a live link, of which several programs may send; 0 in a replay.
+    /// Who has sent it first, and numbers its samples: several programs may send on a live link.
     pub origin: u64,
+    /// Counts the samples of that sender, from 0.
+    pub number: u64,
     /// The header of the only message, or of the first.
     pub message: MessageHeader,
 }
 
 impl SampleHeader {
+    /// That of a sample of one message.
+    pub(super) fn single(message: MessageHeader) -> Self {
+        Self { version: PROTOCOL_VERSION, count: 1, message, ..Default::default() }
+    }
+
     /// Whether its messages have bytes, or headers of their own.
     pub(super) fn has_payload(&self) -> bool {
         self.count > 1 || self.message.length > 0
@@ -69,7 +76,7 @@ impl Batch {
     /// The header and the payload of a sample that holds it. A single message goes without its header in the payload.
     pub(crate) fn sample(&self) -> (SampleHeader, &[u8]) {
         let message = self.first.unwrap_or_default();
-        let header = SampleHeader { version: PROTOCOL_VERSION, count: self.count, message, ..Default::default() };
+        let header = SampleHeader { count: self.count, ..SampleHeader::single(message) };
         match self.count {
             1 => (header, &self.bytes[MessageHeader::SIZE..MessageHeader::SIZE + message.length as usize]),
             _ => (header, &self.bytes),

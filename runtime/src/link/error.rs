@@ -62,6 +62,12 @@ pub enum LinkError {
 /// What mends most failures of shared memory.
 const HELP: &str = "check that /dev/shm has room and can be written";
 
+impl From<LinkError> for crate::stage::StageError {
+    fn from(error: LinkError) -> Self {
+        Self::new("send a message", error)
+    }
+}
+
 impl LinkError {
     /// An error of iceoryx2 while `doing` something.
     pub(crate) fn shared(doing: impl Into<String>) -> impl FnOnce(&dyn fmt::Debug) -> Self {

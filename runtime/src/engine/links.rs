@@ -1,0 +1,91 @@
+//! The ends of links, as the pipeline of a run has them.
+
+use super::runner::readers;
+use crate::link::board::Board;
+use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortBoard, ReaderEnd, RunNames, SenderRole};
+use crate::pipeline::Pipeline;
+use iceoryx2::node::Node;
+use iceoryx2::service::Service;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What the ends of all links of a run are made from: what both ends of a link must agree on.
+pub(super) struct Links<'a> {
+    pub(super) pipeline: &'a Pipeline,
+    names: &'a RunNames,
+    pub(super) board: &'a Arc<Board>,
+    /// For each output port of each stage, those that read it: stages and their wires.
+    readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
+}
+
+impl<'a> Links<'a> {
+    pub(super) fn new(pipeline: &'a Pipeline, names: &'a RunNames, board: &'a Arc<Board>) -> Self {
+        Self { pipeline, names, board, readers: readers(pipeline) }
+    }
+
+    /// The iceoryx2 node of one thread of the run.
+    pub(super) fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
+        self.names.node()
+    }
+
+    /// The wires of a stage.
+    pub(super) fn receivers<S: Service + 'static>(
+        &self,
+        node: &Node<S>,
+        stage: usize,
+    ) -> Result<Vec<LinkReceiver<S>>, LinkError> {
+        let inputs = self.pipeline.stages[stage].inputs.iter().enumerate();
+        let receiver = |(wire, input): (usize, &crate::pipeline::Wire)| {
+            let (from, port) = (input.from_stage, input.from_port);
+            let owner = PortBoard { board: self.board.stage(from), port };
+            LinkReceiver::new(node, self.names, &self.shape(from, port), self.reader_end(stage, wire), owner)
+        };
+        inputs.map(receiver).collect()
+    }
+
+    /// A sender for each output port of a stage that others read.
+    pub(super) fn senders<S: Service + 'static>(
+        &self,
+        node: &Node<S>,
+        stage: usize,
+        role: SenderRole,
+    ) -> Result<BTreeMap<usize, LinkSender<S>>, LinkError> {
+        let ports = (0..self.pipeline.stages[stage].kind.outputs.len()).filter(|&port| self.is_read(stage, port));
+        let sender = |port: usize| {
+            let readers = self.readers[&(stage, port)].iter().map(|&(stage, wire)| self.reader_end(stage, wire));
+            let (shape, board) = (self.shape(stage, port), PortBoard { board: self.board.stage(stage), port });
+            let gather = self.pipeline.batch;
+            let sender = LinkSender::new(node, self.names, &shape, readers.collect(), board, role, gather)?;
+            Ok((port, sender))
+        };
+        ports.map(sender).collect()
+    }
+
+    /// Whether anything reads an output port.
+    pub(super) fn is_read(&self, stage: usize, port: usize) -> bool {
+        self.readers.contains_key(&(stage, port))
+    }
+
+    fn reader_end(&self, stage: usize, wire: usize) -> ReaderEnd {
+        ReaderEnd { board: self.board.stage(stage), wire, depth: self.pipeline.stages[stage].depth }
+    }
+
+    fn shape(&self, stage: usize, port: usize) -> LinkShape<'_> {
+        let spec = &self.pipeline.stages[stage];
+        let readers = self.readers.get(&(stage, port)).map_or(&[][..], Vec::as_slice);
+        let depths = readers.iter().map(|(reader, _)| self.pipeline.stages[*reader].depth);
+        LinkShape {
+            stage: &spec.name,
+            port: spec.kind.outputs[port].name,
+            readers: readers.len(),
+            depth: depths.max().unwrap_or(1),
+            order: Order::from(self.pipeline.mode),
+            overflow: spec.overflow.get(port).copied().unwrap_or_default(),
+        }
+    }
+}
+
+/// What each stage has on the board of the run: (wires, output ports).
+pub(super) fn board_shape(pipeline: &Pipeline) -> Vec<(usize, usize)> {
+    pipeline.stages.iter().map(|stage| (stage.inputs.len(), stage.kind.outputs.len())).collect()
+}
