@@ -1,15 +1,14 @@
 //! The hypotheses that one stage has for one pair of robots, gathered from the messages that they come in.
 
+use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::Alignment;
 use std::collections::BTreeMap;
 
 /// Whose hypotheses they are, and of which pair of robots.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Origin {
-    /// The robot whose map stays.
-    pub a: String,
-    /// The robot whose map is moved.
-    pub b: String,
+    /// The pair.
+    pub pair: RobotPair,
     /// What they were found from, see [`Alignment::source`].
     pub source: String,
 }
@@ -17,12 +16,7 @@ pub struct Origin {
 impl Origin {
     /// Of an alignment.
     pub fn of(alignment: &Alignment) -> Self {
-        Self { a: alignment.a.clone(), b: alignment.b.clone(), source: alignment.source().to_owned() }
-    }
-
-    /// Whether a robot is one of the pair.
-    pub fn concerns(&self, robot: &str) -> bool {
-        self.a == robot || self.b == robot
+        Self { pair: RobotPair::of(alignment), source: alignment.source().to_owned() }
     }
 }
 
@@ -55,7 +49,7 @@ impl HypothesisGatherer {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the hypotheses for {} and {} by {} were left out: number {missing} was due, and {came} came",
-    origin.a, origin.b, origin.source
+    origin.pair.a, origin.pair.b, origin.source
 )]
 pub struct HypothesisMissing {
     /// Whose they are.
@@ -84,7 +78,7 @@ mod tests {
         let (origin, all) = gatherer.add(hypothesis("maps", 2, 3)).unwrap().unwrap();
         assert_eq!((origin.source.as_str(), all.len()), ("map", 3));
         assert!(all.iter().enumerate().all(|(rank, one)| one.rank as usize == rank));
-        assert!(origin.concerns("a") && origin.concerns("b") && !origin.concerns("c"));
+        assert_eq!(origin.pair, RobotPair::new("a", "b"));
     }
 
     #[test]

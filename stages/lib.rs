@@ -1,6 +1,6 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
-//! it `stage.rs`, the thin adapter that turns messages into calls. `geometry` and `hypotheses` are what several stages
-//! share.
+//! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
+//! in `geometry`, `walls`, `hypotheses`, `robot_maps` and `robot_pair`.
 
 #![forbid(unsafe_code)]
 
@@ -13,11 +13,14 @@ pub mod line_extractor;
 pub mod map_aligner;
 pub mod merge_verifier;
 pub mod quadrant_classifier;
+pub mod robot_maps;
+pub mod robot_pair;
 pub mod simulator;
 pub mod tag_filter;
 pub mod tag_localizer;
 #[cfg(test)]
 mod test_world;
+pub mod walls;
 
 use gridweave_runtime::stage::StageKind;
 

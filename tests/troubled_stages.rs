@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
-use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, PoseStamped};
 use gridweave_runtime::stage::{
-    InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
+    Context, Out, Output, OutputPorts, Outputs, Parameters, Received, Source, StageError, StageKind,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -90,10 +90,21 @@ impl Trouble {
     }
 }
 
+/// The poses that a stage sends.
+struct Poses(Out<PoseStamped>);
+
+impl Outputs for Poses {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("out", "poses"))
+    }
+}
+
 struct TroubledSource(Trouble, u64);
 
 impl Source for TroubledSource {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Poses;
+
+    fn next(&mut self, output: &Output<Poses>) -> Result<bool, StageError> {
         let Self(trouble, number) = self;
         if *number == trouble.count {
             return Ok(false);
@@ -102,39 +113,34 @@ impl Source for TroubledSource {
         trouble.happen(*number)?;
         let log_time = LogTime(1_000_000_000 + *number * 1_000_000);
         output.set_log_time(log_time);
-        output.send(0, "robot1", &trouble.pose(log_time))?;
+        output.0.send("robot1", &trouble.pose(log_time))?;
         Ok(true)
     }
 }
 
 struct TroubledStage(Trouble, u64);
 
-impl Stage for TroubledStage {
-    fn receive(&mut self, _port: usize, _message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+impl TroubledStage {
+    fn receive(&mut self, _: Received<'_, PoseStamped>, output: &Output<Poses>) -> Result<(), StageError> {
         let Self(trouble, number) = self;
         *number += 1;
         trouble.happen(*number)?;
         if trouble.what == "nothing_passes" {
             return Ok(());
         }
-        let pose = trouble.pose(output.log_time());
-        output.send(0, "robot1", &pose)
+        output.0.send("robot1", &trouble.pose(output.log_time()))
     }
 }
 
 fn main() -> ExitCode {
-    let pose = PortType::of::<PoseStamped>();
-    let outputs = || vec![OutputPort::new("out", pose, "poses")];
     gridweave::command([
-        StageKind::source("troubled_source", "Sends poses.", outputs(), |trouble: Trouble, _| {
+        StageKind::source("troubled_source", "Sends poses.", |trouble: Trouble, _: &Context| {
             Ok(TroubledSource(trouble.start()?, 0))
         }),
-        StageKind::stage(
-            "troubled_stage",
-            "Sends a pose for each message.",
-            vec![InputPort::many("in", pose, "poses")],
-            outputs(),
-            |trouble: Trouble, _| Ok(TroubledStage(trouble.start()?, 0)),
-        ),
+        StageKind::stage("troubled_stage", "Sends a pose for each message.", |trouble: Trouble, _| {
+            Ok(TroubledStage(trouble.start()?, 0))
+        })
+        .inputs("in", "poses", TroubledStage::receive)
+        .build(),
     ])
 }

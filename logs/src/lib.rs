@@ -1,7 +1,8 @@
 //! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, what a log holds, maps of
-//! nav2's map server, and pictures of maps.
+//! nav2's map server, pictures of maps, and summaries of merges.
 
 pub mod dynamic;
+pub mod file;
 pub mod info;
 pub mod map_file;
 pub mod picture;
@@ -10,7 +11,9 @@ pub mod reader;
 pub mod schemas;
 pub mod sink;
 pub mod source;
+pub mod summary;
 pub mod tf;
+pub mod truth;
 
 #[cfg(test)]
 mod test_log;
@@ -19,5 +22,14 @@ use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![sink::kind(), source::kind(), source::live_kind(), source::map_file::kind()]
+    vec![
+        map_file::kind(),
+        picture::kind(),
+        sink::kind(),
+        source::kind(),
+        source::live_kind(),
+        source::map_file::kind(),
+        summary::kind(),
+        truth::kind(),
+    ]
 }

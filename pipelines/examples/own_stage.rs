@@ -3,7 +3,6 @@
 //!     cargo run --example own_stage -- kinds map_inflater
 //!     cargo run --example own_stage -- golden --partial --cases pipelines/examples/own_stage_golden
 
-use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::cell::is_occupied;
 use gridweave_runtime::ros::{GridPrefix, OccupancyGrid};
 use gridweave_runtime::stage::*;
@@ -38,12 +37,16 @@ impl Parameters for InflaterParameters {
 /// Grows the obstacles of maps by the radius of a robot, so that its centre can be planned for as a point.
 struct Inflater(InflaterParameters);
 
-impl Stage for Inflater {
-    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let Ok(map) = message.decode::<OccupancyGrid<'_>>() else {
-            output.warn("messages that are no map are left out");
-            return Ok(());
-        };
+struct Inflated(Out<OccupancyGrid<'static>>);
+
+impl Outputs for Inflated {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("inflated", "the maps with grown obstacles"))
+    }
+}
+
+impl Inflater {
+    fn receive(&mut self, map: Received<'_, OccupancyGrid<'_>>, output: &Output<Inflated>) -> Result<(), StageError> {
         let (width, height) = (map.info.width as usize, map.info.height as usize);
         let resolution = f64::from(map.info.resolution);
         if width.checked_mul(height) != Some(map.cells().len()) || resolution.is_nan() || resolution <= 0.0 {
@@ -57,7 +60,7 @@ impl Stage for Inflater {
             .filter(|&(x, y)| within(x, y))
             .collect();
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
-        output.send_grid(0, message.robot(), &prefix, |cells| {
+        output.0.send_grid(map.robot(), &prefix, |cells| {
             cells.copy_from_slice(map.cells());
             for (at, _) in map.cells().iter().enumerate().filter(|(_, cell)| is_occupied(**cell)) {
                 for (x, y) in &disc {
@@ -73,11 +76,8 @@ impl Stage for Inflater {
 }
 
 fn kind() -> StageKind {
-    StageKind::stage(
-        "map_inflater",
-        "Grows the obstacles of maps by the radius of a robot.",
-        vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps")],
-        vec![OutputPort::new("inflated", PortType::of::<OccupancyGrid<'_>>(), "the maps with grown obstacles")],
-        |parameters: InflaterParameters, _context: &Context| Ok(Inflater(parameters)),
-    )
+    let make = |parameters: InflaterParameters, _: &Context| Ok(Inflater(parameters));
+    StageKind::stage("map_inflater", "Grows the obstacles of maps by the radius of a robot.", make)
+        .input("map", "the robots' maps", Inflater::receive)
+        .build()
 }

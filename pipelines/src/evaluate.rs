@@ -7,6 +7,7 @@
 
 use crate::table::Table;
 use anyhow::{Context, Result, bail};
+use gridweave_logs::summary::{Frame, Summary};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -72,14 +73,6 @@ pub struct Evaluation {
 }
 
 #[derive(Deserialize)]
-struct Summary {
-    reference: Option<String>,
-    frames: BTreeMap<String, Frame>,
-    #[serde(default)]
-    unmerged: BTreeMap<String, String>,
-}
-
-#[derive(Deserialize)]
 struct Truth {
     /// None if the robots have nothing to do with each other.
     frames: BTreeMap<String, Frame>,
@@ -88,17 +81,8 @@ struct Truth {
     centres: BTreeMap<String, [f64; 2]>,
 }
 
-#[derive(Clone, Copy, Deserialize)]
-struct Frame {
-    x: f64,
-    y: f64,
-    yaw: f64,
-}
-
-impl Frame {
-    fn pose(self) -> Isometry2<f64> {
-        Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
-    }
+fn pose(frame: &Frame) -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(frame.x, frame.y), frame.yaw)
 }
 
 /// Measures the summary that `gridweave run --summary` wrote against a truth file. Where the truth has no frames, the
@@ -107,9 +91,17 @@ impl Frame {
 /// # Errors
 /// A file cannot be read or is not what it should be; or the truth knows robots, but not the summary's reference.
 pub fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
-    let run: Summary = read(summary, "the summary of a run")?;
-    let truth_file: Truth = read(truth, "a truth file")?;
-    measure(&run, &truth_file).with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
+    let merge: Summary = read(summary, "the summary of a run")?;
+    evaluate_summary(&merge, truth)
+        .with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
+}
+
+/// Measures what a merge has found against a truth file, as [`evaluate`] does.
+///
+/// # Errors
+/// The truth cannot be read or is not what it should be; or it knows robots, but not the summary's reference.
+pub fn evaluate_summary(summary: &Summary, truth: &Path) -> Result<Evaluation> {
+    measure(summary, &read(truth, "a truth file")?)
 }
 
 /// A JSON file.
@@ -122,7 +114,7 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
     let related = !truth.frames.is_empty();
     let transform_reference_truth = match &run.reference {
         Some(reference) if related => match truth.frames.get(reference) {
-            Some(frame) => frame.pose().inverse(),
+            Some(frame) => pose(frame).inverse(),
             None => {
                 let known: Vec<&str> = truth.frames.keys().map(String::as_str).collect();
                 bail!("the run's reference `{reference}` is not in the truth, which has {}", known.join(", "));
@@ -132,8 +124,8 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
     };
     let names: BTreeSet<&String> = run.frames.keys().chain(run.unmerged.keys()).chain(truth.frames.keys()).collect();
     let one = |robot: &&String| {
-        let found = run.frames.get(*robot).map(|frame| frame.pose());
-        let expected = truth.frames.get(*robot).map(|frame| transform_reference_truth * frame.pose());
+        let found = run.frames.get(*robot).map(pose);
+        let expected = truth.frames.get(*robot).map(|frame| transform_reference_truth * pose(frame));
         let errors = found.zip(expected).map(|(found, expected)| {
             let [x, y] = truth.centres.get(*robot).copied().unwrap_or_default();
             let metres = (found * Point2::new(x, y) - expected * Point2::new(x, y)).norm();

@@ -10,11 +10,11 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_runtime::engine::{EngineKind, run};
-use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
-use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid, RosMessage};
+use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
-    Context, InputPort, Output, OutputPort, Parameters, PortType, Source, Stage, StageError, StageKind,
+    Context, Out, Output, OutputPorts, Outputs, Parameters, Received, Source, StageError, StageKind,
 };
 use iceoryx2::prelude::*;
 use schemars::JsonSchema;
@@ -74,12 +74,22 @@ struct Writer {
     sent: u64,
 }
 
+struct Written(Out<OccupancyGrid<'static>>);
+
+impl Outputs for Written {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("out", ""))
+    }
+}
+
 impl Source for Writer {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Written;
+
+    fn next(&mut self, output: &Output<Written>) -> Result<bool, StageError> {
         self.clock.wait_for(self.sent);
         let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
         output.set_log_time(LogTime(self.sent));
-        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
+        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
             cells.fill(1);
             self.clock.note_written();
             Ok(())
@@ -91,8 +101,8 @@ impl Source for Writer {
 
 struct Reader(Arc<Clock>);
 
-impl Stage for Reader {
-    fn receive(&mut self, _: usize, _: &Message, _: &mut Output<'_>) -> Result<(), StageError> {
+impl Reader {
+    fn receive(&mut self, _: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
         self.0.note_read();
         Ok(())
     }
@@ -102,17 +112,11 @@ impl Stage for Reader {
 fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
     let clock = Arc::new(Clock::default());
     let (writer, reader) = (Arc::clone(&clock), Arc::clone(&clock));
-    let grid = PortType::Ros(OccupancyGrid::NAME);
-    let source = StageKind::source(
-        "writer",
-        "",
-        vec![OutputPort::new("out", grid, "")],
-        move |parameters: Size, _: &Context| Ok(Writer { clock: Arc::clone(&writer), size: parameters.size, sent: 0 }),
-    );
-    let sink =
-        StageKind::stage("reader", "", vec![InputPort::one("in", grid, "")], vec![], move |_: Size, _: &Context| {
-            Ok(Reader(Arc::clone(&reader)))
-        });
+    let source = StageKind::source("writer", "", move |parameters: Size, _: &Context| {
+        Ok(Writer { clock: Arc::clone(&writer), size: parameters.size, sent: 0 })
+    });
+    let sink = StageKind::stage("reader", "", move |_: Size, _| Ok(Reader(Arc::clone(&reader))));
+    let sink = sink.input("in", "", Reader::receive).build();
     let spec = |name: &str, kind: StageKind, inputs: Vec<Wire>| StageSpec {
         name: name.into(),
         topics: kind.outputs.iter().map(|_| "/out".into()).collect(),

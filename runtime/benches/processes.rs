@@ -10,17 +10,18 @@
 
 use gridweave_runtime::engine::processes::{Launch, run, run_process};
 use gridweave_runtime::link::board::monotonic_nanoseconds;
-use gridweave_runtime::message::{LogTime, Message};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
-use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid, RosMessage};
+use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
-    Context, InputPort, Output, OutputPort, Parameters, PortType, Registry, Source, Stage, StageError, StageKind,
+    AnyMessage, Context, InputPort, Out, Output, OutputPorts, Outputs, Parameters, PortType, Registry, Source,
+    StageError, StageKind,
 };
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -32,6 +33,7 @@ const HOPS: u64 = 100;
 const ROUNDS: usize = 9;
 /// Between hops, so that the reader has gone to sleep.
 const PAUSE: Duration = Duration::from_millis(2);
+const GRID: PortType = PortType::of::<OccupancyGrid<'static>>();
 const SMALL: usize = 64;
 const MANY: u64 = 300_000;
 const DEPTH: usize = 64;
@@ -41,6 +43,8 @@ fn stamp(bytes: &mut [u8]) {
     let end = bytes.len() - 8;
     bytes[end..].copy_from_slice(&monotonic_nanoseconds().to_le_bytes());
 }
+
+type Report = BTreeMap<String, u64>;
 
 /// When each message was written and read, nanoseconds.
 #[derive(Default)]
@@ -61,12 +65,15 @@ impl Times {
         self.hops.push(now.saturating_sub(written));
     }
 
-    fn report(&self) -> Value {
+    /// How many messages were read, the median and the 99th percentile of their hops in nanoseconds, and messages a second.
+    fn report(&self) -> Report {
         let mut hops = self.hops.clone();
         hops.sort_unstable();
-        let at = |share: f64| hops[((hops.len() - 1) as f64 * share) as usize] as f64 * 1e-3;
+        let at = |share: f64| hops[((hops.len() - 1) as f64 * share) as usize];
         let rate = hops.len() as f64 / ((self.last - self.first) as f64 * 1e-9);
-        json!({ "count": hops.len(), "p50": at(0.5), "p99": at(0.99), "rate": rate })
+        [("count", hops.len() as u64), ("p50", at(0.5)), ("p99", at(0.99)), ("rate", rate as u64)]
+            .map(|(what, number)| (what.to_owned(), number))
+            .into()
     }
 }
 
@@ -82,8 +89,21 @@ impl Parameters for Load {}
 
 struct Writer(Load, u64);
 
+struct Written {
+    grids: Out<OccupancyGrid<'static>>,
+    small: Out<AnyMessage>,
+}
+
+impl Outputs for Written {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self { grids: ports.output("grids", ""), small: ports.encoded_output(GRID, "small", "") }
+    }
+}
+
 impl Source for Writer {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Written;
+
+    fn next(&mut self, output: &Output<Written>) -> Result<bool, StageError> {
         let Self(load, sent) = self;
         if load.pause {
             std::thread::sleep(PAUSE);
@@ -91,7 +111,7 @@ impl Source for Writer {
         output.set_log_time(LogTime(*sent));
         if load.pause {
             let info = MapMetaData { width: load.size as u32, height: 1, ..Default::default() };
-            output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
+            output.grids.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
                 cells.fill(1);
                 stamp(bytemuck::cast_slice_mut(cells));
                 Ok(())
@@ -99,44 +119,40 @@ impl Source for Writer {
         } else {
             let mut bytes = [1; SMALL];
             stamp(&mut bytes);
-            output.send_bytes(0, "", &bytes)?;
+            output.small.send_bytes("", &bytes)?;
         }
         *sent += 1;
         Ok(*sent < load.count)
     }
 }
 
-struct Reader(Times);
-
-impl Stage for Reader {
-    fn receive(&mut self, _: usize, message: &Message, _: &mut Output<'_>) -> Result<(), StageError> {
-        self.0.note(message.bytes());
-        Ok(())
-    }
-
-    fn report(&self) -> Option<Value> {
-        Some(self.0.report())
-    }
-}
-
 fn registry() -> Registry {
-    let grid = PortType::Ros(OccupancyGrid::NAME);
-    let writer = |load: Load, _: &Context| Ok(Writer(load, 0));
-    let reader = |_: Load, _: &Context| Ok(Reader(Times::default()));
+    let input = InputPort { name: "in", port_type: GRID, many: false, optional: false, summary: "" };
     Registry::new([
-        StageKind::source("writer", "", vec![OutputPort::new("out", grid, "")], writer),
-        StageKind::stage("reader", "", vec![InputPort::one("in", grid, "")], vec![], reader),
+        StageKind::source("writer", "", |load: Load, _: &Context| Ok(Writer(load, 0))),
+        StageKind::stage("reader", "", |_: Load, _| Ok(Times::default()))
+            .encoded_input(input, |times: &mut Times, message, _: &Output<()>| {
+                times.note(message.bytes());
+                Ok(())
+            })
+            .finish(|times, output| {
+                let report = times.report();
+                ["count", "p50", "p99", "rate"].into_iter().for_each(|what| output.count(what, report[what]));
+                Ok(())
+            })
+            .build(),
     ])
 }
 
 /// What the reader of a pipeline of two processes reports.
-fn pipeline(settings: &str, load: &str) -> Value {
+fn pipeline(settings: &str, load: &str) -> Report {
+    let port = if load.contains("pause") { "grids" } else { "small" };
     let text = format!(
-        "[pipeline]\n{settings}\n[stages.a]\nkind = \"writer\"\n{load}\n[stages.b]\nkind = \"reader\"\ninputs = [\"a\"]\n"
+        "[pipeline]\n{settings}\n[stages.a]\nkind = \"writer\"\n{load}\n[stages.b]\nkind = \"reader\"\ninputs = [\"a.{port}\"]\n"
     );
     let pipeline = Pipeline::parse("bench", &text, &registry(), &Overrides::default()).unwrap();
     let report = run(&pipeline, &Launch::this_program().unwrap(), &()).unwrap();
-    report.results("reader").next().unwrap().1.clone()
+    report.stages[1].counts.clone()
 }
 
 fn service(node: &Node<ipc::Service>, name: &str, depth: usize) -> Bare {
@@ -172,11 +188,11 @@ fn bare_reader(name: &str, depth: usize, count: u64) {
             times.note(sample.payload());
         }
     }
-    println!("{}", times.report());
+    println!("{}", serde_json::to_string(&times.report()).unwrap());
 }
 
 /// Bare iceoryx2 between this process, which sends, and another.
-fn bare(name: &str, size: usize, depth: usize, count: u64, pause: bool) -> Value {
+fn bare(name: &str, size: usize, depth: usize, count: u64, pause: bool) -> Report {
     let name = format!("{}_{name}", std::process::id());
     let node = NodeBuilder::new().create::<ipc::Service>().unwrap();
     let bare = service(&node, &name, depth);
@@ -226,25 +242,26 @@ fn main() {
 }
 
 fn bench() {
-    let number = |report: &Value, name: &str| report[name].as_f64().unwrap();
+    let number = |report: &Report, name: &str| report[name] as f64;
     println!("| message | bare iceoryx2, us (p99) | replay, us (p99) | ratio | live, us (p99) | ratio |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for size in SIZES {
         let load = format!("size = {size}\ncount = {HOPS}\npause = true");
-        let mut rounds: [Vec<Value>; 3] = Default::default();
+        let mut rounds: [Vec<Report>; 3] = Default::default();
         for round in 0..ROUNDS {
             rounds[0].push(bare(&format!("{size}_{round}"), size, 2, HOPS, true));
             rounds[1].push(pipeline("batch = false\ndepth = 2", &load));
             rounds[2].push(pipeline("mode = \"live\"\ndepth = 2", &load));
         }
-        let median = |reports: &[Value], name: &str| {
+        let median = |reports: &[Report], name: &str| {
             let mut values: Vec<f64> = reports.iter().map(|report| number(report, name)).collect();
             values.sort_by(f64::total_cmp);
             values[values.len() / 2]
         };
         let [bare, replay, live] = rounds;
-        let cell = |reports: &[Value]| format!("{:.1} ({:.0})", median(reports, "p50"), median(reports, "p99"));
-        let ratio = |reports: &[Value]| format!("{:.2}", median(reports, "p50") / median(&bare, "p50"));
+        let cell =
+            |reports: &[Report]| format!("{:.1} ({:.0})", median(reports, "p50") * 1e-3, median(reports, "p99") * 1e-3);
+        let ratio = |reports: &[Report]| format!("{:.2}", median(reports, "p50") / median(&bare, "p50"));
         println!(
             "| {size} B | {} | {} | {} | {} | {} |",
             cell(&bare),

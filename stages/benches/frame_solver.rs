@@ -4,11 +4,11 @@
 //!     cargo bench -p gridweave-stages --bench frame_solver
 
 // A bench that cannot go on has nothing better to do than to stop.
-#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, missing_docs, unreachable_pub)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, unreachable_pub)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::ros::encode;
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
+use gridweave_runtime::stage::LoneStage;
 use gridweave_stages::{frame_solver, geometry};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -92,19 +92,15 @@ fn time(robots: usize, nearest: usize, name: &str, share: f64) {
         .map(|index| Message::from_vec(MessageHeader::default(), encode(&team.alignment(index)).unwrap()))
         .collect();
     let run = || {
-        let kind = frame_solver::kind();
-        let Node::Stage(mut stage) = kind.make(toml::Table::new(), &Context::default()).unwrap() else {
-            panic!("a stage was expected");
-        };
-        let mut outputs = CollectedOutputs::new(&kind);
+        let mut stage = LoneStage::new(&frame_solver::kind(), "").unwrap();
         let mut slowest = Duration::ZERO;
         let start = Instant::now();
         for message in &messages {
             let before = Instant::now();
-            stage.receive(1, message, &mut outputs.output(LogTime(0))).unwrap();
+            stage.give_message("alignment", message.clone()).unwrap();
             slowest = slowest.max(before.elapsed());
         }
-        stage.finish(&mut outputs.output(LogTime(0))).unwrap();
+        stage.finish(LogTime(0)).unwrap();
         (start.elapsed(), slowest)
     };
     let repeats = if messages.len() > 500 { 1 } else { 3 };

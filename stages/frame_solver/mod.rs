@@ -20,6 +20,7 @@ mod consensus;
 pub mod consistency;
 mod cut;
 pub mod graph;
+mod messages;
 pub mod optimize;
 mod parameters;
 mod reasons;

@@ -1,19 +1,13 @@
 //! The frame solver as a stage.
 
-use super::solve::{Alignments, Group, Pair, Solution, by_name, solve};
-use super::{FrameSolverParameters, UncertainPose};
-use crate::geometry::row_by_row;
-use gridweave_runtime::message::Message;
+use super::FrameSolverParameters;
+use super::messages::{hold, prefixed, robot_frames, says_the_same, transforms, verdicts};
+use super::solve::{Alignments, Solution, by_name, solve};
 use gridweave_runtime::ros::{
-    Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot,
+    Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, TransformStamped, Verdict, Verdicts,
 };
-use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
-use serde_json::{Value, json};
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
-
-const MAP: usize = 0;
-const FRAMES: usize = 0;
-const TF: usize = 1;
 
 /// The kind `frame_solver`.
 pub fn kind() -> StageKind {
@@ -23,33 +17,49 @@ pub fn kind() -> StageKind {
          others along a cycle are left out; robots that cannot be placed with confidence are not merged, and the reason \
          is given. Where the pipeline names no reference, it is the first robot by name of those heard of when the \
          first two are merged, and stays so.",
-        vec![
-            InputPort::one(
-                "map",
-                PortType::of::<OccupancyGrid<'_>>(),
-                "the robots' maps: says which robots there are, and how their map frames are called",
-            ),
-            InputPort::one("alignment", PortType::of::<Alignment>(), "alignments of pairs, accepted and refused ones"),
-        ],
-        vec![
-            OutputPort::new(
+        |parameters, context| Ok(FrameSolver::new(parameters, context)),
+    )
+    .input(
+        "map",
+        "the robots' maps: says which robots there are, and how their map frames are called",
+        FrameSolver::receive_map,
+    )
+    .input("alignment", "alignments of pairs, accepted and refused ones", FrameSolver::receive_alignment)
+    .finish(FrameSolver::finish)
+    .build()
+}
+
+/// Where the robots' maps lie, and what that rests on.
+struct Placement {
+    frames: Out<RobotFrames>,
+    tf: Out<TFMessage>,
+    verdicts: Out<Verdicts>,
+}
+
+impl Outputs for Placement {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            frames: ports.output_on(
+                "/robot_frames",
                 "frames",
-                PortType::of::<RobotFrames>(),
                 "the pose of every robot's map, why the others have none, and how those of them that are tied to each \
                  other lie; sent when something changes. Robots are moved only if that improves the fit by more than \
                  `min_improvement`, and at the end",
-            )
-            .on_topic("/robot_frames"),
-            OutputPort::new(
+            ),
+            tf: ports.output_on(
+                "/tf_static",
                 "tf",
-                PortType::of::<TFMessage>(),
                 "the same poses as static transforms from `world`, and of robots tied to each other only from a frame of \
                  their own, `world/ROBOT`, with the name of the robot in whose map frame they are placed",
-            )
-            .on_topic("/tf_static"),
-        ],
-        |parameters: FrameSolverParameters, context: &Context| Ok(FrameSolver::new(parameters, context)),
-    )
+            ),
+            verdicts: ports.output_on(
+                "/verdicts",
+                "verdicts",
+                "the last alignment of every pair, whether it is used, and whether others confirm it; sent after the \
+                 frames, and at the end, if it has changed",
+            ),
+        }
+    }
 }
 
 struct FrameSolver {
@@ -66,74 +76,7 @@ struct FrameSolver {
     solution: Solution,
     sent: Option<RobotFrames>,
     sent_tf: TFMessage,
-}
-
-impl Stage for FrameSolver {
-    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let news = match port {
-            MAP => self.receive_map(message, output),
-            _ => self.receive_alignment(message, output),
-        };
-        if news {
-            self.solve();
-            self.send(output, false)?;
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
-        if let Some(wanted) = &self.wanted
-            && !self.robots.contains(wanted)
-        {
-            let robots: Vec<String> = self.robots.iter().cloned().collect();
-            let cause = match robots.is_empty() {
-                true => "neither it nor any other robot sent a map".to_owned(),
-                false => format!("it sent no map; the robots seen are {}", robots.join(", ")),
-            };
-            return Err(StageError::new(format!("place the maps in the frame of the reference `{wanted}`"), cause)
-                .with_help("set `reference` in [pipeline] to one of the robots, or check the topics in [robots]"));
-        }
-        self.send(output, true)
-    }
-
-    fn report(&self) -> Option<Value> {
-        let pose = |pose: &UncertainPose| {
-            json!({
-                "x": pose.pose.translation.x,
-                "y": pose.pose.translation.y,
-                "yaw": pose.pose.rotation.angle(),
-                "covariance": row_by_row(&pose.covariance),
-            })
-        };
-        let frames = |frames: &BTreeMap<String, UncertainPose>| -> BTreeMap<String, Value> {
-            frames.iter().map(|(robot, frame)| (robot.clone(), pose(frame))).collect()
-        };
-        let group = |group: &Group| json!({ "reference": group.reference, "frames": frames(&group.frames) });
-        let unchecked = self.solution.unchecked();
-        let alignment = |(pair, alignment): (&Pair, &Alignment)| {
-            let left_out = self.solution.left_out.get(pair);
-            json!({
-                "a": alignment.a,
-                "b": alignment.b,
-                "method": alignment.method,
-                "x": alignment.x,
-                "y": alignment.y,
-                "yaw": alignment.yaw,
-                "score": alignment.score,
-                "accepted": alignment.accepted && left_out.is_none(),
-                "checked": self.solution.used.contains_key(pair) && !unchecked.contains(pair),
-                "reason": left_out.unwrap_or(&alignment.reason),
-            })
-        };
-        let alignments: Vec<Value> = self.alignments.iter().map(alignment).collect();
-        Some(json!({
-            "reference": self.reference,
-            "frames": frames(&self.solution.frames),
-            "unmerged": self.solution.unmerged,
-            "groups": self.solution.groups.iter().map(group).collect::<Vec<Value>>(),
-            "alignments": alignments,
-        }))
-    }
+    sent_verdicts: Vec<Verdict>,
 }
 
 impl FrameSolver {
@@ -149,50 +92,62 @@ impl FrameSolver {
             solution: Solution::default(),
             sent: None,
             sent_tf: TFMessage::default(),
+            sent_verdicts: Vec::new(),
         }
     }
 
-    /// Whether the map tells something new: another robot, or another name of its frame.
-    fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
-        let robot = message.robot();
+    /// A map tells something new if its robot or the name of its frame is another.
+    fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Placement>,
+    ) -> Result<(), StageError> {
+        let robot = map.robot();
         if robot.is_empty() {
             output.warn("a map that belongs to no robot was left out");
-            return false;
+            return Ok(());
         }
-        let frame_id = match message.decode::<OccupancyGrid<'_>>() {
-            Ok(grid) => prefixed(robot, &grid.header.frame_id),
-            Err(error) => {
-                output.warn(format!("a map of {robot} was left out: {error}"));
-                return false;
-            }
-        };
+        let frame_id = prefixed(robot, &map.header.frame_id);
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
-        is_new || is_renamed
+        if is_new || is_renamed { self.solve_and_send(output) } else { Ok(()) }
     }
 
-    /// Whether the alignment differs from the last one of its pair.
-    fn receive_alignment(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
-        let alignment = match message.decode::<Alignment>() {
-            Ok(alignment) => alignment,
-            Err(error) => {
-                output.warn(format!("an alignment was left out: {error}"));
-                return false;
-            }
-        };
-        let Some((pair, mut alignment)) = by_name(alignment) else {
+    /// An alignment tells something new if it differs from the last one of its pair.
+    fn receive_alignment(
+        &mut self,
+        alignment: Received<'_, Alignment>,
+        output: &Output<Placement>,
+    ) -> Result<(), StageError> {
+        let Some((pair, mut alignment)) = by_name(alignment.into_content()) else {
             output.warn("an alignment that is not of two robots was left out");
-            return false;
+            return Ok(());
         };
         alignment.header = Header::default();
         self.robots.insert(pair.0.clone());
         self.robots.insert(pair.1.clone());
         let before = self.alignments.insert(pair.clone(), alignment);
-        before.as_ref() != self.alignments.get(&pair)
+        if before.as_ref() == self.alignments.get(&pair) { Ok(()) } else { self.solve_and_send(output) }
     }
 
-    fn solve(&mut self) {
+    fn finish(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
+        if let Some(wanted) = &self.wanted
+            && !self.robots.contains(wanted)
+        {
+            let robots: Vec<String> = self.robots.iter().cloned().collect();
+            let cause = match robots.is_empty() {
+                true => "neither it nor any other robot sent a map".to_owned(),
+                false => format!("it sent no map; the robots seen are {}", robots.join(", ")),
+            };
+            return Err(StageError::new(format!("place the maps in the frame of the reference `{wanted}`"), cause)
+                .with_help("set `reference` in [pipeline] to one of the robots, or check the topics in [robots]"));
+        }
+        self.send(output, true)?;
+        self.send_verdicts(output)
+    }
+
+    fn solve_and_send(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
         // Once robots are placed in its frame, a reference stays: an earlier name is no reason to move them all.
         let is_settled = self.solution.frames.len() > 1;
         self.reference = match &self.wanted {
@@ -204,15 +159,19 @@ impl FrameSolver {
         if let Some(reference) = &self.reference {
             self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
         }
+        match self.send(output, false)? {
+            true => self.send_verdicts(output),
+            false => Ok(()),
+        }
     }
 
     /// Sends the frames and transforms if they differ from those sent last: the `last` ones as they are solved, others
     /// with the robots that were sent left in place as long as the parameters allow. Without a reference there is
-    /// nothing to send.
-    fn send(&mut self, output: &mut Output<'_>, last: bool) -> Result<(), StageError> {
-        let Some(reference) = self.reference.clone() else { return Ok(()) };
+    /// nothing to send. Whether there was something.
+    fn send(&mut self, output: &Output<Placement>, last: bool) -> Result<bool, StageError> {
+        let Some(reference) = self.reference.clone() else { return Ok(false) };
         let header = Header::new(output.log_time(), RobotFrames::WORLD);
-        let solved = self.message(header, reference);
+        let solved = robot_frames(&self.solution, header, reference, &self.frame_ids);
         let message = match &self.sent {
             Some(sent) if !last => self.held(sent, solved),
             _ => solved,
@@ -221,38 +180,32 @@ impl FrameSolver {
             true => RobotFrames { header: sent.header.clone(), ..message.clone() } == *sent,
             false => says_the_same(sent, &message),
         }) {
-            return Ok(());
+            return Ok(false);
         }
-        output.send(FRAMES, "", &message)?;
+        output.frames.send("", &message)?;
         let tf = transforms(&message);
         let place = |one: &TransformStamped| (one.header.frame_id.clone(), one.child_frame_id.clone(), one.transform);
         if !tf.transforms.iter().map(place).eq(self.sent_tf.transforms.iter().map(place)) {
-            output.send(TF, "", &tf)?;
+            output.tf.send("", &tf)?;
             self.sent_tf = tf;
         }
         self.sent = Some(message);
-        Ok(())
+        Ok(true)
     }
 
-    /// The solution as a message.
-    fn message(&self, header: Header, reference: String) -> RobotFrames {
-        let frames = |frames: &BTreeMap<String, UncertainPose>| -> Vec<RobotFrame> {
-            frames.iter().map(|(robot, pose)| self.frame(robot, pose)).collect()
-        };
-        let group = |group: &Group| RobotGroup {
-            reference: group.reference.clone(),
-            frame_id: format!("{}/{}", RobotFrames::WORLD, group.reference),
-            frames: frames(&group.frames),
-        };
-        let unmerged = self.solution.unmerged.iter();
-        let unmerged = unmerged.map(|(robot, reason)| UnmergedRobot { robot: robot.clone(), reason: reason.clone() });
-        RobotFrames {
-            header,
-            reference,
-            frames: frames(&self.solution.frames),
-            unmerged: unmerged.collect(),
-            groups: self.solution.groups.iter().map(group).collect(),
+    /// Sends what became of the alignments if it differs from what was sent last.
+    fn send_verdicts(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
+        if self.reference.is_none() || !output.verdicts.is_read() {
+            return Ok(());
         }
+        let verdicts = verdicts(&self.solution, &self.alignments);
+        if verdicts != self.sent_verdicts {
+            let header = Header::new(output.log_time(), RobotFrames::WORLD);
+            let message = Verdicts { header, verdicts };
+            output.verdicts.send("", &message)?;
+            self.sent_verdicts = message.verdicts;
+        }
+        Ok(())
     }
 
     /// What was solved, with the robots that were `sent` in the same frame left in their places; or as it is, if the
@@ -276,61 +229,4 @@ impl FrameSolver {
         let improvement = cost(&held) - cost(&solved);
         if improvement <= self.parameters.min_improvement { held } else { solved }
     }
-
-    fn frame(&self, robot: &str, pose: &UncertainPose) -> RobotFrame {
-        RobotFrame {
-            robot: robot.to_owned(),
-            frame_id: self.frame_ids.get(robot).cloned().unwrap_or_else(|| prefixed(robot, "")),
-            x: pose.pose.translation.x,
-            y: pose.pose.translation.y,
-            yaw: pose.pose.rotation.angle(),
-            covariance: row_by_row(&pose.covariance),
-        }
-    }
-}
-
-/// Leaves the robots that were `sent` in their places. Both by name.
-fn hold(frames: &mut [RobotFrame], sent: &[RobotFrame]) {
-    for frame in frames {
-        if let Ok(place) = sent.binary_search_by(|sent| sent.robot.cmp(&frame.robot)) {
-            let RobotFrame { x, y, yaw, .. } = sent[place];
-            (frame.x, frame.y, frame.yaw) = (x, y, yaw);
-        }
-    }
-}
-
-/// Whether two messages differ by nothing but their times and covariances.
-fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
-    let place = |frame: &RobotFrame| RobotFrame { covariance: [0.0; 9], ..frame.clone() };
-    let same = |one: &[RobotFrame], other: &[RobotFrame]| one.iter().map(place).eq(other.iter().map(place));
-    let same_group =
-        |(one, other): (&RobotGroup, &RobotGroup)| one.reference == other.reference && same(&one.frames, &other.frames);
-    one.reference == other.reference
-        && one.unmerged == other.unmerged
-        && same(&one.frames, &other.frames)
-        && one.groups.len() == other.groups.len()
-        && one.groups.iter().zip(&other.groups).all(same_group)
-}
-
-/// The name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
-fn prefixed(robot: &str, frame_id: &str) -> String {
-    let frame_id = frame_id.trim_start_matches('/');
-    match frame_id.strip_prefix(robot) {
-        Some(rest) if rest.starts_with(['/', '_']) => frame_id.to_owned(),
-        _ if frame_id.is_empty() => format!("{robot}/map"),
-        _ => format!("{robot}/{frame_id}"),
-    }
-}
-
-/// The frames of the message as transforms from `world`, and those of groups from the groups' own frames.
-fn transforms(message: &RobotFrames) -> TFMessage {
-    let main = (&message.header.frame_id, &message.frames);
-    let all = std::iter::once(main).chain(message.groups.iter().map(|group| (&group.frame_id, &group.frames)));
-    let transform = |parent: &str, frame: &RobotFrame| TransformStamped {
-        header: Header { stamp: message.header.stamp, frame_id: parent.to_owned() },
-        child_frame_id: frame.frame_id.clone(),
-        transform: frame.transform_reference_robot().into(),
-    };
-    let transforms = all.flat_map(|(parent, frames)| frames.iter().map(move |frame| transform(parent, frame)));
-    TFMessage { transforms: transforms.collect() }
 }

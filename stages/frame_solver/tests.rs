@@ -5,61 +5,73 @@ use super::team::Team;
 use super::uncertain::error_vector;
 use super::{FrameSolverParameters, kind};
 use crate::geometry::{Pose2, pose, wrap_angle};
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, encode};
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage, StageError};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts};
+use gridweave_runtime::stage::{Context, LoneStage, StageError};
 use proptest::prelude::*;
-use serde_json::{Value, json};
 
 struct Run {
-    stage: Box<dyn Stage>,
-    outputs: CollectedOutputs,
+    stage: LoneStage,
+    /// What was sent last.
+    latest: Option<RobotFrames>,
+    verdicts: Option<Verdicts>,
 }
 
 impl Run {
     fn new(reference: Option<&str>) -> Self {
         let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
-        match kind().make(toml::Table::new(), &context).unwrap() {
-            Node::Stage(stage) => Self { stage, outputs: CollectedOutputs::new(&kind()) },
-            Node::Source(_) | Node::External => panic!("a stage was expected"),
-        }
-    }
-
-    fn feed(&mut self, port: usize, robot: &str, bytes: Vec<u8>) {
-        let header = MessageHeader { robot: FixedText::new(robot).unwrap(), ..Default::default() };
-        let mut output = self.outputs.output(LogTime(5));
-        self.stage.receive(port, &Message::from_vec(header, bytes), &mut output).unwrap();
+        let stage = LoneStage::with_context(&kind(), "", &context).unwrap();
+        Self { stage, latest: None, verdicts: None }
     }
 
     fn map(&mut self, robot: &str, frame_id: &str) {
-        let grid = OccupancyGrid { header: Header::new(LogTime(5), frame_id), ..Default::default() };
-        self.feed(0, robot, encode(&grid).unwrap());
+        let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), ..Default::default() };
+        self.stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(5), &map).unwrap();
     }
 
     fn align(&mut self, alignment: &Alignment) {
-        self.feed(1, "", encode(alignment).unwrap());
+        self.stage.give::<Alignment>("alignment", "", LogTime(5), alignment).unwrap();
     }
 
     fn finish(&mut self) -> Result<(), StageError> {
-        self.stage.finish(&mut self.outputs.output(LogTime(6)))
+        self.stage.finish(LogTime(6))
     }
 
+    /// The frames sent since the last look.
     fn frames(&mut self) -> Vec<RobotFrames> {
-        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+        let frames: Vec<RobotFrames> = self.stage.take("frames").unwrap();
+        self.latest = frames.last().cloned().or_else(|| self.latest.take());
+        frames
     }
 
-    fn report(&self) -> Value {
-        self.stage.report().unwrap()
+    /// The frames sent last.
+    fn latest(&mut self) -> Option<RobotFrames> {
+        self.frames();
+        self.latest.clone()
     }
 
-    fn pose_of(&self, robot: &str) -> Option<Pose2> {
-        let report = self.report();
-        let frame = report["frames"].get(robot)?;
-        Some(pose(frame["x"].as_f64()?, frame["y"].as_f64()?, frame["yaw"].as_f64()?))
+    /// The frames as they are solved: they are sent when the run ends.
+    fn solved(&mut self) -> RobotFrames {
+        self.finish().unwrap();
+        self.latest().unwrap()
     }
 
-    fn reason(&self, robot: &str) -> String {
-        self.report()["unmerged"][robot].as_str().unwrap_or_default().to_owned()
+    /// The verdicts when the run ends.
+    fn verdicts(&mut self) -> Vec<Verdict> {
+        self.finish().unwrap();
+        self.verdicts = self.stage.take("verdicts").unwrap().pop().or_else(|| self.verdicts.take());
+        self.verdicts.clone().unwrap_or_default().verdicts
+    }
+
+    fn pose_of(&mut self, robot: &str) -> Option<Pose2> {
+        let solved = self.solved();
+        let frame = solved.frames.iter().find(|frame| frame.robot == robot)?;
+        Some(pose(frame.x, frame.y, frame.yaw))
+    }
+
+    fn reason(&mut self, robot: &str) -> String {
+        let latest = self.latest().unwrap();
+        latest.unmerged.into_iter().find(|unmerged| unmerged.robot == robot).unwrap_or_default().reason
     }
 }
 
@@ -116,16 +128,15 @@ fn a_provisional_alignment_is_left_out() {
 fn the_reference_is_exactly_at_the_origin() {
     let mut run = Run::new(None);
     run.map("robot1", "map");
-    assert_eq!(
-        run.report(),
-        json!({
-            "reference": "robot1",
-            "frames": {"robot1": {"x": 0.0, "y": 0.0, "yaw": 0.0, "covariance": vec![0.0; 9]}},
-            "unmerged": {},
-            "groups": [],
-            "alignments": [],
-        })
-    );
+    let robot1 = RobotFrame { robot: "robot1".into(), frame_id: "robot1/map".into(), ..Default::default() };
+    let expected = RobotFrames {
+        header: Header::new(LogTime(5), "world"),
+        reference: "robot1".into(),
+        frames: vec![robot1],
+        ..Default::default()
+    };
+    assert_eq!(run.solved(), expected);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "there is no pair");
 }
 
 #[test]
@@ -136,7 +147,7 @@ fn another_reference_turns_the_frames_round() {
     run.map("robot2", "map");
     run.align(&between(1, 2));
     assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
-    assert_eq!(run.frames().last().unwrap().reference, "robot2");
+    assert_eq!(run.latest().unwrap().reference, "robot2");
 }
 
 #[test]
@@ -146,7 +157,7 @@ fn a_reference_that_never_shows_up_is_an_error_that_names_the_robots() {
     run.map("robot2", "map");
     let error = run.finish().unwrap_err().to_string();
     assert!(error.contains("robot7") && error.contains("robot1, robot2"), "{error}");
-    assert_eq!(run.report()["reference"], Value::Null);
+    assert_eq!(run.latest(), None);
 }
 
 #[test]
@@ -154,7 +165,7 @@ fn a_log_without_robots_has_no_frames() {
     let mut run = Run::new(None);
     run.finish().unwrap();
     assert!(run.frames().is_empty());
-    assert_eq!(run.report()["reference"], Value::Null);
+    assert!(run.stage.take_messages("verdicts").is_empty());
 }
 
 #[test]
@@ -176,7 +187,7 @@ fn frames_are_sent_when_something_changes_and_only_then() {
     run.align(&nearly);
     assert_eq!(run.frames().len(), 0, "a pose that the alignments hardly fit better");
     run.finish().unwrap();
-    assert_eq!(run.frames().last().unwrap().frames[1].x, run.pose_of("robot2").unwrap().translation.x);
+    assert!((run.frames()[0].frames[1].x - nearly.x).abs() < 1e-9, "at the end it is as solved");
     run.finish().unwrap();
     assert!(run.frames().is_empty());
 }
@@ -189,8 +200,7 @@ fn transforms_lead_from_the_world_to_frames_with_the_robots_name() {
     run.map("robot3", "");
     run.align(&between(1, 2));
     run.align(&between(2, 3));
-    run.frames();
-    let last = run.outputs.take(1).pop().unwrap();
+    let last = run.stage.take_messages("tf").pop().unwrap();
     assert_eq!(last.header().topic.as_str(), "/tf_static");
     let transforms = last.decode::<TFMessage>().unwrap().transforms;
     let names: Vec<&str> = transforms.iter().map(|transform| transform.child_frame_id.as_str()).collect();
@@ -246,12 +256,10 @@ fn a_contradiction_that_cannot_be_told_leaves_its_robots_out() {
     let mut wrong = between(2, 3);
     wrong.x += 3.0;
     [between(1, 2), between(1, 3), wrong, between(3, 4)].iter().for_each(|alignment| run.align(alignment));
-    let report = run.report();
-    assert_eq!(report["frames"].as_object().unwrap().len(), 1);
+    assert_eq!(run.latest().unwrap().frames.len(), 1);
     assert!(run.reason("robot2").contains("it cannot be told which is wrong"), "{}", run.reason("robot2"));
     assert!(run.reason("robot4").contains("it is tied to robot3 only"), "{}", run.reason("robot4"));
-    let accepted: Vec<bool> =
-        report["alignments"].as_array().unwrap().iter().map(|one| one["accepted"].as_bool().unwrap()).collect();
+    let accepted: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.alignment.accepted).collect();
     assert_eq!(accepted, [false, false, false, true]);
 }
 
@@ -267,12 +275,66 @@ fn a_wrong_alignment_is_left_out_when_the_others_agree() {
     for robot in 2..=4 {
         assert!(is_near(&run.pose_of(&format!("robot{robot}")).unwrap(), &place(robot), 1e-6));
     }
-    let report = run.report();
-    let (left_out, others): (Vec<&Value>, Vec<&Value>) =
-        report["alignments"].as_array().unwrap().iter().partition(|one| one["accepted"] == false);
+    let (left_out, others): (Vec<Verdict>, Vec<Verdict>) =
+        run.verdicts().into_iter().partition(|verdict| !verdict.alignment.accepted);
     assert_eq!((left_out.len(), others.len()), (1, 5));
-    assert_eq!((&left_out[0]["a"], &left_out[0]["b"]), (&json!("robot1"), &json!("robot3")));
-    assert!(left_out[0]["reason"].as_str().unwrap().contains("contradicts"));
+    let left_out = &left_out[0].alignment;
+    assert_eq!((left_out.a.as_str(), left_out.b.as_str(), left_out.yaw), ("robot1", "robot3", wrong.yaw));
+    assert!(left_out.reason.contains("contradicts"), "{}", left_out.reason);
+}
+
+#[test]
+fn a_verdict_says_what_the_alignment_said() {
+    let mut run = Run::new(None);
+    let refusal = refused("robot1", "robot3", 0.2, "no tags in common");
+    [between(1, 2), refusal.clone()].iter().for_each(|alignment| run.align(alignment));
+    run.align(&Alignment { header: Header::new(LogTime(5), "robot1/map"), ..between(1, 2) });
+    let unchecked = |alignment| Verdict { alignment, checked: false };
+    assert_eq!(run.verdicts(), [unchecked(between(1, 2)), unchecked(refusal)]);
+    assert_eq!(run.verdicts.unwrap().header, Header::new(LogTime(5), "world"));
+}
+
+#[test]
+fn verdicts_are_sent_after_frames_and_at_the_end_if_they_have_changed() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    run.align(&between(1, 2));
+    assert_eq!(run.stage.take_messages("verdicts").len(), 1);
+    run.map("robot3", "map");
+    assert_eq!(run.frames().len(), 4);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "another robot is no alignment");
+    let nearly = near(1, 2, 0.01);
+    run.align(&nearly);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "no frames were sent");
+    run.finish().unwrap();
+    assert_eq!(run.verdicts(), [Verdict { alignment: nearly, checked: false }]);
+    run.finish().unwrap();
+    assert!(run.stage.take_messages("verdicts").is_empty());
+}
+
+#[test]
+fn a_score_that_moves_no_robot_is_told_at_the_end() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    let scored = Alignment { score: 0.95, ..between(1, 2) };
+    run.align(&scored);
+    run.frames();
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+    assert_eq!(run.verdicts(), [Verdict { alignment: scored, checked: false }]);
+}
+
+#[test]
+fn covariances_are_sent_as_solved_at_the_end() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    let before = run.frames().pop().unwrap();
+    run.align(&Alignment { covariance: COVARIANCE.map(|variance| 4.0 * variance), ..between(1, 2) });
+    assert!(run.frames().is_empty(), "the poses are the same");
+    run.finish().unwrap();
+    let last = run.frames().pop().unwrap();
+    assert!(last.frames[1].covariance[0] > before.frames[1].covariance[0]);
 }
 
 #[test]
@@ -287,10 +349,8 @@ fn garbage_is_left_out_with_a_reason() {
         assert!(run.reason("robot2").contains("its "), "{}", run.reason("robot2"));
     }
     run.align(&accepted("robot1", "robot1", pose(1.0, 0.0, 0.0)));
-    run.feed(1, "", vec![0, 1]);
-    run.feed(0, "robot5", vec![0, 1]);
     run.map("", "map");
-    assert_eq!(run.outputs.warnings().values().sum::<u64>(), 4);
+    assert_eq!(run.stage.warnings().values().sum::<u64>(), 2);
 }
 
 #[test]
@@ -316,16 +376,16 @@ fn a_reference_stays_when_an_earlier_name_appears_after_a_merge() {
     let mut run = Run::new(None);
     run.map("robot3", "map");
     run.map("robot2", "map");
-    assert_eq!(run.report()["reference"], "robot2", "nothing is merged so far");
+    assert_eq!(run.latest().unwrap().reference, "robot2", "nothing is merged so far");
     run.align(&between(2, 3));
     run.map("robot1", "map");
-    assert_eq!(run.report()["reference"], "robot2");
+    assert_eq!(run.latest().unwrap().reference, "robot2");
     assert!(is_near(&run.pose_of("robot3").unwrap(), &(place(2).inverse() * place(3)), 1e-9));
     run.align(&between(1, 2));
     assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
     run.align(&refused("robot2", "robot3", 0.1, "the larger maps disagree"));
     run.align(&refused("robot1", "robot2", 0.1, "the larger maps disagree"));
-    assert_eq!(run.report()["reference"], "robot2");
+    assert_eq!(run.latest().unwrap().reference, "robot2");
 }
 
 #[test]
@@ -359,23 +419,22 @@ fn robots_tied_to_each_other_only_are_placed_in_a_frame_of_their_own() {
     (1..=6).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
     run.align(&between(4, 5));
     run.align(&between(3, 4));
-    let groups = run.report()["groups"].clone();
-    assert_eq!(groups.as_array().unwrap().len(), 1);
-    assert_eq!(groups[0]["reference"], "robot4", "the reference stays when another robot joins");
     let message = run.frames().pop().unwrap();
     assert_eq!(message.frames.len(), 1);
     assert_eq!(message.unmerged.len(), 5);
+    assert_eq!(message.groups.len(), 1);
     let group = &message.groups[0];
+    assert_eq!(group.reference, "robot4", "the reference stays when another robot joins");
     let robots: Vec<&str> = group.frames.iter().map(|frame| frame.robot.as_str()).collect();
     assert_eq!((group.frame_id.as_str(), robots), ("world/robot4", vec!["robot3", "robot4", "robot5"]));
     for (frame, robot) in group.frames.iter().zip(3..) {
         assert!(is_near(&frame.transform_reference_robot(), &(place(4).inverse() * place(robot)), 1e-9));
     }
-    let transforms = run.outputs.take(1).pop().unwrap().decode::<TFMessage>().unwrap().transforms;
+    let transforms = run.stage.take::<TFMessage>("tf").unwrap().pop().unwrap().transforms;
     let parents: Vec<&str> = transforms.iter().map(|transform| transform.header.frame_id.as_str()).collect();
     assert_eq!(parents, ["world", "world/robot4", "world/robot4", "world/robot4"]);
     run.align(&between(1, 5));
-    assert_eq!(run.report()["groups"], json!([]));
+    assert!(run.latest().unwrap().groups.is_empty());
     assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 1e-9));
 }
 
@@ -384,9 +443,7 @@ fn an_alignment_in_no_cycle_is_not_checked() {
     let mut run = Run::new(None);
     [between(1, 2), between(1, 3), between(2, 3), between(3, 4)].iter().for_each(|alignment| run.align(alignment));
     run.align(&refused("robot1", "robot4", 0.0, "no tags in common"));
-    let report = run.report();
-    let checked: Vec<bool> =
-        report["alignments"].as_array().unwrap().iter().map(|one| one["checked"].as_bool().unwrap()).collect();
+    let checked: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.checked).collect();
     assert_eq!(checked, [true, true, false, true, false]);
 }
 
@@ -462,7 +519,8 @@ proptest! {
         // In the same directions it is the same to the last bit.
         let mut shuffled = Run::new(Some("robot1"));
         order.iter().for_each(|&index| shuffled.align(&alignment(index, false)));
-        prop_assert_eq!(shuffled.report(), plain.report());
+        prop_assert_eq!(shuffled.solved().frames, plain.solved().frames);
+        prop_assert_eq!(shuffled.verdicts(), plain.verdicts());
     }
 
     #[test]

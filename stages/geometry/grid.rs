@@ -1,9 +1,8 @@
 //! Occupancy grids: where their cells lie, and what they say.
 
 use super::{Point2, Pose2};
-use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
-use gridweave_runtime::ros::{DecodeError, Header, MapMetaData, OccupancyGrid};
+use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 
 /// As many cells are looked at together.
 const BLOCK: usize = 64;
@@ -81,24 +80,6 @@ pub enum GridError {
     /// The origin is not a pose.
     #[error("its origin holds a value that is no finite number")]
     Origin,
-}
-
-/// Why a message holds no map that can be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MapError {
-    /// It is no occupancy grid.
-    #[error(transparent)]
-    Decode(#[from] DecodeError),
-    /// It is one that cannot be.
-    #[error(transparent)]
-    Grid(#[from] GridError),
-}
-
-/// The header and the grid of a message that holds a map.
-pub fn read_map(message: &Message) -> Result<(Header, Grid<'_>), MapError> {
-    let map: OccupancyGrid<'_> = message.decode()?;
-    let grid = Grid::from_message(&map)?;
-    Ok((map.header, grid))
 }
 
 /// An occupancy grid, its cells borrowed.

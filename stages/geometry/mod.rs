@@ -3,10 +3,12 @@
 //! A rigid transform is written `T_a_b` in text and `transform_a_b` in code: it takes a point in frame b to frame a.
 
 mod grid;
+mod point_index;
 mod pose;
 mod rigid_fit;
 
-pub use grid::{Cell, Grid, GridError, GridGeometry, MapError, read_map};
+pub use grid::{Cell, Grid, GridError, GridGeometry};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
+pub use point_index::{Buckets, Neighbour, PointIndex};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};
 pub use rigid_fit::{PointPair, RigidFit, fit_rigid, point_jacobian};

@@ -1,6 +1,7 @@
 //! How much of a fused map is known to one map and to several, and how much of it is in conflict.
 
 use crate::geometry::{UNKNOWN, is_known};
+use gridweave_runtime::ros::{Header, MapAgreement};
 use rayon::prelude::*;
 use std::ops::Add;
 
@@ -38,9 +39,15 @@ impl Agreement {
         }
     }
 
-    /// The share of what several maps know that is in conflict, 0 to 1; 0 if there is nothing that several know.
-    pub fn conflict_share(&self) -> f64 {
-        self.in_conflict as f64 / self.known_to_several.max(1) as f64
+    /// The areas, of cells of `cell_area` square metres.
+    pub fn message(&self, header: Header, cell_area: f64) -> MapAgreement {
+        let area = |cells: u64| cells as f64 * cell_area;
+        MapAgreement {
+            header,
+            known_to_one: area(self.known_to_one),
+            known_to_several: area(self.known_to_several),
+            in_conflict: area(self.in_conflict),
+        }
     }
 }
 
@@ -64,8 +71,7 @@ mod tests {
     fn cells_are_counted_once() {
         let agreement = Agreement::of(&[-1, 0, 100, 0, 50, 80, 0], &[-1, -1, -1, 0, 100, 50, 49]);
         assert_eq!(agreement, Agreement { known_to_one: 2, known_to_several: 4, in_conflict: 2 });
-        assert_eq!(agreement.conflict_share(), 0.5);
-        assert_eq!(Agreement::of(&[], &[]).conflict_share(), 0.0);
+        assert_eq!(Agreement::of(&[], &[]), Agreement::default());
     }
 
     #[test]

@@ -4,16 +4,10 @@ use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
-use crate::geometry::{GridGeometry, Point2, read_map};
-use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
-use gridweave_runtime::stage::{Context, InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
-
-const MAP: usize = 0;
-const FUSED: usize = 0;
-const CONFLICTS: usize = 1;
+use crate::geometry::{GridGeometry, Point2};
+use crate::robot_maps::RobotMaps;
+use gridweave_runtime::ros::{GridPrefix, Header, MapAgreement, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {
@@ -21,135 +15,118 @@ pub fn kind() -> StageKind {
         "grid_fuser",
         "Fuses the maps of all placed robots in log-odds: unknown says nothing, evidence adds. The map is sent when the \
          frames change by more than `min_move` or `min_turn`, when a robot that is placed has another map, and at the \
-         end if anything has changed since. Where maps contradict each other is sent beside it, and the area of that is in \
-         the stage's report.",
-        vec![
-            InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, or their coverage fields"),
-            InputPort::one("frames", PortType::of::<RobotFrames>(), "where the maps lie"),
-        ],
-        vec![
-            OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the fused map, in the frame `world`")
-                .on_topic("/map"),
-            OutputPort::new(
+         end if anything has changed since. Where maps contradict each other, and the area of that, is sent beside it.",
+        |parameters, _: &Context| Ok(GridFuser::new(parameters)),
+    )
+    .input("map", "the robots' maps, or their coverage fields", GridFuser::receive_map)
+    .input("frames", "where the maps lie", GridFuser::receive_frames)
+    .finish(GridFuser::finish)
+    .build()
+}
+
+/// The fused map, and how far the robots' maps agree in it.
+struct FusedMap {
+    map: Out<OccupancyGrid<'static>>,
+    conflicts: Out<OccupancyGrid<'static>>,
+    agreement: Out<MapAgreement>,
+}
+
+impl Outputs for FusedMap {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            map: ports.output_on("/map", "map", "the fused map, in the frame `world`"),
+            conflicts: ports.output_on(
+                "/map_conflicts",
                 "conflicts",
-                PortType::of::<OccupancyGrid<'_>>(),
                 "sent with the fused map, on the same cells: how far the maps contradict each other. -1 where fewer than two \
                  maps know the cell, 0 where all say the same; otherwise the log-odds for occupied and those for free, as \
                  shares of the most that one map can say for each, the smaller of them, in percent",
-            )
-            .on_topic("/map_conflicts"),
-        ],
-        |parameters: GridFuserParameters, _: &Context| Ok(GridFuser::new(parameters)),
-    )
+            ),
+            agreement: ports.output_on(
+                "/map_agreement",
+                "agreement",
+                "sent with the fused map: the areas that one map knows, that several know, and on which these contradict \
+                 each other",
+            ),
+        }
+    }
 }
 
 struct GridFuser {
     table: EvidenceTable,
     parameters: GridFuserParameters,
-    maps: BTreeMap<String, StoredMap>,
+    maps: RobotMaps<KnownArea>,
     frames: RobotFrames,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
-    /// How far the maps agree in the fused map sent last, and the area of a cell in it, square metres.
-    agreement: Option<(Agreement, f64)>,
 }
 
-/// A robot's latest map, where it came in: its bytes are not copied.
-struct StoredMap {
-    message: Message,
-    area: KnownArea,
-}
-
-impl Stage for GridFuser {
-    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let is_due = match port {
-            MAP => self.receive_map(message, output),
-            _ => self.receive_frames(message, output),
-        };
-        if is_due { self.fuse(output) } else { Ok(()) }
+impl GridFuser {
+    fn new(parameters: GridFuserParameters) -> Self {
+        let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
+        Self { table, parameters, maps: RobotMaps::default(), frames: RobotFrames::default(), fused: None }
     }
 
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+    /// A map of a robot that is not placed waits for its frame, which mostly follows at the same log time.
+    fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<FusedMap>,
+    ) -> Result<(), StageError> {
+        if !self.maps.keep(&map, output, KnownArea::of) {
+            return Ok(());
+        }
+        let is_placed = self.frames.frames.iter().any(|frame| frame.robot == map.robot());
+        if is_placed { self.fuse(output) } else { Ok(()) }
+    }
+
+    /// Frames that differ from those of the fused map by no more than the parameters allow wait for the end.
+    fn receive_frames(
+        &mut self,
+        frames: Received<'_, RobotFrames>,
+        output: &Output<FusedMap>,
+    ) -> Result<(), StageError> {
+        self.frames = frames.into_content();
+        let is_near = self.fused.as_ref().is_some_and(|fused| self.is_near(fused));
+        if is_near { Ok(()) } else { self.fuse(output) }
+    }
+
+    fn finish(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         let is_sent = self.fused.as_ref().is_some_and(|fused| {
             (&fused.reference, self.placed(fused)) == (&self.frames.reference, self.placed(&self.frames))
         });
         if is_sent { Ok(()) } else { self.fuse(output) }
     }
 
-    fn report(&self) -> Option<Value> {
-        let (agreement, cell_area) = self.agreement?;
-        let area = |cells: u64| cells as f64 * cell_area;
-        Some(json!({
-            "known_to_one_m2": area(agreement.known_to_one),
-            "known_to_several_m2": area(agreement.known_to_several),
-            "in_conflict_m2": area(agreement.in_conflict),
-            "conflict_share": agreement.conflict_share(),
-        }))
-    }
-}
-
-impl GridFuser {
-    fn new(parameters: GridFuserParameters) -> Self {
-        let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
-        Self { table, parameters, maps: BTreeMap::new(), frames: RobotFrames::default(), fused: None, agreement: None }
-    }
-
-    /// Keeps a robot's map. Whether it belongs in the fused one: a map of a robot that is not placed waits for its
-    /// frame, which mostly follows at the same log time.
-    fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
-        let robot = message.robot();
-        match read_map(message) {
-            Ok((_, grid)) => {
-                let area = KnownArea::of(&grid);
-                self.maps.insert(robot.to_owned(), StoredMap { message: message.clone(), area });
-                self.frames.frames.iter().any(|frame| frame.robot == robot)
-            }
-            Err(error) => {
-                output.warn(format!("a map of {robot} was left out: {error}"));
-                false
-            }
-        }
-    }
-
-    /// Keeps the frames. Whether they differ from those of the fused map by more than the parameters allow.
-    fn receive_frames(&mut self, message: &Message, output: &mut Output<'_>) -> bool {
-        match message.decode() {
-            Ok(frames) => self.frames = frames,
-            Err(error) => {
-                output.warn(format!("robot frames were left out: {error}"));
-                return false;
-            }
-        }
+    /// Whether the robots are where the frames that were `fused` have them, as far as the parameters ask.
+    fn is_near(&self, fused: &RobotFrames) -> bool {
         let GridFuserParameters { min_move, min_turn, .. } = self.parameters;
         let is_near = |(one, next): (&RobotFrame, &RobotFrame)| one.is_near(next, min_move, min_turn);
-        let Some(fused) = &self.fused else { return true };
         let (before, after) = (self.placed(fused), self.placed(&self.frames));
-        fused.reference != self.frames.reference
-            || before.len() != after.len()
-            || !before.into_iter().zip(after).all(is_near)
+        fused.reference == self.frames.reference
+            && before.len() == after.len()
+            && before.into_iter().zip(after).all(is_near)
     }
 
     /// The frames of robots that have sent a map, the reference first and then by name.
     fn placed<'a>(&self, frames: &'a RobotFrames) -> Vec<&'a RobotFrame> {
         let mut placed: Vec<&RobotFrame> =
-            frames.frames.iter().filter(|frame| self.maps.contains_key(&frame.robot)).collect();
+            frames.frames.iter().filter(|frame| self.maps.get(&frame.robot).is_some()).collect();
         placed.sort_by_key(|frame| (frame.robot != frames.reference, frame.robot.as_str()));
         placed
     }
 
-    fn fuse(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn fuse(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         self.fused = Some(self.frames.clone());
-        self.agreement = None;
-        if !output.is_read(FUSED) && !output.is_read(CONFLICTS) {
+        if !output.map.is_read() && !output.conflicts.is_read() && !output.agreement.is_read() {
             return Ok(());
         }
         let placed = self.placed(&self.frames);
         let mut maps = Vec::with_capacity(placed.len());
         for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let (_, grid) = read_map(&map.message)
-                .map_err(|error| StageError::new(format!("read the map of {}", frame.robot), error))?;
-            maps.push((PlacedGrid { grid, transform_world_map: frame.transform_reference_robot() }, &map.area));
+            let placed = PlacedGrid { grid: map.grid(), transform_world_map: frame.transform_reference_robot() };
+            maps.push((placed, &map.own));
         }
 
         let finest = maps.iter().map(|(map, _)| map.grid.geometry.resolution).min_by(f64::total_cmp);
@@ -171,32 +148,35 @@ impl GridFuser {
         let mut takes_part = layout.takes_part.iter();
         maps.retain(|_| takes_part.next().is_some_and(|takes_part| *takes_part));
         let Some(geometry) = layout.geometry else { return Ok(()) };
-        let prefix = prefix(&geometry, Header::new(output.log_time(), RobotFrames::WORLD));
+        let header = Header::new(output.log_time(), RobotFrames::WORLD);
+        let prefix = prefix(&geometry, header.clone());
         let mut conflicts = vec![0; geometry.cell_count()];
+        let mut agreement = None;
         let mut fuse = |cells: &mut [i8]| {
             let fused = Fused { cells, conflicts: &mut conflicts };
             match self.parameters.warp {
                 Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, fused),
                 Warp::Forward => forward::fuse(&maps, &geometry, &self.table, fused),
             }
-            Agreement::of(cells, &conflicts)
+            agreement = output.agreement.is_read().then(|| Agreement::of(cells, &conflicts));
         };
-        let mut agreement = Agreement::default();
-        match output.is_read(FUSED) {
-            true => output.send_grid(FUSED, "", &prefix, |cells| {
-                agreement = fuse(cells);
+        match output.map.is_read() {
+            true => output.map.send_grid("", &prefix, |cells| {
+                fuse(cells);
                 Ok(())
             })?,
-            false => agreement = fuse(&mut vec![0; geometry.cell_count()]),
+            false => fuse(&mut vec![0; geometry.cell_count()]),
         }
-        if output.is_read(CONFLICTS) {
-            output.send_grid(CONFLICTS, "", &prefix, |cells| {
+        if output.conflicts.is_read() {
+            output.conflicts.send_grid("", &prefix, |cells| {
                 cells.copy_from_slice(&conflicts);
                 Ok(())
             })?;
         }
-        self.agreement = Some((agreement, geometry.resolution.powi(2)));
-        Ok(())
+        match agreement {
+            Some(agreement) => output.agreement.send("", &agreement.message(header, geometry.resolution.powi(2))),
+            None => Ok(()),
+        }
     }
 }
 

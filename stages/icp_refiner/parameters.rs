@@ -1,5 +1,6 @@
 //! The parameters of the stage.
 
+use crate::walls::NORMAL_RADIUS;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,7 +93,7 @@ impl Default for IcpParameters {
             convergence: 1e-4,
             coarse_points: 600,
             start_spacing: 0.05,
-            normal_radius: 0.2,
+            normal_radius: NORMAL_RADIUS,
             correlation_length: 2.0,
             initial_position_deviation: 0.3,
             initial_yaw_deviation: 0.05,

@@ -1,6 +1,7 @@
 //! The whole of it: register, and judge the registration.
 
-use super::{FirstGuess, IcpParameters, Refusal, Registration, WallMap, register};
+use super::{FirstGuess, IcpParameters, Refusal, Registration, register};
+use crate::walls::WallMap;
 
 /// A refined alignment and the judgement on it.
 #[derive(Clone, Debug, PartialEq)]

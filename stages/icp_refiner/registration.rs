@@ -1,8 +1,9 @@
 //! ICP: moves map b so that its walls lie on those of map a.
 
 use super::iteration::Iteration;
-use super::{FirstGuess, IcpParameters, WallMap};
+use super::{FirstGuess, IcpParameters};
 use crate::geometry::{Point2, Pose2};
+use crate::walls::{WallMap, stride};
 use nalgebra::{Matrix3, Vector3};
 
 /// No more than this many rotations to either side of the first guess are tried.
@@ -126,9 +127,4 @@ fn starts(
         }
     }
     starts
-}
-
-/// Every how many-th of `count` points makes a sample of at most so many.
-pub(crate) fn stride(count: usize, most_points: usize) -> usize {
-    count.div_ceil(most_points.max(1)).max(1)
 }

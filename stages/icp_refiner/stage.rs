@@ -1,37 +1,35 @@
 //! The stage: keeps each robot's map with its walls, and refines the first guesses for a pair when one of the maps or the
 //! guesses change.
 
-use super::{FirstGuess, IcpParameters, Refinement, WallMap, refine};
-use crate::geometry::{read_map, row_by_row, wrap_angle};
+use super::{FirstGuess, IcpParameters, Refinement, refine};
+use crate::geometry::{row_by_row, wrap_angle};
 use crate::hypotheses::{HypothesisGatherer, Origin};
-use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Alignment, Header};
-use gridweave_runtime::stage::{Output, Stage, StageError};
+use crate::robot_maps::RobotMaps;
+use crate::walls::WallsOnDemand;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use nalgebra::Matrix3;
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
-/// The input port of the maps; the other is that of the first guesses.
-const MAP_INPUT: usize = 0;
-/// The output port of the refined alignments.
-const ALIGNMENT_OUTPUT: usize = 0;
+/// What the stage sends.
+pub(super) struct RefinedAlignments {
+    alignment: Out<Alignment>,
+}
+
+impl Outputs for RefinedAlignments {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let summary = "The refined alignments, ranked as before, each settled or refused.";
+        Self { alignment: ports.output("alignment", summary) }
+    }
+}
 
 /// Refines the alignments of pairs of robots.
 pub(super) struct IcpRefiner {
     parameters: IcpParameters,
-    maps: BTreeMap<String, RobotMap>,
+    maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     guesses: BTreeMap<Origin, Guesses>,
-    /// Registrations made, for the report.
-    registrations: u64,
-}
-
-/// A robot's last map. The message is kept as it came; the walls are made when they are first asked for.
-struct RobotMap {
-    message: Message,
-    /// How many usable maps of the robot came before it.
-    number: u64,
-    walls: OnceCell<WallMap>,
 }
 
 /// The last first guesses of one stage for one pair of robots, by rank, and what was made of them.
@@ -56,43 +54,40 @@ impl IcpRefiner {
     pub(super) fn new(parameters: IcpParameters) -> Self {
         Self {
             parameters,
-            maps: BTreeMap::new(),
+            maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             guesses: BTreeMap::new(),
-            registrations: 0,
         }
     }
 
-    fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let robot = message.robot();
-        if let Err(problem) = read_map(message) {
-            output.warn(format!("a map of {robot} was left out: {problem}"));
+    pub(super) fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<RefinedAlignments>,
+    ) -> Result<(), StageError> {
+        if !self.maps.keep(&map, output, |_| WallsOnDemand::new()) {
             return Ok(());
         }
-        let number = self.maps.get(robot).map_or(0, |map| map.number + 1);
-        let map = RobotMap { message: message.clone(), number, walls: OnceCell::new() };
-        self.maps.insert(robot.to_owned(), map);
-        let origins: Vec<Origin> = self.guesses.keys().filter(|origin| origin.concerns(robot)).cloned().collect();
+        let concerned = self.guesses.keys().filter(|origin| origin.pair.concerns(map.robot()));
+        let origins: Vec<Origin> = concerned.cloned().collect();
         origins.iter().try_for_each(|origin| self.update(origin, output))
     }
 
-    fn receive_alignment(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let first_guess: Alignment = match message.decode() {
-            Ok(first_guess) => first_guess,
-            Err(error) => {
-                output.warn(format!("a first guess was left out: {error}"));
-                return Ok(());
-            }
-        };
+    pub(super) fn receive_alignment(
+        &mut self,
+        first_guess: Received<'_, Alignment>,
+        output: &Output<RefinedAlignments>,
+    ) -> Result<(), StageError> {
         if !(first_guess.x.is_finite() && first_guess.y.is_finite() && first_guess.yaw.is_finite()) {
             output.warn("a first guess was left out: it holds a value that is no finite number");
             return Ok(());
         }
-        match self.gatherer.add(first_guess) {
+        let robot = first_guess.robot();
+        match self.gatherer.add(first_guess.into_content()) {
             Ok(None) => Ok(()),
             Ok(Some((origin, first))) => {
                 let guesses = self.guesses.entry(origin.clone()).or_default();
-                guesses.robot = message.robot().to_owned();
+                guesses.robot = robot.to_owned();
                 guesses.first = first;
                 self.update(&origin, output)
             }
@@ -104,9 +99,9 @@ impl IcpRefiner {
     }
 
     /// Sends what is known of some guesses, if it is not what was sent last.
-    fn update(&mut self, origin: &Origin, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn update(&mut self, origin: &Origin, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
         let Some(guesses) = self.guesses.get_mut(origin) else { return Ok(()) };
-        let maps = self.maps.get(&origin.a).zip(self.maps.get(&origin.b));
+        let maps = self.maps.pair(&origin.pair);
         if maps.is_none() && guesses.first.iter().any(|guess| guess.accepted) {
             return Ok(());
         }
@@ -117,56 +112,44 @@ impl IcpRefiner {
                 alignments.push(guess.clone());
                 continue;
             };
-            let reusable = before
-                .next()
-                .filter(|refined| refined.maps == (a.number, b.number) && refined.holds_for(guess, &self.parameters));
+            let maps = (a.number, b.number);
+            let reusable =
+                before.next().filter(|refined| refined.maps == maps && refined.holds_for(guess, &self.parameters));
             let refined = match reusable {
                 Some(refined) => refined,
                 None => {
-                    self.registrations += 1;
-                    let refinement = refine_pair(a, b, guess, &self.parameters)?;
-                    Refined { maps: (a.number, b.number), first_guess: guess.clone(), refinement }
+                    output.count("registrations", 1);
+                    let [a, b] = [a, b].map(|map| map.walls(self.parameters.normal_radius));
+                    let covariance = Matrix3::from_row_slice(&guess.covariance);
+                    let start = FirstGuess::new(guess.transform_a_b(), covariance, &self.parameters);
+                    let refinement = refine(a, b, &start, &self.parameters);
+                    Refined { maps, first_guess: guess.clone(), refinement }
                 }
             };
-            alignments.push(refined.alignment(guess, output));
+            alignments.push(refined.alignment(guess, output.log_time()));
             guesses.refined.push(refined);
         }
         guesses.send(alignments, output)
     }
-}
-
-impl Stage for IcpRefiner {
-    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        match port {
-            MAP_INPUT => self.receive_map(message, output),
-            _ => self.receive_alignment(message, output),
-        }
-    }
 
     /// Guesses that wait for a map to the end are refused, so that they do not go missing.
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
-        for (Origin { a, b, .. }, guesses) in &mut self.guesses {
-            let missing: Vec<&str> =
-                [a, b].into_iter().filter(|robot| !self.maps.contains_key(*robot)).map(String::as_str).collect();
-            if missing.is_empty() || guesses.first.iter().all(|guess| !guess.accepted) {
+    pub(super) fn finish(&mut self, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
+        for (origin, guesses) in &mut self.guesses {
+            let Some(missing) = self.maps.missing(&origin.pair) else { continue };
+            if guesses.first.iter().all(|guess| !guess.accepted) {
                 continue;
             }
-            let reason =
-                format!("no usable map of {} has come, so the alignment cannot be refined", missing.join(" and "));
+            let reason = format!("{missing}, so the alignment cannot be refined");
             let refused = |guess: &Alignment| Alignment { accepted: false, reason: reason.clone(), ..guess.clone() };
             guesses.send(guesses.first.iter().map(refused).collect(), output)?;
         }
         Ok(())
     }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        Some(serde_json::json!({ "registrations": self.registrations }))
-    }
 }
 
 impl Guesses {
     /// Sends alignments, unless they tell only what was sent last. They are sent together, as they are judged together.
-    fn send(&mut self, alignments: Vec<Alignment>, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn send(&mut self, alignments: Vec<Alignment>, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
         let is_same = |(sent, alignment): (&Alignment, &Alignment)| {
             *sent == Alignment { header: sent.header.clone(), ..alignment.clone() }
         };
@@ -174,7 +157,7 @@ impl Guesses {
             return Ok(());
         }
         for alignment in &alignments {
-            output.send(ALIGNMENT_OUTPUT, &self.robot, alignment)?;
+            output.alignment.send(&self.robot, alignment)?;
         }
         self.sent = alignments;
         Ok(())
@@ -200,10 +183,10 @@ impl Refined {
     }
 
     /// The message that tells of it. What the first guess rests on is part of the reason.
-    fn alignment(&self, first_guess: &Alignment, output: &Output<'_>) -> Alignment {
+    fn alignment(&self, first_guess: &Alignment, log_time: LogTime) -> Alignment {
         let Refinement { registration, refusal } = &self.refinement;
         let mut alignment = Alignment {
-            header: Header::new(output.log_time(), first_guess.header.frame_id.clone()),
+            header: Header::new(log_time, first_guess.header.frame_id.clone()),
             covariance: row_by_row(&registration.covariance),
             method: format!("{}+icp", first_guess.method),
             accepted: refusal.is_none(),
@@ -213,20 +196,4 @@ impl Refined {
         alignment.set_transform_a_b(&registration.transform_a_b);
         alignment
     }
-}
-
-fn refine_pair(
-    a: &RobotMap,
-    b: &RobotMap,
-    first_guess: &Alignment,
-    parameters: &IcpParameters,
-) -> Result<Refinement, StageError> {
-    let doing = || format!("refine the alignment of `{}` and `{}`", first_guess.a, first_guess.b);
-    let (_, grid_a) = read_map(&a.message).map_err(|error| StageError::new(doing(), error))?;
-    let (_, grid_b) = read_map(&b.message).map_err(|error| StageError::new(doing(), error))?;
-    let walls_a = a.walls.get_or_init(|| WallMap::new(&grid_a, parameters.normal_radius));
-    let walls_b = b.walls.get_or_init(|| WallMap::new(&grid_b, parameters.normal_radius));
-    let covariance = Matrix3::from_row_slice(&first_guess.covariance);
-    let first_guess = FirstGuess::new(first_guess.transform_a_b(), covariance, parameters);
-    Ok(refine(walls_a, walls_b, &first_guess, parameters))
 }

@@ -3,11 +3,8 @@
 use crate::geometry::{Pose2, pose};
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
-use gridweave_runtime::message::{LogTime, Message, MessageHeader};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid};
-
-const MAP: usize = 0;
-const ALIGNMENT: usize = 1;
 
 fn first_guess(transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
@@ -39,7 +36,7 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
     let mut bench = StageBench::new(&super::kind(), "");
-    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.1, -0.1, 0.02)))), []);
+    assert_eq!(bench.give(&first_guess(&(truth * pose(0.1, -0.1, 0.02)))), []);
     assert_eq!(bench.give_map("robot1", &a), []);
     let sent = bench.give_map("robot2", &b);
     let [refined] = sent.as_slice() else { panic!("{sent:?}") };
@@ -51,7 +48,7 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
     let off = truth.inverse() * refined.transform_a_b();
     assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
     assert_eq!(bench.finish(), []);
-    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+    assert_eq!(bench.counted("registrations"), 1);
 }
 
 #[test]
@@ -61,14 +58,14 @@ fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&truth)).len(), 1);
-    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&truth)), []);
-    assert_eq!(bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.01, 0.01, 0.001)))), []);
-    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+    assert_eq!(bench.give(&first_guess(&truth)).len(), 1);
+    assert_eq!(bench.give(&first_guess(&truth)), []);
+    assert_eq!(bench.give(&first_guess(&(truth * pose(0.01, 0.01, 0.001)))), []);
+    assert_eq!(bench.counted("registrations"), 1);
     assert_eq!(bench.give_map("robot2", &more_of_b).len(), 1);
-    assert_eq!(bench.stage.report().unwrap()["registrations"], 2);
-    bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(0.2, 0.0, 0.0))));
-    assert_eq!(bench.stage.report().unwrap()["registrations"], 3);
+    assert_eq!(bench.counted("registrations"), 2);
+    bench.give(&first_guess(&(truth * pose(0.2, 0.0, 0.0))));
+    assert_eq!(bench.counted("registrations"), 3);
 }
 
 #[test]
@@ -78,20 +75,20 @@ fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    bench.give(ALIGNMENT, "", &first_guess(&truth));
+    bench.give(&first_guess(&truth));
     let other = Alignment { method: "few tags".into(), ..first_guess(&truth) };
-    let sent = bench.give(ALIGNMENT, "", &other);
+    let sent = bench.give(&other);
     assert_eq!(sent.len(), 1);
     assert_eq!(sent[0].method, "few tags+icp");
-    assert_eq!(bench.stage.report().unwrap()["registrations"], 1);
+    assert_eq!(bench.counted("registrations"), 1);
 }
 
 #[test]
 fn a_refused_first_guess_passes_through_unchanged() {
     let mut bench = StageBench::new(&super::kind(), "");
     let refused = Alignment { accepted: false, reason: "two tags only".into(), ..first_guess(&Pose2::identity()) };
-    assert_eq!(bench.give(ALIGNMENT, "", &refused), std::slice::from_ref(&refused));
-    assert_eq!(bench.give(ALIGNMENT, "", &refused), []);
+    assert_eq!(bench.give(&refused), std::slice::from_ref(&refused));
+    assert_eq!(bench.give(&refused), []);
     assert_eq!(bench.finish(), []);
 }
 
@@ -102,10 +99,10 @@ fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    let sent = bench.give(ALIGNMENT, "", &first_guess(&(truth * pose(2.0, 1.5, 0.5))));
+    let sent = bench.give(&first_guess(&(truth * pose(2.0, 1.5, 0.5))));
     assert_eq!(sent.len(), 1);
     assert!(!sent[0].accepted && !sent[0].reason.is_empty());
-    assert!(bench.give(ALIGNMENT, "", &first_guess(&truth))[0].accepted);
+    assert!(bench.give(&first_guess(&truth))[0].accepted);
 }
 
 #[test]
@@ -113,7 +110,7 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
     let (a, ..) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
-    bench.give(ALIGNMENT, "", &first_guess(&Pose2::identity()));
+    bench.give(&first_guess(&Pose2::identity()));
     let sent = bench.finish();
     assert_eq!(sent.len(), 1);
     assert!(!sent[0].accepted);
@@ -126,15 +123,14 @@ fn what_is_no_map_or_no_transform_is_warned_of() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     let info = MapMetaData { resolution: f32::NAN, width: 2, height: 2, ..Default::default() };
-    bench.give(MAP, "robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    bench.give_grid("robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
     let info = MapMetaData { resolution: 0.05, width: 2, height: 3, ..Default::default() };
-    bench.give(MAP, "robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
-    let message = Message::from_vec(MessageHeader::default(), vec![0, 1, 0, 0]);
-    bench.stage.receive(MAP, &message, &mut bench.outputs.output(LogTime(9))).unwrap();
-    bench.give(ALIGNMENT, "", &Alignment { x: f64::NAN, ..first_guess(&Pose2::identity()) });
-    assert_eq!(bench.outputs.warnings().values().sum::<u64>(), 4, "{:?}", bench.outputs.warnings());
+    bench.give_grid("robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    bench.stage.give_bytes("map", "robot1", LogTime(9), vec![0, 1, 0, 0]).unwrap();
+    bench.give(&Alignment { x: f64::NAN, ..first_guess(&Pose2::identity()) });
+    assert_eq!(bench.stage.warnings().values().sum::<u64>(), 4, "{:?}", bench.stage.warnings());
     bench.give_map("robot2", &b);
-    let sent = bench.give(ALIGNMENT, "", &first_guess(&a.transform_to(&b)));
+    let sent = bench.give(&first_guess(&a.transform_to(&b)));
     assert!(sent[0].accepted, "the last good map stays");
 }
 
@@ -147,10 +143,10 @@ fn ranked_guesses_are_refined_and_sent_together() {
     bench.give_map("robot2", &b);
     let ranked =
         |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, method: "maps".into(), ..first_guess(place) };
-    assert_eq!(bench.give(ALIGNMENT, "", &ranked(0, &truth)), []);
-    let sent = bench.give(ALIGNMENT, "", &ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
+    assert_eq!(bench.give(&ranked(0, &truth)), []);
+    let sent = bench.give(&ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
     assert_eq!(sent.iter().map(|one| (one.rank, one.hypotheses)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);
     assert_eq!(bench.give_map("robot2", &more_of_b).len(), 2, "both, though one may have stayed as it was");
-    assert_eq!(bench.give(ALIGNMENT, "", &ranked(1, &truth)), [], "the first is missing");
-    assert_eq!(bench.outputs.warnings().len(), 1);
+    assert_eq!(bench.give(&ranked(1, &truth)), [], "the first is missing");
+    assert_eq!(bench.stage.warnings().len(), 1);
 }

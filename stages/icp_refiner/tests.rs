@@ -1,8 +1,9 @@
 //! Registration and judgement on drawn floor plans.
 
-use super::{FirstGuess, IcpParameters, Metric, Refusal, WallMap, Weighting, refine, register};
+use super::{FirstGuess, IcpParameters, Metric, Refusal, Weighting, refine, register};
 use crate::geometry::{Grid, GridGeometry, Pose2, pose};
 use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
+use crate::walls::WallMap;
 use gridweave_runtime::stage::Parameters;
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! Points in square buckets: which of them lie near a line, and near each other.
 
 use super::line::{Line, Stretch};
-use crate::geometry::Point2;
+use crate::geometry::{Buckets, Point2, PointIndex as BucketIndex};
 use nalgebra::Vector2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
@@ -18,39 +18,17 @@ const BANDS: usize = 9;
 pub(super) struct PointIndex {
     /// The extent of the plane.
     size: Vector2<f64>,
-    side: f64,
-    columns: usize,
-    rows: usize,
-    /// For every bucket, row by row, where its points begin; one more at the end.
-    starts: Vec<usize>,
-    points: Vec<Point2>,
+    sorted: BucketIndex,
 }
 
 impl PointIndex {
     /// Sorts the points of a plane of `width` x `height` into buckets of the given side, which is 1 or more.
     pub(super) fn new(points: &[Point2], width: usize, height: usize, side: f64) -> Self {
         let side = if side >= 1.0 { side } else { 1.0 };
-        let buckets = |cells: usize| ((cells as f64 / side).ceil() as usize).max(1);
-        let (columns, rows) = (buckets(width), buckets(height));
-        let place = |value: f64, count: usize| ((value / side) as usize).min(count - 1);
-        let bucket = |point: &Point2| place(point.y, rows) * columns + place(point.x, columns);
-
-        // Points are counted two places on, so that the starts can serve as the places of the next points.
-        let mut starts = vec![0; columns * rows + 2];
-        let buckets: Vec<usize> = points.iter().map(bucket).collect();
-        for bucket in &buckets {
-            starts[bucket + 2] += 1;
-        }
-        for index in 2..starts.len() {
-            starts[index] += starts[index - 1];
-        }
-        let mut sorted = vec![Point2::origin(); points.len()];
-        for (point, bucket) in points.iter().zip(buckets) {
-            let place = &mut starts[bucket + 1];
-            sorted[*place] = *point;
-            *place += 1;
-        }
-        Self { size: Vector2::new(width as f64, height as f64), side, columns, rows, starts, points: sorted }
+        let count = |cells: usize| ((cells as f64 / side).ceil() as usize).max(1);
+        let buckets = Buckets { corner: Point2::origin(), side, columns: count(width), rows: count(height) };
+        let sorted = BucketIndex::in_buckets(points, buckets, |_, _| ());
+        Self { size: Vector2::new(width as f64, height as f64), sorted }
     }
 
     /// The extent of the plane, which begins at (0, 0).
@@ -60,7 +38,7 @@ impl PointIndex {
 
     /// The points, sorted by bucket.
     pub(super) fn points(&self) -> &[Point2] {
-        &self.points
+        self.sorted.points()
     }
 
     /// Hands the names of points within `reach` of the line to `visit`, which says whether they are wanted.
@@ -76,9 +54,9 @@ impl PointIndex {
         max_gap: f64,
         mut visit: impl FnMut(usize) -> bool,
     ) {
-        let strip = Strip::new(self, line, reach);
+        let strip = Strip::new(&self.sorted, line, reach);
         let middle = strip.slice(from);
-        let most_empty = max_gap / self.side;
+        let most_empty = max_gap / self.sorted.buckets().side;
         let mut empty = 0.0;
         for slice in middle..strip.slices {
             empty = if strip.visit(slice, &mut visit) { 0.0 } else { empty + 1.0 };
@@ -98,7 +76,7 @@ impl PointIndex {
     /// Hands the names of all points within `reach` of the line of a stretch to `visit` that lie along the stretch, and of
     /// some that lie beyond its ends.
     pub(super) fn near_stretch(&self, stretch: &Stretch, reach: f64, mut visit: impl FnMut(usize)) {
-        let strip = Strip::new(self, &stretch.line, reach);
+        let strip = Strip::new(&self.sorted, &stretch.line, reach);
         let beyond = |along: f64| strip.slice(&stretch.line.at(along));
         let (a, b) = (beyond(stretch.start - reach), beyond(stretch.end + reach));
         for slice in a.min(b)..=a.max(b) {
@@ -119,7 +97,8 @@ impl PointIndex {
         wanted: impl Fn(usize) -> bool,
         random: &mut impl Rng,
     ) -> Option<usize> {
-        let point = self.points[id];
+        let points = self.points();
+        let point = points[id];
         let bands = self.bands_around(&point, max_distance);
         let count: usize = bands.iter().map(ExactSizeIterator::len).sum();
         if count == 0 {
@@ -134,7 +113,7 @@ impl PointIndex {
                 inside
             })?;
             let other = band.start + drawn;
-            let distance = (self.points[other] - point).norm_squared();
+            let distance = (points[other] - point).norm_squared();
             (distance >= least && distance <= most && wanted(other)).then_some(other)
         })
     }
@@ -142,11 +121,11 @@ impl PointIndex {
     /// The points of the buckets within `distance` of a point: a run for each row, since a row's buckets follow each
     /// other.
     fn bands_around(&self, point: &Point2, distance: f64) -> [Range<usize>; BANDS] {
-        let place = |value: f64, count: usize| ((value.max(0.0) / self.side) as usize).min(count - 1);
-        let (left, right) = (place(point.x - distance, self.columns), place(point.x + distance, self.columns));
-        let (first, last) = (place(point.y - distance, self.rows), place(point.y + distance, self.rows));
+        let buckets = self.sorted.buckets();
+        let (left, right) = (buckets.column(point.x - distance), buckets.column(point.x + distance));
+        let (first, last) = (buckets.row(point.y - distance), buckets.row(point.y + distance));
         std::array::from_fn(|index| match first + index {
-            row if row <= last => self.starts[row * self.columns + left]..self.starts[row * self.columns + right + 1],
+            row if row <= last => self.sorted.run(row, left, right),
             _ => 0..0,
         })
     }
@@ -154,7 +133,7 @@ impl PointIndex {
 
 /// The buckets that a strip of a plane runs through, cut into slices across its greater axis.
 struct Strip<'a> {
-    index: &'a PointIndex,
+    index: &'a BucketIndex,
     /// Whether the strip runs along y rather than x.
     is_steep: bool,
     /// Where the line crosses the lower border of the first slice, and how far it moves aside within a slice.
@@ -171,19 +150,20 @@ struct Strip<'a> {
 }
 
 impl<'a> Strip<'a> {
-    fn new(index: &'a PointIndex, line: &Line, reach: f64) -> Self {
+    fn new(index: &'a BucketIndex, line: &Line, reach: f64) -> Self {
+        let Buckets { side, columns, rows, .. } = *index.buckets();
         let (point, direction) = (line.point(), line.direction());
         let is_steep = direction.y.abs() > direction.x.abs();
         let (u, v, slope) = match is_steep {
             true => (point.y, point.x, direction.x / direction.y),
             false => (point.x, point.y, direction.y / direction.x),
         };
-        let (slices, across) = if is_steep { (index.rows, index.columns) } else { (index.columns, index.rows) };
+        let (slices, across) = if is_steep { (rows, columns) } else { (columns, rows) };
         Self {
             index,
             is_steep,
             start: v - u * slope,
-            step: index.side * slope,
+            step: side * slope,
             margin: reach * 1.0_f64.hypot(slope),
             normal: [-direction.y, direction.x, direction.y * point.x - direction.x * point.y],
             reach,
@@ -195,28 +175,24 @@ impl<'a> Strip<'a> {
     /// The slice of a point; the nearest one for points outside.
     fn slice(&self, point: &Point2) -> usize {
         let place = if self.is_steep { point.y } else { point.x };
-        ((place / self.index.side) as usize).min(self.slices - 1)
+        ((place / self.index.buckets().side) as usize).min(self.slices - 1)
     }
 
     /// Hands the points of a slice to `visit`. Gives whether one was wanted.
     fn visit(&self, slice: usize, visit: &mut impl FnMut(usize) -> bool) -> bool {
         let (first, last) = (self.start + slice as f64 * self.step, self.start + (slice + 1) as f64 * self.step);
         let (low, high) = (first.min(last) - self.margin, first.max(last) + self.margin);
-        let side = self.index.side;
+        let side = self.index.buckets().side;
         if !(high >= 0.0 && low < self.across as f64 * side) {
             return false;
         }
         let (low, high) = ((low / side) as usize, ((high / side) as usize).min(self.across - 1));
-        let starts = &self.index.starts;
-        let mut is_wanted = false;
         if self.is_steep {
-            let row = slice * self.index.columns;
-            is_wanted |= self.visit_run(starts[row + low]..starts[row + high + 1], visit);
-        } else {
-            for row in low..=high {
-                let bucket = row * self.index.columns + slice;
-                is_wanted |= self.visit_run(starts[bucket]..starts[bucket + 1], visit);
-            }
+            return self.visit_run(self.index.run(slice, low, high), visit);
+        }
+        let mut is_wanted = false;
+        for row in low..=high {
+            is_wanted |= self.visit_run(self.index.run(row, slice, slice), visit);
         }
         is_wanted
     }
@@ -224,7 +200,7 @@ impl<'a> Strip<'a> {
     fn visit_run(&self, run: Range<usize>, visit: &mut impl FnMut(usize) -> bool) -> bool {
         let [x, y, offset] = self.normal;
         let mut is_wanted = false;
-        for (id, point) in run.clone().zip(&self.index.points[run]) {
+        for (id, point) in run.clone().zip(&self.index.points()[run]) {
             if (x * point.x + y * point.y + offset).abs() <= self.reach {
                 is_wanted |= visit(id);
             }

@@ -51,8 +51,8 @@ pub use refusal::Refusal;
 pub use search::{Place, search};
 pub use statement::Statement;
 
-use gridweave_runtime::ros::{Alignment, OccupancyGrid};
-use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
+use gridweave_runtime::stage::StageKind;
+use stage::MapAligner;
 
 /// The stage kind `map_aligner`.
 pub fn kind() -> StageKind {
@@ -62,12 +62,9 @@ pub fn kind() -> StageKind {
          translation is tried, and the places are taken at which walls lie on walls and not on free space of the other \
          map. It sends the best few, ranked and marked as provisional: icp_refiner makes them exact, and merge_verifier \
          decides between them.",
-        vec![InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps.")],
-        vec![OutputPort::new(
-            "alignment",
-            PortType::of::<Alignment>(),
-            "First guesses for each pair of robots, the best first, or why there is none.",
-        )],
-        |parameters: MapAlignerParameters, _context| Ok(stage::MapAligner::new(parameters)),
+        |parameters: MapAlignerParameters, _| Ok(MapAligner::new(parameters)),
     )
+    .input("map", "The robots' maps.", MapAligner::receive_map)
+    .finish(MapAligner::finish)
+    .build()
 }

@@ -7,6 +7,7 @@ use super::{
     align_prepared,
 };
 use crate::geometry::{Grid, Pose2};
+use crate::robot_pair::RobotPair;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// As many groups, the largest first, are tried for a robot when its map comes; the others at the end.
@@ -31,10 +32,10 @@ pub struct MergePlan {
     /// The number of the next group.
     next: u64,
     /// What was told last of each pair.
-    told: BTreeMap<(String, String), Statement>,
-    /// Searches made.
+    told: BTreeMap<RobotPair, Statement>,
+    /// Searches made since they were last counted.
     pub searches: u64,
-    /// Guesses made without a search.
+    /// Guesses made without a search since they were last counted.
     pub predictions: u64,
 }
 
@@ -151,7 +152,7 @@ impl MergePlan {
             if is_before(&self.groups[one], &self.groups[other]) { (one, other) } else { (other, one) };
         let (group_a, group_b) = (&self.groups[first], &self.groups[second]);
         let found = align_prepared(self.map_of(group_a)?, self.map_of(group_b)?, &self.parameters);
-        let pair = (group_a.name().to_owned(), group_b.name().to_owned());
+        let pair = RobotPair::by_name(group_a.name(), group_b.name());
         let (count_a, count_b) = (group_a.members.len(), group_b.members.len());
         self.searches += 1;
         let found = match found {
@@ -184,7 +185,7 @@ impl MergePlan {
                 count_a + count_b - 1,
                 found.reason(0)
             );
-            statements.extend(pairs.first().map(|pair| Statement::of((pair.a.clone(), pair.b.clone()), Err(reason))));
+            statements.extend(pairs.first().map(|PairInCommon { pair, .. }| Statement::of(pair.clone(), Err(reason))));
             return None;
         }
         // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
@@ -212,21 +213,16 @@ impl MergePlan {
     }
 
     /// The guesses for a pair of robots by a search of their own.
-    fn searched(&mut self, PairInCommon { a, b, .. }: &PairInCommon) -> Option<Statement> {
-        let (a, b) = if a < b { (a, b) } else { (b, a) };
-        let found = align_prepared(self.map(a)?, self.map(b)?, &self.parameters);
+    fn searched(&mut self, PairInCommon { pair, .. }: &PairInCommon) -> Option<Statement> {
+        let found = align_prepared(self.map(&pair.a)?, self.map(&pair.b)?, &self.parameters);
         self.searches += 1;
         let found = found.map(|found| with_reasons(&found)).map_err(|refusal| refusal.to_string());
-        Some(Statement::of((a.clone(), b.clone()), found))
+        Some(Statement::of(pair.clone(), found))
     }
 
     /// The guess for a pair of robots where their groups put it.
-    fn predicted(&self, pair: &PairInCommon, others: usize) -> Option<Statement> {
-        let (a, b, guess) = match pair.a < pair.b {
-            true => (&pair.a, &pair.b, pair.transform_a_b),
-            false => (&pair.b, &pair.a, pair.transform_a_b.inverse()),
-        };
-        let found = align_near(self.map(a)?, self.map(b)?, &guess, &self.parameters)?;
+    fn predicted(&self, PairInCommon { pair, transform_a_b, .. }: &PairInCommon, others: usize) -> Option<Statement> {
+        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, &self.parameters)?;
         if found.wall_in_common < self.parameters.min_wall_length {
             return None;
         }
@@ -235,7 +231,7 @@ impl MergePlan {
              together",
             found.wall_in_common
         );
-        Some(Statement::of((a.clone(), b.clone()), Ok(vec![(found, reason)])))
+        Some(Statement::of(pair.clone(), Ok(vec![(found, reason)])))
     }
 
     /// The pairs of a robot of each group, those with the most wall in common first, if the groups lie so.
@@ -244,9 +240,9 @@ impl MergePlan {
         for (a, to_group_a) in &group_a.members {
             for (b, to_group_b) in &group_b.members {
                 let transform_a_b = to_group_a.inverse() * transform_groups * to_group_b;
-                if let Some(length) = self.common_walls(a, b, &transform_a_b).map(|common| common.length) {
-                    pairs.push(PairInCommon { a: a.clone(), b: b.clone(), transform_a_b, length });
-                }
+                let Some(CommonWalls { length, .. }) = self.common_walls(a, b, &transform_a_b) else { continue };
+                let transform_a_b = if a < b { transform_a_b } else { transform_a_b.inverse() };
+                pairs.push(PairInCommon { pair: RobotPair::by_name(a, b), transform_a_b, length });
             }
         }
         pairs.sort_by(|one, other| other.length.total_cmp(&one.length));
@@ -256,9 +252,9 @@ impl MergePlan {
     /// The guesses of a robot whose map has grown a little, if all still fit.
     fn kept(&mut self, robot: &str) -> Option<Vec<Statement>> {
         let mut kept = Vec::new();
-        for statement in self.told.values().filter(|told| told.a == robot || told.b == robot) {
+        for statement in self.told.values().filter(|told| told.pair.concerns(robot)) {
             let Ok(found) = &statement.found else { continue };
-            let (map_a, map_b) = (self.map(&statement.a)?, self.map(&statement.b)?);
+            let (map_a, map_b) = (self.map(&statement.pair.a)?, self.map(&statement.pair.b)?);
             let mut refined = Vec::new();
             for (before, reason) in found {
                 let again = align_near(map_a, map_b, &before.transform_a_b, &self.parameters)?;
@@ -282,7 +278,7 @@ impl MergePlan {
         let refusals = others.filter_map(|(other, known)| {
             let (first, second) = if robot < other.as_str() { (mine, known) } else { (known, mine) };
             let refusal = first.map.as_ref().err().or(second.map.as_ref().err())?;
-            Some(Statement::of((robot.to_owned(), other.clone()), Err(refusal.to_string())))
+            Some(Statement::of(RobotPair::by_name(robot, other), Err(refusal.to_string())))
         });
         refusals.collect()
     }
@@ -292,15 +288,15 @@ impl MergePlan {
         let group = self.group_of(robot).map(|group| &self.groups[group]);
         let stands = |told: &Statement| {
             let (Some(group), Ok(found)) = (group, &told.found) else { return told.found.is_err() };
-            let places = group.members.get(&told.a).zip(group.members.get(&told.b));
+            let places = group.members.get(&told.pair.a).zip(group.members.get(&told.pair.b));
             places.zip(found.first()).is_some_and(|((a, b), (best, _))| {
-                let common = self.common_walls(&told.a, &told.b, &best.transform_a_b);
+                let common = self.common_walls(&told.pair.a, &told.pair.b, &best.transform_a_b);
                 let place = a.inverse() * b;
                 common.is_some_and(|common| is_near(&best.transform_a_b, &place, &common.centre, &self.parameters))
             })
         };
-        let is_told_again = |told: &Statement| statements.iter().any(|new| new.a == told.a && new.b == told.b);
-        let told = self.told.values().filter(|told| told.a == robot || told.b == robot);
+        let is_told_again = |told: &Statement| statements.iter().any(|new| new.pair == told.pair);
+        let told = self.told.values().filter(|told| told.pair.concerns(robot));
         let fallen = told.filter(|told| !is_told_again(told) && !stands(told));
         let reason = format!("the map of {robot} has changed, and does not lie where it lay on this map any more");
         fallen.map(|told| Statement { found: Err(reason.clone()), ..told.clone() }).collect()
@@ -310,9 +306,8 @@ impl MergePlan {
     fn tell(&mut self, statements: Vec<Statement>) -> Vec<Statement> {
         let mut news = Vec::new();
         for statement in statements {
-            let pair = (statement.a.clone(), statement.b.clone());
-            if self.told.get(&pair) != Some(&statement) {
-                self.told.insert(pair, statement.clone());
+            if self.told.get(&statement.pair) != Some(&statement) {
+                self.told.insert(statement.pair.clone(), statement.clone());
                 news.push(statement);
             }
         }
@@ -386,8 +381,8 @@ impl MergePlan {
 
 /// Two robots of different groups, and how they lie if the groups lie so.
 struct PairInCommon {
-    a: String,
-    b: String,
+    /// The first by name as robot a.
+    pair: RobotPair,
     transform_a_b: Pose2,
     /// About the length of wall in common, metres.
     length: f64,

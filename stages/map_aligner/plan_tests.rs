@@ -3,6 +3,7 @@
 use super::tests::angular_office;
 use super::{MapAlignerParameters, MergePlan, Statement};
 use crate::geometry::Grid;
+use crate::robot_pair::RobotPair;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,8 +33,8 @@ impl Bench {
     }
 
     /// What was told last of each pair.
-    fn last(&self) -> BTreeMap<(String, String), &Statement> {
-        self.told.iter().map(|told| ((told.a.clone(), told.b.clone()), told)).collect()
+    fn last(&self) -> BTreeMap<RobotPair, &Statement> {
+        self.told.iter().map(|told| (told.pair.clone(), told)).collect()
     }
 
     /// The robots that guesses tie to the first one.
@@ -41,7 +42,7 @@ impl Bench {
         let last = self.last();
         let mut tied: BTreeSet<String> = self.maps.keys().take(1).cloned().collect();
         for _ in 0..self.maps.len() {
-            for ((a, b), told) in &last {
+            for (RobotPair { a, b }, told) in &last {
                 if told.found.is_ok() && (tied.contains(a) || tied.contains(b)) {
                     tied.extend([a.clone(), b.clone()]);
                 }
@@ -52,7 +53,7 @@ impl Bench {
 
     #[track_caller]
     fn assert_right(&self) {
-        for ((a, b), told) in self.last() {
+        for (RobotPair { a, b }, told) in self.last() {
             let Ok(found) = &told.found else { continue };
             let (map_a, map_b) = (&self.maps[&a], &self.maps[&b]);
             let (metres, radians) = apart(&found[0].0.transform_a_b, &map_a.transform_to(map_b), map_b);
@@ -97,9 +98,9 @@ fn the_map_of_a_stranger_is_laid_on_no_other() {
         told.found.as_ref().is_ok_and(|found| found.get(1).is_none_or(|(second, _)| second.share < 0.5))
     };
     let last = bench.last();
-    let of_stranger = last.values().filter(|told| told.a == "robot1" || told.b == "robot1").copied();
+    let of_stranger = last.values().filter(|told| told.pair.concerns("robot1")).copied();
     assert_eq!(of_stranger.filter(clear).count(), 0, "{last:?}");
-    let of_others = last.values().filter(|told| told.a != "robot1" && told.b != "robot1").copied();
+    let of_others = last.values().filter(|told| !told.pair.concerns("robot1")).copied();
     assert!(of_others.filter(clear).count() >= 2, "{last:?}");
 }
 
@@ -140,7 +141,7 @@ fn what_does_not_hold_any_more_is_taken_back() {
     let elsewhere = FloorPlan::new(&[[0.0, 0.0, 30.0, 0.0], [30.0, 0.0, 30.0, 25.0], [3.0, 22.0, 9.0, 30.0]]);
     bench.give("robot2", elsewhere.draw(seen(-1.0, -1.0, 31.0, 31.0), drawing(0.0, 0.0, 0.0)));
     let of_third: Vec<Statement> =
-        bench.last().values().filter(|told| told.b == "robot2").map(|told| (*told).clone()).collect();
+        bench.last().values().filter(|told| told.pair.b == "robot2").map(|told| (*told).clone()).collect();
     assert_eq!(of_third.len(), 2);
     let tied = of_third.iter().filter(|told| told.found.as_ref().is_ok_and(|found| found.len() == 1)).count();
     assert_eq!(tied, 0, "{of_third:?}");

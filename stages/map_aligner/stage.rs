@@ -1,19 +1,26 @@
 //! The stage: keeps each robot's last map, and sends what a plan of searches tells of pairs of robots.
 
 use super::{MapAlignerParameters, MergePlan, Statement};
-use crate::geometry::{Grid, read_map, row_by_row};
-use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Alignment, Header};
-use gridweave_runtime::stage::{Output, Stage, StageError};
-use std::collections::BTreeMap;
+use crate::geometry::row_by_row;
+use crate::robot_maps::RobotMaps;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 
-/// The output port of the first guesses.
-const ALIGNMENT: usize = 0;
+/// What the stage sends.
+pub(super) struct Guesses {
+    alignment: Out<Alignment>,
+}
+
+impl Outputs for Guesses {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let summary = "First guesses for each pair of robots, the best first, or why there is none.";
+        Self { alignment: ports.output("alignment", summary) }
+    }
+}
 
 /// Aligns the maps of robots.
 pub(super) struct MapAligner {
-    /// The last usable map of each robot, as it came.
-    maps: BTreeMap<String, Message>,
+    maps: RobotMaps<()>,
     plan: MergePlan,
     /// Whether guesses are marked as provisional.
     provisional: bool,
@@ -21,24 +28,47 @@ pub(super) struct MapAligner {
 
 impl MapAligner {
     pub(super) fn new(parameters: MapAlignerParameters) -> Self {
-        Self { provisional: parameters.provisional, maps: BTreeMap::new(), plan: MergePlan::new(parameters) }
+        Self { provisional: parameters.provisional, maps: RobotMaps::default(), plan: MergePlan::new(parameters) }
+    }
+
+    pub(super) fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Guesses>,
+    ) -> Result<(), StageError> {
+        let is_same = self.maps.get(map.robot()).is_some_and(|before| before.is_same(&map));
+        if !self.maps.keep(&map, output, |_| ()) || is_same {
+            return Ok(());
+        }
+        let grids = self.maps.iter().map(|(robot, map)| (robot.to_owned(), map.grid())).collect();
+        let statements = self.plan.update(map.robot(), &grids);
+        self.tell(&statements, output)
+    }
+
+    pub(super) fn finish(&mut self, output: &Output<Guesses>) -> Result<(), StageError> {
+        let statements = self.plan.finish();
+        self.tell(&statements, output)
+    }
+
+    fn tell(&mut self, statements: &[Statement], output: &Output<Guesses>) -> Result<(), StageError> {
+        output.count("searches", std::mem::take(&mut self.plan.searches));
+        output.count("predictions", std::mem::take(&mut self.plan.predictions));
+        statements.iter().try_for_each(|statement| self.send(statement, output))
     }
 
     /// Sends what is told of a pair: each guess in a message of its own, the best first, or why there is none.
-    fn send(&self, statement: &Statement, output: &mut Output<'_>) -> Result<(), StageError> {
-        let doing = || format!("align the maps of `{}` and `{}`", statement.a, statement.b);
-        let Some(map_a) = self.maps.get(&statement.a) else { return Ok(()) };
-        let (header, _) = read_map(map_a).map_err(|error| StageError::new(doing(), error))?;
+    fn send(&self, statement: &Statement, output: &Output<Guesses>) -> Result<(), StageError> {
+        let Some(map_a) = self.maps.get(&statement.pair.a) else { return Ok(()) };
         let of_pair = Alignment {
-            header: Header::new(output.log_time(), header.frame_id),
-            a: statement.a.clone(),
-            b: statement.b.clone(),
+            header: Header::new(output.log_time(), map_a.frame_id.clone()),
+            a: statement.pair.a.clone(),
+            b: statement.pair.b.clone(),
             method: "maps".into(),
             ..Alignment::default()
         };
         let guesses = match &statement.found {
             Ok(guesses) => guesses,
-            Err(reason) => return output.send(ALIGNMENT, "", &Alignment { reason: reason.clone(), ..of_pair }),
+            Err(reason) => return output.alignment.send("", &Alignment { reason: reason.clone(), ..of_pair }),
         };
         for (rank, (found, reason)) in (0..).zip(guesses) {
             let mut alignment = Alignment {
@@ -52,43 +82,8 @@ impl MapAligner {
                 ..of_pair.clone()
             };
             alignment.set_transform_a_b(&found.transform_a_b);
-            output.send(ALIGNMENT, "", &alignment)?;
+            output.alignment.send("", &alignment)?;
         }
         Ok(())
     }
-}
-
-impl Stage for MapAligner {
-    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let robot = message.robot().to_owned();
-        let grid = match read_map(message) {
-            Ok((_, grid)) => grid,
-            Err(problem) => {
-                output.warn(format!("a map of {robot} was left out: {problem}"));
-                return Ok(());
-            }
-        };
-        let before = self.maps.get(&robot).and_then(|before| read_map(before).ok());
-        let is_same = before.is_some_and(|(_, before)| is_same_map(&before, &grid));
-        self.maps.insert(robot.clone(), message.clone());
-        if is_same {
-            return Ok(());
-        }
-        let grids = self.maps.iter().filter_map(|(robot, map)| Some((robot.clone(), read_map(map).ok()?.1)));
-        let statements = self.plan.update(&robot, &grids.collect());
-        statements.iter().try_for_each(|statement| self.send(statement, output))
-    }
-
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
-        let statements = self.plan.finish();
-        statements.iter().try_for_each(|statement| self.send(statement, output))
-    }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        Some(serde_json::json!({ "searches": self.plan.searches, "predictions": self.plan.predictions }))
-    }
-}
-
-fn is_same_map(one: &Grid<'_>, other: &Grid<'_>) -> bool {
-    one.geometry == other.geometry && one.cells == other.cells
 }

@@ -3,7 +3,8 @@
 use super::tests::angular_office;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
-use gridweave_runtime::stage::Context;
+use gridweave_runtime::ros::OccupancyGrid;
+use gridweave_runtime::stage::LoneStage;
 
 /// West, east, and more of the east.
 fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
@@ -29,10 +30,10 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
     assert!(metres < 0.15 && radians < 0.015, "{metres} m, {radians} rad");
 
     assert_eq!(bench.give_map("robot1", &a), [], "the same map again");
-    assert_eq!(bench.reported("searches"), 1);
+    assert_eq!(bench.counted("searches"), 1);
     let second = bench.give_map("robot2", &more_of_b);
     assert!(second[0].accepted && second.len() == second[0].hypotheses as usize, "{second:?}");
-    assert_eq!(bench.reported("searches"), 2);
+    assert_eq!(bench.counted("searches"), 2);
 }
 
 #[test]
@@ -86,13 +87,13 @@ fn the_parameters_decide() {
 }
 
 #[test]
-fn what_cannot_be_read_is_left_out_with_a_warning() {
+fn a_map_that_cannot_be_is_left_out_with_a_warning() {
     let (a, b, _) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
-    assert_eq!(bench.give_bytes(0, "robot2", vec![0, 1, 0, 0, 9]), []);
-    assert_eq!(bench.outputs.warnings().len(), 1);
+    assert_eq!(bench.give_grid("robot2", &OccupancyGrid { info: b.info(), ..Default::default() }), []);
+    assert_eq!(bench.stage.warnings().len(), 1);
     assert_eq!(bench.give_map("robot2", &b), [], "the map before it is still the last");
 }
 
@@ -101,6 +102,6 @@ fn parameters_that_cannot_be_are_refused() {
     for parameters in
         ["cell = 0.0", "rotation_step = nan", "least_share = 1.5", "max_hypotheses = 0", "max_extent = 9000.0"]
     {
-        assert!(super::kind().make(parameters.parse().unwrap(), &Context::default()).is_err(), "{parameters}");
+        assert!(LoneStage::new(&super::kind(), parameters).is_err(), "{parameters}");
     }
 }

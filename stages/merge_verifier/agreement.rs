@@ -2,7 +2,7 @@
 
 use super::MergeVerifierParameters;
 use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_free, is_known};
-use crate::icp_refiner::{WallMap, stride};
+use crate::walls::{WallMap, stride};
 use nalgebra::Vector2;
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other

@@ -28,8 +28,8 @@ pub use refusal::{Hypotheses, Hypothesis, Refusal};
 pub use rivals::{Rival, best_rival_nearby};
 pub use score::{evidence_elsewhere, probability};
 
-use gridweave_runtime::ros::{Alignment, OccupancyGrid};
-use gridweave_runtime::stage::{InputPort, OutputPort, PortType, StageKind};
+use gridweave_runtime::stage::StageKind;
+use stage::MergeVerifier;
 
 /// The stage kind `merge_verifier`.
 pub fn kind() -> StageKind {
@@ -38,19 +38,14 @@ pub fn kind() -> StageKind {
         "Judges all alignments that were proposed for each pair of robots, from tags and from maps, against each other and \
          by the maps: walls must lie on walls and not on free space, enough of them, and no other place may fit nearly as \
          well. It accepts one or none, says why, and how probable it is that it is right.",
-        vec![
-            InputPort::one("map", PortType::of::<OccupancyGrid<'_>>(), "The robots' maps."),
-            InputPort::many(
-                "alignment",
-                PortType::of::<Alignment>(),
-                "Refined alignments, one or several ranked ones for each pair of robots and source.",
-            ),
-        ],
-        vec![OutputPort::new(
-            "alignment",
-            PortType::of::<Alignment>(),
-            "One alignment for each pair of robots, accepted or refused; its score is the probability that it is right.",
-        )],
-        |parameters: MergeVerifierParameters, _context| Ok(stage::MergeVerifier::new(parameters)),
+        |parameters: MergeVerifierParameters, _| Ok(MergeVerifier::new(parameters)),
     )
+    .input("map", "The robots' maps.", MergeVerifier::receive_map)
+    .inputs(
+        "alignment",
+        "Refined alignments, one or several ranked ones for each pair of robots and source.",
+        MergeVerifier::receive_alignment,
+    )
+    .finish(MergeVerifier::finish)
+    .build()
 }

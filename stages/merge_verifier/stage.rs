@@ -1,54 +1,51 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
 use super::{Agreement, MapView, MergeVerifierParameters, Verdict, judge};
-use crate::geometry::{Grid, read_map};
 use crate::hypotheses::{HypothesisGatherer, Origin};
-use crate::icp_refiner::{IcpParameters, WallMap};
-use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Alignment, Header};
-use gridweave_runtime::stage::{Output, Stage, StageError};
-use std::cell::OnceCell;
+use crate::robot_maps::{RobotMap, RobotMaps};
+use crate::robot_pair::RobotPair;
+use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
+use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The input port of the maps; all others are those of alignments.
-const MAP_INPUT: usize = 0;
-/// The output port of the judged alignments.
-const ALIGNMENT_OUTPUT: usize = 0;
+/// What the stage sends.
+pub(super) struct Judgements {
+    alignment: Out<Alignment>,
+    evidence: Out<Evidence>,
+}
 
-/// The names of two robots, as the alignments name them.
-type Pair = (String, String);
+impl Outputs for Judgements {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            alignment: ports.output(
+                "alignment",
+                "One alignment for each pair of robots, accepted or refused; its score is the probability that it is right.",
+            ),
+            evidence: ports.side_output(
+                "evidence",
+                "What the maps say of the place that was judged for each pair of robots, and of the best of other places.",
+            ),
+        }
+    }
+}
 
 /// Judges the alignments of pairs of robots.
 pub(super) struct MergeVerifier {
     parameters: MergeVerifierParameters,
-    maps: BTreeMap<String, RobotMap>,
+    maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
-    sent: BTreeMap<Pair, Alignment>,
-    /// What the last judgement on each pair went by, for the report.
-    evidence: BTreeMap<Pair, Evidence>,
-}
-
-/// What a judgement went by.
-#[derive(Clone, Copy, Debug)]
-struct Evidence {
-    agreement: Agreement,
-    /// The most evidence for another place, as a share of that for this one.
-    evidence_elsewhere: f64,
-    hypotheses: usize,
-}
-
-/// A robot's last map. The message is kept as it came; the walls are made when they are first asked for.
-struct RobotMap {
-    message: Message,
-    walls: OnceCell<WallMap>,
+    sent: BTreeMap<RobotPair, Alignment>,
+    /// What was sent last of what the maps say, without headers.
+    evidence: BTreeMap<RobotPair, Evidence>,
 }
 
 impl MergeVerifier {
     pub(super) fn new(parameters: MergeVerifierParameters) -> Self {
         Self {
             parameters,
-            maps: BTreeMap::new(),
+            maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
             sent: BTreeMap::new(),
@@ -56,30 +53,27 @@ impl MergeVerifier {
         }
     }
 
-    fn receive_map(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let robot = message.robot();
-        if let Err(problem) = read_map(message) {
-            output.warn(format!("a map of {robot} was left out: {problem}"));
+    pub(super) fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
+        if !self.maps.keep(&map, output, |_| WallsOnDemand::new()) {
             return Ok(());
         }
-        self.maps.insert(robot.to_owned(), RobotMap { message: message.clone(), walls: OnceCell::new() });
-        let concerned = self.hypotheses.keys().filter(|origin| origin.concerns(robot));
-        let pairs: BTreeSet<Pair> = concerned.map(|origin| (origin.a.clone(), origin.b.clone())).collect();
+        let pairs: BTreeSet<RobotPair> = self.pairs().filter(|pair| pair.concerns(map.robot())).cloned().collect();
         pairs.iter().try_for_each(|pair| self.update(pair, output))
     }
 
-    fn receive_alignment(&mut self, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let alignment: Alignment = match message.decode() {
-            Ok(alignment) => alignment,
-            Err(error) => {
-                output.warn(format!("an alignment was left out: {error}"));
-                return Ok(());
-            }
-        };
-        match self.gatherer.add(alignment) {
+    pub(super) fn receive_alignment(
+        &mut self,
+        alignment: Received<'_, Alignment>,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
+        match self.gatherer.add(alignment.into_content()) {
             Ok(None) => Ok(()),
             Ok(Some((origin, hypotheses))) => {
-                let pair = (origin.a.clone(), origin.b.clone());
+                let pair = origin.pair.clone();
                 self.hypotheses.insert(origin, hypotheses);
                 self.update(&pair, output)
             }
@@ -90,40 +84,57 @@ impl MergeVerifier {
         }
     }
 
-    /// Everything that was proposed for a pair, by source and rank.
-    fn proposed(&self, pair: &Pair) -> Vec<&Alignment> {
-        let of_pair = |origin: &Origin| (&origin.a, &origin.b) == (&pair.0, &pair.1);
-        self.hypotheses.iter().filter(|(origin, _)| of_pair(origin)).flat_map(|(_, hypotheses)| hypotheses).collect()
+    /// A pair that waits for a map to the end is refused, so that it does not go missing.
+    pub(super) fn finish(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
+        let pairs: BTreeSet<RobotPair> = self.pairs().cloned().collect();
+        for pair in pairs {
+            let Some(missing) = self.maps.missing(&pair) else { continue };
+            let proposed = self.proposed(&pair);
+            if proposed.iter().all(|alignment| !alignment.accepted) {
+                continue;
+            }
+            let reason = format!("{missing}, so the alignment cannot be verified");
+            let alignment = Alignment { reason, ..refused(&proposed) };
+            self.send(&pair, alignment, output)?;
+        }
+        Ok(())
     }
 
-    /// Judges a pair, and sends the outcome if it is not what was sent last.
-    fn update(&mut self, pair: &Pair, output: &mut Output<'_>) -> Result<(), StageError> {
+    /// The pairs that anything was proposed for, once for each source.
+    fn pairs(&self) -> impl Iterator<Item = &RobotPair> {
+        self.hypotheses.keys().map(|origin| &origin.pair)
+    }
+
+    /// Everything that was proposed for a pair, by source and rank.
+    fn proposed(&self, pair: &RobotPair) -> Vec<&Alignment> {
+        let of_pair = self.hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
+        of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
+    }
+
+    /// Judges a pair, and sends the outcome and what it went by if they are not what was sent last.
+    fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
         let proposed = self.proposed(pair);
-        let maps = self.maps.get(&pair.0).zip(self.maps.get(&pair.1));
+        let maps = self.maps.pair(pair);
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let verdict = match maps {
-            Some((a, b)) => {
-                let doing = || format!("verify the alignment of `{}` and `{}`", pair.0, pair.1);
-                let (_, grid_a) = read_map(&a.message).map_err(|error| StageError::new(doing(), error))?;
-                let (_, grid_b) = read_map(&b.message).map_err(|error| StageError::new(doing(), error))?;
-                judge(&a.view(grid_a), &b.view(grid_b), &proposed, &self.parameters)
-            }
-            None => None,
-        };
-        let evidence = verdict.as_ref().map(|verdict| Evidence::of(verdict, proposed.len()));
-        let alignment = match &verdict {
-            Some(verdict) => judged(verdict, &proposed),
-            None => refused(&proposed),
-        };
-        if let Some(evidence) = evidence {
+        let verdict = maps.and_then(|(a, b)| judge(&view(a), &view(b), &proposed, &self.parameters));
+        let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
+        let (evidence, alignment) = (evidence(verdict, pair, proposed.len()), judged(verdict, &proposed));
+        if self.evidence.get(pair) != Some(&evidence) {
+            let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
+            output.evidence.send("", &Evidence { header, ..evidence.clone() })?;
             self.evidence.insert(pair.clone(), evidence);
         }
         self.send(pair, alignment, output)
     }
 
-    fn send(&mut self, pair: &Pair, mut alignment: Alignment, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn send(
+        &mut self,
+        pair: &RobotPair,
+        mut alignment: Alignment,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
         alignment.header = Header::new(output.log_time(), alignment.header.frame_id);
         if let Some(sent) = self.sent.get_mut(pair) {
             sent.header = alignment.header.clone();
@@ -131,71 +142,28 @@ impl MergeVerifier {
                 return Ok(());
             }
         }
-        output.send(ALIGNMENT_OUTPUT, "", &alignment)?;
+        output.alignment.send("", &alignment)?;
         self.sent.insert(pair.clone(), alignment);
         Ok(())
     }
 }
 
-impl Stage for MergeVerifier {
-    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        match port {
-            MAP_INPUT => self.receive_map(message, output),
-            _ => self.receive_alignment(message, output),
-        }
-    }
-
-    /// A pair that waits for a map to the end is refused, so that it does not go missing.
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
-        let pairs: BTreeSet<Pair> = self.hypotheses.keys().map(|origin| (origin.a.clone(), origin.b.clone())).collect();
-        for pair in pairs {
-            let missing: Vec<&str> = [&pair.0, &pair.1]
-                .into_iter()
-                .filter(|robot| !self.maps.contains_key(*robot))
-                .map(String::as_str)
-                .collect();
-            let proposed = self.proposed(&pair);
-            if missing.is_empty() || proposed.iter().all(|alignment| !alignment.accepted) {
-                continue;
-            }
-            let reason =
-                format!("no usable map of {} has come, so the alignment cannot be verified", missing.join(" and "));
-            let alignment = Alignment { reason, ..refused(&proposed) };
-            self.send(&pair, alignment, output)?;
-        }
-        Ok(())
-    }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        let pairs: Vec<serde_json::Value> =
-            self.evidence.iter().map(|(pair, evidence)| evidence.report(pair)).collect();
-        Some(serde_json::json!({ "pairs": pairs }))
-    }
+fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
+    MapView { grid: map.grid(), walls: map.walls(NORMAL_RADIUS) }
 }
 
-impl Evidence {
-    fn of(verdict: &Verdict<'_>, hypotheses: usize) -> Self {
-        Self { agreement: verdict.candidate.agreement, evidence_elsewhere: verdict.evidence_elsewhere, hypotheses }
-    }
-
-    fn report(&self, (a, b): &Pair) -> serde_json::Value {
-        let Agreement { overlap, wall_on_wall, wall_on_free, .. } = self.agreement;
-        serde_json::json!({
-            "a": a,
-            "b": b,
-            "hypotheses": self.hypotheses,
-            "overlap_m2": overlap,
-            "wall_on_wall_m": wall_on_wall,
-            "wall_on_free_m": wall_on_free,
-            "evidence_elsewhere": self.evidence_elsewhere,
-        })
-    }
-}
-
-impl RobotMap {
-    fn view<'a>(&'a self, grid: Grid<'a>) -> MapView<'a> {
-        let walls = self.walls.get_or_init(|| WallMap::new(&grid, IcpParameters::default().normal_radius));
-        MapView { grid, walls }
+/// What a judgement on a pair goes by, of so many hypotheses, without a header.
+fn evidence(verdict: &Verdict<'_>, pair: &RobotPair, hypotheses: usize) -> Evidence {
+    let Agreement { overlap, wall_on_wall, wall_on_free, .. } = verdict.candidate.agreement;
+    Evidence {
+        header: Header::default(),
+        a: pair.a.clone(),
+        b: pair.b.clone(),
+        hypotheses: hypotheses as u32,
+        overlap,
+        wall_on_wall,
+        wall_on_free,
+        evidence_elsewhere: verdict.evidence_elsewhere,
     }
 }
 

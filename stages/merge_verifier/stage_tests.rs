@@ -3,11 +3,8 @@
 use crate::geometry::{Pose2, pose};
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
-use gridweave_runtime::message::{LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header};
-
-const MAP: usize = 0;
-const ALIGNMENT: usize = 1;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Evidence, Header};
 
 /// West and east.
 fn maps() -> (DrawnMap, DrawnMap) {
@@ -38,7 +35,7 @@ fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map(
     let (a, b) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     let truth = a.transform_to(&b);
-    assert_eq!(bench.give(ALIGNMENT, "", &Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
+    assert_eq!(bench.give(&Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
     assert_eq!(bench.give_map("robot1", &a), []);
     let sent = bench.give_map("robot2", &b);
     let [judged] = sent.as_slice() else { panic!("{sent:?}") };
@@ -50,7 +47,27 @@ fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map(
     let sent = bench.give_map("robot2", &other);
     assert!(!sent[0].accepted && sent[0].reason.contains("the maps do not confirm it"), "{}", sent[0].reason);
     assert_eq!(bench.finish(), []);
-    assert_eq!(bench.stage.report().unwrap()["pairs"][0]["hypotheses"], 1);
+}
+
+#[test]
+fn what_a_judgement_went_by_is_sent_when_it_changes() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give(&proposed("tags", &a.transform_to(&b)));
+    bench.give_map("robot1", &a);
+    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has been judged");
+    bench.give_map("robot2", &b);
+    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
+    let [first] = sent.as_slice() else { panic!("{sent:?}") };
+    assert_eq!((first.a.as_str(), first.b.as_str(), first.hypotheses), ("robot1", "robot2", 1));
+    assert_eq!(first.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert!(first.overlap > 80.0 && first.wall_on_wall > 10.0 * first.wall_on_free, "{first:?}");
+    bench.give_map("robot2", &b);
+    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has changed");
+    bench.give(&proposed("maps", &(pose(1.5, 0.0, 0.0) * a.transform_to(&b))));
+    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
+    assert_eq!((sent.len(), sent[0].hypotheses, sent[0].overlap), (1, 2, first.overlap));
+    assert!(sent[0].evidence_elsewhere > 0.0 || first.evidence_elsewhere == 0.0, "{sent:?}");
 }
 
 #[test]
@@ -63,13 +80,13 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
     let ranked =
         |rank: u32, place: &Pose2| Alignment { provisional: true, rank, hypotheses: 2, ..proposed("maps+icp", place) };
     let wrong = pose(1.5, 0.0, 0.0) * truth;
-    assert_eq!(bench.give(ALIGNMENT, "", &ranked(0, &wrong)), []);
-    let sent = bench.give(ALIGNMENT, "", &ranked(1, &truth));
+    assert_eq!(bench.give(&ranked(0, &wrong)), []);
+    let sent = bench.give(&ranked(1, &truth));
     assert!(sent[0].accepted && (sent[0].rank, sent[0].hypotheses) == (0, 0), "{sent:?}");
     assert_eq!(sent[0].transform_a_b(), ranked(1, &truth).transform_a_b());
-    let sent = bench.give(ALIGNMENT, "", &Alignment { hypotheses: 1, ..ranked(0, &wrong) });
+    let sent = bench.give(&Alignment { hypotheses: 1, ..ranked(0, &wrong) });
     assert!(!sent[0].accepted, "{}", sent[0].reason);
-    let sent = bench.give(ALIGNMENT, "", &proposed("tags", &truth));
+    let sent = bench.give(&proposed("tags", &truth));
     assert!(sent[0].accepted && sent[0].method == "tags", "{sent:?}");
 }
 
@@ -82,10 +99,10 @@ fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
         reason: reason.into(),
         ..proposed(method, &Pose2::identity())
     };
-    assert_eq!(bench.give(ALIGNMENT, "", &nothing("maps", "no walls"))[0].reason, "no walls");
-    let sent = bench.give(ALIGNMENT, "", &nothing("tags", "no tags"));
+    assert_eq!(bench.give(&nothing("maps", "no walls"))[0].reason, "no walls");
+    let sent = bench.give(&nothing("tags", "no tags"));
     assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls; by the tags: no tags"));
-    assert_eq!(bench.give(ALIGNMENT, "", &nothing("tags", "no tags")), []);
+    assert_eq!(bench.give(&nothing("tags", "no tags")), []);
     assert_eq!(bench.finish(), []);
 }
 
@@ -94,18 +111,14 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
     let (a, _) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
-    bench.give(ALIGNMENT, "", &proposed("tags", &Pose2::identity()));
+    bench.give(&proposed("tags", &Pose2::identity()));
     let sent = bench.finish();
     assert!(!sent[0].accepted && sent[0].reason.contains("no usable map of robot2"), "{}", sent[0].reason);
 }
 
 #[test]
-fn what_cannot_be_read_is_warned_of() {
+fn a_hypothesis_out_of_order_is_warned_of() {
     let mut bench = StageBench::new(&super::kind(), "");
-    for port in [MAP, ALIGNMENT] {
-        let message = Message::from_vec(MessageHeader::default(), vec![0, 1, 0, 0]);
-        bench.stage.receive(port, &message, &mut bench.outputs.output(LogTime(9))).unwrap();
-    }
-    bench.give(ALIGNMENT, "", &Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
-    assert_eq!(bench.outputs.warnings().len(), 3, "{:?}", bench.outputs.warnings());
+    bench.give(&Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
+    assert_eq!(bench.stage.warnings().len(), 1, "{:?}", bench.stage.warnings());
 }

@@ -17,6 +17,8 @@ mod quadrant;
 mod rotation_by_directions;
 mod single_tag;
 mod stage;
+#[cfg(test)]
+mod stage_tests;
 mod tag_rotation;
 mod translation;
 mod walls;

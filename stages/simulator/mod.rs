@@ -7,7 +7,7 @@
 //! everything that is random has a stream of random numbers of its own.
 //!
 //! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
-//! `/robotN/tag_ranges` and `/tf`. Its report is the [`Truth`].
+//! `/robotN/tag_ranges` and `/tf`; and the [`Truth`] on `/truth`.
 //!
 //! [`draw_map`] makes a single map of a building whose direction is known exactly, without a drive.
 //!

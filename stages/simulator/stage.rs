@@ -7,38 +7,47 @@ use super::world::{Simulation, simulate};
 use crate::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    GridPrefix, Header, MapMetaData, OccupancyGrid, PoseStamped, TFMessage, TagRange, TransformStamped,
+    GridPrefix, Header, MapMetaData, OccupancyGrid, PoseStamped, SimulationTruth, TFMessage, TagRange, TransformStamped,
 };
-use gridweave_runtime::stage::{Context, Output, OutputPort, PortType, Source, StageError, StageKind};
-use serde_json::Value;
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Source, StageError, StageKind};
 
 /// When simulated logs begin: 14 November 2023, 22:13:20 UTC.
 const START: LogTime = LogTime(1_700_000_000_000_000_000);
 /// A map is sent so long after its last scan, seconds.
 const MAP_DELAY: f64 = TICK_SECONDS / 2.0;
 
-const MAP: usize = 0;
-const POSE: usize = 1;
-const TAGS: usize = 2;
-const TF: usize = 3;
-
 /// The stage kind `simulator`.
 pub fn kind() -> StageKind {
     StageKind::source(
         "simulator",
-        "Makes a test world: a building, robots that map it and read radio tags, and the truth, which is its report.",
-        vec![
-            OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "Each robot's map, growing.")
-                .on_topic("/{robot}/map"),
-            OutputPort::new("pose", PortType::of::<PoseStamped>(), "Each robot's pose in its map, at 10 Hz.")
-                .on_topic("/{robot}/pose"),
-            OutputPort::new("tags", PortType::of::<TagRange>(), "Ranges of radio tags in reach, at 10 Hz.")
-                .on_topic("/{robot}/tag_ranges"),
-            OutputPort::new("tf", PortType::of::<TFMessage>(), "The same poses: robotN/map to robotN/base_link.")
-                .on_topic("/tf"),
-        ],
+        "Makes a test world: a building, robots that map it and read radio tags, and the truth.",
         |parameters, context: &Context| Ok(Simulator { parameters, seed: context.seed, playback: None }),
     )
+}
+
+/// What a log of the robots holds, and the truth.
+struct SimulatedLog {
+    map: Out<OccupancyGrid<'static>>,
+    pose: Out<PoseStamped>,
+    tags: Out<TagRange>,
+    tf: Out<TFMessage>,
+    truth: Out<SimulationTruth>,
+}
+
+impl Outputs for SimulatedLog {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            map: ports.output_on("/{robot}/map", "map", "Each robot's map, growing."),
+            pose: ports.output_on("/{robot}/pose", "pose", "Each robot's pose in its map, at 10 Hz."),
+            tags: ports.output_on("/{robot}/tag_ranges", "tags", "Ranges of radio tags in reach, at 10 Hz."),
+            tf: ports.output_on("/tf", "tf", "The same poses: robotN/map to robotN/base_link."),
+            truth: ports.output_on(
+                "/truth",
+                "truth",
+                "Where the maps and the tags lie in the first robot's map frame. Sent once, before everything else.",
+            ),
+        }
+    }
 }
 
 /// The world is made when the first message is asked for.
@@ -72,10 +81,17 @@ enum What {
 }
 
 impl Source for Simulator {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = SimulatedLog;
+
+    fn next(&mut self, output: &Output<SimulatedLog>) -> Result<bool, StageError> {
         let playback = match &mut self.playback {
             Some(playback) => playback,
-            none => none.insert(Playback::new(&self.parameters, self.seed)?),
+            none => {
+                let playback = none.insert(Playback::new(&self.parameters, self.seed)?);
+                output.set_log_time(START);
+                output.truth.send("", &playback.simulation.truth.message(START))?;
+                playback
+            }
         };
         let Some(&Event { time, robot, what }) = playback.events.get(playback.sent) else { return Ok(false) };
         output.set_log_time(time);
@@ -93,10 +109,6 @@ impl Source for Simulator {
     fn progress(&self) -> Option<f64> {
         let playback = self.playback.as_ref()?;
         Some(playback.sent as f64 / playback.events.len().max(1) as f64)
-    }
-
-    fn report(&self) -> Option<Value> {
-        self.playback.as_ref().map(|playback| playback.simulation.truth.to_json())
     }
 }
 
@@ -129,17 +141,17 @@ fn base_frame(log: &RobotLog) -> String {
     format!("{}/base_link", log.name)
 }
 
-fn send_pose(output: &mut Output<'_>, log: &RobotLog, index: usize) -> Result<(), StageError> {
+fn send_pose(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Result<(), StageError> {
     let Some(pose) = log.poses.get(index) else { return Ok(()) };
     let header = Header::new(output.log_time(), map_frame(log));
-    output.send(POSE, &log.name, &PoseStamped { header: header.clone(), pose: (*pose).into() })?;
+    output.pose.send(&log.name, &PoseStamped { header: header.clone(), pose: (*pose).into() })?;
     let transform: Pose2 = *pose;
     let transform = TransformStamped { header, child_frame_id: base_frame(log), transform: transform.into() };
-    output.send(TF, "", &TFMessage { transforms: vec![transform] })
+    output.tf.send("", &TFMessage { transforms: vec![transform] })
 }
 
 fn send_reading(
-    output: &mut Output<'_>,
+    output: &Output<SimulatedLog>,
     simulation: &Simulation,
     log: &RobotLog,
     index: usize,
@@ -154,10 +166,10 @@ fn send_reading(
         range_stddev: parameters.tag_noise,
         rssi: reading.rssi,
     };
-    output.send(TAGS, &log.name, &message)
+    output.tags.send(&log.name, &message)
 }
 
-fn send_map(output: &mut Output<'_>, log: &RobotLog, index: usize) -> Result<(), StageError> {
+fn send_map(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Result<(), StageError> {
     let Some((_, map)) = log.maps.get(index) else { return Ok(()) };
     let size = |cells: usize| {
         u32::try_from(cells).map_err(|error| StageError::new(format!("send the map of {}", log.name), error))
@@ -170,7 +182,7 @@ fn send_map(output: &mut Output<'_>, log: &RobotLog, index: usize) -> Result<(),
         ..Default::default()
     };
     let prefix = GridPrefix { header: Header::new(output.log_time(), map_frame(log)), info };
-    output.send_grid(MAP, &log.name, &prefix, |cells| {
+    output.map.send_grid(&log.name, &prefix, |cells| {
         cells.copy_from_slice(&map.cells);
         Ok(())
     })
@@ -181,57 +193,61 @@ mod tests {
     use super::*;
     use crate::geometry::Grid;
     use gridweave_runtime::message::Message;
-    use gridweave_runtime::stage::{CollectedOutputs, Node};
+    use gridweave_runtime::stage::LoneStage;
 
     const WORLD: &str = "robots = 2\nwidth = 10\nheight = 9\nbeams = 60\ntags = 8\nduration = 20";
 
-    fn run(parameters: &str, seed: u64) -> Result<(Vec<Vec<Message>>, Option<Value>), StageError> {
-        let kind = kind();
+    /// What is sent on the ports `map`, `pose`, `tags`, `tf` and `truth`.
+    fn run(parameters: &str, seed: u64) -> Result<[Vec<Message>; 5], StageError> {
         let context = Context { stage: "world".into(), seed, ..Default::default() };
-        let Node::Source(mut source) = kind.make(parameters.parse().unwrap(), &context)? else { panic!("a source") };
-        let mut outputs = CollectedOutputs::new(&kind);
-        while source.next(&mut outputs.output(LogTime::MIN))? {
-            assert!((0.0..1.0).contains(&source.progress().unwrap()));
+        let mut stage = LoneStage::with_context(&kind(), parameters, &context)?;
+        while stage.node().advance()? {
+            assert!((0.0..1.0).contains(&stage.node().progress().unwrap()));
         }
-        assert_eq!(source.progress(), Some(1.0));
-        assert!(!source.next(&mut outputs.output(LogTime::MIN))?, "it stays at its end");
-        Ok(((0..4).map(|port| outputs.take(port)).collect(), source.report()))
+        assert_eq!(stage.node().progress(), Some(1.0));
+        assert!(!stage.node().advance()?, "it stays at its end");
+        Ok(["map", "pose", "tags", "tf", "truth"].map(|port| stage.take_messages(port)))
     }
 
     #[test]
     fn the_messages_are_those_of_a_log() {
-        let (ports, report) = run(WORLD, 1).unwrap();
-        assert_eq!(ports[MAP].len(), 6);
-        assert_eq!(ports[POSE].len(), 400);
-        assert_eq!(ports[TF].len(), 400);
-        let topics = [MAP, POSE, TAGS, TF].map(|port| ports[port][0].header().topic);
-        assert_eq!(topics[MAP].as_str(), "/robot1/map");
-        assert_eq!(topics[POSE].as_str(), "/robot1/pose");
-        assert!(topics[TAGS].as_str().ends_with("/tag_ranges"));
-        assert_eq!(topics[TF].as_str(), "/tf");
+        let [maps, poses, tags, tf, _] = run(WORLD, 1).unwrap();
+        assert_eq!((maps.len(), poses.len(), tf.len()), (6, 400, 400));
+        assert_eq!(maps[0].header().topic.as_str(), "/robot1/map");
+        assert_eq!(poses[0].header().topic.as_str(), "/robot1/pose");
+        assert!(tags[0].header().topic.as_str().ends_with("/tag_ranges"));
+        assert_eq!(tf[0].header().topic.as_str(), "/tf");
 
-        let pose: PoseStamped = ports[POSE][0].decode().unwrap();
-        assert_eq!((pose.header.frame_id.as_str(), ports[POSE][0].header().log_time), ("robot1/map", START));
-        let tf: TFMessage = ports[TF][0].decode().unwrap();
+        let pose: PoseStamped = poses[0].decode().unwrap();
+        assert_eq!((pose.header.frame_id.as_str(), poses[0].header().log_time), ("robot1/map", START));
+        let tf: TFMessage = tf[0].decode().unwrap();
         assert_eq!(tf.transforms[0].child_frame_id, "robot1/base_link");
         assert!((tf.transforms[0].transform.translation.x - pose.pose.position.x).abs() < 1e-12);
-        let range: TagRange = ports[TAGS][0].decode().unwrap();
+        let range: TagRange = tags[0].decode().unwrap();
         assert!(range.header.frame_id.ends_with("/base_link") && range.range_stddev == 0.05);
-        for message in &ports[MAP] {
+        for message in &maps {
             let map: OccupancyGrid<'_> = message.decode().unwrap();
             assert!(Grid::from_message(&map).unwrap().occupied().count() > 50);
             assert_eq!(map.header.frame_id, format!("{}/map", message.robot()));
         }
-        let report = report.unwrap();
-        assert_eq!(report["frames"].as_object().unwrap().len(), 2);
+    }
+
+    #[test]
+    fn the_truth_is_sent_once_when_the_log_begins() {
+        let [.., truth] = run(WORLD, 1).unwrap();
+        assert_eq!(truth.len(), 1);
+        let header = truth[0].header();
+        assert_eq!((header.topic.as_str(), header.log_time, truth[0].robot()), ("/truth", START, ""));
+        let truth: SimulationTruth = truth[0].decode().unwrap();
+        assert_eq!(truth.header, Header::new(START, "robot1/map"));
+        assert!(truth.frames.len() == 2 && !truth.tags.is_empty());
     }
 
     #[test]
     fn a_seed_gives_the_same_bytes() {
         let bytes = |seed| {
-            let (ports, report) = run(WORLD, seed).unwrap();
-            let bytes: Vec<Vec<u8>> = ports.iter().flatten().map(|message| message.bytes().to_vec()).collect();
-            (bytes, report)
+            let ports = run(WORLD, seed).unwrap();
+            ports.iter().flatten().map(|message| message.bytes().to_vec()).collect::<Vec<Vec<u8>>>()
         };
         assert!(bytes(7) == bytes(7));
         assert!(bytes(7) != bytes(8));
@@ -239,8 +255,7 @@ mod tests {
 
     #[test]
     fn every_port_is_in_the_order_of_time() {
-        let (ports, _) = run(WORLD, 3).unwrap();
-        for port in ports {
+        for port in run(WORLD, 3).unwrap() {
             assert!(port.is_sorted_by_key(|message| message.header().log_time));
         }
     }

@@ -1,7 +1,8 @@
 //! What a merge is measured against.
 
 use crate::geometry::{Point2, Pose2};
-use serde_json::{Map, Value, json};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Header, SimulationTruth, TrueFrame, TrueTag};
 
 /// The truth of a simulation.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,24 +18,27 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// The truth as a JSON object: `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note` and
-    /// `centres` (robot to x, y).
-    pub fn to_json(&self) -> Value {
-        let frame =
-            |pose: &Pose2| json!({ "x": pose.translation.x, "y": pose.translation.y, "yaw": pose.rotation.angle() });
-        json!({
-            "resolution": self.resolution,
-            "frames": object(&self.frames, frame),
-            "tags": object(&self.tags, |point| json!([point.x, point.y])),
-            "note": "frames: pose of each robot's map frame in robot1's map frame, metres and radians; tags in robot1's \
-                     map frame; centres: middle of each robot's last map, in its own map frame (errors are taken there)",
-            "centres": object(&self.centres, |point| json!([point.x, point.y])),
-        })
+    /// The truth as a message.
+    pub fn message(&self, log_time: LogTime) -> SimulationTruth {
+        let first = self.frames.first().map_or("", |(robot, _)| robot);
+        let frame = |(robot, pose): &(String, Pose2)| {
+            let centre = self.centres.iter().find(|(name, _)| name == robot);
+            TrueFrame {
+                robot: robot.clone(),
+                x: pose.translation.x,
+                y: pose.translation.y,
+                yaw: pose.rotation.angle(),
+                centre: centre.map_or([0.0; 2], |(_, centre)| [centre.x, centre.y]),
+            }
+        };
+        let tag = |(id, place): &(String, Point2)| TrueTag { tag_id: id.clone(), x: place.x, y: place.y };
+        SimulationTruth {
+            header: Header::new(log_time, format!("{first}/map")),
+            resolution: self.resolution,
+            frames: self.frames.iter().map(frame).collect(),
+            tags: self.tags.iter().map(tag).collect(),
+        }
     }
-}
-
-fn object<T>(entries: &[(String, T)], value: impl Fn(&T) -> Value) -> Value {
-    Value::Object(entries.iter().map(|(name, entry)| (name.clone(), value(entry))).collect::<Map<_, _>>())
 }
 
 #[cfg(test)]
@@ -43,18 +47,20 @@ mod tests {
     use crate::geometry::pose;
 
     #[test]
-    fn the_truth_has_the_form_of_a_truth_file() {
+    fn the_message_says_all_of_the_truth() {
         let truth = Truth {
             resolution: 0.05,
             frames: vec![("robot1".into(), Pose2::identity()), ("robot2".into(), pose(1.0, 2.0, 0.5))],
             tags: vec![("tag00".into(), Point2::new(3.0, 4.0))],
-            centres: vec![("robot1".into(), Point2::new(5.0, 6.0))],
+            centres: vec![("robot1".into(), Point2::new(5.0, 6.0)), ("robot2".into(), Point2::new(7.0, 8.0))],
         };
-        let json = truth.to_json();
-        assert_eq!(json["resolution"], 0.05);
-        assert_eq!(json["frames"]["robot2"], json!({ "x": 1.0, "y": 2.0, "yaw": 0.5 }));
-        assert_eq!(json["tags"]["tag00"], json!([3.0, 4.0]));
-        assert_eq!(json["centres"]["robot1"], json!([5.0, 6.0]));
-        assert!(json["note"].is_string());
+        let frame = |robot: &str, [x, y, yaw]: [f64; 3], centre| TrueFrame { robot: robot.into(), x, y, yaw, centre };
+        let expected = SimulationTruth {
+            header: Header::new(LogTime(9), "robot1/map"),
+            resolution: 0.05,
+            frames: vec![frame("robot1", [0.0; 3], [5.0, 6.0]), frame("robot2", [1.0, 2.0, 0.5], [7.0, 8.0])],
+            tags: vec![TrueTag { tag_id: "tag00".into(), x: 3.0, y: 4.0 }],
+        };
+        assert_eq!(truth.message(LogTime(9)), expected);
     }
 }

@@ -1,28 +1,25 @@
 //! The stage `tag_filter`.
 
 use super::{Judgement, RobotTags, TagFilterParameters, judge};
-use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{CommonTag, CommonTags, Header, TagEstimates};
-use gridweave_runtime::stage::{InputPort, Output, OutputPort, PortType, Stage, StageError, StageKind};
-use serde_json::{Value, json};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::BTreeMap;
-
-const COMMON: usize = 0;
 
 /// The stage kind `tag_filter`.
 pub fn kind() -> StageKind {
-    StageKind::stage::<TagFilterParameters, TagFilterStage>(
+    StageKind::stage(
         "tag_filter",
         "Finds the tags that two robots have in common (Tsardoulias et al., sections 4 and 4.1.3) and leaves out those \
          that do not agree with the others on one rigid transform. Sends the tags of a pair of robots when they change, \
          and says why they do not suffice for a merge if so.",
-        vec![InputPort::one("estimates", PortType::of::<TagEstimates>(), "all tags of one robot")],
-        vec![OutputPort::new("common", PortType::of::<CommonTags>(), "the common tags of one pair of robots")],
-        |parameters, _| Ok(TagFilterStage { parameters, robots: BTreeMap::new(), sent: BTreeMap::new() }),
+        |parameters, _| Ok(TagFilter { parameters, robots: BTreeMap::new(), sent: BTreeMap::new() }),
     )
+    .input("estimates", "all tags of one robot", TagFilter::receive_estimates)
+    .finish(TagFilter::finish)
+    .build()
 }
 
-struct TagFilterStage {
+struct TagFilter {
     parameters: TagFilterParameters,
     /// The last estimates of each robot.
     robots: BTreeMap<String, TagEstimates>,
@@ -30,17 +27,24 @@ struct TagFilterStage {
     sent: BTreeMap<(String, String), Judgement>,
 }
 
-impl Stage for TagFilterStage {
-    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
-        let estimates: TagEstimates = match message.decode() {
-            Ok(estimates) => estimates,
-            Err(error) => {
-                output.warn(format!("tag estimates that cannot be read are left out: {error}"));
-                return Ok(());
-            }
-        };
+struct Pairs {
+    common: Out<CommonTags>,
+}
+
+impl Outputs for Pairs {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self { common: ports.output("common", "the common tags of one pair of robots") }
+    }
+}
+
+impl TagFilter {
+    fn receive_estimates(
+        &mut self,
+        estimates: Received<'_, TagEstimates>,
+        output: &Output<Pairs>,
+    ) -> Result<(), StageError> {
         // The robot's name in the message counts; a program that only fills the header is understood as well.
-        let robot = if estimates.robot.is_empty() { message.robot() } else { &estimates.robot }.to_owned();
+        let robot = if estimates.robot.is_empty() { estimates.robot() } else { &estimates.robot }.to_owned();
         if robot.is_empty() {
             output.warn("tag estimates without a robot are left out");
             return Ok(());
@@ -48,7 +52,7 @@ impl Stage for TagFilterStage {
         for _ in estimates.tags.iter().filter(|tag| !super::common::is_usable(tag)) {
             output.warn("tag estimates without an id or with a value that is no finite number are left out");
         }
-        self.robots.insert(robot.clone(), estimates);
+        self.robots.insert(robot.clone(), estimates.into_content());
         let others: Vec<String> = self.robots.keys().filter(|other| **other != robot).cloned().collect();
         for other in others {
             let pair = if robot < other { (robot.clone(), other) } else { (other, robot.clone()) };
@@ -57,30 +61,14 @@ impl Stage for TagFilterStage {
         Ok(())
     }
 
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn finish(&mut self, output: &Output<Pairs>) -> Result<(), StageError> {
         let pairs: Vec<_> = self.sent.keys().cloned().collect();
         pairs.into_iter().try_for_each(|pair| self.update(pair, 0.0, output))
     }
 
-    fn report(&self) -> Option<Value> {
-        let pair = |((a, b), judgement): (&(String, String), &Judgement)| {
-            json!({
-                "a": a,
-                "b": b,
-                "tags": judgement.tags.len(),
-                "accepted": judgement.accepted,
-                "provisional": judgement.provisional,
-                "reason": judgement.reason,
-            })
-        };
-        Some(json!({ "pairs": self.sent.iter().map(pair).collect::<Vec<_>>() }))
-    }
-}
-
-impl TagFilterStage {
     /// Judges a pair and sends the result, unless it was sent before and no tag has moved by more than `min_change`
     /// metres since.
-    fn update(&mut self, pair: (String, String), min_change: f64, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn update(&mut self, pair: (String, String), min_change: f64, output: &Output<Pairs>) -> Result<(), StageError> {
         let (Some(a), Some(b)) = (self.robots.get(&pair.0), self.robots.get(&pair.1)) else { return Ok(()) };
         let judgement = judge(
             RobotTags { robot: &pair.0, tags: &a.tags },
@@ -99,7 +87,7 @@ impl TagFilterStage {
             provisional: judgement.provisional,
             reason: judgement.reason.clone(),
         };
-        output.send(COMMON, "", &message)?;
+        output.common.send("", &message)?;
         self.sent.insert(pair, judgement);
         Ok(())
     }
@@ -124,28 +112,21 @@ fn says_the_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
-    use gridweave_runtime::ros::{TagEstimate, encode};
-    use gridweave_runtime::stage::{CollectedOutputs, Context, Node};
+    use gridweave_runtime::message::LogTime;
+    use gridweave_runtime::ros::TagEstimate;
+    use gridweave_runtime::stage::LoneStage;
 
-    struct Bench {
-        stage: Box<dyn Stage>,
-        outputs: CollectedOutputs,
-    }
+    struct Bench(LoneStage);
 
     impl Bench {
         fn new() -> Self {
-            let kind = kind();
-            let Ok(Node::Stage(stage)) = kind.make(toml::Table::new(), &Context::default()) else { panic!("no stage") };
-            Self { stage, outputs: CollectedOutputs::new(&kind) }
+            Self(LoneStage::new(&kind(), "").unwrap())
         }
 
         fn send(&mut self, robot: &str, tags: &[TagEstimate]) -> Vec<CommonTags> {
             let estimates = TagEstimates { robot: robot.into(), tags: tags.to_vec(), ..Default::default() };
-            let header = MessageHeader { robot: FixedText::new(robot).unwrap(), ..Default::default() };
-            let message = Message::from_vec(header, encode(&estimates).unwrap());
-            self.stage.receive(0, &message, &mut self.outputs.output(LogTime(1))).unwrap();
-            self.outputs.take(COMMON).iter().map(|message| message.decode().unwrap()).collect()
+            self.0.give::<TagEstimates>("estimates", robot, LogTime(1), &estimates).unwrap();
+            self.0.take("common").unwrap()
         }
     }
 
@@ -199,8 +180,8 @@ mod tests {
         moved[0].x += 0.01;
         assert_eq!(bench.send("robot2", &moved), vec![]);
         for count in [1, 0] {
-            bench.stage.finish(&mut bench.outputs.output(LogTime(2))).unwrap();
-            assert_eq!(bench.outputs.take(COMMON).len(), count);
+            bench.0.finish(LogTime(2)).unwrap();
+            assert_eq!(bench.0.take_messages("common").len(), count);
         }
     }
 
@@ -220,8 +201,6 @@ mod tests {
         broken[0].x = f64::NAN;
         bench.send("robot1", &broken);
         bench.send("", &tags());
-        let message = Message::from_vec(MessageHeader::default(), vec![1, 2]);
-        bench.stage.receive(0, &message, &mut bench.outputs.output(LogTime(1))).unwrap();
-        assert_eq!(bench.outputs.warnings().values().sum::<u64>(), 3, "{:?}", bench.outputs.warnings());
+        assert_eq!(bench.0.warnings().values().sum::<u64>(), 2, "{:?}", bench.0.warnings());
     }
 }

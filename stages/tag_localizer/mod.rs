@@ -19,6 +19,8 @@ mod read_out;
 mod reading_groups;
 mod ring_product;
 mod stage;
+#[cfg(test)]
+mod stage_tests;
 
 pub use localizer::{ReadingProblem, TagLocalizer};
 pub use parameters::{Readout, TagLocalizerParameters};

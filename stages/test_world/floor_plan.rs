@@ -1,8 +1,9 @@
 //! Floor plans for tests, and maps of them as robots would draw them.
 
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN};
-use crate::icp_refiner::{FirstGuess, IcpParameters, WallMap};
+use crate::icp_refiner::FirstGuess;
 use crate::merge_verifier::MapView;
+use crate::walls::{NORMAL_RADIUS, WallMap};
 use gridweave_runtime::ros::MapMetaData;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -123,7 +124,7 @@ impl FloorPlan {
             }
         }
         let grid = Grid::new(geometry, &cells).unwrap();
-        let walls = WallMap::new(&grid, IcpParameters::default().normal_radius);
+        let walls = WallMap::new(&grid, NORMAL_RADIUS);
         DrawnMap { geometry, cells, walls, transform_world_map }
     }
 

@@ -1,59 +1,59 @@
-//! A stage from outside: messages in, alignments out.
+//! A stage from outside: maps and alignments in, alignments out.
 
 use super::floor_plan::DrawnMap;
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageHeader};
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RosMessage, encode};
-use gridweave_runtime::stage::{CollectedOutputs, Context, Node, Stage, StageKind};
-use serde::Serialize;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
+use gridweave_runtime::stage::{LoneStage, StageKind};
 
-/// The input port of the maps.
-const MAP: usize = 0;
-
-/// A stage, and what it sends.
+/// A stage that is given a message each second.
 pub(crate) struct StageBench {
-    pub(crate) stage: Box<dyn Stage>,
-    pub(crate) outputs: CollectedOutputs,
-    /// Messages that were given, one each second.
-    pub(crate) time: u64,
+    pub(crate) stage: LoneStage,
+    seconds: u64,
 }
 
 impl StageBench {
     /// A stage of a kind, with parameters in TOML.
     pub(crate) fn new(kind: &StageKind, parameters: &str) -> Self {
-        let made = kind.make(parameters.parse().unwrap(), &Context::default());
-        let Ok(Node::Stage(stage)) = made else { panic!("no stage") };
-        Self { stage, outputs: CollectedOutputs::new(kind), time: 0 }
+        Self { stage: LoneStage::new(kind, parameters).unwrap(), seconds: 0 }
     }
 
-    pub(crate) fn give<T: RosMessage + Serialize>(&mut self, port: usize, robot: &str, message: &T) -> Vec<Alignment> {
-        self.give_bytes(port, robot, encode(message).unwrap())
-    }
-
-    pub(crate) fn give_bytes(&mut self, port: usize, robot: &str, bytes: Vec<u8>) -> Vec<Alignment> {
-        self.time += 1;
-        let log_time = LogTime(self.time * 1_000_000_000);
-        let header = MessageHeader { log_time, robot: FixedText::new(robot).unwrap(), ..Default::default() };
-        let message = Message::from_vec(header, bytes);
-        self.stage.receive(port, &message, &mut self.outputs.output(log_time)).unwrap();
+    /// Gives the stage an alignment; what it sends then.
+    pub(crate) fn give(&mut self, alignment: &Alignment) -> Vec<Alignment> {
+        let log_time = self.next();
+        self.stage.give::<Alignment>("alignment", "", log_time, alignment).unwrap();
         self.sent()
     }
 
+    /// Gives the stage the map of a robot; what it sends then.
     pub(crate) fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
         let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
-        self.give(MAP, robot, &OccupancyGrid { header, info: map.info(), data: &map.bytes() })
+        self.give_grid(robot, &OccupancyGrid { header, info: map.info(), data: &map.bytes() })
     }
 
-    pub(crate) fn finish(&mut self) -> Vec<Alignment> {
-        self.stage.finish(&mut self.outputs.output(LogTime(self.time))).unwrap();
+    /// The same, of a map as a message.
+    pub(crate) fn give_grid(&mut self, robot: &str, map: &OccupancyGrid<'_>) -> Vec<Alignment> {
+        let log_time = self.next();
+        self.stage.give::<OccupancyGrid<'_>>("map", robot, log_time, map).unwrap();
         self.sent()
     }
 
-    /// A number of the stage's report.
-    pub(crate) fn reported(&self, field: &str) -> u64 {
-        self.stage.report().unwrap()[field].as_u64().unwrap()
+    /// Ends the inputs of the stage; what it sends then.
+    pub(crate) fn finish(&mut self) -> Vec<Alignment> {
+        self.stage.finish(LogTime(self.seconds)).unwrap();
+        self.sent()
+    }
+
+    /// What the stage has counted of its work.
+    pub(crate) fn counted(&self, what: &str) -> u64 {
+        self.stage.counts()[what]
+    }
+
+    fn next(&mut self) -> LogTime {
+        self.seconds += 1;
+        LogTime(self.seconds * 1_000_000_000)
     }
 
     fn sent(&mut self) -> Vec<Alignment> {
-        self.outputs.take(0).iter().map(|message| message.decode().unwrap()).collect()
+        self.stage.take("alignment").unwrap()
     }
 }

@@ -245,7 +245,9 @@ fn whoever_looks_on_at_a_replay_and_however_he_ends_its_result_is_the_same() {
     let watched = watched.wait();
     watched.assert_done();
     signal(halted.id(), "KILL");
-    (killed.wait(), halted.wait(), top.wait());
+    killed.wait();
+    halted.wait();
+    top.wait();
     // The recorder says so if it was too slow.
     assert!([0, 1].contains(&recorder.wait().status));
     assert!(!read(&watched.path("recorded.mcap")).is_empty());

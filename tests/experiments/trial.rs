@@ -1,12 +1,13 @@
 //! One log, merged by any pipeline and compared with the truth.
 
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Evaluation, evaluate};
+use gridweave::evaluate::{Evaluation, evaluate_summary};
 use gridweave::shipped;
-use gridweave::summary::Summary;
+use gridweave_logs::summary::{self, Summary};
+use gridweave_logs::truth;
 use gridweave_runtime::engine::{self, EngineKind, RunReport};
 use gridweave_runtime::pipeline::Overrides;
-use gridweave_runtime::stage::Registry;
+use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -40,11 +41,7 @@ impl World {
         let world =
             Self { log: folder.path().join("world.mcap"), truth: folder.path().join("world.truth.json"), folder };
         let settings: Vec<String> = settings.iter().map(|setting| format!("simulator.{setting}")).collect();
-        let report = world.run(SIMULATE, &settings, Some(seed), &world.log, registry)?;
-        for (_, truth) in report.results("simulator") {
-            std::fs::write(&world.truth, truth.to_string())
-                .with_context(|| format!("cannot write {}", world.truth.display()))?;
-        }
+        world.run(SIMULATE, &settings, Some(seed), &world.log, &truth::kind(), &world.truth, registry)?;
         Ok(world)
     }
 
@@ -69,20 +66,24 @@ impl World {
 
     /// Merges the world's log by a shipped pipeline, in one thread. `settings` are `STAGE.PARAMETER=VALUE`.
     pub(super) fn merge(&self, pipeline: &str, settings: &[String], registry: &Registry) -> Result<Merge> {
-        let report = self.run(pipeline, settings, None, &self.output(), registry)?;
-        let summary = Summary::new(&report);
-        let path = self.folder.path().join("summary.json");
-        std::fs::write(&path, summary.to_json()).with_context(|| format!("cannot write {}", path.display()))?;
-        let evaluation = evaluate(&path, &self.truth)?;
+        let found = self.folder.path().join("summary.json");
+        let report = self.run(pipeline, settings, None, &self.output(), &summary::kind(), &found, registry)?;
+        let text = std::fs::read(&found).with_context(|| format!("cannot read {}", found.display()))?;
+        let summary: Summary = serde_json::from_slice(&text).context("cannot read the summary of a merge")?;
+        let evaluation = evaluate_summary(&summary, &self.truth)?;
         Ok(Merge { summary, evaluation, report })
     }
 
+    /// Runs a shipped pipeline, with a sink that writes its `result`.
+    #[allow(clippy::too_many_arguments)]
     fn run(
         &self,
         pipeline: &str,
         settings: &[String],
         seed: Option<u64>,
         output: &Path,
+        sink: &StageKind,
+        result: &Path,
         registry: &Registry,
     ) -> Result<RunReport> {
         let mut overrides = Overrides::default();
@@ -96,7 +97,9 @@ impl World {
             overrides.set_for_kind("mcap_source", "files", vec![text(&self.log)]);
             overrides.set_for_kind("mcap_sink", "pass_input", false);
         }
-        let pipeline = shipped::load(Path::new(pipeline), &overrides, registry)?;
+        let mut pipeline = shipped::load(Path::new(pipeline), &overrides, registry)?;
+        let parameters = toml::Table::from_iter([("file".to_owned(), text(result).into())]);
+        pipeline.attach(sink, parameters, "results", |_, _, _| true);
         Ok(engine::run(&pipeline, EngineKind::Single, &())?)
     }
 }

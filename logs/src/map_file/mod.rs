@@ -8,10 +8,12 @@ mod error;
 mod load;
 mod save;
 mod shades;
+mod sink;
 
 pub use error::MapFileError;
 pub use load::{image_of, load};
 pub use save::{image_beside, save};
+pub use sink::kind;
 
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 

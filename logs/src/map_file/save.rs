@@ -1,11 +1,10 @@
 //! Writing a map.
 
 use super::{GridMap, MapFileError};
+use crate::file::{WriteError, replace};
 use gridweave_runtime::ros::cell::{is_free, is_occupied};
 use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// The shade of a cell that is occupied, free or unknown.
@@ -30,41 +29,9 @@ pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     let encoded = encoder.write_image(&pixels, map.info.width, map.info.height, ExtendedColorType::L8);
     encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
 
-    // Both are written beside before either is replaced, so that a full disk leaves the map that was there.
-    let parts = [Part::write(&image, &file)?, Part::write(yaml, text.as_bytes())?];
     // The image first, so that there is never a description of a map that is not there.
-    parts.iter().try_for_each(Part::put_in_place)
-}
-
-/// A file that was written under another name, which is gone with this unless it was put in place.
-struct Part<'a> {
-    path: &'a Path,
-    written: PathBuf,
-}
-
-impl<'a> Part<'a> {
-    fn write(path: &'a Path, bytes: &[u8]) -> Result<Self, MapFileError> {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".part");
-        let part = Self { path, written: name.into() };
-        fs::write(&part.written, bytes).map_err(|source| part.error(source))?;
-        Ok(part)
-    }
-
-    fn put_in_place(&self) -> Result<(), MapFileError> {
-        fs::rename(&self.written, self.path).map_err(|source| self.error(source))
-    }
-
-    fn error(&self, source: io::Error) -> MapFileError {
-        MapFileError::Write { path: self.path.to_owned(), source }
-    }
-}
-
-impl Drop for Part<'_> {
-    fn drop(&mut self) {
-        // Not there if it was put in place.
-        let _ = fs::remove_file(&self.written);
-    }
+    replace(&[(&image, &file), (yaml, text.as_bytes())])
+        .map_err(|WriteError { path, source }| MapFileError::Write { path, source })
 }
 
 /// The image that [`save`] writes beside the YAML file at `yaml`.

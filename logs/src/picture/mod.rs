@@ -9,13 +9,16 @@ mod decoration;
 mod difference;
 mod error;
 mod layer;
+mod sink;
 mod view;
 
 pub use colour::robot_colour;
 pub use difference::render_difference;
 pub use error::PictureError;
 pub use layer::MapLayer;
+pub use sink::kind;
 
+use crate::file::{WriteError, replace};
 use colour::{FREE, OCCUPIED, UNKNOWN};
 use image::{ImageFormat, Rgb, RgbImage};
 use layer::{Coverage, PlacedLayer};
@@ -45,7 +48,8 @@ impl Picture {
 
     /// Writes the picture as a PNG file.
     pub fn save_png(&self, path: &Path) -> Result<(), PictureError> {
-        std::fs::write(path, self.png()?).map_err(|source| PictureError::Write { path: path.to_owned(), source })
+        let png = self.png()?;
+        replace(&[(path, &png)]).map_err(|WriteError { path, source }| PictureError::Write { path, source })
     }
 }
 

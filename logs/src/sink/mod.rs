@@ -20,9 +20,10 @@ pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
 pub use routing::result_channel;
 
-use gridweave_runtime::stage::{InputPort, ParameterError, Parameters, PortType, StageKind};
+use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stage::McapSink;
 use std::path::PathBuf;
 
 /// How the chunks of a log are compressed.
@@ -79,8 +80,11 @@ pub fn kind() -> StageKind {
         "mcap_sink",
         "Writes messages of any type to a log (MCAP): each result on the topic of its output, and the messages of the \
          input as they were logged.",
-        vec![InputPort::many("messages", PortType::Any, "what to write")],
-        Vec::new(),
-        stage::McapSink::new,
+        McapSink::new,
     )
+    .any_inputs("messages", "what to write", McapSink::receive)
+    .announce(McapSink::announce)
+    .finish(|sink, _: &Output<()>| sink.end(Outcome::Complete))
+    .abort(McapSink::abort)
+    .build()
 }

@@ -23,8 +23,8 @@ pub(super) struct ResultTopics {
 
 impl ResultTopics {
     pub(super) fn new(context: &Context) -> Self {
-        let outputs = context.input_topics.iter().cloned().zip(context.input_types.iter().cloned());
-        Self { outputs: outputs.filter(|(topic, _)| !topic.is_empty()).collect() }
+        let results = context.inputs.iter().filter(|wire| !wire.topic.is_empty());
+        Self { outputs: results.map(|wire| (wire.topic.clone(), wire.ros_type.clone())).collect() }
     }
 
     /// The type of the result that has this topic.
@@ -72,14 +72,22 @@ pub fn result_channel(topic: &str, ros_type: &str) -> Channel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gridweave_runtime::stage::InputWire;
 
     fn results() -> ResultTopics {
-        let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-        ResultTopics::new(&Context {
-            input_topics: of(&["", "/map", "/tf_static", "/{robot}/lines/segments"]),
-            input_types: of(&["", "nav_msgs/msg/OccupancyGrid", TFMessage::NAME, "gridweave_msgs/msg/Segments"]),
+        let wires = [
+            ("", ""),
+            ("/map", "nav_msgs/msg/OccupancyGrid"),
+            ("/tf_static", TFMessage::NAME),
+            ("/{robot}/lines/segments", "gridweave_msgs/msg/Segments"),
+        ];
+        let wire = |(topic, ros_type): (&str, &str)| InputWire {
+            port: "messages",
+            ros_type: ros_type.into(),
+            topic: topic.into(),
             ..Default::default()
-        })
+        };
+        ResultTopics::new(&Context { inputs: wires.map(wire).to_vec(), ..Default::default() })
     }
 
     fn channel(topic: &str, schema_name: &str) -> Channel {

@@ -3,20 +3,17 @@
 use super::routing::{ResultTopics, Route, result_channel};
 use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
 use gridweave_runtime::message::{Channel, FixedText, Message};
-use gridweave_runtime::stage::{Context, Output, Stage, StageError, match_robot};
-use serde_json::{Map, Value, json};
+use gridweave_runtime::stage::{Context, Output, StageError, match_robot};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A channel of the log, and what was written on it.
+/// A channel of the log.
 struct Lane {
     channel: Channel,
     /// Its number in the log, from its first message on.
     id: Option<u16>,
     /// The sequence number of the next result.
     next_sequence: u32,
-    messages: u64,
-    bytes: u64,
 }
 
 /// Where the messages of an announced channel go.
@@ -64,7 +61,7 @@ impl McapSink {
             pass_input,
             only_topics,
             result_topics: ResultTopics::new(context),
-            input_types: context.input_types.clone(),
+            input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
             log: None,
             started: false,
             lanes: Vec::new(),
@@ -86,14 +83,14 @@ impl McapSink {
         match self.lanes.iter().position(|lane| lane.channel == channel) {
             Some(index) => index,
             None => {
-                self.lanes.push(Lane { channel, id: None, next_sequence: 0, messages: 0, bytes: 0 });
+                self.lanes.push(Lane { channel, id: None, next_sequence: 0 });
                 self.lanes.len() - 1
             }
         }
     }
 
     /// The lane of what a stage has made.
-    fn result_lane(&mut self, message: &Message, output: &mut Output<'_>) -> Result<usize, StageError> {
+    fn result_lane(&mut self, message: &Message, output: &Output<()>) -> Result<usize, StageError> {
         let key = (message.wire(), message.header().topic);
         if let Some(&lane) = self.results.get(&key) {
             return Ok(lane);
@@ -139,12 +136,10 @@ impl McapSink {
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }
-        lane.messages += 1;
-        lane.bytes += message.bytes().len() as u64;
         Ok(())
     }
 
-    fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
+    pub(super) fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
         self.start()?;
         match self.log.take() {
             Some(log) => log.finish(outcome).map_err(failure),
@@ -153,8 +148,8 @@ impl McapSink {
     }
 }
 
-impl Stage for McapSink {
-    fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+impl McapSink {
+    pub(super) fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
         let target = match self.result_topics.route(channel) {
             _ if !self.is_wanted(&channel.topic) => Target::Unwanted,
             Route::Write(channel) => Target::Lane(self.lane(channel)),
@@ -164,7 +159,7 @@ impl Stage for McapSink {
         Ok(())
     }
 
-    fn receive(&mut self, _port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+    pub(super) fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let number = message.header().channel;
         let lane = match number {
             0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
@@ -191,32 +186,13 @@ impl Stage for McapSink {
         written
     }
 
-    fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
-        self.end(Outcome::Complete)
-    }
-
-    fn abort(&mut self, reason: &str) {
+    pub(super) fn abort(&mut self, reason: &str) {
         // A run that has not begun leaves the log of an earlier one alone.
         if self.log.is_some()
             && let Err(error) = self.end(Outcome::Incomplete(reason))
         {
             tracing::warn!("{error}");
         }
-    }
-
-    fn report(&self) -> Option<Value> {
-        let mut topics: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
-        for lane in self.lanes.iter().filter(|lane| lane.messages > 0) {
-            let (messages, bytes) = topics.entry(&lane.channel.topic).or_default();
-            *messages += lane.messages;
-            *bytes += lane.bytes;
-        }
-        let (messages, bytes) = topics.values().fold((0, 0), |sum, topic| (sum.0 + topic.0, sum.1 + topic.1));
-        let topics: Map<String, Value> = topics
-            .into_iter()
-            .map(|(topic, (messages, bytes))| (topic.to_owned(), json!({ "messages": messages, "bytes": bytes })))
-            .collect();
-        Some(json!({ "file": self.file.display().to_string(), "messages": messages, "bytes": bytes, "topics": topics }))
     }
 }
 

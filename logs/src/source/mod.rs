@@ -2,8 +2,6 @@
 //! [`map_file`] gives the maps of map files.
 
 mod carry;
-mod count;
-mod live;
 pub mod map_file;
 mod pose;
 mod route;
@@ -13,24 +11,14 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub use live::live_kind;
 pub(crate) use route::{Classified, Role, classify};
 pub use stage::McapSource;
 
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange};
-use gridweave_runtime::stage::{OutputPort, ParameterError, Parameters, PortType, StageKind};
+use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
-
-/// The port of occupancy grids.
-pub const MAP: usize = 0;
-/// The port of poses.
-pub const POSE: usize = 1;
-/// The port of tag readings.
-pub const TAGS: usize = 2;
-/// The port of everything else.
-pub const OTHER: usize = 3;
 
 /// The parameters of `mcap_source`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -61,29 +49,44 @@ impl Parameters for SourceParameters {
 
 /// The kind `mcap_source`.
 pub fn kind() -> StageKind {
-    StageKind::source::<SourceParameters, _>(
+    StageKind::source(
         "mcap_source",
         "Reads MCAP logs and ROS 2 bags by log time, and tells maps, poses and tag readings of the robots apart",
-        ports(),
         McapSource::new,
     )
 }
 
+/// The kind `live_source`.
+pub fn live_kind() -> StageKind {
+    StageKind::external::<RobotMessages>(
+        "live_source",
+        "Takes what robots send into a live pipeline while it runs: `gridweave play`, or a program of theirs. Keeps the last \
+         message of each topic for stages that are started again",
+    )
+}
+
 /// The outputs of all sources of what robots send.
-fn ports() -> Vec<OutputPort> {
-    vec![
-        OutputPort::new("map", PortType::of::<OccupancyGrid<'_>>(), "the robots' maps, as they were logged or sent"),
-        OutputPort::new(
-            "pose",
-            PortType::of::<PoseWithCovarianceStamped>(),
-            "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
+pub struct RobotMessages {
+    pub(crate) map: Out<OccupancyGrid<'static>>,
+    pub(crate) pose: Out<PoseWithCovarianceStamped>,
+    pub(crate) tags: Out<TagRange>,
+    pub(crate) other: Out<AnyMessage>,
+}
+
+impl Outputs for RobotMessages {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            map: ports.output("map", "the robots' maps, as they were logged or sent"),
+            pose: ports.output(
+                "pose",
+                "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
                  covariance, odometry, or tf",
-        ),
-        OutputPort::new("tags", PortType::of::<TagRange>(), "range readings of tags, as they were logged or sent"),
-        OutputPort::new(
-            "other",
-            PortType::Any,
-            "all other messages, and those from which poses were made, as they were logged or sent",
-        ),
-    ]
+            ),
+            tags: ports.output("tags", "range readings of tags, as they were logged or sent"),
+            other: ports.any_output(
+                "other",
+                "all other messages, and those from which poses were made, as they were logged or sent",
+            ),
+        }
+    }
 }

@@ -1,16 +1,15 @@
 //! Sends each message of the logs to the port of its channel.
 
+use super::RobotMessages;
 use super::carry::{Carried, Carry, Latch};
-use super::count::{RobotCount, SourceCount};
 use super::pose::{NoPose, pose_with_covariance};
 use super::route::{PoseSource, Role, classify};
-use super::{MAP, OTHER, POSE, TAGS};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
-use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
+use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TFMessage, decode};
-use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use gridweave_runtime::stage::{Out, Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -26,6 +25,19 @@ struct Route {
     messages: u64,
     /// How many of the messages hold no pose although their type has one.
     unreadable: u64,
+}
+
+impl Route {
+    /// Sends a message of this channel, which is announced before the first of them.
+    fn send<T>(&mut self, stamp: Stamp, data: &[u8], out: &Out<T>, log_time: LogTime) -> Result<(), StageError> {
+        if !self.announced {
+            self.announced = true;
+            out.announce(self.header.channel, &self.channel)?;
+        }
+        self.messages += 1;
+        let Stamp { sequence: log_sequence, publish_time } = stamp;
+        out.send_encoded(MessageHeader { log_time, publish_time, log_sequence, ..self.header }, data)
+    }
 }
 
 /// What a message is, besides its bytes.
@@ -44,9 +56,8 @@ pub(crate) struct Router {
     by_number: Vec<Vec<Option<usize>>>,
     by_channel: BTreeMap<Channel, usize>,
     tf: Option<TfPoses>,
-    /// How many poses were made from transforms, by robot.
-    tf_poses: BTreeMap<String, u64>,
-    bytes: u64,
+    /// Whether poses were made from transforms.
+    has_tf_poses: bool,
 }
 
 impl Router {
@@ -58,13 +69,12 @@ impl Router {
             files,
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
-            tf_poses: BTreeMap::new(),
-            bytes: 0,
+            has_tf_poses: false,
         }
     }
 
     /// Sends a message. The output's log time is the message's.
-    pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &mut Output<'_>) -> Result<(), StageError> {
+    pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let Some(route) = self.route(message, output)? else { return Ok(()) };
         let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
         self.send_on(route, stamp, message.data, output)
@@ -75,7 +85,7 @@ impl Router {
         &mut self,
         message: &LogMessage<'_>,
         carry: &mut Carry,
-        output: &mut Output<'_>,
+        output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(index) = self.route(message, output)? else { return Ok(()) };
         let Some(route) = self.routes.get(index) else { return Ok(()) };
@@ -93,32 +103,25 @@ impl Router {
         &mut self,
         route: usize,
         carried: &Carried,
-        output: &mut Output<'_>,
+        output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let stamp = Stamp { sequence: carried.sequence, publish_time: carried.publish_time };
         self.send_on(route, stamp, &carried.data, output)
     }
 
-    fn send_on(&mut self, index: usize, stamp: Stamp, data: &[u8], output: &mut Output<'_>) -> Result<(), StageError> {
+    fn send_on(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        let port = match route.role {
-            Role::Map => MAP,
-            Role::Tags => TAGS,
-            Role::Pose(_) | Role::Tf | Role::Other => OTHER,
-        };
-        if !route.announced {
-            route.announced = true;
-            output.announce(port, route.header.channel, &route.channel)?;
-        }
-        route.messages += 1;
-        self.bytes += data.len() as u64;
-        let header = MessageHeader {
-            log_time: output.log_time(),
-            publish_time: stamp.publish_time,
-            log_sequence: stamp.sequence,
-            ..route.header
-        };
-        output.send_encoded(port, header, data)?;
+        match route.role {
+            Role::Map => route.send(stamp, data, &output.map, output.log_time()),
+            Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
+            Role::Pose(_) | Role::Tf | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
+        }?;
         match route.role {
             Role::Pose(source) => self.send_pose(index, source, data, output),
             Role::Tf => self.send_tf_poses(index, data, output),
@@ -131,11 +134,11 @@ impl Router {
         route: usize,
         source: PoseSource,
         data: &[u8],
-        output: &mut Output<'_>,
+        output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let Some(route) = self.routes.get_mut(route).filter(|_| output.is_read(POSE)) else { return Ok(()) };
+        let Some(route) = self.routes.get_mut(route).filter(|_| output.pose.is_read()) else { return Ok(()) };
         match pose_with_covariance(source, data) {
-            Ok(pose) => output.send_bytes(POSE, &route.robot, &pose),
+            Ok(pose) => output.pose.send_bytes(&route.robot, &pose),
             Err(NoPose) => {
                 route.unreadable += 1;
                 output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
@@ -144,9 +147,9 @@ impl Router {
         }
     }
 
-    fn send_tf_poses(&mut self, route: usize, data: &[u8], output: &mut Output<'_>) -> Result<(), StageError> {
+    fn send_tf_poses(&mut self, route: usize, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
         let (Some(route), Some(tf)) = (self.routes.get(route), &mut self.tf) else { return Ok(()) };
-        if !output.is_read(POSE) {
+        if !output.pose.is_read() {
             return Ok(());
         }
         let Ok(message) = decode::<TFMessage>(data) else {
@@ -158,14 +161,14 @@ impl Router {
             output.warn("transforms with values that are not finite, or between a frame and itself");
         }
         for (robot, pose) in poses {
-            count(&mut self.tf_poses, &robot);
-            output.send(POSE, &robot, &PoseWithCovarianceStamped::from(pose))?;
+            self.has_tf_poses = true;
+            output.pose.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
         }
         Ok(())
     }
 
     /// The index of the message's route; `None` if the log does not describe its channel.
-    fn route(&mut self, message: &LogMessage<'_>, output: &mut Output<'_>) -> Result<Option<usize>, StageError> {
+    fn route(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let number = usize::from(message.channel);
         let known = self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten());
         if known.is_some() {
@@ -188,7 +191,7 @@ impl Router {
         Ok(Some(index))
     }
 
-    fn add_route(&mut self, channel: Channel, output: &mut Output<'_>) -> Result<usize, StageError> {
+    fn add_route(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Result<usize, StageError> {
         let index = self.routes.len();
         let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
         let classified = classify(&self.robots, &channel);
@@ -210,18 +213,18 @@ impl Router {
     }
 
     /// Warns of what the logs were expected to hold, and do not.
-    pub(crate) fn warn_of_missing(&self, output: &mut Output<'_>) {
+    pub(crate) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         let routed = |role: fn(Role) -> bool| {
             self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
         };
-        if output.is_read(MAP) && !routed(|role| role == Role::Map) {
+        if output.map.is_read() && !routed(|role| role == Role::Map) {
             let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
             let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
             let others =
                 if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
         }
-        if output.is_read(POSE) && !routed(|role| matches!(role, Role::Pose(_))) && self.tf_poses.is_empty() {
+        if output.pose.is_read() && !routed(|role| matches!(role, Role::Pose(_))) && !self.has_tf_poses {
             match &self.robots.tf {
                 Some(frames) => output.warn(format!(
                     "no pose was found: tf never ties `{}` to `{}`",
@@ -230,50 +233,13 @@ impl Router {
                 None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
             }
         }
-        if output.is_read(TAGS) && !routed(|role| role == Role::Tags) {
+        if output.tags.is_read() && !routed(|role| role == Role::Tags) {
             output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
         }
-        if let Some(tf) = self.tf.as_ref().filter(|_| output.is_read(POSE)) {
+        if let Some(tf) = self.tf.as_ref().filter(|_| output.pose.is_read()) {
             for robot in tf.robots_without_pose() {
                 output.warn(format!("tf does not tie the base of {robot} to its map"));
             }
-        }
-    }
-
-    /// What was sent.
-    pub(crate) fn count(&self) -> SourceCount {
-        let mut robots: BTreeMap<String, RobotCount> = BTreeMap::new();
-        for (robot, &poses) in &self.tf_poses {
-            robots.entry(robot.clone()).or_default().poses += poses;
-        }
-        for route in &self.routes {
-            let robot = match route.role {
-                Role::Tf | Role::Other => continue,
-                _ => robots.entry(route.robot.clone()).or_default(),
-            };
-            match route.role {
-                Role::Map => robot.maps += route.messages,
-                Role::Pose(_) => robot.poses += route.messages - route.unreadable,
-                Role::Tags => robot.readings += route.messages,
-                Role::Tf | Role::Other => {}
-            }
-        }
-        SourceCount {
-            files: self.files.len(),
-            messages: self.routes.iter().map(|route| route.messages).sum(),
-            bytes: self.bytes,
-            chunks: self.files.iter().map(LogFile::chunks).sum(),
-            chunks_skipped: 0,
-            robots,
-        }
-    }
-}
-
-fn count(counts: &mut BTreeMap<String, u64>, robot: &str) {
-    match counts.get_mut(robot) {
-        Some(count) => *count += 1,
-        None => {
-            counts.insert(robot.to_owned(), 1);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The stage `mcap_source`.
 
-use super::SourceParameters;
 use super::carry::{Carry, Window};
 use super::router::Router;
-use crate::reader::{self, Damage, LogFile, LogReader};
+use super::{RobotMessages, SourceParameters};
+use crate::reader::{self, LogFile, LogReader};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 
@@ -18,7 +18,6 @@ pub struct McapSource {
     /// What is latched before the start; `None` once it has been sent.
     carry: Option<Carry>,
     begun: bool,
-    chunks_skipped: u64,
 }
 
 impl McapSource {
@@ -45,11 +44,10 @@ impl McapSource {
             window: Window::new(origin, parameters.start, parameters.end),
             carry: Some(Carry::default()),
             begun: false,
-            chunks_skipped: 0,
         })
     }
 
-    fn warn_of_damage(&mut self, output: &mut Output<'_>) {
+    fn warn_of_damage(&mut self, output: &Output<RobotMessages>) {
         let files = self.reader.files().clone();
         let mut damage = self.reader.take_damage();
         if !std::mem::replace(&mut self.begun, true) {
@@ -59,14 +57,13 @@ impl McapSource {
             damage.extend(files.iter().enumerate().flat_map(found_at_opening));
         }
         for (file, damage) in damage {
-            self.chunks_skipped += u64::from(matches!(damage, Damage::BadChunk { .. }));
             if let Some(file) = files.get(file) {
                 output.warn(format!("{}: {damage}", file.path().display()));
             }
         }
     }
 
-    fn end(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    fn end(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
         self.warn_of_damage(output);
         self.router.warn_of_missing(output);
@@ -75,7 +72,9 @@ impl McapSource {
 }
 
 impl Source for McapSource {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = RobotMessages;
+
+    fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         for _ in 0..BATCH {
             let Some(message) = self.reader.next_message() else { return self.end(output) };
             if message.log_time > self.window.end {
@@ -98,12 +97,6 @@ impl Source for McapSource {
     fn progress(&self) -> Option<f64> {
         Some(self.reader.progress())
     }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        let mut count = self.router.count();
-        count.chunks_skipped = self.chunks_skipped;
-        serde_json::to_value(count).ok()
-    }
 }
 
 /// Sends what was latched before the start, as of the start, if that has not been done yet.
@@ -111,7 +104,7 @@ fn send_carried(
     carry: &mut Option<Carry>,
     start: LogTime,
     router: &mut Router,
-    output: &mut Output<'_>,
+    output: &Output<RobotMessages>,
 ) -> Result<(), StageError> {
     for (route, carried) in carry.take().map(|mut carry| carry.take()).unwrap_or_default() {
         output.set_log_time(start);

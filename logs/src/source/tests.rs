@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{
     Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
 use gridweave_runtime::stage::{
-    CollectedOutputs, Context, Node, Output, OutputSink, RobotTopics, Sent, Source, StageError, TfFrames,
+    Context, LoneStage, OutputEnd, OutputPort, OutputSink, RobotTopics, StageError, TfFrames,
 };
 use nalgebra::{Isometry2, Vector2};
 use std::cell::RefCell;
@@ -17,13 +17,13 @@ const ODOMETRY: &str = Odometry::NAME;
 const POSE_WITH_COVARIANCE: &str = PoseWithCovarianceStamped::NAME;
 
 /// What was sent: the port, the header and the bytes.
-type Sending = (usize, MessageHeader, Vec<u8>);
+type Sending = (&'static str, MessageHeader, Vec<u8>);
 
 /// All that was sent, announcements among it.
 #[derive(Clone, Default)]
 struct Everything(Rc<RefCell<Vec<Sending>>>);
 
-struct Port(usize, Everything);
+struct Port(&'static str, Everything);
 
 impl OutputSink for Port {
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
@@ -43,55 +43,46 @@ impl OutputSink for Port {
 struct Run {
     sent: Vec<Sending>,
     warnings: BTreeMap<String, u64>,
-    report: serde_json::Value,
 }
 
 impl Run {
     /// The messages of a port.
-    fn on(&self, port: usize) -> Vec<Message> {
+    fn on(&self, port: &str) -> Vec<Message> {
         let is_data = |(at, header, _): &&Sending| *at == port && header.flags.contains(MessageFlags::DATA);
         self.sent.iter().filter(is_data).map(|(_, header, bytes)| Message::from_vec(*header, bytes.clone())).collect()
     }
 
     /// The topics and numbers announced on a port.
-    fn announced(&self, port: usize) -> Vec<(u32, String)> {
+    fn announced(&self, port: &str) -> Vec<(u32, String)> {
         let is_channel = |(at, header, _): &&Sending| *at == port && header.flags.contains(MessageFlags::CHANNEL);
         let channel = |bytes: &[u8]| Channel::decode(bytes).unwrap().topic;
         self.sent.iter().filter(is_channel).map(|(_, header, bytes)| (header.channel, channel(bytes))).collect()
     }
 
-    fn times(&self, port: usize) -> Vec<u64> {
+    fn times(&self, port: &str) -> Vec<u64> {
         self.on(port).iter().map(|message| message.header().log_time.0).collect()
     }
 }
 
-fn make(parameters: SourceParameters, robots: RobotTopics) -> Result<McapSource, StageError> {
-    McapSource::new(parameters, &Context { stage: "log".into(), robots, ..Default::default() })
-}
-
-fn try_run(parameters: SourceParameters, robots: RobotTopics) -> Result<Run, StageError> {
-    let mut source = make(parameters, robots)?;
+fn try_run(files: Vec<PathBuf>, more: &str, robots: RobotTopics) -> Result<Run, StageError> {
+    let mut parameters: toml::Table = more.parse().unwrap();
+    let files: Vec<toml::Value> = files.iter().map(|file| file.to_str().unwrap().into()).collect();
+    parameters.insert("files".into(), files.into());
     let everything = Everything::default();
-    let mut ports: Vec<Sent> = kind()
-        .outputs
-        .iter()
-        .enumerate()
-        .map(|(index, port)| {
-            Sent::new(
-                port.name,
-                format!("/{{robot}}/log/{}", port.name),
-                Some(Box::new(Port(index, everything.clone()))),
-            )
-        })
-        .collect();
-    let mut warnings = BTreeMap::new();
-    while source.next(&mut Output::new(&mut ports, LogTime(0), &mut warnings))? {}
-    let sent = everything.0.take();
-    Ok(Run { sent, warnings, report: source.report().unwrap() })
+    let kind = kind();
+    let end = |port: &OutputPort| OutputEnd {
+        topic: format!("/{{robot}}/log/{}", port.name),
+        sink: Some(Box::new(Port(port.name, everything.clone()))),
+    };
+    let ends = kind.outputs.iter().map(end).collect();
+    let context = Context { stage: "log".into(), robots, ..Default::default() };
+    let mut source = kind.make(parameters, &context, ends)?;
+    while source.advance()? {}
+    Ok(Run { sent: everything.0.take(), warnings: source.warnings() })
 }
 
 fn run(files: Vec<PathBuf>) -> Run {
-    try_run(SourceParameters { files, ..Default::default() }, RobotTopics::default()).unwrap()
+    try_run(files, "", RobotTopics::default()).unwrap()
 }
 
 fn write(fill: impl FnOnce(&mut TestLog)) -> (Folder, Vec<PathBuf>) {
@@ -127,12 +118,12 @@ fn each_message_comes_on_its_port_as_it_was_logged() {
             .raw("/robot1/scan", "sensor_msgs/msg/LaserScan", 13, b"scan");
     });
     let run = run(files);
-    let mut announced = BTreeMap::<usize, Vec<_>>::new();
+    let mut announced = BTreeMap::<&str, Vec<_>>::new();
     for (port, robot, topic, number) in [
-        (MAP, "robot1", "/robot1/map", 1),
-        (OTHER, "robot1", "/robot1/pose", 2),
-        (TAGS, "robot2", "/robot2/tag_ranges", 3),
-        (OTHER, "", "/robot1/scan", 4),
+        ("map", "robot1", "/robot1/map", 1),
+        ("other", "robot1", "/robot1/pose", 2),
+        ("tags", "robot2", "/robot2/tag_ranges", 3),
+        ("other", "", "/robot1/scan", 4),
     ] {
         let announced = announced.entry(port).or_default();
         let messages = run.on(port);
@@ -145,10 +136,8 @@ fn each_message_comes_on_its_port_as_it_was_logged() {
     for (port, announced) in announced {
         assert_eq!((run.announced(port), run.on(port).len()), (announced.clone(), announced.len()));
     }
-    assert_eq!(run.on(MAP)[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
-    assert_eq!(run.on(OTHER)[1].bytes(), b"scan");
-    assert_eq!(run.report["messages"], 4);
-    assert_eq!(run.report["robots"]["robot1"], serde_json::json!({ "maps": 1, "poses": 1, "readings": 0 }));
+    assert_eq!(run.on("map")[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
+    assert_eq!(run.on("other")[1].bytes(), b"scan");
     assert!(run.warnings.is_empty(), "{:?}", run.warnings);
 }
 
@@ -162,11 +151,11 @@ fn a_channel_is_announced_before_its_first_message_and_shared_between_files() {
     });
     files.extend(more);
     let run = run(files);
-    assert_eq!(run.announced(OTHER), [(1, "/y".into()), (2, "/x".into()), (3, "/x".into())]);
+    assert_eq!(run.announced("other"), [(1, "/y".into()), (2, "/x".into()), (3, "/x".into())]);
     let sent: Vec<_> = run.sent.iter().map(|(_, header, _)| (header.flags.0, header.channel)).collect();
     let (data, channel) = (MessageFlags::DATA.0, MessageFlags::CHANNEL.0);
     assert_eq!(sent, [(channel, 1), (data, 1), (channel, 2), (data, 2), (data, 2), (data, 2), (channel, 3), (data, 3)]);
-    assert_eq!(run.times(OTHER), [0, 1, 2, 3, 4]);
+    assert_eq!(run.times("other"), [0, 1, 2, 3, 4]);
 }
 
 #[test]
@@ -191,24 +180,24 @@ fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
             .raw("/robot3/pose", PoseStamped::NAME, 14, b"cut");
     });
     let run = run(files);
-    let poses: Vec<PoseWithCovarianceStamped> = run.on(POSE).iter().map(|message| message.decode().unwrap()).collect();
+    let poses: Vec<PoseWithCovarianceStamped> =
+        run.on("pose").iter().map(|message| message.decode().unwrap()).collect();
     assert_eq!(poses[0], PoseWithCovarianceStamped { header: odometry.header.clone(), pose: odometry.pose });
     assert_eq!(poses[1], with_covariance);
     assert_eq!((poses[2].header.clone(), poses[2].pose.pose), (without.header.clone(), without.pose));
     assert_eq!((poses.len(), poses[2].pose.covariance), (3, [[0.0; 6]; 6]));
-    let header = *run.on(POSE)[0].header();
+    let header = *run.on("pose")[0].header();
     assert_eq!((header.channel, header.topic.as_str(), header.robot.as_str()), (0, "/robot1/log/pose", "robot1"));
     assert_eq!(header.log_time.0, 10);
-    assert!(run.announced(POSE).is_empty(), "what was made here was not logged");
-    assert_eq!(run.times(OTHER), [10, 11, 12, 13, 14], "what they were made of goes on");
-    assert_eq!(run.on(OTHER)[0].decode::<Odometry>().unwrap(), odometry);
-    assert_eq!(run.on(OTHER)[3].decode::<PoseStamped>().unwrap(), without);
+    assert!(run.announced("pose").is_empty(), "what was made here was not logged");
+    assert_eq!(run.times("other"), [10, 11, 12, 13, 14], "what they were made of goes on");
+    assert_eq!(run.on("other")[0].decode::<Odometry>().unwrap(), odometry);
+    assert_eq!(run.on("other")[3].decode::<PoseStamped>().unwrap(), without);
     assert_eq!(
-        run.announced(OTHER).iter().map(|(_, topic)| topic.as_str()).collect::<Vec<_>>(),
+        run.announced("other").iter().map(|(_, topic)| topic.as_str()).collect::<Vec<_>>(),
         ["/robot1/pose", "/robot2/pose", "/robot3/pose"]
     );
     for robot in ["robot1", "robot2", "robot3"] {
-        assert_eq!(run.report["robots"][robot]["poses"], 1, "those that could not be read do not count");
         let warning = format!("messages on `/{robot}/pose` could not be read as a pose");
         assert_eq!(run.warnings.contains_key(&warning), robot != "robot2");
     }
@@ -220,7 +209,7 @@ fn a_topic_that_fits_with_another_type_goes_to_other_and_is_warned_of() {
         log.raw("/robot1/map", "nav_msgs/msg/GridCells", 1, b"?").raw("/robot1/map", "nav_msgs/msg/GridCells", 2, b"?");
     });
     let run = run(files);
-    assert_eq!((run.on(MAP).len(), run.on(OTHER).len()), (0, 2));
+    assert_eq!((run.on("map").len(), run.on("other").len()), (0, 2));
     let warning = "`/robot1/map` fits `robots.map` but carries nav_msgs/msg/GridCells where nav_msgs/msg/OccupancyGrid is expected";
     assert!(run.warnings.contains_key(warning), "{:?}", run.warnings);
     assert!(run.warnings.keys().any(|warning| warning.starts_with("no map was found")));
@@ -231,7 +220,7 @@ fn a_type_name_without_msg_is_known() {
     let (_folder, files) = write(|log| {
         log.add("/robot1/map", "nav_msgs/OccupancyGrid", 1, &grid());
     });
-    assert_eq!(run(files).on(MAP).len(), 1);
+    assert_eq!(run(files).on("map").len(), 1);
     assert_eq!(full_type_name("nav_msgs/msg/OccupancyGrid"), "nav_msgs/msg/OccupancyGrid");
     assert_eq!(full_type_name("foxglove.Pose"), "foxglove.Pose");
 }
@@ -254,16 +243,14 @@ fn tf_gives_poses_and_goes_on_as_it_is() {
     });
     let frames = |map: &str| TfFrames { map_frame: map.into(), base_frame: "{robot}/base_link".into() };
     let robots = RobotTopics { tf: Some(frames("{robot}/map")), ..Default::default() };
-    let parameters = SourceParameters { files, ..Default::default() };
-    let run = try_run(parameters.clone(), robots).unwrap();
-    let poses: Vec<_> = run.on(POSE).iter().map(|message| message.robot().to_owned()).collect();
+    let run = try_run(files.clone(), "", robots).unwrap();
+    let poses: Vec<_> = run.on("pose").iter().map(|message| message.robot().to_owned()).collect();
     assert_eq!(poses, ["robot1", "robot2"]);
-    assert_eq!(run.on(POSE)[1].decode::<PoseWithCovarianceStamped>().unwrap().header.frame_id, "robot2/map");
-    assert_eq!(run.times(OTHER), [1, 2, 3, 4, 5]);
-    assert_eq!(run.report["robots"]["robot2"]["poses"], 1);
+    assert_eq!(run.on("pose")[1].decode::<PoseWithCovarianceStamped>().unwrap().header.frame_id, "robot2/map");
+    assert_eq!(run.times("other"), [1, 2, 3, 4, 5]);
     assert_eq!(run.warnings.len(), 4, "not finite, not readable, no map, no tags: {:?}", run.warnings);
     let robots = RobotTopics { tf: Some(frames("map")), ..Default::default() };
-    assert!(try_run(parameters, robots).err().unwrap().to_string().contains("{robot}/map"));
+    assert!(try_run(files, "", robots).err().unwrap().to_string().contains("{robot}/map"));
 }
 
 #[test]
@@ -281,18 +268,16 @@ fn what_is_latched_before_the_start_is_carried_over() {
             .raw("/scan", "p/msg/S", 3 * second, b"S")
             .raw("/scan", "p/msg/S", 4 * second, b"s");
     });
-    let parameters = SourceParameters { files: files.clone(), start: 1.5, end: Some(3.0) };
-    let run = try_run(parameters, RobotTopics::default()).unwrap();
-    assert_eq!(run.times(MAP), [second * 3 / 2]);
-    assert_eq!(run.on(MAP)[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
-    let others: Vec<_> = run.on(OTHER).iter().map(|message| message.bytes().to_vec()).collect();
+    let run = try_run(files.clone(), "start = 1.5\nend = 3.0", RobotTopics::default()).unwrap();
+    assert_eq!(run.times("map"), [second * 3 / 2]);
+    assert_eq!(run.on("map")[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
+    let others: Vec<_> = run.on("other").iter().map(|message| message.bytes().to_vec()).collect();
     assert_eq!(others, [b"a", b"d", b"b", b"S", b"S"]);
     let times: Vec<_> = run.sent.iter().map(|(_, header, _)| header.log_time).collect();
     assert!(times.is_sorted());
     // A log that ends before the start still gives its last map.
-    let parameters = SourceParameters { files, start: 100.0, end: None };
-    let run = try_run(parameters, RobotTopics::default()).unwrap();
-    assert_eq!((run.on(MAP).len(), run.on(OTHER).len()), (1, 3));
+    let run = try_run(files, "start = 100.0", RobotTopics::default()).unwrap();
+    assert_eq!((run.on("map").len(), run.on("other").len()), (1, 3));
 }
 
 #[test]
@@ -301,22 +286,21 @@ fn names_that_are_too_long_are_an_error_that_says_which() {
     let (_folder, files) = write(|log| {
         log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, 1, &grid());
     });
-    let parameters = |files| SourceParameters { files, ..Default::default() };
-    let error = try_run(parameters(files), RobotTopics::default()).err().unwrap().to_string();
+    let error = try_run(files, "", RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("robot's name") && error.contains("32"), "{error}");
     let (_folder, files) = write(|log| {
         log.raw(&format!("/{}", "t".repeat(128)), "p/msg/X", 1, b"");
     });
-    let error = try_run(parameters(files), RobotTopics::default()).err().unwrap().to_string();
+    let error = try_run(files, "", RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("128"), "{error}");
 }
 
 #[test]
 fn a_source_without_files_says_how_to_give_them() {
-    let error = make(SourceParameters::default(), RobotTopics::default()).err().unwrap().to_string();
+    let error = try_run(Vec::new(), "", RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("--input"), "{error}");
     let files = vec!["/nowhere/a.mcap".into()];
-    let error = make(SourceParameters { files, ..Default::default() }, RobotTopics::default()).err().unwrap();
+    let error = try_run(files, "", RobotTopics::default()).err().unwrap();
     assert!(error.to_string().contains("/nowhere/a.mcap"));
 }
 
@@ -339,23 +323,17 @@ fn damage_is_warned_of_and_counted() {
     bytes[place] = 8;
     bytes.truncate(bytes.len() - 20);
     let run = run(vec![folder.write("a.mcap", &bytes)]);
-    assert_eq!(run.report["chunks_skipped"], 1);
-    assert_eq!(run.on(OTHER).len(), 2);
+    assert_eq!(run.on("other").len(), 2);
     assert!(run.warnings.keys().any(|warning| warning.contains("has no end")), "{:?}", run.warnings);
     assert!(run.warnings.keys().any(|warning| warning.contains("checksum")), "{:?}", run.warnings);
 }
 
 #[test]
-fn the_kind_makes_a_source_from_a_table() {
+fn a_source_that_is_done_has_done_all_its_work() {
     let (_folder, files) = write(|log| {
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
     });
-    let kind = kind();
-    let mut table = toml::Table::new();
-    table.insert("files".into(), vec![files[0].display().to_string()].into());
-    let Ok(Node::Source(mut source)) = kind.make(table, &Context::default()) else { panic!() };
-    let mut outputs = CollectedOutputs::new(&kind);
-    while source.next(&mut outputs.output(LogTime(0))).unwrap() {}
-    assert_eq!(outputs.take(MAP).iter().filter(|message| message.header().flags == MessageFlags::DATA).count(), 1);
-    assert_eq!(source.progress(), Some(1.0));
+    let mut source = LoneStage::new(&kind(), &format!("files = [{:?}]", files[0])).unwrap();
+    while source.node().advance().unwrap() {}
+    assert_eq!(source.node().progress(), Some(1.0));
 }

@@ -2,8 +2,7 @@
 
 use crate::commands::simulate;
 use crate::evaluate::evaluate;
-use crate::job::Job;
-use crate::job::RunOptions;
+use crate::job::{Job, Output, RunOptions};
 use crate::status::Status;
 use anyhow::{Context, Result};
 use clap::Args;
@@ -46,8 +45,13 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
     };
     let merged = folder.join("merged.mcap");
     let inputs = [log];
-    let job =
-        Job { pipeline: Path::new("tag_merge"), inputs: &inputs, output: Some(&merged), options: &options, registry };
+    let job = Job {
+        pipeline: Path::new("tag_merge"),
+        inputs: &inputs,
+        output: Output::Log(&merged),
+        options: &options,
+        registry,
+    };
     let summary = job.run()?;
     print!("{}", summary.to_text());
 

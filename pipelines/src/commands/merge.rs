@@ -2,13 +2,12 @@
 
 use crate::job::Job;
 use crate::job::RunOptions;
-use crate::job::{Inputs, is_yaml};
+use crate::job::{Inputs, Output, is_yaml};
 use crate::status::{BadUse, Status};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// What `gridweave merge` is told.
 #[derive(Debug, Args)]
@@ -31,16 +30,11 @@ pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
         Inputs::Logs => "auto_merge",
         Inputs::MapFiles => "map_file_merge",
     };
-    let merge_to = |log: &Path, options: &RunOptions| {
-        let job = Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output: Some(log), options, registry };
-        job.run_and_print()
+    let (output, options) = match is_yaml(&args.output) {
+        true => (Output::MapOnly, with_map(args)?),
+        false => (Output::Log(&args.output), args.options.clone()),
     };
-    if !is_yaml(&args.output) {
-        return merge_to(&args.output, &args.options);
-    }
-    // A map alone is asked for: the log that it is taken from goes when that is done.
-    let folder = TempDir::with_prefix("gridweave-merge-").context("cannot make a folder for the log of the merge")?;
-    merge_to(&folder.path().join("merge.mcap"), &with_map(args)?)
+    Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output, options: &options, registry }.run_and_print()
 }
 
 /// The options of a merge whose output is the map. An error if they speak of a log, which there is none of.
@@ -54,10 +48,5 @@ fn with_map(args: &MergeArgs) -> Result<RunOptions, BadUse> {
         let text = format!("--results-only says what to leave out of a log, and {output} is a map: leave it out");
         return Err(BadUse(text));
     }
-    Ok(RunOptions {
-        map: Some(args.output.clone()),
-        // A picture is drawn from the maps that were merged; nothing else needs them.
-        results_only: args.options.picture.is_none(),
-        ..args.options.clone()
-    })
+    Ok(RunOptions { map: Some(args.output.clone()), ..args.options.clone() })
 }

@@ -32,7 +32,7 @@ pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Status> {
     let job = Job {
         pipeline: &args.pipeline,
         inputs: &args.input,
-        output: args.output.as_deref(),
+        output: args.output.as_deref().into(),
         options: &args.options,
         registry,
     };

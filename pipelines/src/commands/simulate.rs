@@ -3,8 +3,9 @@
 use crate::job::progress::Progress;
 use crate::shipped;
 use crate::status::{BadUse, Status};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
+use gridweave_logs::truth;
 use gridweave_runtime::engine::{self, EngineKind, RunReport};
 use gridweave_runtime::pipeline::{Mode, Overrides};
 use gridweave_runtime::stage::Registry;
@@ -42,7 +43,8 @@ pub(crate) fn simulate(args: &SimulateArgs, registry: &Registry) -> Result<Statu
     }
     let truth = args.truth.clone().unwrap_or_else(|| beside(&args.output));
     let report = write_log(&args.output, &truth, overrides, registry)?;
-    let messages: u64 = report.stages.iter().map(|stage| stage.messages_in).sum();
+    let logged = report.stages.iter().filter(|stage| stage.kind == "mcap_sink");
+    let messages: u64 = logged.map(|stage| stage.messages_in).sum();
     println!("wrote {messages} messages to {} and the truth to {}", args.output.display(), truth.display());
     Ok(Status::Done)
 }
@@ -51,16 +53,14 @@ pub(crate) fn simulate(args: &SimulateArgs, registry: &Registry) -> Result<Statu
 pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, registry: &Registry) -> Result<RunReport> {
     let path = log.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", log.display())))?;
     overrides.set_for_kind("mcap_sink", "file", path);
-    let pipeline = shipped::load(Path::new("simulate"), &overrides, registry)?;
+    let mut pipeline = shipped::load(Path::new("simulate"), &overrides, registry)?;
+    let file = truth.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", truth.display())))?;
+    let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(file))]);
+    pipeline.attach(&truth::kind(), parameters, "truth", |_, _, _| true);
     let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();
-    let report = report?;
-    for (_, result) in report.results("simulator") {
-        let text = serde_json::to_string_pretty(result)? + "\n";
-        std::fs::write(truth, text).with_context(|| format!("cannot write the truth {}", truth.display()))?;
-    }
-    Ok(report)
+    Ok(report?)
 }
 
 /// `a/b.mcap` -> `a/b.truth.json`.

@@ -1,26 +1,47 @@
 //! One run of a pipeline, as the commands put it together from what the user says.
 
-mod export;
 mod inputs;
 mod options;
 mod outputs;
 pub(crate) mod progress;
+mod results;
 
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 
 use crate::shipped;
 use crate::status::{BadUse, Status};
-use crate::summary::Summary;
-use anyhow::{Context, Result};
-use export::Exports;
+use crate::summary::RunSummary;
+use anyhow::Result;
+use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
 use gridweave_runtime::engine::{self, EngineKind};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
 use progress::Progress;
+use results::ResultSinks;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
+
+/// The kind of stage that writes logs.
+const LOG_SINK: &str = "mcap_sink";
+
+/// What a run writes beside what its options ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Output<'a> {
+    /// What the pipeline says.
+    OfPipeline,
+    /// A log, by the only sink of logs.
+    Log(&'a Path),
+    /// No log.
+    MapOnly,
+}
+
+impl<'a> From<Option<&'a Path>> for Output<'a> {
+    fn from(log: Option<&'a Path>) -> Self {
+        log.map_or(Self::OfPipeline, Self::Log)
+    }
+}
 
 /// One run of a pipeline, put together from what the command line says.
 pub(crate) struct Job<'a> {
@@ -28,8 +49,8 @@ pub(crate) struct Job<'a> {
     pub(crate) pipeline: &'a Path,
     /// What the only source of logs, or of map files, reads; if none, what the pipeline says.
     pub(crate) inputs: &'a [PathBuf],
-    /// What the only sink writes; if none, what the pipeline says.
-    pub(crate) output: Option<&'a Path>,
+    /// What is written beside what the options ask for.
+    pub(crate) output: Output<'a>,
     pub(crate) options: &'a RunOptions,
     /// The stage kinds that the pipeline may name.
     pub(crate) registry: &'a Registry,
@@ -50,10 +71,13 @@ impl Job<'_> {
     }
 
     /// Runs the pipeline and writes all that was asked for.
-    pub(crate) fn run(&self) -> Result<Summary> {
-        let exports = Exports::new(self.options, self.output)?;
-        let pipeline = shipped::load(self.pipeline, &self.overrides()?, self.registry)?;
+    pub(crate) fn run(&self) -> Result<RunSummary> {
+        let mut pipeline = shipped::load(self.pipeline, &self.overrides()?, self.registry)?;
+        if self.output == Output::MapOnly {
+            pipeline.take_out(LOG_SINK);
+        }
         outputs::check(&pipeline, self.options)?;
+        let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         let progress = Progress::new(pipeline.mode);
         let start = SystemTime::now();
         let by_mode = match pipeline.mode {
@@ -66,15 +90,14 @@ impl Job<'_> {
             close_outputs(&pipeline, start, &error.to_string());
         }
         let report = report?;
-        let summary = Summary::new(&report);
+        let summary = RunSummary::new(sinks.summary()?, &report);
         if let Some(path) = &self.options.summary {
-            std::fs::write(path, summary.to_json() + "\n")
-                .with_context(|| format!("cannot write the summary {}", path.display()))?;
+            replace(&[(path, (summary.to_json() + "\n").as_bytes())])?;
         }
         if pipeline.mode == Mode::Replay {
             summary.check_for_maps()?;
         }
-        exports.write(&summary, &pipeline.robots)?;
+        sinks.check_written(&report)?;
         Ok(summary)
     }
 
@@ -86,11 +109,11 @@ impl Job<'_> {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
             overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);
         }
-        if let Some(output) = self.output {
-            overrides.set_for_kind("mcap_sink", "file", text_of(output)?);
+        if let Output::Log(output) = self.output {
+            overrides.set_for_kind(LOG_SINK, "file", text_of(output)?);
         }
         if self.options.results_only {
-            overrides.set_for_kind("mcap_sink", "pass_input", false);
+            overrides.set_for_kind(LOG_SINK, "pass_input", false);
         }
         for setting in &self.options.set {
             overrides.set(setting).map_err(|error| BadUse(error.to_string()))?;
@@ -106,7 +129,7 @@ fn text_of(path: &Path) -> Result<String> {
 
 /// A sink whose process was killed has not closed its output: it is closed here, and says why it is not complete.
 fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
-    for stage in pipeline.stages.iter().filter(|stage| stage.kind.name == "mcap_sink") {
+    for stage in pipeline.stages.iter().filter(|stage| stage.kind.name == LOG_SINK) {
         let Some(file) = stage.parameters.get("file").and_then(|file| file.as_str()).map(Path::new) else { continue };
         let is_of_this_run = file.metadata().and_then(|file| file.modified()).is_ok_and(|time| time >= start);
         if is_of_this_run && let Err(error) = close_log(file, reason) {

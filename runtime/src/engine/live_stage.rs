@@ -53,9 +53,8 @@ impl<'a, S: Service + 'static> LiveStage<'a, S> {
         let receivers = links.receivers(&node, stage)?;
         let senders = links.senders(&node, stage, &Pause::Stage(Rc::clone(&wake)), true)?;
         let sink = |port: usize| Some(senders.get(port)?.as_ref()?.sink());
-        let sent = Runner::outputs(pipeline, stage, sink);
         let working = wake.working();
-        let runner = Runner::new(pipeline, stage, sent)?;
+        let runner = Runner::new(pipeline, stage, sink)?;
         drop(working);
         board.set_state(StageState::Running);
         let senders = senders.into_iter().flatten().collect();

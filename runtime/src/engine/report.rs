@@ -30,8 +30,8 @@ pub struct StageReport {
     pub busy: Duration,
     /// What was wrong with its input and how often.
     pub warnings: BTreeMap<String, u64>,
-    /// What it has found: [`Stage::report`](crate::stage::Stage::report).
-    pub result: Option<serde_json::Value>,
+    /// What it has counted of its work, such as searches.
+    pub counts: BTreeMap<String, u64>,
 }
 
 impl RunReport {
@@ -40,11 +40,5 @@ impl RunReport {
         self.stages
             .iter()
             .flat_map(|stage| stage.warnings.iter().map(|(what, count)| (stage.name.as_str(), what.as_str(), *count)))
-    }
-
-    /// What the stages of one kind have found, with their names.
-    pub fn results<'a>(&'a self, kind: &'a str) -> impl Iterator<Item = (&'a str, &'a serde_json::Value)> {
-        let of_kind = self.stages.iter().filter(move |stage| stage.kind == kind);
-        of_kind.filter_map(|stage| Some((stage.name.as_str(), stage.result.as_ref()?)))
     }
 }

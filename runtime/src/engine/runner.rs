@@ -5,50 +5,51 @@ use crate::link::board::{StageBoard, StageNumber};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
 use crate::pipeline::Pipeline;
-use crate::stage::{Node, Output, Sent, StageError};
+use crate::stage::{Node, OutputEnd, OutputSink, StageError};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-/// A stage that runs: its node, its outputs, and what it has done.
+/// A stage that runs: its node, and what it has done.
 pub(super) struct Runner {
     node: Node,
-    outputs: Vec<Sent>,
     /// For each wire, the input port it leads to.
     ports: Vec<usize>,
-    log_time: LogTime,
     report: StageReport,
 }
 
 impl Runner {
-    /// Makes the stage with the given index of a pipeline.
-    pub(super) fn new(pipeline: &Pipeline, stage: usize, outputs: Vec<Sent>) -> Result<Self, Failure> {
+    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it.
+    pub(super) fn new(
+        pipeline: &Pipeline,
+        stage: usize,
+        mut sink: impl FnMut(usize) -> Option<Box<dyn OutputSink>>,
+    ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
         let context = pipeline.context(stage);
-        let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context))?;
+        let ends =
+            spec.topics.iter().enumerate().map(|(port, topic)| OutputEnd { topic: topic.clone(), sink: sink(port) });
+        let ends = ends.collect();
+        let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context, ends))?;
         let report = StageReport { name: spec.name.clone(), kind: spec.kind.name.to_owned(), ..Default::default() };
-        let ports = spec.inputs.iter().map(|wire| wire.port).collect();
-        Ok(Self { node, outputs, ports, log_time: LogTime::MIN, report })
+        Ok(Self { node, ports: spec.inputs.iter().map(|wire| wire.port).collect(), report })
     }
 
     /// Whether the stage is a source.
     pub(super) fn is_source(&self) -> bool {
-        matches!(self.node, Node::Source(_))
+        self.node.is_source()
     }
 
     /// Whether the messages of the stage come from outside of the run.
     pub(super) fn is_external(&self) -> bool {
-        matches!(self.node, Node::External)
+        self.node.is_external()
     }
 
     /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
     pub(super) fn advance(&mut self) -> Result<bool, Failure> {
-        let Node::Source(source) = &mut self.node else { return Ok(false) };
         let start = Instant::now();
-        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
-        let more = guarded(|| source.next(&mut output));
-        self.log_time = output.log_time();
+        let more = guarded(|| self.node.advance());
         self.report.busy += start.elapsed();
         more
     }
@@ -58,27 +59,24 @@ impl Runner {
         board.set(StageNumber::MessagesIn, self.report.messages_in);
         board.set(StageNumber::Busy, self.report.busy.saturating_sub(waited).as_nanos() as u64);
         board.set(StageNumber::Warnings, self.warnings());
-        for (port, output) in self.outputs.iter().enumerate() {
-            board.set_sent(port, output.messages());
+        for (port, messages) in self.node.messages_sent().enumerate() {
+            board.set_sent(port, messages);
         }
     }
 
     /// The log time that the stage has come to.
     pub(super) fn log_time(&self) -> LogTime {
-        self.log_time
+        self.node.log_time()
     }
 
     /// How often the stage has warned.
     pub(super) fn warnings(&self) -> u64 {
-        self.report.warnings.values().sum()
+        self.node.warning_count()
     }
 
     /// How much of its work a source has done.
     pub(super) fn progress(&self) -> Result<Option<f64>, Failure> {
-        match &self.node {
-            Node::Source(source) => guarded(|| Ok(source.progress())),
-            Node::Stage(_) | Node::External => Ok(None),
-        }
+        guarded(|| Ok(self.node.progress()))
     }
 
     /// Hands the next message to the stage, if it can be told which that is. Gives the wire it came on.
@@ -99,65 +97,45 @@ impl Runner {
     }
 
     fn handle(&mut self, wire: usize, message: &Message) -> Result<(), Failure> {
-        let Node::Stage(stage) = &mut self.node else { return Ok(()) };
         let header = message.header();
-        self.log_time = self.log_time.max(header.log_time);
+        self.node.set_log_time(self.node.log_time().max(header.log_time));
         if header.flags.contains(MessageFlags::CHANNEL) {
             return guarded(|| {
                 let channel = Channel::decode(message.bytes())
                     .map_err(|error| StageError::new("read the announcement of a channel", error))?;
-                stage.announce(wire, header.channel, &channel)
+                self.node.announce(wire, header.channel, &channel)
             });
         }
         self.report.messages_in += 1;
-        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
-        guarded(|| stage.receive(self.ports[wire], message, &mut output))
+        guarded(|| self.node.receive(self.ports[wire], message))
     }
 
     /// Tells the stage that all its inputs have ended, having come to the log time `time`.
     pub(super) fn finish(&mut self, time: LogTime) -> Result<(), Failure> {
-        self.log_time = self.log_time.max(time);
-        let Node::Stage(stage) = &mut self.node else { return Ok(()) };
+        self.node.set_log_time(self.node.log_time().max(time));
         let start = Instant::now();
-        let mut output = Output::new(&mut self.outputs, self.log_time, &mut self.report.warnings);
-        let result = guarded(|| stage.finish(&mut output));
+        let result = guarded(|| self.node.finish());
         self.report.busy += start.elapsed();
         result
     }
 
     /// Tells the stage that the run has failed.
     pub(super) fn abort(&mut self, reason: &str) {
-        if let Node::Stage(stage) = &mut self.node {
-            // The run has failed already; a second failure while it is wound up would only hide the first.
-            let _ = catch_unwind(AssertUnwindSafe(|| stage.abort(reason)));
-        }
+        // The run has failed already; a second failure while it is wound up would only hide the first.
+        let _ = catch_unwind(AssertUnwindSafe(|| self.node.abort(reason)));
     }
 
     /// Drops the stage and gives its report. Of the time it worked, `waited` was spent waiting for others.
     pub(super) fn into_report(mut self, waited: Duration) -> Result<StageReport, Failure> {
-        self.report.result = guarded(|| match &self.node {
-            Node::Stage(stage) => Ok(stage.report()),
-            Node::Source(source) => Ok(source.report()),
-            Node::External => Ok(None),
-        })?;
+        self.report.messages_out = self.node.messages_sent().sum();
+        self.report.warnings = self.node.warnings();
+        self.report.counts = self.node.counts();
+        self.report.busy = self.report.busy.saturating_sub(waited);
         guarded(|| {
             drop(self.node);
             Ok(())
         })?;
-        self.report.messages_out = self.outputs.iter().map(Sent::messages).sum();
-        self.report.busy = self.report.busy.saturating_sub(waited);
         Ok(self.report)
-    }
-
-    /// The outputs of the stage with the given index, each leading to what `sink` gives for it.
-    pub(super) fn outputs(
-        pipeline: &Pipeline,
-        stage: usize,
-        mut sink: impl FnMut(usize) -> Option<Box<dyn crate::stage::OutputSink>>,
-    ) -> Vec<Sent> {
-        let spec = &pipeline.stages[stage];
-        let ports = spec.kind.outputs.iter().zip(&spec.topics).enumerate();
-        ports.map(|(port, (output, topic))| Sent::new(output.name, topic.clone(), sink(port))).collect()
     }
 }
 

@@ -137,11 +137,9 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             )?);
         }
         let outputs = SharedOutputs::new(senders, Rc::clone(&wake));
-        let sent = Runner::outputs(pipeline, stage, |port| {
-            places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link))
-        });
+        let sink = |port: usize| places.get(port).copied().flatten().map(|link| SharedOutputs::sink(&outputs, link));
         let working = wake.working();
-        let runner = Runner::new(pipeline, stage, sent)?;
+        let runner = Runner::new(pipeline, stage, sink)?;
         drop(working);
         let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         let flush_interval = (spec.depth / 2).max(1);

@@ -48,6 +48,7 @@
 //! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
 //! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
 
+mod attach;
 mod binding;
 mod diagnostic;
 mod document;
@@ -82,7 +83,7 @@ pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
 pub use single_stage::SingleStage;
 
-use crate::stage::{Context, RobotTopics, StageKind};
+use crate::stage::{Context, InputWire, RobotTopics, StageKind};
 use std::time::Duration;
 
 /// A pipeline that has passed every check: each stage's kind exists, each wire's ends exist and agree in type, and
@@ -173,27 +174,19 @@ impl Pipeline {
             seed: stage_seed(self.seed, &spec.name),
             reference: self.reference.clone(),
             robots: self.robots.clone(),
-            input_types: spec.inputs.iter().map(|wire| self.output_type(wire)).collect(),
-            input_topics: spec.inputs.iter().map(|wire| self.output_topic(wire)).collect(),
+            inputs: spec.inputs.iter().map(|wire| self.input_wire(spec, wire)).collect(),
         }
     }
 
-    /// The ROS 2 type that a wire carries; empty for any.
-    fn output_type(&self, wire: &Wire) -> String {
-        match self.stages[wire.from_stage].kind.outputs[wire.from_port].port_type {
-            crate::stage::PortType::Ros(name) => name.to_owned(),
-            crate::stage::PortType::Any => String::new(),
-        }
-    }
-
-    /// The topic of the messages that a wire carries, with `{robot}` for the robot's name; empty for those of a
-    /// source, which bring their own.
-    fn output_topic(&self, wire: &Wire) -> String {
+    /// What a stage is told of a wire to it.
+    fn input_wire(&self, spec: &StageSpec, wire: &Wire) -> InputWire {
         let from = &self.stages[wire.from_stage];
-        match from.kind.inputs.is_empty() {
+        let topic = match from.kind.inputs.is_empty() {
             true => String::new(),
             false => from.topics.get(wire.from_port).cloned().unwrap_or_default(),
-        }
+        };
+        let ros_type = from.kind.outputs[wire.from_port].port_type.name().to_owned();
+        InputWire { port: spec.kind.inputs[wire.port].name, from: from.name.clone(), ros_type, topic }
     }
 }
 

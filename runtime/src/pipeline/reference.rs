@@ -64,12 +64,13 @@ pub(super) fn resolve(text: &str, at: &Location, reader: usize, drafts: &[Draft<
     let all = || (0..kind.outputs.len()).map(output).collect::<Vec<_>>();
     let names: Vec<String> = all().into_iter().map(|output| output.name(drafts)).collect();
     let several = format!("{}, or `{name}.*` for all where an input takes many", quoted_list(&names));
+    let main: Vec<Output> = all().into_iter().filter(|output| !kind.outputs[output.port].side).collect();
+    if port.is_none() && main.len() == 1 {
+        resolved.outputs = main;
+        return resolved;
+    }
     let problem = match (port, kind.outputs.as_slice()) {
         (_, []) => Diagnostic::new(format!("`{name}` has no outputs")).at(at, format!("it is a `{}`", kind.name)),
-        (None, [_]) => {
-            resolved.outputs = all();
-            return resolved;
-        }
         (None, outputs) => Diagnostic::new(format!("it is not clear which output of `{name}` is meant"))
             .at(at, format!("`{}` has {} outputs", kind.name, outputs.len()))
             .help(format!("name one: {several}")),

@@ -1,36 +1,63 @@
 //! Small stage kinds for the tests of this module.
 
-use crate::message::Message;
+use crate::ros::{Alignment, OccupancyGrid, PoseStamped, RosMessage, Segments};
 use crate::stage::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-const GRID: PortType = PortType::Ros("nav_msgs/msg/OccupancyGrid");
-const POSE: PortType = PortType::Ros("geometry_msgs/msg/PoseStamped");
-const SEGMENTS: PortType = PortType::Ros("gridweave_msgs/msg/Segments");
-const ALIGNMENT: PortType = PortType::Ros("gridweave_msgs/msg/Alignment");
+type Grid = OccupancyGrid<'static>;
 
 /// Stands for every stage: it does nothing.
 struct Idle;
 
-impl Stage for Idle {
-    fn receive(&mut self, _port: usize, _message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
-        Ok(())
-    }
-}
-
 impl Source for Idle {
-    fn next(&mut self, _output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Logged;
+
+    fn next(&mut self, _output: &Output<Logged>) -> Result<bool, StageError> {
         Ok(false)
     }
 }
 
-/// No parameters.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-struct None_ {}
+struct Logged;
 
-impl Parameters for None_ {}
+impl Outputs for Logged {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let _: (Out<Grid>, Out<PoseStamped>) = (ports.output("map", "Maps."), ports.output("pose", "Poses."));
+        ports.any_output("other", "All else.");
+        Self
+    }
+}
+
+struct Walls;
+
+impl Outputs for Walls {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let _: Out<Segments> = ports.output("segments", "Walls.");
+        Self
+    }
+}
+
+struct Alignments;
+
+impl Outputs for Alignments {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let _: Out<Alignment> = ports.output("alignment", "How the maps lie.");
+        Self
+    }
+}
+
+struct Merged;
+
+impl Outputs for Merged {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let _: Out<Grid> = ports.output_on("/map", "map", "The merged map.");
+        Self
+    }
+}
+
+fn ignore<T: RosMessage, O>(_: &mut Idle, _: Received<'_, T>, _: &Output<O>) -> Result<(), StageError> {
+    Ok(())
+}
 
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -98,57 +125,25 @@ impl Parameters for Lines {
     }
 }
 
-fn stage<P: Parameters>(
-    name: &'static str,
-    summary: &'static str,
-    inputs: Vec<InputPort>,
-    outputs: Vec<OutputPort>,
-) -> StageKind {
-    StageKind::stage(name, summary, inputs, outputs, |_: P, _| Ok(Idle))
-}
-
 /// Kinds that look like those of the tag pipeline from outside.
 pub(super) fn registry() -> Registry {
-    let log = StageKind::source(
-        "mcap_source",
-        "Reads logs.",
-        vec![
-            OutputPort::new("map", GRID, "Maps."),
-            OutputPort::new("pose", POSE, "Poses."),
-            OutputPort::new("other", PortType::Any, "All else."),
-        ],
-        |_: Files, _| Ok(Idle),
-    );
     Registry::new([
-        log,
-        stage::<Lines>(
-            "line_extractor",
-            "Finds straight walls.",
-            vec![InputPort::one("map", GRID, "Maps.")],
-            vec![OutputPort::new("segments", SEGMENTS, "Walls.")],
-        ),
-        stage::<None_>(
-            "aligner",
-            "Aligns maps by their walls.",
-            vec![
-                InputPort::one("map", GRID, "Maps."),
-                InputPort::one("segments", SEGMENTS, "Walls."),
-                InputPort::one("guess", ALIGNMENT, "A first guess.").or_none(),
-            ],
-            vec![OutputPort::new("alignment", ALIGNMENT, "How the maps lie.")],
-        ),
-        stage::<None_>(
-            "fuser",
-            "Fuses maps.",
-            vec![InputPort::one("map", GRID, "Maps."), InputPort::many("alignment", ALIGNMENT, "How they lie.")],
-            vec![OutputPort::new("map", GRID, "The merged map.").on_topic("/map")],
-        ),
-        stage::<File>(
-            "mcap_sink",
-            "Writes a log.",
-            vec![InputPort::many("in", PortType::Any, "What to write.")],
-            vec![],
-        ),
+        StageKind::source("mcap_source", "Reads logs.", |_: Files, _: &Context| Ok(Idle)),
+        StageKind::stage("line_extractor", "Finds straight walls.", |_: Lines, _| Ok(Idle))
+            .input("map", "Maps.", ignore::<Grid, Walls>)
+            .build(),
+        StageKind::stage("aligner", "Aligns maps by their walls.", |(): (), _| Ok(Idle))
+            .input("map", "Maps.", ignore::<Grid, Alignments>)
+            .input("segments", "Walls.", ignore::<Segments, _>)
+            .optional_input("guess", "A first guess.", ignore::<Alignment, _>)
+            .build(),
+        StageKind::stage("fuser", "Fuses maps.", |(): (), _| Ok(Idle))
+            .input("map", "Maps.", ignore::<Grid, Merged>)
+            .inputs("alignment", "How they lie.", ignore::<Alignment, _>)
+            .build(),
+        StageKind::stage("mcap_sink", "Writes a log.", |_: File, _| Ok(Idle))
+            .any_inputs("in", "What to write.", |_, _, _: &Output<()>| Ok(()))
+            .build(),
     ])
 }
 

@@ -1,6 +1,6 @@
 //! `geometry_msgs` and `tf2_msgs`.
 
-use super::{Header, RosMessage};
+use super::{Header, ros_messages};
 use nalgebra::{Isometry2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -85,10 +85,6 @@ pub struct PoseStamped {
     pub pose: Pose,
 }
 
-impl RosMessage for PoseStamped {
-    const NAME: &'static str = "geometry_msgs/msg/PoseStamped";
-}
-
 /// `geometry_msgs/msg/PoseWithCovariance`. The covariance is 6 x 6, row by row, over (x, y, z, roll, pitch, yaw).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseWithCovariance {
@@ -104,10 +100,6 @@ pub struct PoseWithCovariance {
 pub struct PoseWithCovarianceStamped {
     pub header: Header,
     pub pose: PoseWithCovariance,
-}
-
-impl RosMessage for PoseWithCovarianceStamped {
-    const NAME: &'static str = "geometry_msgs/msg/PoseWithCovarianceStamped";
 }
 
 impl From<PoseStamped> for PoseWithCovarianceStamped {
@@ -157,6 +149,5 @@ pub struct TFMessage {
     pub transforms: Vec<TransformStamped>,
 }
 
-impl RosMessage for TFMessage {
-    const NAME: &'static str = "tf2_msgs/msg/TFMessage";
-}
+ros_messages!("geometry_msgs": PoseStamped, PoseWithCovarianceStamped);
+ros_messages!("tf2_msgs": TFMessage);

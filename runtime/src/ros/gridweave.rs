@@ -2,7 +2,7 @@
 //!
 //! `T_a_b` takes a point in frame b to frame a. Covariances are row by row.
 
-use super::{Header, RosMessage};
+use super::{Header, ros_messages};
 use nalgebra::{Isometry2, Vector2};
 use serde::{Deserialize, Serialize};
 
@@ -266,17 +266,104 @@ pub struct RobotGroup {
     pub frames: Vec<RobotFrame>,
 }
 
+/// What became of one pair of robots.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// How the maps lie to each other, whether that is used, and why not.
+    pub alignment: Alignment,
+    /// Whether others along a cycle confirm it.
+    pub checked: bool,
+}
+
+/// What became of all pairs of robots of which an alignment has come.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Verdicts {
+    /// Time, and the frame `world`.
+    pub header: Header,
+    /// The pairs, by the names of their robots.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// What the maps of two robots say of the place that was judged for them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Time, and the frame of map a.
+    pub header: Header,
+    /// The robot whose map stays.
+    pub a: String,
+    /// The robot whose map is moved.
+    pub b: String,
+    /// How many places were proposed.
+    pub hypotheses: u32,
+    /// The area that both maps know, square metres.
+    pub overlap: f64,
+    /// The length of walls of one map that lie on walls of the other, metres.
+    pub wall_on_wall: f64,
+    /// The length of walls of one map that lie on free space of the other, metres.
+    pub wall_on_free: f64,
+    /// The most evidence for another place, as a share of that for this one.
+    pub evidence_elsewhere: f64,
+}
+
+/// How far the maps that were fused agree.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapAgreement {
+    /// Time, and the frame of the fused map.
+    pub header: Header,
+    /// The area that one map knows, square metres.
+    pub known_to_one: f64,
+    /// The area that several maps know, square metres.
+    pub known_to_several: f64,
+    /// The part of that on which they contradict each other, square metres.
+    pub in_conflict: f64,
+}
+
+/// Where a simulated robot's map lies in truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueFrame {
+    /// Whose map.
+    pub robot: String,
+    /// Metres in the first robot's map frame.
+    pub x: f64,
+    /// Metres in the first robot's map frame.
+    pub y: f64,
+    /// Radians.
+    pub yaw: f64,
+    /// The middle of the robot's last map, in its map frame, metres.
+    pub centre: [f64; 2],
+}
+
+/// Where a simulated tag is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueTag {
+    /// Which tag.
+    pub tag_id: String,
+    /// Metres in the first robot's map frame.
+    pub x: f64,
+    /// Metres in the first robot's map frame.
+    pub y: f64,
+}
+
+/// What is true of a simulated world.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SimulationTruth {
+    /// Time, and the first robot's map frame.
+    pub header: Header,
+    /// Metres a cell of the first robot's map.
+    pub resolution: f64,
+    /// The robots, by name.
+    pub frames: Vec<TrueFrame>,
+    /// The tags, by id.
+    pub tags: Vec<TrueTag>,
+}
+
 impl RobotFrames {
     /// The name of the frame that all maps are placed in: the reference robot's map frame.
     pub const WORLD: &'static str = "world";
 }
 
-macro_rules! named {
-    ($($type:ident),*) => {$(
-        impl RosMessage for $type {
-            const NAME: &'static str = concat!("gridweave_msgs/msg/", stringify!($type));
-        }
-    )*};
-}
-
-named!(TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames);
+ros_messages!(
+    "gridweave_msgs":
+    TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement,
+    SimulationTruth
+);

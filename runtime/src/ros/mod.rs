@@ -16,14 +16,31 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonTag, CommonTags, MapDirection, RobotFrame, RobotFrames, RobotGroup, Segment, Segments,
-    TagEstimate, TagEstimates, TagRange, UnmergedRobot,
+    Alignment, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RobotFrame, RobotFrames, RobotGroup,
+    Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag, UnmergedRobot,
+    Verdict, Verdicts,
 };
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};
 pub use std_msgs::{Header, Time};
+
+use serde::{Deserialize, Serialize};
 
 /// A message type with a ROS 2 name.
 pub trait RosMessage {
     /// The full name, such as `nav_msgs/msg/OccupancyGrid`.
     const NAME: &'static str;
+
+    /// The type as it is decoded from bytes that live for `'a`: one that borrows from them, or this type itself.
+    type Borrowed<'a>: Serialize + Deserialize<'a>;
 }
+
+/// Gives types that own all their parts their ROS 2 names.
+macro_rules! ros_messages {
+    ($package:literal: $($type:ident),*) => {$(
+        impl $crate::ros::RosMessage for $type {
+            const NAME: &'static str = concat!($package, "/msg/", stringify!($type));
+            type Borrowed<'a> = Self;
+        }
+    )*};
+}
+use ros_messages;

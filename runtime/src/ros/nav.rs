@@ -1,6 +1,6 @@
 //! `nav_msgs`.
 
-use super::{EncodeError, Header, Pose, PoseWithCovariance, RosMessage, Time, Vector3, encode_into};
+use super::{EncodeError, Header, Pose, PoseWithCovariance, RosMessage, Time, Vector3, encode_into, ros_messages};
 use serde::{Deserialize, Serialize};
 
 /// `nav_msgs/msg/MapMetaData`.
@@ -39,6 +39,7 @@ impl<'a> OccupancyGrid<'a> {
 
 impl RosMessage for OccupancyGrid<'_> {
     const NAME: &'static str = "nav_msgs/msg/OccupancyGrid";
+    type Borrowed<'a> = OccupancyGrid<'a>;
 }
 
 /// All of an occupancy grid but its cells: what stands before them in the encoded message.
@@ -82,9 +83,7 @@ pub struct Odometry {
     pub twist_covariance: [[f64; 6]; 6],
 }
 
-impl RosMessage for Odometry {
-    const NAME: &'static str = "nav_msgs/msg/Odometry";
-}
+ros_messages!("nav_msgs": Odometry);
 
 #[cfg(test)]
 mod tests {

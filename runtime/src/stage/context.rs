@@ -13,11 +13,29 @@ pub struct Context {
     pub reference: Option<String>,
     /// How topics are told apart.
     pub robots: RobotTopics,
-    /// For every input of the stage, in order: the ROS 2 type, empty for any.
-    pub input_types: Vec<String>,
-    /// For every input of the stage, in order: the topic that its messages get in a log, with `{robot}` for the
-    /// robot's name; empty if they bring topics of their own, as those of a source do.
-    pub input_topics: Vec<String>,
+    /// What is wired to the stage, in the order of its wires: see [`Message::wire`](crate::message::Message::wire).
+    pub inputs: Vec<InputWire>,
+}
+
+impl Context {
+    /// Whether anything is wired to the input port of the given name.
+    pub fn is_wired(&self, port: &str) -> bool {
+        self.inputs.iter().any(|wire| wire.port == port)
+    }
+}
+
+/// An output of another stage that is wired to an input.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct InputWire {
+    /// The input port that it is wired to.
+    pub port: &'static str,
+    /// The stage that the output belongs to.
+    pub from: String,
+    /// The ROS 2 type of its messages; empty for any.
+    pub ros_type: String,
+    /// The topic that its messages get in a log, with `{robot}` for the robot's name; empty if they bring topics of their
+    /// own, as those of a source do.
+    pub topic: String,
 }
 
 /// How the topics of a log are told apart: patterns in which `{robot}` stands for any one part of a path.

@@ -1,111 +1,16 @@
 //! Stage kinds: what a stage looks like from outside, and how one is made.
 
-use super::{Context, ParameterError, Parameters, Source, Stage, StageError};
-use crate::ros::RosMessage;
+use super::builder::StageBuilder;
+use super::node::{Node, Role, RunningSource};
+use super::{
+    Context, InputPort, Output, OutputEnd, OutputPort, OutputPorts, Outputs, ParameterError, Parameters, StageError,
+};
 use schemars::Schema;
 use std::fmt;
 use std::sync::Arc;
 
-/// The type of the messages of a port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PortType {
-    /// One ROS 2 type, by name.
-    Ros(&'static str),
-    /// Any: each message's channel says what it is.
-    Any,
-}
-
-impl PortType {
-    /// The port type of `T`.
-    pub const fn of<T: RosMessage>() -> Self {
-        Self::Ros(T::NAME)
-    }
-}
-
-impl fmt::Display for PortType {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ros(name) => name,
-            Self::Any => "any",
-        })
-    }
-}
-
-/// An input of a stage kind.
-#[derive(Clone, Debug)]
-pub struct InputPort {
-    /// Its name.
-    pub name: &'static str,
-    /// The type it takes.
-    pub port_type: PortType,
-    /// Whether any number of outputs may be wired to it; otherwise it is one.
-    pub many: bool,
-    /// Whether it may be left unwired.
-    pub optional: bool,
-    /// What it is for.
-    pub summary: &'static str,
-}
-
-impl InputPort {
-    /// An input that must be wired to one output.
-    pub const fn one(name: &'static str, port_type: PortType, summary: &'static str) -> Self {
-        Self { name, port_type, many: false, optional: false, summary }
-    }
-
-    /// An input that any number of outputs may be wired to, but at least one.
-    pub const fn many(name: &'static str, port_type: PortType, summary: &'static str) -> Self {
-        Self { name, port_type, many: true, optional: false, summary }
-    }
-
-    /// The same input, which may be left unwired.
-    #[must_use]
-    pub const fn or_none(mut self) -> Self {
-        self.optional = true;
-        self
-    }
-}
-
-/// An output of a stage kind.
-#[derive(Clone, Debug)]
-pub struct OutputPort {
-    /// Its name.
-    pub name: &'static str,
-    /// The type it gives.
-    pub port_type: PortType,
-    /// The topic that its messages get in a log, where it is not `/{robot}/{stage}/{port}`; `{robot}` and `{stage}`
-    /// are put in.
-    pub topic: Option<&'static str>,
-    /// What it carries.
-    pub summary: &'static str,
-}
-
-impl OutputPort {
-    /// An output whose messages get the topic `/{robot}/{stage}/{port}` or, if they are about no robot in particular,
-    /// `/{stage}/{port}`.
-    pub const fn new(name: &'static str, port_type: PortType, summary: &'static str) -> Self {
-        Self { name, port_type, topic: None, summary }
-    }
-
-    /// The same output, with a topic of its own.
-    #[must_use]
-    pub const fn on_topic(mut self, topic: &'static str) -> Self {
-        self.topic = Some(topic);
-        self
-    }
-}
-
-/// A stage, ready to run.
-pub enum Node {
-    /// It has inputs.
-    Stage(Box<dyn Stage>),
-    /// It has none.
-    Source(Box<dyn Source>),
-    /// It has none, and its messages come from outside of the run.
-    External,
-}
-
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
-type MakeFn = dyn Fn(toml::Table, &Context) -> Result<Node, StageError> + Send + Sync;
+type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
 
 /// A kind of stage: its name, ports and parameters, and how to make one.
 #[derive(Clone)]
@@ -124,57 +29,90 @@ pub struct StageKind {
     make: Arc<MakeFn>,
 }
 
+/// A stage without inputs: it makes the messages that start everything else.
+pub trait Source: 'static {
+    /// Its output ports.
+    type Outputs: Outputs;
+
+    /// Sends the next message or the next few, by rising log time over all ports together. `false` when there are no
+    /// more.
+    fn next(&mut self, output: &Output<Self::Outputs>) -> Result<bool, StageError>;
+
+    /// How much of its work is done, 0 to 1, if it can tell.
+    fn progress(&self) -> Option<f64> {
+        None
+    }
+}
+
 impl StageKind {
-    /// A kind of stage with parameters `P`.
-    pub fn stage<P, S>(
+    /// Begins a kind of stage with parameters `P`, state `S` and outputs `O`: `make` gives the state from the parameters.
+    /// What it takes, and what it does with it, is added to what this gives.
+    pub fn stage<P, S, O>(
         name: &'static str,
         summary: &'static str,
-        inputs: Vec<InputPort>,
-        outputs: Vec<OutputPort>,
         make: impl Fn(P, &Context) -> Result<S, StageError> + Send + Sync + 'static,
-    ) -> Self
+    ) -> StageBuilder<P, S, O>
     where
         P: Parameters,
-        S: Stage + 'static,
+        S: 'static,
+        O: Outputs,
     {
-        Self::with::<P>(name, summary, inputs, outputs, move |parameters, context| {
-            Ok(Node::Stage(Box::new(make(parameters, context)?)))
-        })
+        StageBuilder::new(name, summary, make)
     }
 
     /// A kind of source with parameters `P`.
     pub fn source<P, S>(
         name: &'static str,
         summary: &'static str,
-        outputs: Vec<OutputPort>,
         make: impl Fn(P, &Context) -> Result<S, StageError> + Send + Sync + 'static,
     ) -> Self
     where
         P: Parameters,
-        S: Source + 'static,
+        S: Source,
     {
-        Self::with::<P>(name, summary, Vec::new(), outputs, move |parameters, context| {
-            Ok(Node::Source(Box::new(make(parameters, context)?)))
-        })
+        Self::source_with(name, summary, S::Outputs::declare, make)
     }
 
-    /// A kind of source whose messages come from outside of a live run: from programs that send on its outputs.
-    pub fn external<P: Parameters>(name: &'static str, summary: &'static str, outputs: Vec<OutputPort>) -> Self {
-        let kind = Self::with::<P>(name, summary, Vec::new(), outputs, |_, _| Ok(Node::External));
+    /// A kind of source whose outputs are known only when the program runs: `declare` names them.
+    pub fn source_with<P, S>(
+        name: &'static str,
+        summary: &'static str,
+        declare: impl Fn(&mut OutputPorts) -> S::Outputs + Send + Sync + 'static,
+        make: impl Fn(P, &Context) -> Result<S, StageError> + Send + Sync + 'static,
+    ) -> Self
+    where
+        P: Parameters,
+        S: Source,
+    {
+        let mut declared = OutputPorts::default();
+        drop(declare(&mut declared));
+        let make = move |parameters, context: &Context, mut ports: OutputPorts| {
+            let outputs = declare(&mut ports);
+            let output = ports.tied_to(outputs);
+            let source = make(parameters, context)?;
+            Ok(Node { role: Role::Source(Box::new(Running { source, output })), sent: ports.counted() })
+        };
+        Self::new::<P>(name, summary, Vec::new(), declared.into_declared(), make)
+    }
+
+    /// A kind of source whose messages come from outside of a live run: from programs that send on its outputs `O`.
+    pub fn external<O: Outputs>(name: &'static str, summary: &'static str) -> Self {
+        let mut declared = OutputPorts::default();
+        drop(O::declare(&mut declared));
+        let make = |(), _: &Context, mut ports: OutputPorts| {
+            drop(O::declare(&mut ports));
+            Ok(Node { role: Role::External, sent: ports.counted() })
+        };
+        let kind = Self::new::<()>(name, summary, Vec::new(), declared.into_declared(), make);
         Self { external: true, ..kind }
     }
 
-    /// Whether its messages come from outside of the run.
-    pub fn is_external(&self) -> bool {
-        self.external
-    }
-
-    fn with<P: Parameters>(
+    pub(super) fn new<P: Parameters>(
         name: &'static str,
         summary: &'static str,
         inputs: Vec<InputPort>,
         outputs: Vec<OutputPort>,
-        make: impl Fn(P, &Context) -> Result<Node, StageError> + Send + Sync + 'static,
+        make: impl Fn(P, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync + 'static,
     ) -> Self {
         Self {
             name,
@@ -182,17 +120,22 @@ impl StageKind {
             inputs,
             outputs,
             external: false,
-            schema: schemars::schema_for!(P),
-            check: Arc::new(|table| Ok(P::deserialize(table.clone())?.check())),
-            make: Arc::new(move |table, context| {
+            schema: P::schema(),
+            check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
+            make: Arc::new(move |table, context, ports| {
                 let doing = || format!("read the parameters of stage `{}`", context.stage);
-                let parameters = P::deserialize(table).map_err(|error| StageError::new(doing(), error.message()))?;
+                let parameters = P::read(table).map_err(|error| StageError::new(doing(), error.message()))?;
                 if let Some(error) = parameters.check().first() {
                     return Err(StageError::new(doing(), error));
                 }
-                make(parameters, context)
+                make(parameters, context, ports)
             }),
         }
+    }
+
+    /// Whether its messages come from outside of the run.
+    pub fn is_external(&self) -> bool {
+        self.external
     }
 
     /// The JSON schema of the parameters: names, types, defaults and the doc comments of the code.
@@ -206,14 +149,32 @@ impl StageKind {
         (self.check)(table)
     }
 
-    /// Makes a stage of this kind.
-    pub fn make(&self, parameters: toml::Table, context: &Context) -> Result<Node, StageError> {
-        (self.make)(parameters, context)
+    /// Makes a stage of this kind whose output ports lead to `ends`, in their order; those beyond it lead nowhere.
+    ///
+    /// # Errors
+    /// The parameters are wrong, or the stage cannot begin.
+    pub fn make(&self, parameters: toml::Table, context: &Context, ends: Vec<OutputEnd>) -> Result<Node, StageError> {
+        (self.make)(parameters, context, OutputPorts::leading_to(ends))
     }
 }
 
 impl fmt::Debug for StageKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("StageKind").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+struct Running<S: Source> {
+    source: S,
+    output: Output<S::Outputs>,
+}
+
+impl<S: Source> RunningSource for Running<S> {
+    fn next(&mut self) -> Result<bool, StageError> {
+        self.source.next(&self.output)
+    }
+
+    fn progress(&self) -> Option<f64> {
+        self.source.progress()
     }
 }

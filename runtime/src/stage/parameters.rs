@@ -1,6 +1,7 @@
 //! The parameters of a stage kind.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, schema_for};
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 /// A value of a parameter that its type allows and its meaning does not.
@@ -21,10 +22,38 @@ impl ParameterError {
 }
 
 /// The parameters of a stage kind: a struct with `#[serde(default, deny_unknown_fields)]`, whose doc comments are the
-/// reference that `gridweave kinds` prints. Lengths are metres, angles radians, times seconds.
+/// reference that `gridweave kinds` prints; or `()` for none. Lengths are metres, angles radians, times seconds.
 pub trait Parameters: DeserializeOwned + JsonSchema + Default + 'static {
     /// Every value that is out of its range.
     fn check(&self) -> Vec<ParameterError> {
         Vec::new()
     }
+
+    /// The parameters as a pipeline file has them.
+    ///
+    /// # Errors
+    /// A value has another type, or there is no parameter of that name.
+    fn read(table: toml::Table) -> Result<Self, toml::de::Error> {
+        Self::deserialize(table)
+    }
+
+    /// The JSON schema of the parameters.
+    fn schema() -> Schema {
+        schema_for!(Self)
+    }
 }
+
+impl Parameters for () {
+    fn read(table: toml::Table) -> Result<Self, toml::de::Error> {
+        NoParameters::deserialize(table).map(drop)
+    }
+
+    fn schema() -> Schema {
+        schema_for!(NoParameters)
+    }
+}
+
+/// A table without entries.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct NoParameters {}

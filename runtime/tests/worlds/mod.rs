@@ -5,7 +5,8 @@ use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
-    Context, InputPort, Output, OutputPort, Parameters, PortType, Registry, Source, Stage, StageError, StageKind,
+    AnyMessage, Context, InputPort, Out, Output, OutputPorts, Outputs, Parameters, PortType, Received, Registry,
+    Source, StageError, StageKind,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -79,8 +80,31 @@ struct Counter {
     stall: Stall,
 }
 
+/// All numbers, and some of them.
+struct Counted {
+    a: Out<AnyMessage>,
+    b: Out<AnyMessage>,
+}
+
+impl Outputs for Counted {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self { a: ports.encoded_output(TEXT, "a", "all"), b: ports.encoded_output(TEXT, "b", "some") }
+    }
+}
+
+/// What came in.
+struct Passed(Out<AnyMessage>);
+
+impl Outputs for Passed {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.encoded_output(TEXT, "out", "what came in"))
+    }
+}
+
 impl Source for Counter {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Counted;
+
+    fn next(&mut self, output: &Output<Counted>) -> Result<bool, StageError> {
         let p = &self.parameters;
         if self.next == p.count {
             return Ok(false);
@@ -96,9 +120,9 @@ impl Source for Counter {
         let bytes: Vec<u8> = (0..size).map(|place| (number as usize * 31 + place) as u8).collect();
         let header = MessageHeader { log_time: LogTime(time), publish_time: number, ..Default::default() };
         output.set_log_time(LogTime(time));
-        output.send_encoded(0, header, &bytes)?;
+        output.a.send_encoded(header, &bytes)?;
         if p.both && number.is_multiple_of(3) {
-            output.send_encoded(1, header, &bytes)?;
+            output.b.send_encoded(header, &bytes)?;
         }
         Ok(true)
     }
@@ -119,8 +143,8 @@ impl Relay {
     }
 }
 
-impl Stage for Relay {
-    fn receive(&mut self, port: usize, message: &Message, output: &mut Output<'_>) -> Result<(), StageError> {
+impl Relay {
+    fn receive(&mut self, message: &Message, output: &Output<Passed>) -> Result<(), StageError> {
         self.seen += 1;
         self.stall.wait();
         if self.seen == 20 && self.parameters.fail {
@@ -129,15 +153,15 @@ impl Stage for Relay {
         assert!(!(self.seen == 20 && self.parameters.panic), "on purpose");
         if self.parameters.keep_every > 0 && self.seen.is_multiple_of(self.parameters.keep_every) {
             let mut bytes = message.bytes().to_vec();
-            bytes.push(port as u8 + message.wire() as u8);
-            output.send_encoded(0, *message.header(), &bytes)?;
+            bytes.push(message.wire() as u8);
+            output.0.send_encoded(*message.header(), &bytes)?;
         }
         Ok(())
     }
 
-    fn finish(&mut self, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn finish(&mut self, output: &Output<Passed>) -> Result<(), StageError> {
         let header = MessageHeader { log_time: output.log_time(), ..Default::default() };
-        output.send_encoded(0, header, &self.seen.to_le_bytes())
+        output.0.send_encoded(header, &self.seen.to_le_bytes())
     }
 }
 
@@ -157,8 +181,8 @@ impl Recorder {
     }
 }
 
-impl Stage for Recorder {
-    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
+impl Recorder {
+    fn receive(&mut self, message: &Message, _: &Output<()>) -> Result<(), StageError> {
         self.stall.wait();
         self.count += 1;
         self.add(message.header().log_time.0.to_le_bytes());
@@ -170,10 +194,12 @@ impl Stage for Recorder {
         Ok(())
     }
 
-    fn finish(&mut self, _output: &mut Output<'_>) -> Result<(), StageError> {
+    fn finish(&mut self, output: &Output<()>) -> Result<(), StageError> {
         for message in std::mem::take(&mut self.kept) {
             self.add(message.bytes().to_vec());
         }
+        output.count("messages", self.count);
+        output.count("hash", self.hash);
         Ok(())
     }
 
@@ -182,80 +208,78 @@ impl Stage for Recorder {
             std::fs::write(&self.parameters.abort_file, reason).unwrap();
         }
     }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        Some(serde_json::json!({ "count": self.count, "hash": format!("{:016x}", self.hash) }))
-    }
 }
 
 /// Writes messages in place and notes where.
 struct Writer {
     size: usize,
-    places: Vec<usize>,
+    sent: u64,
+}
+
+struct Written(Out<OccupancyGrid<'static>>);
+
+impl Outputs for Written {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("out", "grids"))
+    }
 }
 
 impl Source for Writer {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Written;
+
+    fn next(&mut self, output: &Output<Written>) -> Result<bool, StageError> {
         let info = MapMetaData { width: self.size as u32, height: 1, ..Default::default() };
-        output.set_log_time(LogTime(self.places.len() as u64));
-        output.send_grid(0, "", &GridPrefix { info, ..Default::default() }, |cells| {
-            self.places.push(cells.as_ptr() as usize);
+        output.set_log_time(LogTime(self.sent));
+        output.0.send_grid("", &GridPrefix { info, ..Default::default() }, |cells| {
+            note_place(cells, output);
             cells.fill(7);
             Ok(())
         })?;
-        Ok(self.places.len() < 5)
-    }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        Some(self.places.clone().into())
+        self.sent += 1;
+        Ok(self.sent < 5)
     }
 }
 
 /// Notes where the cells lie that it reads.
-#[derive(Default)]
-struct Reader(Vec<usize>);
+fn read(_: &mut (), grid: Received<'_, OccupancyGrid<'_>>, output: &Output<()>) -> Result<(), StageError> {
+    assert!(grid.cells().iter().all(|cell| *cell == 7));
+    note_place(grid.cells(), output);
+    Ok(())
+}
 
-impl Stage for Reader {
-    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
-        let grid: OccupancyGrid<'_> = message.decode().unwrap();
-        assert!(grid.cells().iter().all(|cell| *cell == 7));
-        self.0.push(grid.cells().as_ptr() as usize);
-        Ok(())
-    }
-
-    fn report(&self) -> Option<serde_json::Value> {
-        Some(self.0.clone().into())
-    }
+/// Counts the addresses of messages: the sums are equal where the reader sees the memory that the writer has filled.
+fn note_place<O>(cells: &[i8], output: &Output<O>) {
+    output.count("places", cells.as_ptr() as u64 >> 4);
 }
 
 /// The kinds `writer`, `reader`, `counter`, `relay`, `filter` and `join` (a relay of one and of many), and `recorder`.
 pub fn registry() -> Registry {
-    let out = || vec![OutputPort::new("out", TEXT, "what came in")];
-    let one = || vec![InputPort::one("in", TEXT, "anything")];
-    let many = || vec![InputPort::many("in", TEXT, "anything")];
+    let input = |many| InputPort { name: "in", port_type: TEXT, many, optional: false, summary: "anything" };
+    let relay = |name, summary, many| {
+        let kind = StageKind::stage(name, summary, Relay::new).encoded_input(input(many), Relay::receive);
+        kind.finish(Relay::finish).build()
+    };
+    let recorder = |parameters: TestParameters, context: &Context| {
+        let stall = Stall { most: parameters.stall, state: context.seed };
+        Ok(Recorder { parameters, hash: 0x2325, count: 0, kept: Vec::new(), stall })
+    };
     Registry::new([
-        StageKind::source(
-            "counter",
-            "Counts.",
-            vec![OutputPort::new("a", TEXT, "all"), OutputPort::new("b", TEXT, "some")],
-            |parameters: TestParameters, context: &Context| {
-                let stall = Stall { most: parameters.stall, state: context.seed };
-                Ok(Counter { parameters, next: 0, stall })
-            },
-        ),
-        StageKind::source("writer", "Writes grids.", out(), |parameters: TestParameters, _: &Context| {
-            Ok(Writer { size: parameters.size, places: Vec::new() })
-        }),
-        StageKind::stage("reader", "Reads grids.", one(), vec![], |_: TestParameters, _: &Context| {
-            Ok(Reader::default())
-        }),
-        StageKind::stage("relay", "Passes on.", one(), out(), Relay::new),
-        StageKind::stage("filter", "Passes some on.", one(), out(), Relay::new),
-        StageKind::stage("join", "Passes on what comes on any.", many(), out(), Relay::new),
-        StageKind::stage("recorder", "Hashes.", many(), vec![], |parameters: TestParameters, context: &Context| {
+        StageKind::source("counter", "Counts.", |parameters: TestParameters, context: &Context| {
             let stall = Stall { most: parameters.stall, state: context.seed };
-            Ok(Recorder { parameters, hash: 0xcbf2_9ce4_8422_2325, count: 0, kept: Vec::new(), stall })
+            Ok(Counter { parameters, next: 0, stall })
         }),
+        StageKind::source("writer", "Writes grids.", |parameters: TestParameters, _: &Context| {
+            Ok(Writer { size: parameters.size, sent: 0 })
+        }),
+        StageKind::stage("reader", "Reads grids.", |_: TestParameters, _| Ok(())).input("in", "grids", read).build(),
+        relay("relay", "Passes on.", false),
+        relay("filter", "Passes some on.", false),
+        relay("join", "Passes on what comes on any.", true),
+        StageKind::stage("recorder", "Hashes.", recorder)
+            .encoded_input(input(true), Recorder::receive)
+            .finish(Recorder::finish)
+            .abort(Recorder::abort)
+            .build(),
     ])
 }
 

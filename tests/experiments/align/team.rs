@@ -68,7 +68,7 @@ pub(super) fn run(
             stages.map(|stage| stage.busy.as_secs_f64()).sum::<f64>()
         };
         let total: f64 = merge.report.stages.iter().map(|stage| stage.busy.as_secs_f64()).sum();
-        let searches = merge.report.results("map_aligner").find_map(|(_, report)| report["searches"].as_u64());
+        let searches = merge.report.stages.iter().find_map(|stage| stage.counts.get("searches"));
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
         let outcomes = [Outcome::Right, Outcome::Wrong, Outcome::Refused].map(count);
         let errors = [median(&metres), quantile(&metres, 1.0), median(&degrees), quantile(&degrees, 1.0)].map(number);

@@ -1,14 +1,16 @@
 //! What became of one pair of robots.
 
 use super::worlds::PairWorld;
-use crate::log::last_maps;
+use crate::log::{last_maps, read_messages};
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Evaluation, Outcome, evaluate};
+use gridweave::evaluate::{Evaluation, Outcome, evaluate_summary};
 use gridweave_logs::map_file::GridMap;
-use gridweave_runtime::engine::RunReport;
+use gridweave_logs::summary::{Frame, Summary};
+use gridweave_runtime::ros::{Evidence, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
 use nalgebra::{Isometry2, Point2, Vector2};
-use serde_json::{Value, json};
+use serde_json::Value;
+use std::collections::BTreeMap;
 
 /// What the verifier went by, and whether what it judged best is right.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +84,7 @@ impl PairTrial {
 pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Result<Vec<PairTrial>> {
     let merge = pair.world.merge(pipeline, &[], registry)?;
     let is_pair = merge.evaluation.robots.len() == 1;
-    let judged = if is_pair { judged(pair, &merge.report)? } else { None };
+    let judged = if is_pair { judged(pair, &merge.summary)? } else { None };
     let overlap = if is_pair && merge.evaluation.related { overlap(pair)? } else { None };
     let Evaluation { robots, .. } = merge.evaluation;
     let trial = |robot: gridweave::evaluate::RobotResult| PairTrial {
@@ -99,26 +101,19 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
 }
 
 /// What the verifier has said of the only pair, and whether its best hypothesis is right, even where it was refused.
-fn judged(pair: &PairWorld, report: &RunReport) -> Result<Option<Judged>> {
-    let evidence = report.results("merge_verifier").find_map(|(_, report)| report["pairs"].get(0).cloned());
-    let alignment = report.results("frame_solver").find_map(|(_, report)| report["alignments"].get(0).cloned());
-    let Some((evidence, alignment)) = evidence.zip(alignment) else { return Ok(None) };
-    let number = |value: &Value| value.as_f64().unwrap_or_default();
-    let pose = json!({ "x": alignment["x"], "y": alignment["y"], "yaw": alignment["yaw"] });
-    let origin = json!({ "x": 0.0, "y": 0.0, "yaw": 0.0 });
-    let frames = json!({
-        alignment["a"].as_str().unwrap_or_default(): origin,
-        alignment["b"].as_str().unwrap_or_default(): pose,
-    });
-    let path = pair.world.output().with_extension("judged.json");
-    std::fs::write(&path, json!({ "reference": alignment["a"], "frames": frames }).to_string())
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    let evaluation = evaluate(&path, &pair.world.truth)?;
+fn judged(pair: &PairWorld, summary: &Summary) -> Result<Option<Judged>> {
+    let mut last = None;
+    read_messages(&pair.world.output(), Evidence::NAME, |_, data| last = decode::<Evidence>(data).ok())?;
+    let Some((evidence, best)) = last.zip(summary.alignments.first()) else { return Ok(None) };
+    let placed = Frame { x: best.x, y: best.y, yaw: best.yaw, ..Default::default() };
+    let frames = BTreeMap::from([(best.a.clone(), Frame::default()), (best.b.clone(), placed)]);
+    let placed = Summary { reference: Some(best.a.clone()), frames, ..Default::default() };
+    let evaluation = evaluate_summary(&placed, &pair.world.truth)?;
     Ok(Some(Judged {
-        score: number(&alignment["score"]),
-        wall_on_wall: number(&evidence["wall_on_wall_m"]),
-        wall_on_free: number(&evidence["wall_on_free_m"]),
-        evidence_elsewhere: number(&evidence["evidence_elsewhere"]),
+        score: best.score,
+        wall_on_wall: evidence.wall_on_wall,
+        wall_on_free: evidence.wall_on_free,
+        evidence_elsewhere: evidence.evidence_elsewhere,
         is_right: evaluation.related && evaluation.right == 1,
     }))
 }

@@ -3,11 +3,11 @@
 use crate::log::read_messages;
 use crate::trial::World;
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Outcome, evaluate};
+use gridweave::evaluate::{Outcome, evaluate_summary};
 use gridweave::table::Table;
+use gridweave_logs::summary::{Pair, Summary};
 use gridweave_runtime::ros::{RobotFrames, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
-use serde_json::{Map, Value, json};
 
 /// The pipeline under test.
 const PIPELINE: &str = "tag_merge";
@@ -33,16 +33,12 @@ impl PairOutcome {
         let merge = world.merge(PIPELINE, settings, registry)?;
         let robot = merge.evaluation.robots.iter().find(|robot| robot.robot == robot_b);
         let robot = robot.with_context(|| format!("{} does not hold {robot_b}", world.log.display()))?;
-        let few = |alignment: &Value| {
-            let method = alignment["method"].as_str().unwrap_or_default();
-            alignment["accepted"] == true && method.starts_with("few tags")
-        };
-        let alignments = merge.report.results("frame_solver").find_map(|(_, result)| result["alignments"].as_array());
+        let few = |pair: &Pair| pair.accepted && pair.method.starts_with("few tags");
         Ok(Self {
             outcome: robot.outcome,
             ever_wrong: ever_wrong(world)?,
             errors: robot.error_m.zip(robot.error_deg),
-            is_provisional: alignments.is_some_and(|alignments| alignments.iter().any(few)),
+            is_provisional: merge.summary.alignments.iter().any(few),
             reason: robot.reason.clone().unwrap_or_default(),
         })
     }
@@ -70,14 +66,11 @@ fn ever_wrong(world: &World) -> Result<bool> {
     if let Some(error) = broken {
         return Err(error).context("cannot read the frames of a merge");
     }
-    let folder = tempfile::tempdir().context("cannot make a folder for summaries")?;
-    let path = folder.path().join("summary.json");
     for found in frames.iter().filter(|found| found.frames.len() > 1) {
-        let pose = |frame: &gridweave_runtime::ros::RobotFrame| json!({"x": frame.x, "y": frame.y, "yaw": frame.yaw});
-        let poses: Map<String, Value> = found.frames.iter().map(|frame| (frame.robot.clone(), pose(frame))).collect();
-        let summary = json!({"reference": found.reference, "frames": poses});
-        std::fs::write(&path, summary.to_string()).with_context(|| format!("cannot write {}", path.display()))?;
-        if evaluate(&path, &world.truth)?.wrong > 0 {
+        let mut summary = Summary::default();
+        summary.set_frames(found);
+        summary.unmerged.clear();
+        if evaluate_summary(&summary, &world.truth)?.wrong > 0 {
             return Ok(true);
         }
     }

@@ -61,8 +61,7 @@ impl Record {
         alignment: Option<OneAlignment>,
         merge: &Merge,
     ) -> Self {
-        let found = merge.summary.frames().find(|(name, _)| *name == robot.robot);
-        let found = found.map(|(_, [x, y, yaw])| pose(x, y, yaw));
+        let found = merge.summary.frames.get(&robot.robot).map(|frame| pose(frame.x, frame.y, frame.yaw));
         let error = match (robot.error_m, robot.error_deg, robot.transform_true_found, found, maps) {
             (Some(metres), Some(degrees), Some(transform_true_found), Some(found), Some(maps)) => {
                 let square_metres = mean_square_distance(&maps.b, &Pose2::identity(), &transform_true_found);

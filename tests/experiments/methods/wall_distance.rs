@@ -2,7 +2,7 @@
 
 use super::one_alignment::PairMaps;
 use gridweave_stages::geometry::Pose2;
-use gridweave_stages::icp_refiner::WallMap;
+use gridweave_stages::walls::WallMap;
 
 /// Walls farther apart than this are not the same wall, metres.
 const SAME_WALL: f64 = 0.1;

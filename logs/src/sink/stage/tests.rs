@@ -2,7 +2,7 @@ use super::*;
 use crate::sink::kind;
 use gridweave_runtime::message::{LogTime, MessageHeader};
 use gridweave_runtime::ros::{self, OccupancyGrid, Segments, TFMessage};
-use gridweave_runtime::stage::{CollectedOutputs, Node};
+use gridweave_runtime::stage::{InputWire, LoneStage};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -14,34 +14,29 @@ const SEGMENTS: &str = "gridweave_msgs/msg/Segments";
 /// A sink with two sources on wires 0 and 1, and results on wires 2 (`/map`), 3 (`/tf_static`) and 4 (segments).
 struct Run {
     folder: TempDir,
-    sink: Box<dyn Stage>,
-    outputs: CollectedOutputs,
+    sink: LoneStage,
 }
 
 fn context() -> Context {
-    let of = |names: [&str; 5]| names.map(str::to_owned).to_vec();
-    Context {
-        stage: "sink".into(),
-        input_types: of(["", "", GRID, TF, SEGMENTS]),
-        input_topics: of(["", "", "/map", "/tf_static", "/{robot}/lines/segments"]),
+    let wires = [("", ""), ("", ""), (GRID, "/map"), (TF, "/tf_static"), (SEGMENTS, "/{robot}/lines/segments")];
+    let wire = |(ros_type, topic): (&str, &str)| InputWire {
+        port: "messages",
+        ros_type: ros_type.into(),
+        topic: topic.into(),
         ..Default::default()
-    }
+    };
+    Context { stage: "sink".into(), inputs: wires.map(wire).to_vec(), ..Default::default() }
 }
 
-fn make(file: &Path, more: &str) -> Result<Box<dyn Stage>, StageError> {
-    let mut parameters: toml::Table = more.parse().unwrap();
-    parameters.insert("file".into(), file.to_str().unwrap().into());
-    match kind().make(parameters, &context())? {
-        Node::Stage(stage) => Ok(stage),
-        Node::Source(_) | Node::External => panic!("a sink has inputs"),
-    }
+fn make(file: &Path, more: &str) -> Result<LoneStage, StageError> {
+    LoneStage::with_context(&kind(), &format!("file = {file:?}\n{more}"), &context())
 }
 
 impl Run {
     fn new(more: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let sink = make(&folder.path().join("out.mcap"), more).unwrap();
-        Self { folder, sink, outputs: CollectedOutputs::new(&kind()) }
+        Self { folder, sink }
     }
 
     fn file(&self) -> PathBuf {
@@ -57,7 +52,7 @@ impl Run {
             schema: b"# from the input".to_vec(),
             metadata: BTreeMap::from([("offered_qos_profiles".into(), "theirs".into())]),
         };
-        self.sink.announce(wire, number, &channel).unwrap();
+        self.sink.node().announce(wire, number, &channel).unwrap();
     }
 
     /// A message of the input's channel `number`.
@@ -80,11 +75,11 @@ impl Run {
             ..Default::default()
         };
         let message = Message::from_vec(header, bytes.to_vec()).on_wire(wire);
-        self.sink.receive(0, &message, &mut self.outputs.output(LogTime(time)))
+        self.sink.give_message("messages", message)
     }
 
     fn finish(&mut self) {
-        self.sink.finish(&mut self.outputs.output(LogTime(0))).unwrap();
+        self.sink.finish(LogTime(0)).unwrap();
     }
 
     fn log(&self) -> Log {
@@ -158,7 +153,7 @@ fn results_and_input_are_written_with_all_that_is_known_of_them() {
     assert_eq!(schema.data.as_ref(), crate::schemas::schema_text(GRID).unwrap().as_bytes());
     assert!(map.metadata["offered_qos_profiles"].contains("durability: 1"));
     assert_eq!(log.outcome, BTreeMap::from([("complete".into(), "true".into())]));
-    assert!(run.outputs.warnings().is_empty());
+    assert!(run.sink.warnings().is_empty());
 }
 
 #[test]
@@ -211,7 +206,8 @@ fn the_input_cannot_pass_for_a_result() {
     run.result(2, "/map", 5, b"ours").unwrap();
     run.finish();
     assert_eq!(run.log().topics(), ["/robot1/map", "/map"]);
-    let warnings: Vec<_> = run.outputs.warnings().iter().map(|(text, count)| (text.as_str(), *count)).collect();
+    let warnings = run.sink.warnings();
+    let warnings: Vec<_> = warnings.iter().map(|(text, count)| (text.as_str(), *count)).collect();
     let text = |topic| format!("the input's messages on {topic} were left out: a result of this run has that topic");
     assert_eq!(warnings, [(text("/map").as_str(), 2), (text("/robot1/lines/segments").as_str(), 1)]);
 }
@@ -262,7 +258,7 @@ fn a_large_message_has_a_chunk_of_its_own() {
 fn a_failed_run_leaves_a_log_that_says_so() {
     let mut run = Run::new("");
     run.result(2, "/map", 1, b"grid").unwrap();
-    run.sink.abort("stage `lines` failed");
+    run.sink.node().abort("stage `lines` failed");
     let log = run.log();
     assert_eq!(log.topics(), ["/map"]);
     let expected = [("complete", "false"), ("reason", "stage `lines` failed")];
@@ -273,7 +269,7 @@ fn a_failed_run_leaves_a_log_that_says_so() {
 fn a_run_that_fails_at_once_leaves_the_log_of_an_earlier_run_alone() {
     let mut run = Run::new("");
     fs::write(run.file(), "earlier").unwrap();
-    run.sink.abort("no input");
+    run.sink.node().abort("no input");
     assert_eq!(fs::read(run.file()).unwrap(), b"earlier");
 }
 
@@ -344,12 +340,11 @@ fn bad_paths_are_refused_with_what_would_mend_them() {
 #[test]
 fn a_full_disk_is_an_error() {
     let mut sink = make(Path::new("/dev/full"), "chunk_size = 1024").unwrap();
-    let mut outputs = CollectedOutputs::new(&kind());
     let message = Message::from_vec(MessageHeader::default(), vec![0; 5000]).on_wire(2);
-    let received = sink.receive(0, &message, &mut outputs.output(LogTime(0)));
-    let error = received.and_then(|()| sink.finish(&mut outputs.output(LogTime(0)))).unwrap_err().to_string();
+    let received = sink.give_message("messages", message);
+    let error = received.and_then(|()| sink.finish(LogTime(0))).unwrap_err().to_string();
     assert!(error.contains("there is no room left for /dev/full; make room on its disk"), "{error}");
-    sink.abort("no room");
+    sink.node().abort("no room");
 }
 
 #[test]
@@ -368,20 +363,6 @@ fn a_message_of_which_nothing_is_known_is_an_error() {
     assert!(error.starts_with("cannot write a message on /other: nothing says what type it has"), "{error}");
     let error = run.input(0, 3, 1, b"").unwrap_err().to_string();
     assert!(error.contains("its channel, 3, was not announced"), "{error}");
-}
-
-#[test]
-fn the_report_counts_messages_and_bytes_by_topic() {
-    let mut run = Run::new("");
-    run.announce(0, 1, "/scan", "sensor_msgs/msg/LaserScan");
-    run.input(0, 1, 1, &[0; 10]).unwrap();
-    run.input(0, 1, 2, &[0; 10]).unwrap();
-    run.result(2, "/map", 3, &[0; 5]).unwrap();
-    run.finish();
-    let report = run.sink.report().unwrap();
-    assert_eq!((&report["messages"], &report["bytes"]), (&json!(3), &json!(25)));
-    let topics = json!({ "/map": { "messages": 1, "bytes": 5 }, "/scan": { "messages": 2, "bytes": 20 } });
-    assert_eq!(report["topics"], topics);
 }
 
 #[test]

@@ -9,7 +9,7 @@ mod tests;
 pub use stage::MapFileSource;
 
 use gridweave_runtime::ros::OccupancyGrid;
-use gridweave_runtime::stage::{OutputPort, Parameters, PortType, StageKind};
+use gridweave_runtime::stage::{Out, OutputPorts, Outputs, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -28,15 +28,19 @@ impl Parameters for MapFileSourceParameters {}
 
 /// The kind `map_file_source`.
 pub fn kind() -> StageKind {
-    StageKind::source::<MapFileSourceParameters, _>(
+    StageKind::source(
         "map_file_source",
         "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files tell no time: the maps \
          are logged a second after each other, the first a second after the epoch, by the robots' names",
-        vec![OutputPort::new(
-            "map",
-            PortType::of::<OccupancyGrid<'_>>(),
-            "the robots' maps, on the topics of [robots]",
-        )],
         MapFileSource::new,
     )
+}
+
+/// The maps of the files.
+pub struct FileMaps(Out<OccupancyGrid<'static>>);
+
+impl Outputs for FileMaps {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.output("map", "the robots' maps, on the topics of [robots]"))
+    }
 }

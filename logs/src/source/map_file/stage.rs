@@ -1,7 +1,7 @@
 //! The stage `map_file_source`.
 
-use super::MapFileSourceParameters;
 use super::names::robot_names;
+use super::{FileMaps, MapFileSourceParameters};
 use crate::map_file;
 use crate::qos;
 use crate::schemas::schema_text;
@@ -13,7 +13,6 @@ use std::path::PathBuf;
 /// Files tell no time. The first map is logged so long after the epoch, since 0 stands for no time in ROS, and each other
 /// so long after the one before: what follows from one map can be handled before the next, however many there are.
 const INTERVAL: u64 = 1_000_000_000;
-const MAP: usize = 0;
 
 /// Reads map files; see the [module](super).
 pub struct MapFileSource {
@@ -49,7 +48,9 @@ impl MapFileSource {
 }
 
 impl Source for MapFileSource {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = FileMaps;
+
+    fn next(&mut self, output: &Output<FileMaps>) -> Result<bool, StageError> {
         let Some(map) = self.maps.get(self.sent) else { return Ok(false) };
         self.sent += 1;
         output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
@@ -65,7 +66,7 @@ impl Source for MapFileSource {
 
 impl NamedMap {
     /// Sends the map on a channel of its own, as a log would.
-    fn send(&self, channel_number: u32, output: &mut Output<'_>) -> Result<(), StageError> {
+    fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
         let doing = || format!("send the map {}", self.file.display());
         let map = map_file::load(&self.file).map_err(|error| StageError::new("read a map file", error))?;
         let time = output.log_time();
@@ -89,7 +90,7 @@ impl NamedMap {
             schema: schema_text(OccupancyGrid::NAME).unwrap_or_default().into_bytes(),
             metadata: qos::metadata(&self.topic, OccupancyGrid::NAME),
         };
-        output.announce(MAP, channel_number, &channel)?;
-        output.send_encoded(MAP, header, &bytes)
+        output.0.announce(channel_number, &channel)?;
+        output.0.send_encoded(header, &bytes)
     }
 }

@@ -1,8 +1,8 @@
-use super::{MapFileSource, MapFileSourceParameters, kind};
+use super::kind;
 use crate::map_file::{self, GridMap};
 use gridweave_runtime::message::{LogTime, Message, MessageFlags};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
-use gridweave_runtime::stage::{CollectedOutputs, Context, RobotTopics, Source, StageError};
+use gridweave_runtime::stage::{Context, LoneStage, RobotTopics, StageError};
 use nalgebra::{Isometry2, Vector2};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,12 +23,13 @@ fn save(folder: &Path, name: &str, map: &GridMap) -> PathBuf {
 /// All maps that the source sends.
 fn run(files: Vec<PathBuf>, robots: RobotTopics) -> Result<Vec<Message>, StageError> {
     let context = Context { stage: "maps".into(), robots, ..Default::default() };
-    let mut source = MapFileSource::new(MapFileSourceParameters { files }, &context)?;
-    let mut outputs = CollectedOutputs::new(&kind());
-    while source.next(&mut outputs.output(LogTime::MIN))? {}
-    assert_eq!(source.progress(), Some(1.0));
-    assert!(!source.next(&mut outputs.output(LogTime::MIN))?, "it stays at its end");
-    Ok(outputs.take(0).into_iter().filter(|message| message.header().flags.contains(MessageFlags::DATA)).collect())
+    let files: Vec<&str> = files.iter().map(|file| file.to_str().unwrap()).collect();
+    let mut source = LoneStage::with_context(&kind(), &format!("files = {files:?}"), &context)?;
+    while source.node().advance()? {}
+    assert_eq!(source.node().progress(), Some(1.0));
+    assert!(!source.node().advance()?, "it stays at its end");
+    let sent = source.take_messages("map").into_iter();
+    Ok(sent.filter(|message| message.header().flags.contains(MessageFlags::DATA)).collect())
 }
 
 #[test]

@@ -1,10 +1,9 @@
 //! The sink of a case: keeps what the stage sends.
 
 use super::recording::Recorded;
-use super::source::NoParameters;
 use gridweave_logs::sink::result_channel;
 use gridweave_runtime::message::{Channel, Message};
-use gridweave_runtime::stage::{InputPort, Output, PortType, Stage, StageError, StageKind};
+use gridweave_runtime::stage::{Context, Output, StageError, StageKind};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
@@ -13,11 +12,14 @@ pub(super) type Received = Arc<Mutex<Vec<Recorded>>>;
 
 /// The kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
 pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
-    let inputs = vec![InputPort::many("messages", PortType::Any, "what the stage sends")];
-    StageKind::stage(name, "Keeps what a stage sends.", inputs, Vec::new(), move |_: NoParameters, context| {
-        let types = context.input_types.clone();
+    let make = move |(): (), context: &Context| {
+        let types = context.inputs.iter().map(|wire| wire.ros_type.clone()).collect();
         Ok(CaseSink { received: Arc::clone(&received), types, channels: BTreeMap::new() })
-    })
+    };
+    StageKind::stage(name, "Keeps what a stage sends.", make)
+        .any_inputs("messages", "what the stage sends", CaseSink::receive)
+        .announce(CaseSink::announce)
+        .build()
 }
 
 struct CaseSink {
@@ -28,13 +30,13 @@ struct CaseSink {
     channels: BTreeMap<(usize, u32, String), Arc<Channel>>,
 }
 
-impl Stage for CaseSink {
+impl CaseSink {
     fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
         self.channels.insert((wire, number, channel.topic.clone()), Arc::new(channel.clone()));
         Ok(())
     }
 
-    fn receive(&mut self, _port: usize, message: &Message, _output: &mut Output<'_>) -> Result<(), StageError> {
+    fn receive(&mut self, message: &Message, _: &Output<()>) -> Result<(), StageError> {
         let (header, wire) = (message.header(), message.wire());
         let topic = header.topic.as_str();
         let key = (wire, header.channel, topic.to_owned());

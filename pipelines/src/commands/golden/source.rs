@@ -3,22 +3,13 @@
 use super::routes::Feed;
 use gridweave_logs::reader::{self, LogReader};
 use gridweave_runtime::message::MessageHeader;
-use gridweave_runtime::stage::{Output, OutputPort, Parameters, Source, StageError, StageKind};
-use schemars::JsonSchema;
-use serde::Deserialize;
+use gridweave_runtime::stage::{AnyMessage, Context, Out, Output, OutputPorts, Outputs, Source, StageError, StageKind};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
 /// A stage can be fed by so many wires.
 pub(super) const MOST_FEEDS: usize = 256;
-
-/// A stage of a case is told everything by the code that makes it.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub(super) struct NoParameters {}
-
-impl Parameters for NoParameters {}
 
 /// The names of the ports, which must differ from each other.
 static PORT_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| (0..MOST_FEEDS).map(|at| format!("feed{at}")).collect());
@@ -27,9 +18,13 @@ static PORT_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| (0..MOST_FEEDS).map(
 /// most [`MOST_FEEDS`], each with the type of the input of `stage` that it leads to.
 pub(super) fn kind(name: &'static str, stage: &StageKind, path: &Path, feeds: Vec<Feed>) -> StageKind {
     let ports = feeds.iter().filter_map(|feed| stage.inputs.get(feed.port)).zip(PORT_NAMES.iter());
-    let outputs = ports.map(|(port, name)| OutputPort::new(name, port.port_type, port.summary)).collect();
+    let ports: Vec<_> = ports.map(|(port, name)| (name.as_str(), port.port_type, port.summary)).collect();
+    let declare = move |outputs: &mut OutputPorts| {
+        let declared = ports.iter().map(|(name, port_type, summary)| outputs.encoded_output(*port_type, name, summary));
+        Feeds(declared.collect())
+    };
     let (path, feeds): (PathBuf, Arc<[Feed]>) = (path.to_owned(), feeds.into());
-    StageKind::source(name, "Sends the input of a golden case.", outputs, move |_: NoParameters, _| {
+    StageKind::source_with(name, "Sends the input of a golden case.", declare, move |(): (), _: &Context| {
         let reader = reader::open(std::slice::from_ref(&path)).map_err(failure)?;
         if let Some(damage) = reader.files().iter().flat_map(|file| file.damage()).next() {
             return Err(failure(damage));
@@ -42,6 +37,16 @@ fn failure(error: impl std::fmt::Display) -> StageError {
     StageError::new("read input.mcap", error)
 }
 
+/// An output for each of the feeds.
+struct Feeds(Vec<Out<AnyMessage>>);
+
+/// The ports are those of a case; see [`kind`].
+impl Outputs for Feeds {
+    fn declare(_: &mut OutputPorts) -> Self {
+        Self(Vec::new())
+    }
+}
+
 struct CaseSource {
     reader: LogReader,
     feeds: Arc<[Feed]>,
@@ -50,7 +55,9 @@ struct CaseSource {
 }
 
 impl Source for CaseSource {
-    fn next(&mut self, output: &mut Output<'_>) -> Result<bool, StageError> {
+    type Outputs = Feeds;
+
+    fn next(&mut self, output: &Output<Feeds>) -> Result<bool, StageError> {
         let Some(message) = self.reader.next_message() else {
             return match self.reader.take_damage().first() {
                 Some((_, damage)) => Err(failure(damage)),
@@ -58,12 +65,12 @@ impl Source for CaseSource {
             };
         };
         output.set_log_time(message.log_time);
-        for (port, feed) in self.feeds.iter().enumerate() {
+        for (port, (feed, out)) in self.feeds.iter().zip(&output.0).enumerate() {
             let Some(fed) = feed.channels.get(&message.channel) else { continue };
             // 0 stands for messages that no log has described.
             let number = if feed.announces { u32::from(message.channel) + 1 } else { 0 };
             if feed.announces && self.announced.insert((port, message.channel)) {
-                output.announce(port, number, &fed.channel)?;
+                out.announce(number, &fed.channel)?;
             }
             let header = MessageHeader {
                 log_time: message.log_time,
@@ -74,7 +81,7 @@ impl Source for CaseSource {
                 topic: fed.topic,
                 ..Default::default()
             };
-            output.send_encoded(port, header, message.data)?;
+            out.send_encoded(header, message.data)?;
         }
         Ok(true)
     }

@@ -7,9 +7,8 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use gridweave_runtime::engine::Feed;
 use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader};
-use gridweave_runtime::stage::{Context, Node, Output, OutputSink, Registry, Sent, Source, StageError};
+use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, Registry, StageError};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -58,7 +57,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     }
     let player = Player { args, registry, context: Context { stage: "play".to_owned(), ..Default::default() } };
     // Logs that cannot be read are known before there is a run to play into.
-    player.source()?;
+    player.source(Vec::new())?;
     let running = find_run(&args.run, registry)?;
     let stage = external_stage(&running, args.stage.as_deref())?;
     let player = Player { context: running.pipeline.context(stage), ..player };
@@ -70,8 +69,8 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     }
     let is_over = || stop.load(Ordering::Relaxed) || !running.run.is_running();
     let pace = Rc::new(RefCell::new(Pace::new(args.rate)));
-    let mut sent = player.outputs(&running, stage, &feed, &pace)?;
-    let result = watch_while(&is_over, &stopped, || player.play_all(&mut sent, &pace, &stopped));
+    let links = || player.links(&running, stage, &feed, &pace);
+    let result = watch_while(&is_over, &stopped, || player.play_all(&links, &pace, &stopped));
     let messages = pace.borrow().messages;
     match result {
         Err(_) if stopped.load(Ordering::Relaxed) => {}
@@ -133,8 +132,8 @@ struct Player<'a> {
 }
 
 impl Player<'_> {
-    /// A source that reads the logs from their beginning.
-    fn source(&self) -> Result<Box<dyn Source>> {
+    /// A source that reads the logs from their beginning, and sends on these links.
+    fn source(&self, links: Vec<OutputEnd>) -> Result<Node> {
         let mut parameters = toml::Table::new();
         let files = self.args.logs.iter().map(|path| {
             let text = path.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", path.display())))?;
@@ -146,41 +145,34 @@ impl Player<'_> {
             parameters.insert("end".into(), end.into());
         }
         let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
-        match kind.make(parameters, &self.context)? {
-            Node::Source(source) => Ok(source),
-            Node::Stage(_) | Node::External => bail!("`{SOURCE}` is no source"),
-        }
+        Ok(kind.make(parameters, &self.context, links)?)
     }
 
-    /// The outputs of the source: each the one of the same name of the stage that it plays for.
-    fn outputs(&self, running: &Running, stage: usize, feed: &Feed, pace: &Rc<RefCell<Pace>>) -> Result<Vec<Sent>> {
+    /// Where the outputs of the source lead: each to that of the same name of the stage that it plays for.
+    fn links(&self, running: &Running, stage: usize, feed: &Feed, pace: &Rc<RefCell<Pace>>) -> Result<Vec<OutputEnd>> {
         let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
         let spec = &running.pipeline.stages[stage];
-        let sent = kind.outputs.iter().map(|output| {
+        let links = kind.outputs.iter().map(|output| {
             let port = spec.kind.outputs.iter().position(|port| port.name == output.name);
             let link = port.and_then(|port| feed.output(port));
-            let paced = link.map(|link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link }) });
-            let topic = port.and_then(|port| spec.topics.get(port)).cloned().unwrap_or_default();
-            Sent::new(output.name, topic, paced)
+            let sink = link.map(|link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link }) });
+            OutputEnd { topic: port.and_then(|port| spec.topics.get(port)).cloned().unwrap_or_default(), sink }
         });
-        Ok(sent.collect())
+        Ok(links.collect())
     }
 
-    fn play_all(&self, sent: &mut [Sent], pace: &Rc<RefCell<Pace>>, stopped: &Arc<AtomicBool>) -> Result<()> {
+    fn play_all(
+        &self,
+        links: &dyn Fn() -> Result<Vec<OutputEnd>>,
+        pace: &Rc<RefCell<Pace>>,
+        stopped: &Arc<AtomicBool>,
+    ) -> Result<()> {
         pace.borrow_mut().stopped = Arc::clone(stopped);
         loop {
-            let mut source = self.source()?;
-            let (mut warnings, mut log_time) = (BTreeMap::new(), LogTime::MIN);
-            loop {
-                let mut output = Output::new(sent, log_time, &mut warnings);
-                let more = source.next(&mut output)?;
-                log_time = output.log_time();
-                if !more || stopped.load(Ordering::Relaxed) {
-                    break;
-                }
-            }
+            let mut source = self.source(links()?)?;
+            while source.advance()? && !stopped.load(Ordering::Relaxed) {}
             // Another turn has the same to warn of.
-            for (warning, count) in warnings.iter().filter(|_| !pace.borrow().is_repeated()) {
+            for (warning, count) in source.warnings().iter().filter(|_| !pace.borrow().is_repeated()) {
                 tracing::warn!("{count} times: {warning}");
             }
             if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_next_turn() {

@@ -67,11 +67,8 @@ mod tests {
 
     #[test]
     fn whatever_is_said_is_understood() {
-        let report = StageReport {
-            name: "lines".into(),
-            result: Some(serde_json::json!({ "share": 0.1 + 0.2 })),
-            ..Default::default()
-        };
+        let report =
+            StageReport { name: "lines".into(), counts: [("searches".to_owned(), 3)].into(), ..Default::default() };
         let all = [
             Said::Alive,
             Said::Progress { stage: "log".into(), share: 0.1, log_time: LogTime(u64::MAX) },

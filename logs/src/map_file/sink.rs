@@ -1,0 +1,63 @@
+//! The stage `map_file_sink`.
+
+use super::{GridMap, save};
+use gridweave_runtime::message::Message;
+use gridweave_runtime::ros::OccupancyGrid;
+use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// The parameters of `map_file_sink`.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct MapFileSinkParameters {
+    /// The YAML file to write; the image gets the same name with the ending pgm. Files that have these names are replaced.
+    file: PathBuf,
+}
+
+impl Parameters for MapFileSinkParameters {}
+
+/// The kind `map_file_sink`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "map_file_sink",
+        "Writes the last map that comes in as a map file (YAML and image of nav2's map server), at the end of the run. \
+         Writes nothing if no map has come.",
+        MapFileSink::new,
+    )
+    .inputs("map", "the merged map", MapFileSink::receive)
+    .finish(MapFileSink::write)
+    .build()
+}
+
+struct MapFileSink {
+    file: PathBuf,
+    last: Option<Message>,
+}
+
+impl MapFileSink {
+    fn new(MapFileSinkParameters { file }: MapFileSinkParameters, context: &Context) -> Result<Self, StageError> {
+        if file.as_os_str().is_empty() {
+            let doing = format!("write the map file of stage `{}`", context.stage);
+            return Err(
+                StageError::new(doing, "it has no file").with_help("give --map FILE.yaml or file = \"FILE.yaml\"")
+            );
+        }
+        Ok(Self { file, last: None })
+    }
+
+    fn receive(&mut self, map: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
+        self.last = Some(map.message().clone());
+        Ok(())
+    }
+
+    fn write(&mut self, output: &Output<()>) -> Result<(), StageError> {
+        let failed = |cause: &dyn std::fmt::Display| StageError::new("write the merged map", cause);
+        let Some(message) = &self.last else { return Ok(()) };
+        let grid: OccupancyGrid<'_> = message.decode().map_err(|error| failed(&error))?;
+        save(&self.file, &GridMap::from_message(&grid)).map_err(|error| failed(&error))?;
+        output.count("files", 1);
+        Ok(())
+    }
+}

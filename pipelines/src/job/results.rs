@@ -1,0 +1,79 @@
+//! The sinks that a run gets for what the user asks of it: the summary, the merged map as a file, and its picture. They read
+//! messages by their types, whatever stages send them.
+
+use super::options::RunOptions;
+use crate::status::BadUse;
+use anyhow::{Context, Result, bail};
+use gridweave_logs::summary::Summary;
+use gridweave_logs::{map_file, picture, summary};
+use gridweave_runtime::engine::RunReport;
+use gridweave_runtime::pipeline::{Pipeline, StageSpec};
+use gridweave_runtime::stage::{InputPort, OutputPort, StageKind};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// The topic of the merged map.
+const MERGED: &str = "/map";
+/// The process that the sinks share where stages have processes.
+const PROCESS: &str = "results";
+
+/// The sinks of a run.
+pub(super) struct ResultSinks {
+    /// Where the summary is left for the command, which adds what the stages have done. None if nothing is merged.
+    summary: Option<PathBuf>,
+    /// How many files the other sinks are to write.
+    files: u64,
+    _folder: TempDir,
+}
+
+impl ResultSinks {
+    /// Adds the sinks to a pipeline.
+    ///
+    /// # Errors
+    /// A merged map is asked for, and no stage sends one.
+    pub(super) fn attach(pipeline: &mut Pipeline, options: &RunOptions) -> Result<Self> {
+        let folder = TempDir::with_prefix("gridweave-").context("cannot make a folder for the summary")?;
+        let file = folder.path().join("summary.json");
+        let is_attached = attach(pipeline, &summary::kind(), &file, |_, _, _| true)?;
+        let mut files = 0;
+        for (kind, asked) in [(map_file::kind(), &options.map), (picture::kind(), &options.picture)] {
+            let Some(path) = asked else { continue };
+            let is_merged = |output: &OutputPort| output.topic == Some(MERGED);
+            let is_drawn = kind.name == picture::kind().name;
+            if !attach(pipeline, &kind, path, |input, from, output| {
+                input.name != "map" || is_merged(output) || is_drawn && from.kind.inputs.is_empty()
+            })? {
+                let text = format!("the pipeline `{}` has no stage that sends a merged map on {MERGED}", pipeline.name);
+                return Err(BadUse(format!("cannot write {}: {text}", path.display())).into());
+            }
+            files += 1;
+        }
+        Ok(Self { summary: is_attached.then_some(file), files, _folder: folder })
+    }
+
+    /// What was merged; none if the pipeline merges nothing.
+    pub(super) fn summary(&self) -> Result<Option<Summary>> {
+        let Some(file) = &self.summary else { return Ok(None) };
+        let text = std::fs::read(file).context("cannot read the summary of the run")?;
+        Ok(Some(serde_json::from_slice(&text).context("cannot read the summary of the run")?))
+    }
+
+    /// An error if there was no map to write or to draw.
+    pub(super) fn check_written(&self, report: &RunReport) -> Result<()> {
+        let counts = report.stages.iter().filter_map(|stage| stage.counts.get("files"));
+        if counts.sum::<u64>() < self.files {
+            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}, as no map says anything");
+        }
+        Ok(())
+    }
+}
+
+fn attach(
+    pipeline: &mut Pipeline,
+    kind: &StageKind,
+    file: &Path,
+    takes: impl Fn(&InputPort, &StageSpec, &OutputPort) -> bool,
+) -> Result<bool> {
+    let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(super::text_of(file)?))]);
+    Ok(pipeline.attach(kind, parameters, PROCESS, takes))
+}

@@ -1,0 +1,100 @@
+//! The solution as messages.
+
+use super::UncertainPose;
+use super::solve::{Alignments, Group, Pair, Solution};
+use crate::geometry::row_by_row;
+use gridweave_runtime::ros::{
+    Alignment, Header, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot, Verdict,
+};
+use std::collections::BTreeMap;
+
+/// Where the robots' maps lie. `frame_ids` are the names of the map frames of robots that have sent a map.
+pub(super) fn robot_frames(
+    solution: &Solution,
+    header: Header,
+    reference: String,
+    frame_ids: &BTreeMap<String, String>,
+) -> RobotFrames {
+    let frame = |(robot, pose): (&String, &UncertainPose)| RobotFrame {
+        robot: robot.clone(),
+        frame_id: frame_ids.get(robot).cloned().unwrap_or_else(|| prefixed(robot, "")),
+        x: pose.pose.translation.x,
+        y: pose.pose.translation.y,
+        yaw: pose.pose.rotation.angle(),
+        covariance: row_by_row(&pose.covariance),
+    };
+    let group = |group: &Group| RobotGroup {
+        reference: group.reference.clone(),
+        frame_id: format!("{}/{}", RobotFrames::WORLD, group.reference),
+        frames: group.frames.iter().map(frame).collect(),
+    };
+    let unmerged = solution.unmerged.iter();
+    let unmerged = unmerged.map(|(robot, reason)| UnmergedRobot { robot: robot.clone(), reason: reason.clone() });
+    RobotFrames {
+        header,
+        reference,
+        frames: solution.frames.iter().map(frame).collect(),
+        unmerged: unmerged.collect(),
+        groups: solution.groups.iter().map(group).collect(),
+    }
+}
+
+/// What became of every alignment.
+pub(super) fn verdicts(solution: &Solution, alignments: &Alignments) -> Vec<Verdict> {
+    let unchecked = solution.unchecked();
+    let verdict = |(pair, alignment): (&Pair, &Alignment)| {
+        let mut alignment = alignment.clone();
+        if let Some(reason) = solution.left_out.get(pair) {
+            alignment.accepted = false;
+            alignment.reason.clone_from(reason);
+        }
+        Verdict { alignment, checked: solution.used.contains_key(pair) && !unchecked.contains(pair) }
+    };
+    alignments.iter().map(verdict).collect()
+}
+
+/// Leaves the robots that were `sent` in their places. Both by name.
+pub(super) fn hold(frames: &mut [RobotFrame], sent: &[RobotFrame]) {
+    for frame in frames {
+        if let Ok(place) = sent.binary_search_by(|sent| sent.robot.cmp(&frame.robot)) {
+            let RobotFrame { x, y, yaw, .. } = sent[place];
+            (frame.x, frame.y, frame.yaw) = (x, y, yaw);
+        }
+    }
+}
+
+/// Whether two messages differ by nothing but their times and covariances.
+pub(super) fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
+    let place = |frame: &RobotFrame| RobotFrame { covariance: [0.0; 9], ..frame.clone() };
+    let same = |one: &[RobotFrame], other: &[RobotFrame]| one.iter().map(place).eq(other.iter().map(place));
+    let same_group =
+        |(one, other): (&RobotGroup, &RobotGroup)| one.reference == other.reference && same(&one.frames, &other.frames);
+    one.reference == other.reference
+        && one.unmerged == other.unmerged
+        && same(&one.frames, &other.frames)
+        && one.groups.len() == other.groups.len()
+        && one.groups.iter().zip(&other.groups).all(same_group)
+}
+
+/// The name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
+pub(super) fn prefixed(robot: &str, frame_id: &str) -> String {
+    let frame_id = frame_id.trim_start_matches('/');
+    match frame_id.strip_prefix(robot) {
+        Some(rest) if rest.starts_with(['/', '_']) => frame_id.to_owned(),
+        _ if frame_id.is_empty() => format!("{robot}/map"),
+        _ => format!("{robot}/{frame_id}"),
+    }
+}
+
+/// The frames of the message as transforms from `world`, and those of groups from the groups' own frames.
+pub(super) fn transforms(message: &RobotFrames) -> TFMessage {
+    let main = (&message.header.frame_id, &message.frames);
+    let all = std::iter::once(main).chain(message.groups.iter().map(|group| (&group.frame_id, &group.frames)));
+    let transform = |parent: &str, frame: &RobotFrame| TransformStamped {
+        header: Header { stamp: message.header.stamp, frame_id: parent.to_owned() },
+        child_frame_id: frame.frame_id.clone(),
+        transform: frame.transform_reference_robot().into(),
+    };
+    let transforms = all.flat_map(|(parent, frames)| frames.iter().map(move |frame| transform(parent, frame)));
+    TFMessage { transforms: transforms.collect() }
+}

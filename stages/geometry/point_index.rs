@@ -1,0 +1,232 @@
+//! Nearest neighbours among points that lie in the plane about as densely as the cells of a map.
+//!
+//! The points are sorted into square buckets, so that a query reads a few short runs of memory. For the two searches
+//! that occur here, a small radius and points that are spread along walls, this takes a fraction of the time that a k-d
+//! tree takes, and it settles ties by the order of the points, so that no result depends on the machine's vector
+//! instructions.
+
+use super::Point2;
+use std::ops::Range;
+
+/// How a rectangle of the plane is cut into square buckets.
+#[derive(Clone, Copy, Debug)]
+pub struct Buckets {
+    /// The corner of least x and y.
+    pub corner: Point2,
+    /// The side of a bucket.
+    pub side: f64,
+    /// Buckets along x, at least one.
+    pub columns: usize,
+    /// Buckets along y, at least one.
+    pub rows: usize,
+}
+
+impl Buckets {
+    /// Buckets of the given side that hold all of the points, which are finite; of a wider one where they lie far apart, so
+    /// that few points take few buckets.
+    fn around(points: &[Point2], mut side: f64) -> Self {
+        let Some(first) = points.first() else { return Self { corner: Point2::origin(), side, columns: 1, rows: 1 } };
+        let (low, high) = points.iter().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
+        let most = 1024.0 + 64.0 * points.len() as f64;
+        while ((high.x - low.x) / side + 1.0) * ((high.y - low.y) / side + 1.0) > most && side < f64::MAX / 4.0 {
+            side *= 2.0;
+        }
+        let count = |low: f64, high: f64| ((high - low) / side) as usize + 1;
+        Self { corner: low, side, columns: count(low.x, high.x), rows: count(low.y, high.y) }
+    }
+
+    /// The column of buckets that `x` lies in; the nearest one for what lies outside.
+    pub fn column(&self, x: f64) -> usize {
+        (((x - self.corner.x) / self.side).max(0.0) as usize).min(self.columns - 1)
+    }
+
+    /// The row of buckets that `y` lies in; the nearest one for what lies outside.
+    pub fn row(&self, y: f64) -> usize {
+        (((y - self.corner.y) / self.side).max(0.0) as usize).min(self.rows - 1)
+    }
+}
+
+/// Points in buckets.
+#[derive(Clone, Debug)]
+pub struct PointIndex {
+    buckets: Buckets,
+    /// Where each bucket's points begin in `points`, row of buckets by row, and the end of the last.
+    starts: Vec<u32>,
+    /// The points, bucket by bucket.
+    points: Vec<Point2>,
+}
+
+/// The nearest neighbour of a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbour {
+    /// Its place in [`PointIndex::points`].
+    pub index: usize,
+    /// Square of the distance to it.
+    pub squared_distance: f64,
+}
+
+impl PointIndex {
+    /// Sorts points into buckets of the given side, or of a wider one where they lie far apart. `order[i]` of the second
+    /// result is the place that point `i` of the index had in `points`. Points that are not finite, and points beyond the
+    /// first 2^32, are left out.
+    pub fn new(points: &[Point2], side: f64) -> (Self, Vec<usize>) {
+        let is_finite = |point: &Point2| point.x.is_finite() && point.y.is_finite();
+        let (places, finite): (Vec<usize>, Vec<Point2>) =
+            points.iter().enumerate().filter(|(_, point)| is_finite(point)).unzip();
+        let mut order = vec![0; finite.len()];
+        let index = Self::in_buckets(&finite, Buckets::around(&finite, side), |from, to| order[to] = places[from]);
+        (index, order)
+    }
+
+    /// Sorts points into buckets; those of one bucket stay in their order. `moved` is told from where to where each of
+    /// them goes. Points beyond the first 2^32 are left out.
+    pub fn in_buckets(points: &[Point2], buckets: Buckets, mut moved: impl FnMut(usize, usize)) -> Self {
+        let points = &points[..points.len().min(u32::MAX as usize)];
+        let numbers: Vec<usize> =
+            points.iter().map(|point| buckets.row(point.y) * buckets.columns + buckets.column(point.x)).collect();
+        // Points are counted two places on, so that the starts can serve as the places of the next points.
+        let mut starts = vec![0u32; buckets.columns * buckets.rows + 2];
+        for number in &numbers {
+            starts[number + 2] += 1;
+        }
+        for number in 2..starts.len() {
+            starts[number] += starts[number - 1];
+        }
+        let mut sorted = vec![Point2::origin(); points.len()];
+        for (from, (point, number)) in points.iter().zip(numbers).enumerate() {
+            let to = &mut starts[number + 1];
+            sorted[*to as usize] = *point;
+            moved(from, *to as usize);
+            *to += 1;
+        }
+        Self { buckets, starts, points: sorted }
+    }
+
+    /// The points, bucket by bucket.
+    pub fn points(&self) -> &[Point2] {
+        &self.points
+    }
+
+    /// The buckets.
+    pub fn buckets(&self) -> &Buckets {
+        &self.buckets
+    }
+
+    /// The places in [`points`](Self::points) of what lies in a row of buckets from column `first` to `last`: the buckets
+    /// of a row follow each other.
+    pub fn run(&self, row: usize, first: usize, last: usize) -> Range<usize> {
+        let start = row * self.buckets.columns;
+        self.starts[start + first] as usize..self.starts[start + last + 1] as usize
+    }
+
+    /// The point nearest to `point`, if one lies within `radius` of it. Of several that are equally near it is
+    /// the first.
+    pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
+        let Buckets { corner, side, columns, rows } = self.buckets;
+        let local = (point - corner) / side;
+        let reach = radius / side;
+        let (column_end, row_end) = (columns as f64, rows as f64);
+        // Written so that a value that is no number fails it.
+        let inside = local.x + reach >= 0.0
+            && local.y + reach >= 0.0
+            && local.x - reach < column_end
+            && local.y - reach < row_end;
+        if self.points.is_empty() || !inside {
+            return None;
+        }
+        let clamp = |value: f64, count: usize| (value.max(0.0) as usize).min(count - 1);
+        let (first_row, last_row) = (clamp(local.y - reach, rows), clamp(local.y + reach, rows));
+        let home = clamp(local.y, rows);
+        let mut best: Option<Neighbour> = None;
+        let mut limit = radius * radius;
+        // Row of buckets by row, from the point's own outwards: what is found first narrows what follows.
+        for step in 0..=(home - first_row).max(last_row - home) {
+            for row in [home.checked_sub(step), (step > 0).then_some(home + step)].into_iter().flatten() {
+                if row < first_row || row > last_row {
+                    continue;
+                }
+                let below = row as f64 - local.y;
+                let gap = below.max(-below - 1.0).max(0.0) * side;
+                if gap * gap > limit {
+                    continue;
+                }
+                let width = (limit - gap * gap).sqrt() / side;
+                let run = self.run(row, clamp(local.x - width, columns), clamp(local.x + width, columns));
+                for (index, candidate) in run.clone().zip(&self.points[run]) {
+                    let squared_distance = (candidate - point).norm_squared();
+                    let closer = squared_distance < limit
+                        || (squared_distance == limit && best.is_none_or(|best| index < best.index));
+                    if closer {
+                        limit = squared_distance;
+                        best = Some(Neighbour { index, squared_distance });
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SIDE: f64 = 0.2;
+
+    fn by_looking_at_all(points: &[Point2], point: &Point2, radius: f64) -> Option<f64> {
+        let nearest = points.iter().map(|other| (other - point).norm_squared()).min_by(f64::total_cmp);
+        nearest.filter(|squared| *squared <= radius * radius)
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_point_is_the_one_that_looking_at_all_finds(
+            points in prop::collection::vec((-5.0..5.0, -3.0..3.0), 0..200),
+            x in -7.0..7.0, y in -7.0..7.0, radius in 0.0..3.0,
+        ) {
+            let points: Vec<Point2> = points.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
+            let point = Point2::new(x, y);
+            let (index, order) = PointIndex::new(&points, SIDE);
+            let found = index.nearest(&point, radius);
+            prop_assert_eq!(found.map(|found| found.squared_distance), by_looking_at_all(&points, &point, radius));
+            if let Some(found) = found {
+                prop_assert_eq!(index.points()[found.index], points[order[found.index]]);
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_index_has_no_neighbours() {
+        let (index, order) = PointIndex::new(&[], SIDE);
+        assert_eq!(index.nearest(&Point2::origin(), f64::INFINITY), None);
+        assert!(order.is_empty());
+    }
+
+    #[test]
+    fn points_that_are_no_numbers_are_left_out() {
+        let points = [Point2::new(f64::NAN, 0.0), Point2::new(1.0, 2.0), Point2::new(0.0, f64::INFINITY)];
+        let (index, order) = PointIndex::new(&points, SIDE);
+        assert_eq!(order, [1]);
+        assert!(index.nearest(&Point2::new(1.0, 2.1), 0.2).is_some());
+        assert_eq!(index.nearest(&Point2::new(f64::NAN, 2.1), 0.2), None);
+        assert_eq!(index.nearest(&Point2::new(1.0, 2.1), f64::NAN), None);
+    }
+
+    #[test]
+    fn points_that_lie_far_apart_take_few_buckets() {
+        let points = [Point2::new(-1e300, -1e300), Point2::new(1e300, 1e300), Point2::new(0.0, 0.0)];
+        let (index, _) = PointIndex::new(&points, SIDE);
+        assert!(index.starts.len() < 10_000);
+        assert!(index.nearest(&Point2::new(0.05, 0.0), 0.1).is_some());
+    }
+
+    #[test]
+    fn of_two_equally_near_points_the_first_is_taken() {
+        let points = [Point2::new(1.0, 0.0), Point2::new(-1.0, 0.0)];
+        let (index, order) = PointIndex::new(&points, SIDE);
+        let found = index.nearest(&Point2::origin(), 2.0).unwrap();
+        assert_eq!(found.index, 0);
+        assert_eq!(order, [1, 0], "the bucket of the smaller x comes first");
+    }
+}

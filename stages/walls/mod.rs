@@ -1,0 +1,28 @@
+//! The walls of a map as points with normals: what registers maps on each other and what compares them look at these.
+
+mod wall_line;
+mod wall_map;
+
+pub use wall_map::{KnownSample, WallMap};
+
+use crate::robot_maps::RobotMap;
+use std::cell::OnceCell;
+
+/// The radius in which a wall's direction is measured, metres: what stages take that are not told another.
+pub const NORMAL_RADIUS: f64 = 0.2;
+
+/// Walls that are made when they are first asked for.
+pub type WallsOnDemand = OnceCell<WallMap>;
+
+impl RobotMap<WallsOnDemand> {
+    /// The walls of the map. Their directions are taken within `normal_radius` metres, which must be the same at every
+    /// call.
+    pub fn walls(&self, normal_radius: f64) -> &WallMap {
+        self.own.get_or_init(|| WallMap::new(&self.grid(), normal_radius))
+    }
+}
+
+/// Every how many-th of `count` points makes a sample of at most so many.
+pub fn stride(count: usize, most_points: usize) -> usize {
+    count.div_ceil(most_points.max(1)).max(1)
+}
