@@ -1,6 +1,6 @@
 //! Every stage sends what its golden cases expect, and so does the example of a stage of one's own.
 
-use crate::support::gridweave;
+use crate::support::{WITHOUT_TROUBLE, gridweave_with};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -16,7 +16,8 @@ fn differences(name: &str) -> String {
 
 #[test]
 fn every_stage_sends_what_is_expected() {
-    let ended = gridweave(&repository(), &["golden", "--differences", &differences("golden")]);
+    let args = ["golden", "--differences", &differences("golden")];
+    let ended = gridweave_with(&repository(), &args, &[WITHOUT_TROUBLE]);
     assert_eq!(ended.status, 0, "{}", ended.text());
 }
 

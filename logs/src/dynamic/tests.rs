@@ -209,6 +209,7 @@ fn a_schema_that_cannot_be_used_says_why() {
     let of = |text: &str| Schema::parse("a/msg/A", text).unwrap_err().to_string();
     assert_eq!(of("b/B[] x"), "there is no definition of b/B");
     assert_eq!(of("int32 x\nint32"), "the definition of a/A has the line `int32`, which is no field");
+    assert_eq!(of("int32 x\nint8 y\nfloat64 x"), "the definition of a/A has two fields called `x`");
     assert!(of("A[] again").contains("contains itself"), "{}", of("A[] again"));
     let chain: String = (0..1000).map(|n| format!("===\nMSG: a/T{n}\nT{} x\n", n + 1)).collect();
     assert!(of(&format!("T0 x\n{chain}")).contains("nested too deeply"));

@@ -172,6 +172,25 @@ fn missing_and_broken_files_are_told() {
 }
 
 #[test]
+fn an_image_that_claims_more_than_its_bytes_can_hold_is_refused() {
+    for header in ["P5\n20000 20000\n255\n", "P4 60000 60000\n", "P2 20000 20000 255\n", "P6\n9000 9000\n255\n"] {
+        let (folder, path) = folder(&yaml(""));
+        fs::write(folder.path().join("map.pgm"), format!("{header}abc")).unwrap();
+        let error = load(&path).unwrap_err().to_string();
+        assert!(error.contains("cannot hold the"), "{header}: {error}");
+    }
+}
+
+#[test]
+fn an_image_of_one_shade_is_read_however_small_its_file() {
+    let (folder, path) = folder(&yaml("").replace("map.pgm", "map.png"));
+    let image = DynamicImage::ImageLuma8(ImageBuffer::from_pixel(3000, 3000, Luma([205u8])));
+    image.save(folder.path().join("map.png")).unwrap();
+    assert!(fs::metadata(folder.path().join("map.png")).unwrap().len() < 30_000);
+    assert!(load(&path).unwrap().cells.iter().all(|cell| *cell == -1));
+}
+
+#[test]
 fn a_map_that_cannot_be_written_leaves_the_one_that_was_there() {
     let (folder, path) = folder(&yaml(""));
     let before = load(&path).unwrap();

@@ -1,6 +1,6 @@
 //! Folders of golden cases to run `gridweave golden` on.
 
-use crate::support::{Ended, LogBuilder, TestMap, gridweave};
+use crate::support::{Ended, LogBuilder, TestMap, WITHOUT_TROUBLE, gridweave_with};
 use gridweave_runtime::ros::{TagEstimate, TagEstimates};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ impl Cases {
     }
 
     pub(crate) fn golden(&self, args: &[&str]) -> Ended {
-        gridweave(self.0.path(), &[&["golden", "--cases", "cases"], args].concat())
+        gridweave_with(self.0.path(), &[&["golden", "--cases", "cases"], args].concat(), &[WITHOUT_TROUBLE])
     }
 
     pub(crate) fn bless(&self) -> Ended {

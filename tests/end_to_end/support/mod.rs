@@ -67,6 +67,9 @@ pub(crate) struct Running {
     stderr: Printed,
 }
 
+/// Leaves the command with the stages that ship.
+pub(crate) const WITHOUT_TROUBLE: (&str, &str) = ("WITHOUT_TROUBLE", "1");
+
 /// The command, with stages that get into trouble beside those that ship.
 pub(crate) fn gridweave_program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_troubled_stages"))

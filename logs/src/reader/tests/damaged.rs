@@ -96,6 +96,42 @@ fn a_broken_length_in_the_middle_loses_one_chunk_only() {
 }
 
 #[test]
+fn lengths_in_chunks_that_nothing_can_have_lose_these_chunks_only() {
+    for options in &layouts()[1..] {
+        let whole = three_chunks(options.clone());
+        let summary = summary::Summary::read(&whole);
+        let [_, second, third] = summary.chunk_starts[..] else { panic!() };
+        // Behind the record's head: two times, the size of the contents, their checksum, the compression, their length.
+        let size = |chunk: usize| chunk + record::HEAD + 16;
+        let name = |chunk: usize| size(chunk) + 12;
+        let compression = |chunk: usize| u32::from_le_bytes(whole[name(chunk)..][..4].try_into().unwrap()) as usize;
+        let length = |chunk: usize| name(chunk) + 4 + compression(chunk);
+        for absurd in [u64::MAX, u64::MAX - 30, 1 << 40, 0xffff_ffff] {
+            for (places, left) in [
+                (vec![size(second)], vec![0, 1, 2, 3, 20, 21, 22, 23]),
+                (vec![size(second), size(third)], vec![0, 1, 2, 3]),
+                (vec![length(second)], vec![0, 1, 2, 3, 20, 21, 22, 23]),
+            ] {
+                let mut bytes = whole.clone();
+                places.iter().for_each(|at| bytes[*at..at + 8].copy_from_slice(&absurd.to_le_bytes()));
+                let (seen, damage) = read_damaged(&bytes);
+                assert_eq!((times(&seen), damage.len()), (left, places.len()), "{absurd} at {places:?}: {damage:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chunk_that_is_packed_tighter_than_usual_is_read_whole() {
+    for options in layouts() {
+        let mut log = TestLog::new(options);
+        log.raw("/a", "p/msg/A", 1, &vec![0; 3_000_000]);
+        let (seen, damage) = read_damaged(&log.finish());
+        assert_eq!((seen[0].3.len(), damage), (3_000_000, vec![]));
+    }
+}
+
+#[test]
 fn what_a_killed_recorder_has_written_is_read() {
     let folder = Folder::new();
     for options in layouts() {
