@@ -11,6 +11,7 @@ mod logs;
 mod map_aligner;
 mod merge_verifier;
 mod quadrant_classifier;
+mod result_sinks;
 mod tag_filter;
 mod tag_localizer;
 
@@ -52,6 +53,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         map_aligner::cases(),
         merge_verifier::cases(),
         quadrant_classifier::cases(),
+        result_sinks::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),
     ]

@@ -4,6 +4,7 @@ use anyhow::{Context, Result, bail};
 use gridweave_logs::reader;
 use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::message::{Channel, LogTime};
+use gridweave_runtime::ros::encode;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -70,6 +71,26 @@ impl Recording {
             recording.warnings.insert(warning.clone(), count);
         }
         Ok(recording)
+    }
+
+    /// Reads a file that a stage has written: the messages of a log, or the bytes of any other file as one message.
+    pub(super) fn read_file(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+        if bytes.starts_with(mcap::MAGIC) {
+            return Self::read(path);
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let channel = Channel {
+            topic: format!("/{name}"),
+            message_encoding: "cdr".to_owned(),
+            schema_name: "gridweave_msgs/msg/File".to_owned(),
+            schema_encoding: "ros2msg".to_owned(),
+            schema: b"uint8[] data".to_vec(),
+            ..Default::default()
+        };
+        let bytes = encode(&serde_bytes::Bytes::new(&bytes))?;
+        let message = Recorded { channel: Arc::new(channel), port: None, log_time: LogTime::MIN, publish_time: 0, bytes };
+        Ok(Self { messages: vec![message], warnings: BTreeMap::new() })
     }
 
     /// Writes a log. The same recording gives the same bytes.

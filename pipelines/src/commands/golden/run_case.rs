@@ -10,7 +10,7 @@ use gridweave_runtime::engine::{self, EngineKind, Observer};
 use gridweave_runtime::pipeline::{DEFAULT_DEPTH, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::stage::StageKind;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -39,11 +39,16 @@ pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording
     let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?), (CASE, text_of(&case.folder)?)];
     let mut recording = run_stage(case, &files, observer)?;
     if case.has_placeholder(OUTPUT) {
-        if !output.exists() {
+        let mut written: Vec<PathBuf> =
+            std::fs::read_dir(folder.path())?.map(|file| Ok(file?.path())).collect::<std::io::Result<_>>()?;
+        if written.is_empty() {
             bail!("the stage has not written the file {OUTPUT}");
         }
-        let written = Recording::read(&output).context("what the stage has written cannot be read")?;
-        recording.messages.extend(written.messages);
+        written.sort();
+        for path in written {
+            let read = Recording::read_file(&path).context("what the stage has written cannot be read")?;
+            recording.messages.extend(read.messages);
+        }
     }
     Ok(recording)
 }
