@@ -121,11 +121,11 @@ fn a_stage_whose_process_is_halted_ends_the_run_with_its_name() {
 #[test]
 fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     let folder = folder();
-    let expected = run_diamond(folder.path(), "single", &["source.pause=0"]).wait();
+    let expected = run_diamond(folder.path(), "single", &["source.count=20000", "source.pause=0"]).wait();
     assert_eq!(expected.status, 0, "{expected:#?}");
     let expected = fs::read(folder.path().join(OUTPUT)).unwrap();
     fs::remove_file(folder.path().join(OUTPUT)).unwrap();
-    let run = run_diamond(folder.path(), "processes", &[]);
+    let run = run_diamond(folder.path(), "processes", &["source.count=20000"]);
     wait_for_output(folder.path());
     for _ in 0..3 {
         for (process, _) in processes(run.id()) {

@@ -74,22 +74,28 @@ impl Feed {
 
     /// Waits until every reader is connected, so that none misses the first messages. `false` if it takes too long.
     pub fn wait_for_readers(&self, longest: Duration) -> bool {
-        self.wait(longest, |sender| sender.is_connected())
+        self.wait(&self.sleeper, longest, |sender| sender.is_connected())
     }
 
     /// Waits until every reader has taken all that was sent. What is sent is lost with its sender where it has not been
-    /// taken. `false` if it takes too long.
+    /// taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers go on.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
-        self.wait(longest, LinkSender::is_taken)
+        let sleeper = Sleeper::new(self.sleeper.board().clone(), Arc::default());
+        self.wait(&sleeper, longest, LinkSender::is_taken)
     }
 
-    fn wait(&self, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
+    fn wait(
+        &self,
+        sleeper: &Sleeper,
+        longest: Duration,
+        is_ready: impl Fn(&mut LinkSender<Service>) -> bool,
+    ) -> bool {
         let are_ready = || {
             if !self.run.is_running() {
                 return Err(LinkError::Stopped);
             }
             Ok(self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
         };
-        self.sleeper.wait_until(Some(Instant::now() + longest), are_ready).unwrap_or(false)
+        sleeper.wait_until(Some(Instant::now() + longest), are_ready).unwrap_or(false)
     }
 }

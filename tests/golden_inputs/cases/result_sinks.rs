@@ -12,7 +12,8 @@ pub(super) fn cases() -> Vec<Case> {
         Case::new("summary_sink", "four_robots", |log| {
             log.message(1.0, "/robot_frames", &RobotFrames { reference: "robot1".into(), ..Default::default() });
             log.message(2.0, "/robot_frames", &frames()).message(2.0, "/verdicts", &verdicts());
-            let agreement = MapAgreement { known_to_one: 12.5, known_to_several: 8.0, in_conflict: 0.5, ..Default::default() };
+            let agreement =
+                MapAgreement { known_to_one: 12.5, known_to_several: 8.0, in_conflict: 0.5, ..Default::default() };
             log.message(3.0, "/map_agreement", &agreement);
         }),
         Case::new("summary_sink", "nothing_merged", |log| {
@@ -35,7 +36,8 @@ pub(super) fn cases() -> Vec<Case> {
             log.message(2.0, "/robot_frames", &RobotFrames::default());
         }),
         Case::new("truth_sink", "two_robots", |log| {
-            let frame = |robot: &str, x: f64| TrueFrame { robot: robot.into(), x, y: 2.0, yaw: -0.5, centre: [3.0, 4.0] };
+            let frame =
+                |robot: &str, x: f64| TrueFrame { robot: robot.into(), x, y: 2.0, yaw: -0.5, centre: [3.0, 4.0] };
             let truth = SimulationTruth {
                 header: header(1.0, "robot1/map"),
                 resolution: 0.05,
@@ -62,7 +64,8 @@ fn frames() -> RobotFrames {
         yaw: 0.1 * x,
         covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
     };
-    let unmerged = |robot: &str| UnmergedRobot { robot: robot.into(), reason: "it shares too little with robot1".into() };
+    let unmerged =
+        |robot: &str| UnmergedRobot { robot: robot.into(), reason: "it shares too little with robot1".into() };
     RobotFrames {
         header: header(2.0, RobotFrames::WORLD),
         reference: "robot1".into(),

@@ -89,7 +89,8 @@ impl Recording {
             ..Default::default()
         };
         let bytes = encode(&serde_bytes::Bytes::new(&bytes))?;
-        let message = Recorded { channel: Arc::new(channel), port: None, log_time: LogTime::MIN, publish_time: 0, bytes };
+        let message =
+            Recorded { channel: Arc::new(channel), port: None, log_time: LogTime::MIN, publish_time: 0, bytes };
         Ok(Self { messages: vec![message], warnings: BTreeMap::new() })
     }
 
