@@ -204,7 +204,7 @@ fn a_stage_kind_without_a_case_fails() {
         &[
             "ok       tag_filter/four_tags",
             "FAILED   grid_fuser: this stage kind has no case in cases",
-            "1 case: 1 as expected; 12 stage kinds without a case",
+            "stage kinds without a case",
         ],
     );
     let json: serde_json::Value = serde_json::from_str(&cases.golden(&["--json"]).stdout).unwrap();

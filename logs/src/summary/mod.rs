@@ -26,7 +26,7 @@ pub struct Summary {
     #[serde(default)]
     pub alignments: Vec<Pair>,
     /// How far the maps agree that were fused, by the stage that fused them.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub areas: BTreeMap<String, Areas>,
 }
 
