@@ -208,7 +208,8 @@ fn a_stage_kind_without_a_case_fails() {
         ],
     );
     let json: serde_json::Value = serde_json::from_str(&cases.golden(&["--json"]).stdout).unwrap();
-    assert_eq!(json["kinds_without_a_case"].as_array().unwrap().len(), 12);
+    let without = json["kinds_without_a_case"].as_array().unwrap();
+    assert!(without.contains(&"grid_fuser".into()) && !without.contains(&"tag_filter".into()), "{without:?}");
     assert_eq!((&json["failed"], &json["cases"][0]["status"]), (&true.into(), &"passed".into()));
 }
 

@@ -84,12 +84,7 @@ impl Feed {
         self.wait(&sleeper, longest, LinkSender::is_taken)
     }
 
-    fn wait(
-        &self,
-        sleeper: &Sleeper,
-        longest: Duration,
-        is_ready: impl Fn(&mut LinkSender<Service>) -> bool,
-    ) -> bool {
+    fn wait(&self, sleeper: &Sleeper, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
         let are_ready = || {
             if !self.run.is_running() {
                 return Err(LinkError::Stopped);
