@@ -2,7 +2,7 @@
 
 use super::{Agreement, Rival};
 
-/// Weights of the logistic model, fitted to simulated pairs of maps by `gridweave experiment align --tuning --calibrate`.
+/// Weights of the logistic model, fitted to simulated pairs of maps by the experiment `align --tuning --calibrate`.
 const INTERCEPT: f64 = -2.869;
 /// Per natural logarithm of the metres of wall that agree.
 const BY_LENGTH: f64 = 1.128;

@@ -15,7 +15,7 @@ use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
 
-/// What `gridweave experiment noise` is told.
+/// What the experiment `noise` is told.
 #[derive(Debug, Args)]
 pub(super) struct NoiseArgs {
     /// How many worlds for each value, each with a seed of its own.

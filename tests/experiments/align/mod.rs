@@ -25,7 +25,7 @@ use std::path::PathBuf;
 use trial::PairTrial;
 use worlds::Seeds;
 
-/// What `gridweave experiment align` is told.
+/// What the experiment `align` is told.
 #[derive(Debug, Args)]
 pub(super) struct AlignArgs {
     /// Random pairs of one building.

@@ -40,7 +40,7 @@ const SHARED: [usize; 3] = [2, 3, 5];
 /// How far two tags are moved alike, metres.
 const MOVED: [f64; 3] = [1.0, 2.0, 3.0];
 
-/// What `gridweave experiment few-tags` is told.
+/// What the experiment `few-tags` is told.
 #[derive(Debug, Args)]
 pub(super) struct FewTagsArgs {
     /// How many buildings with each number of tags.

@@ -18,7 +18,7 @@ use super::results::Results;
 use anyhow::Result;
 use clap::Args;
 
-/// What `gridweave experiment localization` is told.
+/// What the experiment `localization` is told.
 #[derive(Debug, Args)]
 pub(super) struct LocalizationArgs {
     /// How many drives for each point, each with a seed of its own.

@@ -36,7 +36,7 @@ const METHODS: [&str; 3] = ["tag_only", "tag_direction", "tag_merge"];
 /// a deviation of 5 cm. The rest is the simulator's default.
 const WORLD: [&str; 6] = ["robots=2", "width=14", "height=12", "resolution=[0.02]", "tag_reach=3", "tag_noise=0.05"];
 
-/// What `gridweave experiment methods` is told.
+/// What the experiment `methods` is told.
 #[derive(Debug, Args)]
 pub(super) struct MethodsArgs {
     /// How many simulated worlds of each kind, each with a seed of its own.
