@@ -16,7 +16,7 @@ pub struct Origin {
 impl Origin {
     /// Of an alignment.
     pub fn of(alignment: &Alignment) -> Self {
-        Self { pair: RobotPair::of(alignment), source: alignment.source().to_owned() }
+        Self { pair: RobotPair::of(alignment), source: alignment.source.clone() }
     }
 }
 
@@ -48,7 +48,7 @@ impl HypothesisGatherer {
 /// Hypotheses came out of order.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the hypotheses for {} and {} by {} were left out: number {missing} was due, and {came} came",
+    "the hypotheses for {} and {} by the {} were left out: number {missing} was due, and {came} came",
     origin.pair.a, origin.pair.b, origin.source
 )]
 pub struct HypothesisMissing {
@@ -64,8 +64,8 @@ pub struct HypothesisMissing {
 mod tests {
     use super::*;
 
-    fn hypothesis(method: &str, rank: u32, hypotheses: u32) -> Alignment {
-        Alignment { a: "a".into(), b: "b".into(), method: method.into(), rank, hypotheses, ..Default::default() }
+    fn hypothesis(source: &str, rank: u32, hypotheses: u32) -> Alignment {
+        Alignment { a: "a".into(), b: "b".into(), source: source.into(), rank, hypotheses, ..Default::default() }
     }
 
     #[test]
@@ -73,10 +73,10 @@ mod tests {
         let mut gatherer = HypothesisGatherer::default();
         assert_eq!(gatherer.add(hypothesis("maps", 0, 3)), Ok(None));
         assert_eq!(gatherer.add(hypothesis("maps", 1, 3)), Ok(None));
-        let (_, alone) = gatherer.add(hypothesis("tags+directions", 0, 0)).unwrap().unwrap();
+        let (_, alone) = gatherer.add(hypothesis("tags", 0, 0)).unwrap().unwrap();
         assert_eq!(alone.len(), 1, "another stage's are another matter");
         let (origin, all) = gatherer.add(hypothesis("maps", 2, 3)).unwrap().unwrap();
-        assert_eq!((origin.source.as_str(), all.len()), ("map", 3));
+        assert_eq!((origin.source.as_str(), all.len()), ("maps", 3));
         assert!(all.iter().enumerate().all(|(rank, one)| one.rank as usize == rank));
         assert_eq!(origin.pair, RobotPair::new("a", "b"));
     }

@@ -13,6 +13,7 @@ fn first_guess(transform_a_b: &Pose2) -> Alignment {
         b: "robot2".into(),
         covariance: [0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.001],
         score: 0.9,
+        source: "tags".into(),
         method: "tags".into(),
         accepted: true,
         reason: "three tags".into(),
@@ -142,7 +143,7 @@ fn ranked_guesses_are_refined_and_sent_together() {
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     let ranked =
-        |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, method: "maps".into(), ..first_guess(place) };
+        |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, source: "maps".into(), ..first_guess(place) };
     assert_eq!(bench.give(&ranked(0, &truth)), []);
     let sent = bench.give(&ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
     assert_eq!(sent.iter().map(|one| (one.rank, one.hypotheses)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);

@@ -63,6 +63,7 @@ impl MapAligner {
             header: Header::new(output.log_time(), map_a.frame_id.clone()),
             a: statement.pair.a.clone(),
             b: statement.pair.b.clone(),
+            source: "maps".into(),
             method: "maps".into(),
             ..Alignment::default()
         };

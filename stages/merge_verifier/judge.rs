@@ -46,7 +46,7 @@ impl Verdict<'_> {
                 refusal => format!("{found}; the maps do not confirm it: {refusal}"),
             };
         }
-        let too = self.found_too_by.map_or_else(String::new, |source| format!(", found by the {source}s, too"));
+        let too = self.found_too_by.map_or_else(String::new, |source| format!(", found by the {source}, too"));
         let elsewhere = self.rival.map_or_else(String::new, |Rival { agreement, .. }| {
             let share = 100.0 * agreement.wall_agreement();
             format!("; at the best of other places {share:.0} % of {:.0} m agree", agreement.wall_seen())
@@ -95,9 +95,9 @@ pub fn judge<'a>(
     first
 }
 
-/// Whether an alignment says where map b lies. One that was refused for want of a place has no covariance.
+/// Whether an alignment says where map b lies, in numbers.
 fn has_place(alignment: &Alignment) -> bool {
-    alignment.covariance[8] > 0.0 && [alignment.x, alignment.y, alignment.yaw].iter().all(|value| value.is_finite())
+    alignment.has_transform && [alignment.x, alignment.y, alignment.yaw].iter().all(|value| value.is_finite())
 }
 
 fn judge_one<'a>(
@@ -114,9 +114,9 @@ fn judge_one<'a>(
     };
     let found_too_by = all
         .iter()
-        .filter(|other| other.alignment.accepted && other.alignment.source() != alignment.source())
+        .filter(|other| other.alignment.accepted && other.alignment.source != alignment.source)
         .find(|other| rival_of(other).is_none())
-        .map(|other| other.alignment.source());
+        .map(|other| other.alignment.source.as_str());
     let elsewhere = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
     let another = elsewhere.max_by(|(one, _), (other, _)| one.evidence.total_cmp(&other.evidence));
     let is_strict = alignment.provisional && found_too_by.is_none();
@@ -188,7 +188,7 @@ fn contradiction(
     let is_sound = Refusal::by_bounds(&other.agreement, &parameters.provisional_bounds(false)).is_none();
     let is_far_worse = candidate.evidence <= parameters.max_rival_evidence * other.evidence;
     (is_sound && is_far_worse).then(|| Refusal::Elsewhere {
-        source_of_rival: other.alignment.source().to_owned(),
+        source_of_rival: other.alignment.source.clone(),
         shift: rival.shift,
         turn: rival.turn.to_degrees(),
         rival: other.agreement.wall_on_wall,

@@ -84,7 +84,7 @@ pub enum Refusal {
     },
     /// Another source has found a place at which the maps fit far better.
     #[error(
-        "the evidence contradicts itself: the {source_of_rival}s lay map b {shift:.1} m away and turned by {turn:.0} degrees, \
+        "the evidence contradicts itself: the {source_of_rival} lay map b {shift:.1} m away and turned by {turn:.0} degrees, \
          where the maps fit far better ({rival:.0} m of wall agree, and {here:.0} m here)"
     )]
     Elsewhere {

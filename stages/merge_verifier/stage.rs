@@ -180,7 +180,7 @@ fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment]) -> Alignment {
         reason: if accepted {
             reason
         } else {
-            with_other_sources(reason, verdict.candidate.alignment.source(), proposed)
+            with_other_sources(reason, &verdict.candidate.alignment.source, proposed)
         },
         ..verdict.candidate.alignment.clone()
     }
@@ -189,12 +189,12 @@ fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment]) -> Alignment {
 /// The outcome for a pair of which none was.
 fn refused(proposed: &[&Alignment]) -> Alignment {
     let Some(first) = proposed.first() else { return Alignment::default() };
-    let reason = with_other_sources(first.reason.clone(), first.source(), proposed);
+    let reason = with_other_sources(first.reason.clone(), &first.source, proposed);
     Alignment { accepted: false, provisional: false, rank: 0, hypotheses: 0, reason, ..(*first).clone() }
 }
 
 /// A refusal, with what the other sources have against the pair: whoever reads it wants to know why nothing helped.
 fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> String {
-    let others = proposed.iter().filter(|alignment| alignment.source() != source && alignment.rank == 0);
-    others.fold(reason, |reason, other| format!("{reason}; by the {}s: {}", other.source(), other.reason))
+    let others = proposed.iter().filter(|alignment| alignment.source != source && alignment.rank == 0);
+    others.fold(reason, |reason, other| format!("{reason}; by the {}: {}", other.source, other.reason))
 }

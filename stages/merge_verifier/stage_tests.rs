@@ -14,14 +14,15 @@ fn maps() -> (DrawnMap, DrawnMap) {
     (a, b)
 }
 
-fn proposed(method: &str, transform_a_b: &Pose2) -> Alignment {
+fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
         header: Header::new(LogTime(0), "robot1/map"),
         a: "robot1".into(),
         b: "robot2".into(),
         covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
         score: 0.3,
-        method: method.into(),
+        source: source.into(),
+        method: source.into(),
         accepted: true,
         reason: "somebody says so".into(),
         ..Default::default()
@@ -78,7 +79,7 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
     bench.give_map("robot2", &b);
     let truth = a.transform_to(&b);
     let ranked =
-        |rank: u32, place: &Pose2| Alignment { provisional: true, rank, hypotheses: 2, ..proposed("maps+icp", place) };
+        |rank: u32, place: &Pose2| Alignment { provisional: true, rank, hypotheses: 2, ..proposed("maps", place) };
     let wrong = pose(1.5, 0.0, 0.0) * truth;
     assert_eq!(bench.give(&ranked(0, &wrong)), []);
     let sent = bench.give(&ranked(1, &truth));
@@ -93,11 +94,11 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
 #[test]
 fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
     let mut bench = StageBench::new(&super::kind(), "");
-    let nothing = |method: &str, reason: &str| Alignment {
+    let nothing = |source: &str, reason: &str| Alignment {
         accepted: false,
-        covariance: [0.0; 9],
+        has_transform: false,
         reason: reason.into(),
-        ..proposed(method, &Pose2::identity())
+        ..proposed(source, &Pose2::identity())
     };
     assert_eq!(bench.give(&nothing("maps", "no walls"))[0].reason, "no walls");
     let sent = bench.give(&nothing("tags", "no tags"));

@@ -19,6 +19,7 @@ fn office_maps() -> (DrawnMap, DrawnMap) {
 /// A hypothesis that rests on enough tags.
 fn by_tags(transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
+        source: "tags".into(),
         method: "tags+icp".into(),
         accepted: true,
         covariance: row_by_row(&(Matrix3::identity() * 1e-4)),
@@ -32,6 +33,7 @@ fn by_tags(transform_a_b: &Pose2) -> Alignment {
 /// Hypotheses of the maps alone.
 fn by_maps(places: &[Pose2]) -> Vec<Alignment> {
     let hypothesis = |(rank, place): (usize, &Pose2)| Alignment {
+        source: "maps".into(),
         method: "maps+icp".into(),
         provisional: true,
         rank: rank as u32,
@@ -107,7 +109,7 @@ fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
     let truth = a.transform_to(&b);
     let hypotheses: Vec<Alignment> = [vec![by_tags(&(pose(1.5, 0.0, 0.0) * truth))], by_maps(&[truth])].concat();
     let verdict = judged(&a, &b, &hypotheses);
-    assert!(verdict.refusal.is_none() && verdict.candidate.alignment.source() == "map");
+    assert!(verdict.refusal.is_none() && verdict.candidate.alignment.source == "maps");
 }
 
 #[test]
@@ -121,7 +123,7 @@ fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
     maps[0].reason = "ICP has not settled".into();
     let verdict = judged(&a, &b, &maps);
     assert_eq!(verdict.reason(), "ICP has not settled");
-    let nowhere = Alignment { covariance: [0.0; 9], accepted: false, ..maps[0].clone() };
+    let nowhere = Alignment { has_transform: false, accepted: false, ..maps[0].clone() };
     assert!(judge(&a.view(), &b.view(), &[&nowhere], &MergeVerifierParameters::default()).is_none());
 }
 

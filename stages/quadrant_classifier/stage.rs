@@ -126,6 +126,7 @@ impl QuadrantClassifier {
             header: Header::new(output.log_time(), frame_id),
             a: pair.0.clone(),
             b: pair.1.clone(),
+            source: "tags".into(),
             method: "tags".into(),
             ..Default::default()
         };

@@ -83,6 +83,8 @@ fn result_messages_agree_with_their_definitions() {
         header: header(),
         a: "robot1".into(),
         b: "robot2".into(),
+        source: "maps".into(),
+        has_transform: true,
         x: 1.0,
         y: 2.0,
         yaw: 3.0,

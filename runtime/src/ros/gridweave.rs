@@ -150,6 +150,11 @@ pub struct Alignment {
     pub a: String,
     /// The robot whose map is moved.
     pub b: String,
+    /// What it was found from, such as `tags` or `maps`. Alignments of a pair from one source take each other's place;
+    /// those from several compete.
+    pub source: String,
+    /// Whether it says where map b lies. If not, the transform and its covariance mean nothing.
+    pub has_transform: bool,
     /// Translation of `T_a_b`, metres.
     pub x: f64,
     /// Translation of `T_a_b`, metres.
@@ -160,7 +165,7 @@ pub struct Alignment {
     pub covariance: [f64; 9],
     /// How well the maps agree, 0 to 1.
     pub score: f64,
-    /// How it was found: what from, and then what was added, as in `tags+directions+icp`.
+    /// How it was found, step by step, as in `tags+directions+icp`. For people to read.
     pub method: String,
     /// Whether it may be used to merge the maps.
     pub accepted: bool,
@@ -177,13 +182,6 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// What it was found from, `tag` or `map`: the last word of the first part of its method. Alignments of a pair from
-    /// one source take each other's place; those from several compete.
-    pub fn source(&self) -> &str {
-        let first = self.method.split('+').next().unwrap_or_default();
-        first.split(' ').next_back().unwrap_or_default().trim_end_matches('s')
-    }
-
     /// The transform that takes a point in map b to map a.
     pub fn transform_a_b(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.x, self.y), self.yaw)
@@ -191,6 +189,7 @@ impl Alignment {
 
     /// Sets the transform that takes a point in map b to map a.
     pub fn set_transform_a_b(&mut self, transform_a_b: &Isometry2<f64>) {
+        self.has_transform = true;
         self.x = transform_a_b.translation.x;
         self.y = transform_a_b.translation.y;
         self.yaw = transform_a_b.rotation.angle();

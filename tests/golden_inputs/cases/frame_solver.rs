@@ -136,6 +136,7 @@ fn alignment(seconds: f64, a: u32, b: u32, transform_a_b: &Pose2) -> Alignment {
         b: format!("robot{b}"),
         covariance: [1e-4, 2e-5, 0.0, 2e-5, 2e-4, 1e-6, 0.0, 1e-6, 1e-6],
         score: 0.9,
+        source: "tags".into(),
         method: "tags+directions+icp".into(),
         accepted: true,
         reason: "4 common tags".into(),

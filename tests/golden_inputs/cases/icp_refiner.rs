@@ -63,6 +63,7 @@ pub(super) fn cases() -> Vec<Case> {
                 header: header(3.0, "robot1/map"),
                 a: "robot1".into(),
                 b: "robot2".into(),
+                source: "tags".into(),
                 method: "tags".into(),
                 reason: "robot1 and robot2 have no tag in common; robot1 knows 4 tags, robot2 0".into(),
                 ..Default::default()
@@ -136,6 +137,7 @@ fn vague_guess(log: &mut LogBuilder, seconds: f64, transform_a_b: &Pose2, deviat
         b: "robot2".into(),
         covariance: [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 0.0004],
         score: 0.8,
+        source: "tags".into(),
         method: "tags+directions".into(),
         accepted: true,
         reason: "4 common tags".into(),

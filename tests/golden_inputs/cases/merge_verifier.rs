@@ -67,11 +67,12 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         case("refused_before", |log| {
             maps(log);
-            let nothing = |method: &str, reason: &str| Alignment {
+            let nothing = |source: &str, reason: &str| Alignment {
                 header: header(3.0, "robot1/map"),
                 a: "robot1".into(),
                 b: "robot2".into(),
-                method: method.into(),
+                source: source.into(),
+                method: source.into(),
                 reason: reason.into(),
                 ..Default::default()
             };
@@ -130,6 +131,7 @@ fn by_tags(transform_a_b: &Pose2) -> Alignment {
         b: "robot2".into(),
         covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
         score: 0.8,
+        source: "tags".into(),
         method: "tags+directions+icp".into(),
         accepted: true,
         reason: "4 common tags; walls lie within 0.020 m of each other".into(),
@@ -145,6 +147,7 @@ fn by_maps(log: &mut LogBuilder, seconds: f64, places: &[Pose2]) {
             provisional: true,
             rank: rank as u32,
             hypotheses: places.len() as u32,
+            source: "maps".into(),
             method: "maps+icp".into(),
             reason: "the maps alone; walls lie within 0.020 m of each other".into(),
             ..by_tags(place)

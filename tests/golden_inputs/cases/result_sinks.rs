@@ -84,6 +84,8 @@ fn verdicts() -> Verdicts {
         alignment: Alignment {
             a: a.into(),
             b: b.into(),
+            source: "maps".into(),
+            has_transform: true,
             x: 4.5,
             y: -2.25,
             yaw: 0.45,

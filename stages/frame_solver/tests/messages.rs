@@ -1,0 +1,219 @@
+//! What is sent, and when.
+
+use super::*;
+
+#[test]
+fn a_provisional_alignment_is_left_out() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    run.align(&Alignment { provisional: true, reason: "2 tags only".into(), ..between(1, 2) });
+    assert_eq!(run.pose_of("robot2"), None);
+    let reason = run.reason("robot2");
+    assert!(reason.contains("provisional") && reason.contains("2 tags only"), "{reason}");
+    run.align(&between(1, 2));
+    assert!(run.pose_of("robot2").is_some());
+}
+
+#[test]
+fn the_reference_is_exactly_at_the_origin() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    let robot1 = RobotFrame { robot: "robot1".into(), frame_id: "robot1/map".into(), ..Default::default() };
+    let expected = RobotFrames {
+        header: Header::new(LogTime(5), "world"),
+        reference: "robot1".into(),
+        frames: vec![robot1],
+        ..Default::default()
+    };
+    assert_eq!(run.solved(), expected);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "there is no pair");
+}
+
+#[test]
+fn another_reference_turns_the_frames_round() {
+    let mut run = Run::new(Some("robot2"));
+    run.map("robot1", "map");
+    assert!(run.frames().is_empty(), "without the reference there is no world");
+    run.map("robot2", "map");
+    run.align(&between(1, 2));
+    assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
+    assert_eq!(run.latest().unwrap().reference, "robot2");
+}
+
+#[test]
+fn a_reference_that_never_shows_up_is_an_error_that_names_the_robots() {
+    let mut run = Run::new(Some("robot7"));
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    let error = run.finish().unwrap_err().to_string();
+    assert!(error.contains("robot7") && error.contains("robot1, robot2"), "{error}");
+    assert_eq!(run.latest(), None);
+}
+
+#[test]
+fn a_log_without_robots_has_no_frames() {
+    let mut run = Run::new(None);
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+    assert!(run.stage.take_messages("verdicts").is_empty());
+}
+
+#[test]
+fn frames_are_sent_when_something_changes_and_only_then() {
+    let mut run = Run::new(None);
+    run.map("robot1", "robot1/map");
+    assert_eq!(run.frames().len(), 1);
+    run.map("robot1", "robot1/map");
+    assert_eq!(run.frames().len(), 0, "a later map of a known robot");
+    run.map("robot2", "robot2/map");
+    assert_eq!(run.frames().len(), 1, "another robot");
+    run.align(&refused("robot1", "robot2", 0.1, "two tags in common"));
+    assert_eq!(run.frames().len(), 1, "another reason");
+    run.align(&between(1, 2));
+    assert_eq!(run.frames().len(), 1, "a pose");
+    let mut nearly = between(1, 2);
+    run.align(&nearly);
+    nearly.x += 0.01;
+    run.align(&nearly);
+    assert_eq!(run.frames().len(), 0, "a pose that the alignments hardly fit better");
+    run.finish().unwrap();
+    assert!((run.frames()[0].frames[1].x - nearly.x).abs() < 1e-9, "at the end it is as solved");
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+}
+
+#[test]
+fn transforms_lead_from_the_world_to_frames_with_the_robots_name() {
+    let mut run = Run::new(None);
+    run.map("robot1", "/robot1/map");
+    run.map("robot2", "map");
+    run.map("robot3", "");
+    run.align(&between(1, 2));
+    run.align(&between(2, 3));
+    let last = run.stage.take_messages("tf").pop().unwrap();
+    assert_eq!(last.header().topic.as_str(), "/tf_static");
+    let transforms = last.decode::<TFMessage>().unwrap().transforms;
+    let names: Vec<&str> = transforms.iter().map(|transform| transform.child_frame_id.as_str()).collect();
+    assert_eq!(names, ["robot1/map", "robot2/map", "robot3/map"]);
+    assert!(transforms.iter().all(|transform| transform.header.frame_id == "world"));
+    assert!(is_near(&transforms[2].transform.planar(), &place(3), 1e-9));
+}
+
+#[test]
+fn a_robot_without_alignments_says_so() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    assert!(run.reason("robot2").starts_with("no alignment with any robot was found"), "{}", run.reason("robot2"));
+}
+
+#[test]
+fn the_most_telling_refusal_is_the_reason() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    run.align(&refused("robot1", "robot3", 0.0, "no tags in common"));
+    run.align(&refused("robot2", "robot3", 0.0, "no tags in common"));
+    run.align(&refused("robot3", "robot4", 0.9, "not merged either"));
+    assert_eq!(run.reason("robot3"), "no alignment with robot1 and robot2: no tags in common");
+    run.align(&refused("robot2", "robot3", 0.4, "walls agree to 40 % only"));
+    assert_eq!(run.reason("robot3"), "no alignment with robot2: walls agree to 40 % only");
+    assert_eq!(run.reason("robot4"), "no alignment with robot3: not merged either");
+}
+
+#[test]
+fn robots_tied_to_each_other_but_not_to_the_reference_say_so() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.align(&between(2, 3));
+    run.align(&refused("robot1", "robot3", 0.2, "no tags in common"));
+    let expected = "it is tied to robot3 only, not to the reference: no alignment with robot1: no tags in common";
+    assert_eq!(run.reason("robot2"), expected);
+}
+
+#[test]
+fn a_verdict_says_what_the_alignment_said() {
+    let mut run = Run::new(None);
+    let refusal = refused("robot1", "robot3", 0.2, "no tags in common");
+    [between(1, 2), refusal.clone()].iter().for_each(|alignment| run.align(alignment));
+    run.align(&Alignment { header: Header::new(LogTime(5), "robot1/map"), ..between(1, 2) });
+    let unchecked = |alignment| Verdict { alignment, checked: false };
+    assert_eq!(run.verdicts(), [unchecked(between(1, 2)), unchecked(refusal)]);
+    assert_eq!(run.verdicts.unwrap().header, Header::new(LogTime(5), "world"));
+}
+
+#[test]
+fn verdicts_are_sent_after_frames_and_at_the_end_if_they_have_changed() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    run.align(&between(1, 2));
+    assert_eq!(run.stage.take_messages("verdicts").len(), 1);
+    run.map("robot3", "map");
+    assert_eq!(run.frames().len(), 4);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "another robot is no alignment");
+    let nearly = near(1, 2, 0.01);
+    run.align(&nearly);
+    assert!(run.stage.take_messages("verdicts").is_empty(), "no frames were sent");
+    run.finish().unwrap();
+    assert_eq!(run.verdicts(), [Verdict { alignment: nearly, checked: false }]);
+    run.finish().unwrap();
+    assert!(run.stage.take_messages("verdicts").is_empty());
+}
+
+#[test]
+fn a_score_that_moves_no_robot_is_told_at_the_end() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    let scored = Alignment { score: 0.95, ..between(1, 2) };
+    run.align(&scored);
+    run.frames();
+    run.finish().unwrap();
+    assert!(run.frames().is_empty());
+    assert_eq!(run.verdicts(), [Verdict { alignment: scored, checked: false }]);
+}
+
+#[test]
+fn covariances_are_sent_as_solved_at_the_end() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    let before = run.frames().pop().unwrap();
+    run.align(&Alignment { covariance: COVARIANCE.map(|variance| 4.0 * variance), ..between(1, 2) });
+    assert!(run.frames().is_empty(), "the poses are the same");
+    run.finish().unwrap();
+    let last = run.frames().pop().unwrap();
+    assert!(last.frames[1].covariance[0] > before.frames[1].covariance[0]);
+}
+
+#[test]
+fn garbage_is_left_out_with_a_reason() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    for (x, variance) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (1e300, 1.0), (0.0, f64::NAN), (0.0, -5.0)] {
+        let mut alignment = between(1, 2);
+        (alignment.x, alignment.covariance[0]) = (x, variance);
+        run.align(&alignment);
+        assert!(run.pose_of("robot2").is_none());
+        assert!(run.reason("robot2").contains("its "), "{}", run.reason("robot2"));
+    }
+    run.align(&accepted("robot1", "robot1", pose(1.0, 0.0, 0.0)));
+    run.map("", "map");
+    assert_eq!(run.stage.warnings().values().sum::<u64>(), 2);
+}
+
+#[test]
+fn a_reference_stays_when_an_earlier_name_appears_after_a_merge() {
+    let mut run = Run::new(None);
+    run.map("robot3", "map");
+    run.map("robot2", "map");
+    assert_eq!(run.latest().unwrap().reference, "robot2", "nothing is merged so far");
+    run.align(&between(2, 3));
+    run.map("robot1", "map");
+    assert_eq!(run.latest().unwrap().reference, "robot2");
+    assert!(is_near(&run.pose_of("robot3").unwrap(), &(place(2).inverse() * place(3)), 1e-9));
+    run.align(&between(1, 2));
+    assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
+    run.align(&refused("robot2", "robot3", 0.1, "the larger maps disagree"));
+    run.align(&refused("robot1", "robot2", 0.1, "the larger maps disagree"));
+    assert_eq!(run.latest().unwrap().reference, "robot2");
+}
