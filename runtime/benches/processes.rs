@@ -9,7 +9,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_runtime::engine::processes::{Launch, run, run_process};
-use gridweave_runtime::link::board::monotonic_nanoseconds;
+use gridweave_runtime::link::monotonic_nanoseconds;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};

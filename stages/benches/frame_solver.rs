@@ -54,7 +54,7 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
         let team = Team::new(robots, nearest, seed);
         let team = if agreeing { team.with_agreeing_mistakes(share) } else { team.with_mistakes(share) };
         let names: BTreeSet<String> = (0..robots).map(Team::name).collect();
-        let alignments = (0..team.edges.len()).filter_map(|index| frame_solver::solve::by_name(team.alignment(index)));
+        let alignments = (0..team.edges.len()).filter_map(|index| frame_solver::solution::by_name(team.alignment(index)));
         let parameters =
             frame_solver::FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..Default::default() };
         let solution = frame_solver::solve::solve(
@@ -62,7 +62,7 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
             &alignments.collect(),
             &Team::name(0),
             &parameters,
-            &frame_solver::solve::Solution::default(),
+            &frame_solver::solution::Solution::default(),
         );
         for robot in 1..robots {
             if let Some(frame) = solution.frames.get(&Team::name(robot)) {

@@ -1,8 +1,9 @@
 //! The solution as messages.
 
 use super::UncertainPose;
-use super::solve::{Alignments, Group, Pair, Solution};
+use super::solution::{Alignments, Group, Solution};
 use crate::geometry::row_by_row;
+use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
     Alignment, Header, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot, Verdict,
 };
@@ -42,7 +43,7 @@ pub(super) fn robot_frames(
 /// What became of every alignment.
 pub(super) fn verdicts(solution: &Solution, alignments: &Alignments) -> Vec<Verdict> {
     let unchecked = solution.unchecked();
-    let verdict = |(pair, alignment): (&Pair, &Alignment)| {
+    let verdict = |(pair, alignment): (&RobotPair, &Alignment)| {
         let mut alignment = alignment.clone();
         if let Some(reason) = solution.left_out.get(pair) {
             alignment.accepted = false;

@@ -10,6 +10,7 @@
 //! better by a margin, and the reference stays once robots are placed in its frame.
 //!
 //! - [`solve`]: names in, poses and reasons out; the whole of the algorithm.
+//! - [`solution`]: what is solved for, and from what.
 //! - [`graph`]: the pose graph, its spanning trees and cycles.
 //! - [`consistency`]: which alignments contradict each other; by trial where there are few contradictions (`search`),
 //!   else by moves of robots (`consensus`), which are least cuts (`cut`).
@@ -25,6 +26,7 @@ pub mod optimize;
 mod parameters;
 mod reasons;
 mod search;
+pub mod solution;
 pub mod solve;
 mod stage;
 #[cfg(test)]

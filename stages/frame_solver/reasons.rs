@@ -1,7 +1,8 @@
 //! Why an alignment was left out, and why a robot is not merged, in plain words.
 
 use super::UncertainPose;
-use super::solve::{Alignments, OpenCycle, Pair, Solution};
+use super::solution::{Alignments, OpenCycle, Solution};
+use crate::robot_pair::RobotPair;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The reason of an alignment that the others show to be wrong.
@@ -15,7 +16,7 @@ pub(super) fn disputed(cycle: &OpenCycle) -> String {
 }
 
 fn gap(cycle: &OpenCycle) -> String {
-    let pairs: Vec<String> = cycle.pairs.iter().map(|(a, b)| format!("{a}-{b}")).collect();
+    let pairs: Vec<String> = cycle.pairs.iter().map(|pair| pair.robots().join("-")).collect();
     format!(
         "{} do not close by {:.2} m and {:.1} degrees, {:.0} standard deviations",
         list(&pairs),
@@ -72,7 +73,7 @@ struct Refusal<'a> {
 struct Refusals<'a>(BTreeMap<&'a str, Vec<Refusal<'a>>>);
 
 impl<'a> Refusals<'a> {
-    fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<Pair, String>) -> Self {
+    fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<RobotPair, String>) -> Self {
         let mut by_robot: BTreeMap<&str, Vec<Refusal<'_>>> = outside.iter().map(|robot| (*robot, Vec::new())).collect();
         for (pair, alignment) in alignments {
             let reason = match alignment.accepted {
@@ -80,7 +81,7 @@ impl<'a> Refusals<'a> {
                 false => Some(&alignment.reason),
             };
             let Some(reason) = reason else { continue };
-            for (robot, other) in [(&pair.0, &pair.1), (&pair.1, &pair.0)] {
+            for (robot, other) in [(&pair.a, &pair.b), (&pair.b, &pair.a)] {
                 if let Some(refusals) = by_robot.get_mut(robot.as_str()) {
                     refusals.push(Refusal { other, score: alignment.score, reason });
                 }

@@ -3,93 +3,15 @@
 use super::consistency::{Verdict, judge};
 use super::graph::{Cycle, Edge, Forest};
 use super::reasons;
+use super::solution::{Alignments, Group, OpenCycle, Solution};
 use super::{FrameSolverParameters, UncertainPose, optimize, uncertain::error_vector};
-use crate::geometry::{Pose2, row_by_row};
+use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A length (metres) or variance beyond which a value of an alignment is taken for garbage.
 const ABSURD: f64 = 1e7;
-
-/// Two robots, the first by name first.
-pub type Pair = (String, String);
-
-/// Where every robot's map lies.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Solution {
-    /// `T_reference_robot` for every robot that is tied to the reference, itself among them. Its covariance is relative
-    /// to the reference.
-    pub frames: BTreeMap<String, UncertainPose>,
-    /// The robots that are not, with the reason.
-    pub unmerged: BTreeMap<String, String>,
-    /// Those of them that are tied to each other, by the name of the group's reference.
-    pub groups: Vec<Group>,
-    /// The alignments that their stage accepted and that were left out here, with the reason.
-    pub left_out: BTreeMap<Pair, String>,
-    /// The others, `T_a_b` with the floors added to the covariance: what the frames were solved from.
-    pub used: BTreeMap<Pair, UncertainPose>,
-}
-
-/// Robots that are tied to each other, but not to the reference.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Group {
-    /// The robot in whose map frame the others are placed.
-    pub reference: String,
-    /// `T_reference_robot` for every robot of the group, two at least, the reference among them. Its covariance is
-    /// relative to the group's reference.
-    pub frames: BTreeMap<String, UncertainPose>,
-}
-
-impl Solution {
-    /// The sum of the squared deviations (Mahalanobis distances) of all alignments that are used, if the robots' map
-    /// frames were at the poses given: those tied to each other in one frame.
-    pub fn squared_deviations(&self, poses: &BTreeMap<&str, Pose2>) -> f64 {
-        let deviation = |((a, b), transform_a_b): (&Pair, &UncertainPose)| {
-            let (pose_a, pose_b) = (poses.get(a.as_str())?, poses.get(b.as_str())?);
-            Some(optimize::squared_deviation(&Edge { a: 0, b: 1, transform_a_b: *transform_a_b }, pose_a, pose_b))
-        };
-        self.used.iter().filter_map(deviation).sum()
-    }
-
-    /// The alignments that are used and that no other one can check: those in no cycle.
-    pub fn unchecked(&self) -> BTreeSet<&Pair> {
-        let robots: BTreeSet<&String> = self.used.keys().flat_map(|(a, b)| [a, b]).collect();
-        let places: BTreeMap<&String, usize> =
-            robots.iter().enumerate().map(|(place, robot)| (*robot, place)).collect();
-        let edges: Vec<Edge> = self
-            .used
-            .iter()
-            .map(|((a, b), transform_a_b)| Edge { a: places[a], b: places[b], transform_a_b: *transform_a_b })
-            .collect();
-        let forest = Forest::grow(places.len(), &edges, 0, |_| true);
-        let closing = (0..edges.len()).filter(|&index| !forest.contains(index, &edges[index]));
-        let checked: BTreeSet<usize> =
-            closing.filter_map(|index| forest.cycle(&edges, index)).flat_map(|cycle| cycle.edges).collect();
-        self.used.keys().enumerate().filter(|(index, _)| !checked.contains(index)).map(|(_, pair)| pair).collect()
-    }
-}
-
-/// The latest alignment of each pair, `a` before `b` by name.
-pub type Alignments = BTreeMap<Pair, Alignment>;
-
-/// Brings an alignment into the form in which `a` is the first of the pair by name. `None` if it is no pair.
-pub fn by_name(mut alignment: Alignment) -> Option<(Pair, Alignment)> {
-    if alignment.a == alignment.b || alignment.a.is_empty() || alignment.b.is_empty() {
-        return None;
-    }
-    if alignment.a > alignment.b {
-        let transform_a_b = UncertainPose {
-            pose: alignment.transform_a_b(),
-            covariance: Matrix3::from_row_slice(&alignment.covariance),
-        };
-        let transform_b_a = transform_a_b.inverse();
-        std::mem::swap(&mut alignment.a, &mut alignment.b);
-        alignment.set_transform_a_b(&transform_b_a.pose);
-        alignment.covariance = row_by_row(&transform_b_a.covariance);
-    }
-    Some(((alignment.a.clone(), alignment.b.clone()), alignment))
-}
 
 /// Solves for the frames of all `robots` in the frame of `reference`, which must be one of them.
 ///
@@ -115,7 +37,7 @@ pub fn solve(
     let mut edges = Vec::new();
     let mut pairs = Vec::new();
     for (pair, alignment) in alignments.iter().filter(|(_, alignment)| alignment.accepted) {
-        let (Some(a), Some(b)) = (index_of(&pair.0), index_of(&pair.1)) else { continue };
+        let (Some(a), Some(b)) = (index_of(&pair.a), index_of(&pair.b)) else { continue };
         match usable(alignment, parameters) {
             Ok(transform_a_b) => {
                 edges.push(Edge { a, b, transform_a_b });
@@ -199,21 +121,9 @@ fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<U
     }
 }
 
-/// What a reader needs to know of a cycle that does not close.
-pub(super) struct OpenCycle {
-    /// The pairs along it.
-    pub(super) pairs: Vec<Pair>,
-    /// By how much it does not close, metres.
-    pub(super) metres: f64,
-    /// By how much it does not close, radians.
-    pub(super) radians: f64,
-    /// The same in standard deviations.
-    pub(super) deviations: f64,
-}
-
-fn describe(cycle: &Cycle, pairs: &[&Pair]) -> OpenCycle {
+fn describe(cycle: &Cycle, pairs: &[&RobotPair]) -> OpenCycle {
     let error = error_vector(&cycle.remainder.pose);
-    let mut on_cycle: Vec<Pair> = cycle.edges.iter().map(|&index| pairs[index].clone()).collect();
+    let mut on_cycle: Vec<RobotPair> = cycle.edges.iter().map(|&index| pairs[index].clone()).collect();
     on_cycle.sort();
     OpenCycle {
         pairs: on_cycle,

@@ -2,7 +2,8 @@
 
 use super::FrameSolverParameters;
 use super::messages::{hold, prefixed, robot_frames, says_the_same, transforms, verdicts};
-use super::solve::{Alignments, Solution, by_name, solve};
+use super::solution::{Alignments, Solution, by_name};
+use super::solve::solve;
 use gridweave_runtime::ros::{
     Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, TransformStamped, Verdict, Verdicts,
 };
@@ -125,8 +126,8 @@ impl FrameSolver {
             return Ok(());
         };
         alignment.header = Header::default();
-        self.robots.insert(pair.0.clone());
-        self.robots.insert(pair.1.clone());
+        self.robots.insert(pair.a.clone());
+        self.robots.insert(pair.b.clone());
         let before = self.alignments.insert(pair.clone(), alignment);
         if before.as_ref() == self.alignments.get(&pair) { Ok(()) } else { self.solve_and_send(output) }
     }

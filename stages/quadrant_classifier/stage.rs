@@ -5,6 +5,7 @@ use super::{
     single_tag_guesses,
 };
 use crate::geometry::{row_by_row, turn_difference};
+use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, MapDirection, Segments};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::BTreeMap;
@@ -26,9 +27,6 @@ pub fn kind() -> StageKind {
     .build()
 }
 
-/// The names of two robots, the first by name first.
-type Pair = (String, String);
-
 /// What is known of one robot's map.
 struct Map {
     direction: Direction,
@@ -39,9 +37,9 @@ struct Map {
 struct QuadrantClassifier {
     parameters: QuadrantClassifierParameters,
     maps: BTreeMap<String, Map>,
-    common: BTreeMap<Pair, CommonTags>,
+    common: BTreeMap<RobotPair, CommonTags>,
     /// What was sent last for a pair, by rank.
-    sent: BTreeMap<Pair, Vec<Alignment>>,
+    sent: BTreeMap<RobotPair, Vec<Alignment>>,
 }
 
 struct Rotations {
@@ -90,7 +88,7 @@ impl QuadrantClassifier {
         self.maps.insert(robot.clone(), Map { direction, frame_id: header.frame_id });
 
         // What refines an alignment works on the maps, so each new map calls for it, changed or not.
-        let pairs: Vec<Pair> = self.common.keys().filter(|(a, b)| *a == robot || *b == robot).cloned().collect();
+        let pairs: Vec<RobotPair> = self.common.keys().filter(|pair| pair.concerns(&robot)).cloned().collect();
         for pair in pairs {
             let alignments = self.align(&pair, output);
             self.send(pair, alignments, output)?;
@@ -108,7 +106,7 @@ impl QuadrantClassifier {
             output.warn(format!("common tags of `{}` with itself were left out", common.robot_a));
             return Ok(());
         }
-        let pair = (common.robot_a.clone(), common.robot_b.clone());
+        let pair = RobotPair::new(&common.robot_a, &common.robot_b);
         self.common.insert(pair.clone(), common);
         let alignments = self.align(&pair, output);
         match self.differs(&pair, &alignments) {
@@ -118,14 +116,14 @@ impl QuadrantClassifier {
     }
 
     /// What the common tags of a pair come to: one alignment, or several from a single tag; accepted or refused.
-    fn align(&self, pair: &Pair, output: &Output<Rotations>) -> Vec<Alignment> {
+    fn align(&self, pair: &RobotPair, output: &Output<Rotations>) -> Vec<Alignment> {
         let Some(common) = self.common.get(pair) else { return Vec::new() };
-        let (a, b) = (self.maps.get(&pair.0), self.maps.get(&pair.1));
-        let frame_id = a.map_or_else(|| format!("{}/map", pair.0), |map| map.frame_id.clone());
+        let (a, b) = (self.maps.get(&pair.a), self.maps.get(&pair.b));
+        let frame_id = a.map_or_else(|| format!("{}/map", pair.a), |map| map.frame_id.clone());
         let of_pair = Alignment {
             header: Header::new(output.log_time(), frame_id),
-            a: pair.0.clone(),
-            b: pair.1.clone(),
+            a: pair.a.clone(),
+            b: pair.b.clone(),
             source: "tags".into(),
             method: "tags".into(),
             ..Default::default()
@@ -168,7 +166,7 @@ impl QuadrantClassifier {
         (self.parameters.single_tag && is_certain).then_some(tag)
     }
 
-    fn differs(&self, pair: &Pair, alignments: &[Alignment]) -> bool {
+    fn differs(&self, pair: &RobotPair, alignments: &[Alignment]) -> bool {
         let Some(sent) = self.sent.get(pair).filter(|sent| sent.len() == alignments.len()) else { return true };
         sent.iter().zip(alignments).any(|(sent, alignment)| {
             let moved = (alignment.x - sent.x).hypot(alignment.y - sent.y);
@@ -180,7 +178,12 @@ impl QuadrantClassifier {
         })
     }
 
-    fn send(&mut self, pair: Pair, alignments: Vec<Alignment>, output: &Output<Rotations>) -> Result<(), StageError> {
+    fn send(
+        &mut self,
+        pair: RobotPair,
+        alignments: Vec<Alignment>,
+        output: &Output<Rotations>,
+    ) -> Result<(), StageError> {
         alignments.iter().try_for_each(|alignment| output.alignment.send("", alignment))?;
         self.sent.insert(pair, alignments);
         Ok(())

@@ -6,8 +6,9 @@
 //! in whole stretches that furniture hides, walls waver slowly (scans that were laid a little askew) and from cell to cell
 //! (noise of ranges), there is furniture at odd angles, and single cells are occupied where nothing stands.
 
-use super::floor_plan::{BuildingSize, FloorPlan, WALL};
+use super::floor_plan::{BuildingSize, FloorPlan};
 use super::mapper::SnapshotMap;
+use super::room::WALL;
 use super::scanned_map::{ScanSettings, scan_building};
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};

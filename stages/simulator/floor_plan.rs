@@ -5,14 +5,13 @@
 //! are those of the building: x from 0 to its width, y from 0 to its height, metres.
 
 use super::furniture::{furnish_corridor, furnish_room};
+use super::room::{Door, Room, WALL};
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::Point2;
 use rand::{Rng, RngExt};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How thick walls are, metres.
-pub(super) const WALL: f64 = 0.15;
 /// About how deep a band is: a corridor and two rows of rooms, metres.
 const BAND: f64 = 14.0;
 /// A building wider than this has two corridors along y, metres.
@@ -46,40 +45,6 @@ pub(super) struct BuildingSize {
     pub(super) clutter: f64,
     /// How the rooms are laid out.
     pub(super) layout: Layout,
-}
-
-/// A gap in a wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Door {
-    /// The middle of the gap, on the centre line of the wall.
-    pub centre: Point2,
-    /// Its width, metres.
-    pub width: f64,
-    /// Whether its wall runs along x.
-    pub along_x: bool,
-}
-
-impl Door {
-    /// The gap, with `depth` metres kept clear on each side of the wall.
-    pub fn clearing(&self, depth: f64) -> Rectangle {
-        let (along, across) = (self.width + 0.2, WALL + 2.0 * depth);
-        let (width, height) = if self.along_x { (along, across) } else { (across, along) };
-        Rectangle::round(self.centre, width, height)
-    }
-
-    fn gap(&self) -> (f64, f64) {
-        let middle = if self.along_x { self.centre.x } else { self.centre.y };
-        (middle - self.width / 2.0, middle + self.width / 2.0)
-    }
-}
-
-/// A room.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Room {
-    /// The room between the faces of its walls.
-    pub bounds: Rectangle,
-    /// Its doors: to the corridor first.
-    pub doors: Vec<Door>,
 }
 
 /// A building.

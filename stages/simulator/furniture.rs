@@ -3,7 +3,7 @@
 //! A piece either stands against a wall or leaves a passage on all its sides; pieces leave a passage between each
 //! other, and doors stay clear. So no piece can cut a room in two.
 
-use super::floor_plan::Room;
+use super::room::Room;
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::{Point2, pose};
 use rand::{Rng, RngExt};

@@ -1,8 +1,9 @@
 //! Which rooms each robot visits, and the way through them.
 
-use super::floor_plan::{FloorPlan, Room};
+use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
 use super::planner::{plan_path, smooth_path};
+use super::room::Room;
 use crate::geometry::Point2;
 use rand::{Rng, RngExt};
 use std::ops::Range;

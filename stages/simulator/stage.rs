@@ -3,7 +3,7 @@
 use super::drive::TICK_SECONDS;
 use super::parameters::SimulatorParameters;
 use super::robot::RobotLog;
-use super::world::{Simulation, simulate};
+use super::simulation::{Simulation, simulate};
 use crate::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{

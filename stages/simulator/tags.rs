@@ -4,9 +4,10 @@
 //! Gaussian noise; some readings are lost, and some have come over a reflection and are too long by 0.3 m to 2 m. The
 //! signal strength falls with the square of the distance, from -45 dBm at one metre, with a deviation of 2 dB.
 
-use super::floor_plan::{FloorPlan, WALL};
+use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
 use super::ray_caster::RayCaster;
+use super::room::WALL;
 use super::shape::{Rectangle, between};
 use crate::geometry::{Point2, Pose2};
 use nalgebra::Vector2;

@@ -1,6 +1,7 @@
 //! The stage `tag_filter`.
 
 use super::{Judgement, RobotTags, TagFilterParameters, judge};
+use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{CommonTag, CommonTags, Header, TagEstimates};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::BTreeMap;
@@ -24,7 +25,7 @@ struct TagFilter {
     /// The last estimates of each robot.
     robots: BTreeMap<String, TagEstimates>,
     /// What was sent last for each pair.
-    sent: BTreeMap<(String, String), Judgement>,
+    sent: BTreeMap<RobotPair, Judgement>,
 }
 
 struct Pairs {
@@ -55,7 +56,7 @@ impl TagFilter {
         self.robots.insert(robot.clone(), estimates.into_content());
         let others: Vec<String> = self.robots.keys().filter(|other| **other != robot).cloned().collect();
         for other in others {
-            let pair = if robot < other { (robot.clone(), other) } else { (other, robot.clone()) };
+            let pair = RobotPair::by_name(&robot, other);
             self.update(pair, self.parameters.min_change, output)?;
         }
         Ok(())
@@ -68,11 +69,11 @@ impl TagFilter {
 
     /// Judges a pair and sends the result, unless it was sent before and no tag has moved by more than `min_change`
     /// metres since.
-    fn update(&mut self, pair: (String, String), min_change: f64, output: &Output<Pairs>) -> Result<(), StageError> {
-        let (Some(a), Some(b)) = (self.robots.get(&pair.0), self.robots.get(&pair.1)) else { return Ok(()) };
+    fn update(&mut self, pair: RobotPair, min_change: f64, output: &Output<Pairs>) -> Result<(), StageError> {
+        let (Some(a), Some(b)) = (self.robots.get(&pair.a), self.robots.get(&pair.b)) else { return Ok(()) };
         let judgement = judge(
-            RobotTags { robot: &pair.0, tags: &a.tags },
-            RobotTags { robot: &pair.1, tags: &b.tags },
+            RobotTags { robot: &pair.a, tags: &a.tags },
+            RobotTags { robot: &pair.b, tags: &b.tags },
             &self.parameters,
         );
         if self.sent.get(&pair).is_some_and(|sent| says_the_same(sent, &judgement, min_change)) {
@@ -80,8 +81,8 @@ impl TagFilter {
         }
         let message = CommonTags {
             header: Header::new(output.log_time(), a.header.frame_id.clone()),
-            robot_a: pair.0.clone(),
-            robot_b: pair.1.clone(),
+            robot_a: pair.a.clone(),
+            robot_b: pair.b.clone(),
             tags: judgement.tags.clone(),
             accepted: judgement.accepted,
             provisional: judgement.provisional,

@@ -1,7 +1,7 @@
 //! From bytes to a value.
 
 use super::definition::{Count, Primitive};
-use super::reader::CdrReader;
+use super::reader::{CdrReader, DecodeFault};
 use super::schema::{Element, Field, MessageType, Schema};
 use super::value::{Array, Scalar, Value};
 
@@ -25,26 +25,6 @@ pub enum DecodeError {
     /// The message is longer than its fields.
     #[error("the message does not fit its schema: {0} bytes are left behind its last field")]
     Rest(usize),
-}
-
-/// What is wrong with a field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DecodeFault {
-    /// The bytes end within it.
-    #[error("it ends")]
-    End,
-    /// It claims more elements than the rest of the message has room for.
-    #[error("there is no room for the {0} elements that it claims")]
-    Count(usize),
-    /// A truth value is neither 0 nor 1.
-    #[error("a truth value is {0}")]
-    Boolean(u8),
-    /// A text is not UTF-8.
-    #[error("the text is not UTF-8")]
-    Text,
-    /// `wstring`: how it is encoded differs between the versions of ROS 2.
-    #[error("there is a wide text (wstring), which cannot be read")]
-    WideText,
 }
 
 /// A fault, and the path to it from the inside out.

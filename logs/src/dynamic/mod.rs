@@ -31,8 +31,9 @@ mod value;
 mod tests;
 
 pub use compare::{Difference, Differences, compare, nearly_equal};
-pub use decode::{DecodeError, DecodeFault};
+pub use decode::DecodeError;
 pub use json::JsonOptions;
 pub use path::{FieldPath, PathError};
+pub use reader::DecodeFault;
 pub use schema::{Schema, SchemaError};
 pub use value::{Array, Scalar, Value};

@@ -1,6 +1,24 @@
 //! CDR by hand: numbers and texts, aligned as the encoding wants it.
 
-use super::decode::DecodeFault;
+/// What is wrong with a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeFault {
+    /// The bytes end within it.
+    #[error("it ends")]
+    End,
+    /// It claims more elements than the rest of the message has room for.
+    #[error("there is no room for the {0} elements that it claims")]
+    Count(usize),
+    /// A truth value is neither 0 nor 1.
+    #[error("a truth value is {0}")]
+    Boolean(u8),
+    /// A text is not UTF-8.
+    #[error("the text is not UTF-8")]
+    Text,
+    /// `wstring`: how it is encoded differs between the versions of ROS 2.
+    #[error("there is a wide text (wstring), which cannot be read")]
+    WideText,
+}
 
 /// Reads the fields of a message one after the other.
 pub(super) struct CdrReader<'a> {

@@ -74,7 +74,9 @@ fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync) 
         .enumerate()
         .map(|(index, map)| PlacedLayer::new(map).map_err(|problem| PictureError::Map { index, problem }))
         .collect::<Result<_, _>>()?;
-    let view = View::of(&layers).ok_or(PictureError::Empty)?;
+    let finest = layers.iter().map(|layer| layer.resolution).fold(f64::INFINITY, f64::min);
+    let outlines = layers.iter().flat_map(PlacedLayer::outline);
+    let view = View::of(outlines, layers.len(), finest).ok_or(PictureError::Empty)?;
 
     let mut image = RgbImage::from_pixel(view.width, view.height, UNKNOWN);
     let row = view.width as usize * 3;

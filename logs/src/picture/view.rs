@@ -1,6 +1,5 @@
 //! What part of the world a picture shows, and how large.
 
-use super::layer::PlacedLayer;
 use nalgebra::Point2;
 
 /// The longest side of the maps in a picture, pixels.
@@ -26,24 +25,24 @@ pub(super) struct View {
 }
 
 impl View {
-    /// All known cells of the maps. `None` if there are none, or if they lie too far apart to be measured.
-    pub(super) fn of(layers: &[PlacedLayer<'_>]) -> Option<Self> {
+    /// All points of the outlines of so many maps, of which the finest has cells of `finest` metres. `None` if there are
+    /// none, or if they lie too far apart to be measured.
+    pub(super) fn of(outlines: impl Iterator<Item = Point2<f64>>, maps: usize, finest: f64) -> Option<Self> {
         let mut bounds: Option<[f64; 4]> = None;
-        for point in layers.iter().flat_map(PlacedLayer::outline) {
+        for point in outlines {
             let [left, bottom, right, top] = bounds.unwrap_or([point.x, point.y, point.x, point.y]);
             bounds = Some([left.min(point.x), bottom.min(point.y), right.max(point.x), top.max(point.y)]);
         }
         let [left, bottom, right, top] = bounds?;
         let (extent_x, extent_y) = (right - left, top - bottom);
         let extent = extent_x.max(extent_y);
-        let finest = layers.iter().map(|layer| layer.resolution).fold(f64::INFINITY, f64::min);
         if !(extent.is_finite() && extent > 0.0 && finest.is_finite()) {
             return None;
         }
         let pixels_a_cell = (PLEASANT_SIDE * finest / extent).floor().clamp(1.0, MOST_PIXELS_A_CELL);
         let metres_per_pixel = (finest / pixels_a_cell).max(extent / LONGEST_SIDE);
         // The cells of one map lie on the pixels; those of several lie askew and need to be smoothed.
-        let least_samples = match layers.len() {
+        let least_samples = match maps {
             1 => 1.0,
             _ if pixels_a_cell >= 2.0 => 2.0,
             _ => 3.0,

@@ -3,7 +3,7 @@
 use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::{Failure, RunError};
-use crate::link::board::Board;
+use crate::link::Board;
 use crate::link::{Control, LinkError, LinkSender, Outputs, SenderRole, Sleeper};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::OutputSink;

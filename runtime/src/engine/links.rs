@@ -1,7 +1,7 @@
 //! The ends of links, as the pipeline of a run has them.
 
 use super::runner::readers;
-use crate::link::board::Board;
+use crate::link::Board;
 use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortBoard, ReaderEnd, RunNames, SenderRole};
 use crate::pipeline::Pipeline;
 use iceoryx2::node::Node;

@@ -6,8 +6,8 @@
 //! is left over, and so is all that bears its prefix in `/dev/shm`.
 
 use super::links::board_shape;
+use crate::link::Board;
 use crate::link::RunNames;
-use crate::link::board::Board;
 use crate::pipeline::Pipeline;
 use std::fs::{self, File, TryLockError};
 use std::io;

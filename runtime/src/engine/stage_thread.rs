@@ -4,10 +4,10 @@ use super::links::Links;
 use super::runner::Runner;
 use super::work::Work;
 use super::{Failure, StageReport};
-use crate::link::board::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::link::{
     Control, InputQueue, LinkError, LinkReceiver, Order, Outputs, SenderRole, Sleeper, latest, lower_bound,
 };
+use crate::link::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::message::{LogTime, MessageFlags};
 use iceoryx2::service::Service;
 use std::cell::RefCell;

@@ -3,7 +3,7 @@
 use super::links::{Links, board_shape};
 use super::stage_thread::{Event, StageThread};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::board::{Board, StageState};
+use crate::link::{Board, StageState};
 use crate::link::{Control, LinkError, RunNames};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;

@@ -3,7 +3,7 @@
 use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::{Failure, RunError};
-use crate::link::board::StageBoard;
+use crate::link::StageBoard;
 use crate::link::{Observer, SampleHeader};
 use crate::message::Message;
 use crate::pipeline::{Mode, Pipeline};

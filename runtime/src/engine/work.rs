@@ -1,7 +1,7 @@
 //! How long a stage works, for those who look on.
 
 use crate::link::Sleeper;
-use crate::link::board::{StageBoard, StageNumber, monotonic_nanoseconds};
+use crate::link::{StageBoard, StageNumber, monotonic_nanoseconds};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -60,8 +60,8 @@ pub(super) fn working_for(board: &StageBoard) -> Option<Duration> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::link::Board;
     use crate::link::Control;
-    use crate::link::board::Board;
     use std::sync::Arc;
 
     #[test]

@@ -7,8 +7,6 @@
 
 use super::histogram::BUCKETS;
 use super::protocol::{Word, ring};
-use super::stage_board::BELL;
-pub use super::stage_board::{StageBoard, StageNumber, StageState, WireNumber};
 use memmap2::MmapRaw;
 use rustix::thread::futex;
 use rustix::time::{ClockId, Timespec, clock_gettime};
@@ -30,6 +28,9 @@ const STAGE_WORDS: usize = 2 * LINE;
 pub(super) const WIRE_WORDS: usize = 3;
 /// All numbers of a wire: with two for each sender.
 const ALL_WIRE_WORDS: usize = (WIRE_WORDS + 2 * MAX_SENDERS).next_multiple_of(LINE);
+
+/// Where among its numbers a stage has its bell.
+pub(super) const BELL: usize = 0;
 
 /// Nanoseconds on the monotonic clock, which is the same for all processes of a machine.
 pub fn monotonic_nanoseconds() -> u64 {
@@ -129,9 +130,9 @@ impl Board {
         }
     }
 
-    /// The part of a stage.
-    pub fn stage(self: &Arc<Self>, stage: usize) -> StageBoard {
-        StageBoard::new(Arc::clone(self), self.places[stage])
+    /// Where the numbers of a stage are.
+    pub(super) fn place(&self, stage: usize) -> Place {
+        self.places[stage]
     }
 
     /// Wakes all stages, so that they look at what has changed.
@@ -197,59 +198,4 @@ fn half(word: &AtomicU64) -> &AtomicU32 {
     // SAFETY: both halves lie within the word and are aligned. This process never accesses them by themselves: it hands the
     // address to the system, which reads it atomically.
     unsafe { &*std::ptr::from_ref(word).cast::<AtomicU32>().add(low) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const STAGES: [(usize, usize); 2] = [(0, 2), (3, 1)];
-
-    #[test]
-    fn what_one_process_writes_another_reads_and_no_number_lies_on_another() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("board");
-        let written = Board::create(&path, &STAGES).unwrap();
-        let read = Board::open(&path, &STAGES).unwrap();
-        for stage in 0..2 {
-            let board = written.stage(stage);
-            board.set_state(StageState::Running);
-            board.set(StageNumber::Process, 7 + stage as u64);
-            for port in 0..board.ports() {
-                board.add_sent(port, 10 + port as u64);
-                board.add_sender(port);
-            }
-            for wire in 0..board.wires() {
-                board.add_wire(wire, WireNumber::Taken, 100 + wire as u64);
-                board.window(wire, MAX_SENDERS - 1).give(99, 5);
-            }
-            board.add_latency(1_000);
-            board.greet();
-        }
-        for stage in 0..2 {
-            let board = read.stage(stage);
-            assert_eq!((board.state(), board.get(StageNumber::Process)), (StageState::Running, 7 + stage as u64));
-            assert_eq!((board.get(StageNumber::WorkingSince), board.get(StageNumber::Greetings)), (0, 1));
-            (0..board.ports())
-                .for_each(|port| assert_eq!((board.sent(port), board.senders(port)), (10 + port as u64, 1)));
-            for wire in 0..board.wires() {
-                assert_eq!(board.get_wire(wire, WireNumber::Taken), 100 + wire as u64);
-                assert_eq!(board.get_wire(wire, WireNumber::Waiting), 0);
-                assert_eq!((board.limit_of(wire, 99), board.limit_of(wire, 98)), (Some(5), None));
-            }
-            assert_eq!(board.latency().count(), 1);
-        }
-        written.stage(1).clear();
-        assert_eq!((read.stage(1).state(), read.stage(1).limit_of(0, 99)), (StageState::Absent, None));
-        assert_eq!(read.stage(1).get_wire(2, WireNumber::Taken), 102, "what was counted stays");
-    }
-
-    #[test]
-    fn a_board_of_another_run_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("board");
-        Board::create(&path, &STAGES[..1]).unwrap();
-        assert!(Board::open(&path, &STAGES).is_err());
-        assert!(Board::create(&path, &STAGES).is_err(), "it is there already");
-    }
 }

@@ -17,7 +17,7 @@
 //!
 //! All names stand below the run's prefix. A link is a publish-subscribe service `PREFIX/link/STAGE/PORT`. The stage is its
 //! *owner*. The payload is `[u8]`, aligned to 8 as its user header is, a [`SampleHeader`]. What its ends tell each other beside
-//! the messages are numbers on the [`board`] of the run.
+//! the messages are numbers on the [`Board`] of the run.
 //!
 //! 1. **Senders.** The owner sends; on a live link, programs outside of the run may send as well, if the owner is a source whose
 //!    messages come from outside. A sender is known by its *origin*, and numbers its samples. It makes its publisher, counts
@@ -44,7 +44,7 @@
 //! 8. **The end.** The owner's last message says that the stream has ended. A reader takes what is left, and is noted on the
 //!    board as ended when its stage is done and holds nothing any more; the owner keeps its publisher until then.
 
-pub mod board;
+mod board;
 pub mod direct;
 mod error;
 mod heap;
@@ -68,6 +68,7 @@ mod service;
 mod sleeper;
 mod stage_board;
 
+pub use board::{Board, MAX_SENDERS, monotonic_nanoseconds};
 pub use error::LinkError;
 pub use histogram::Histogram;
 pub use input_queue::InputQueue;
@@ -82,3 +83,4 @@ pub use sender::{LinkSender, SenderRole};
 pub(crate) use sequence::Sequence;
 pub use service::{LinkShape, PortBoard};
 pub use sleeper::{Control, Sleeper};
+pub use stage_board::{StageBoard, StageNumber, StageState, WireNumber};

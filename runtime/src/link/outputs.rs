@@ -1,6 +1,6 @@
 //! All outputs of a stage, and how they wait.
 
-use super::board::StageNumber;
+use super::stage_board::StageNumber;
 use super::{LinkError, LinkSender, Sleeper};
 use crate::message::{LogTime, MessageHeader, Write};
 use crate::stage::{OutputSink, StageError};

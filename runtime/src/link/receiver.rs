@@ -1,12 +1,12 @@
 //! The reading end of a link.
 
-use super::board::{MAX_SENDERS, StageBoard, StageNumber, StageState, WireNumber};
+use super::board::MAX_SENDERS;
 use super::heap::HeapLink;
 use super::heard::Heard;
 use super::held::HeldSamples;
 use super::protocol::NOTHING_HEARD;
-use super::sender::origin;
-use super::service::{LinkShape, PortBoard};
+use super::service::{LinkShape, PortBoard, origin};
+use super::stage_board::{StageBoard, StageNumber, StageState, WireNumber};
 use super::{InputQueue, LinkError, Order, RunNames, SampleHeader, unpack};
 use crate::message::{LogTime, MessageFlags};
 use iceoryx2::node::Node;

@@ -1,12 +1,14 @@
 //! The sending end of a link.
 
-use super::board::{StageBoard, StageNumber, StageState, monotonic_nanoseconds};
+use super::board::monotonic_nanoseconds;
 use super::heap::HeapLink;
 use super::kept::Kept;
 use super::protocol::{NOTHING_HEARD, ring};
 use super::receiver::ReaderEnd;
 use super::sample::Batch;
+use super::service::origin;
 use super::service::{FIRST_PLACE, LinkShape, PortBoard};
+use super::stage_board::{StageBoard, StageNumber, StageState};
 use super::{LinkError, Order, RunNames, SampleHeader, Sequence};
 use crate::message::{LogTime, MessageFlags, MessageHeader, Write, write_all, write_vec};
 use crate::pipeline::Overflow;
@@ -345,9 +347,4 @@ impl<S: Service + 'static> LinkSender<S> {
     fn failed(&self, cause: &dyn std::fmt::Debug) -> LinkError {
         LinkError::shared(format!("send on {}", self.name))(cause)
     }
-}
-
-/// The number by which readers know a sender, made of iceoryx2's for its publisher; never 0.
-pub(super) fn origin(publisher: u128) -> u64 {
-    ((publisher >> 64) as u64 ^ publisher as u64).max(1)
 }

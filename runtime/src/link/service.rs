@@ -1,6 +1,7 @@
 //! The service of a link, as all of its ends open it.
 
-use super::board::{MAX_SENDERS, StageBoard};
+use super::board::MAX_SENDERS;
+use super::stage_board::StageBoard;
 use super::{LinkError, Order, RunNames, SampleHeader};
 use crate::pipeline::Overflow;
 use iceoryx2::node::Node;
@@ -127,6 +128,11 @@ impl LinkShape<'_> {
                 other => LinkError::shared(format!("publish {}", self.name()))(&other),
             })
     }
+}
+
+/// The number by which readers know a sender, made of iceoryx2's for its publisher; never 0.
+pub(super) fn origin(publisher: u128) -> u64 {
+    ((publisher >> 64) as u64 ^ publisher as u64).max(1)
 }
 
 #[cfg(test)]

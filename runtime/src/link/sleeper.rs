@@ -1,8 +1,9 @@
 //! How a stage sleeps, and how it learns that it should not go on.
 
 use super::LinkError;
-use super::board::{Board, StageBoard, StageNumber, monotonic_nanoseconds};
+use super::board::{Board, monotonic_nanoseconds};
 use super::protocol;
+use super::stage_board::{StageBoard, StageNumber};
 use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

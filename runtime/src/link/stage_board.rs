@@ -1,6 +1,6 @@
 //! The part of a board that belongs to one stage.
 
-use super::board::{Board, MAX_SENDERS, Place, WIRE_WORDS};
+use super::board::{BELL, Board, MAX_SENDERS, Place, WIRE_WORDS};
 use super::histogram::Histogram;
 use super::protocol::Window;
 use std::sync::Arc;
@@ -20,8 +20,7 @@ pub enum StageState {
     Ended = 3,
 }
 
-/// The places of the numbers that are not [`StageNumber`]s.
-pub(super) const BELL: usize = 0;
+/// The place of the state, which is no [`StageNumber`].
 const STATE: usize = 1;
 
 /// A number of a stage.
@@ -63,11 +62,14 @@ pub struct StageBoard {
     place: Place,
 }
 
-impl StageBoard {
-    pub(super) fn new(board: Arc<Board>, place: Place) -> Self {
-        Self { board, place }
+impl Board {
+    /// The part of a stage.
+    pub fn stage(self: &Arc<Self>, stage: usize) -> StageBoard {
+        StageBoard { board: Arc::clone(self), place: self.place(stage) }
     }
+}
 
+impl StageBoard {
     /// How the stage stands.
     pub fn state(&self) -> StageState {
         let states = [StageState::Absent, StageState::Starting, StageState::Running, StageState::Ended];
@@ -214,4 +216,59 @@ impl StageBoard {
 /// Adds to a word that one thread writes.
 fn add(word: &AtomicU64, value: u64) {
     word.store(word.load(Ordering::Relaxed).wrapping_add(value), Ordering::Relaxed);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STAGES: [(usize, usize); 2] = [(0, 2), (3, 1)];
+
+    #[test]
+    fn what_one_process_writes_another_reads_and_no_number_lies_on_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("board");
+        let written = Board::create(&path, &STAGES).unwrap();
+        let read = Board::open(&path, &STAGES).unwrap();
+        for stage in 0..2 {
+            let board = written.stage(stage);
+            board.set_state(StageState::Running);
+            board.set(StageNumber::Process, 7 + stage as u64);
+            for port in 0..board.ports() {
+                board.add_sent(port, 10 + port as u64);
+                board.add_sender(port);
+            }
+            for wire in 0..board.wires() {
+                board.add_wire(wire, WireNumber::Taken, 100 + wire as u64);
+                board.window(wire, MAX_SENDERS - 1).give(99, 5);
+            }
+            board.add_latency(1_000);
+            board.greet();
+        }
+        for stage in 0..2 {
+            let board = read.stage(stage);
+            assert_eq!((board.state(), board.get(StageNumber::Process)), (StageState::Running, 7 + stage as u64));
+            assert_eq!((board.get(StageNumber::WorkingSince), board.get(StageNumber::Greetings)), (0, 1));
+            (0..board.ports())
+                .for_each(|port| assert_eq!((board.sent(port), board.senders(port)), (10 + port as u64, 1)));
+            for wire in 0..board.wires() {
+                assert_eq!(board.get_wire(wire, WireNumber::Taken), 100 + wire as u64);
+                assert_eq!(board.get_wire(wire, WireNumber::Waiting), 0);
+                assert_eq!((board.limit_of(wire, 99), board.limit_of(wire, 98)), (Some(5), None));
+            }
+            assert_eq!(board.latency().count(), 1);
+        }
+        written.stage(1).clear();
+        assert_eq!((read.stage(1).state(), read.stage(1).limit_of(0, 99)), (StageState::Absent, None));
+        assert_eq!(read.stage(1).get_wire(2, WireNumber::Taken), 102, "what was counted stays");
+    }
+
+    #[test]
+    fn a_board_of_another_run_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("board");
+        Board::create(&path, &STAGES[..1]).unwrap();
+        assert!(Board::open(&path, &STAGES).is_err());
+        assert!(Board::create(&path, &STAGES).is_err(), "it is there already");
+    }
 }

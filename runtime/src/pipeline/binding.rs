@@ -4,10 +4,27 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::nearest::{quoted_list, suggest};
 use super::reference::{Output, Resolved, outputs_of_type, resolve, type_text};
-use super::settings::{text, wrong_type};
 use super::stage_section::Draft;
-use super::wiring::{Input, Mention};
+use super::values::{text, wrong_type};
 use crate::stage::{InputPort, PortType, Registry, StageKind};
+
+/// What feeds an input port, and where the file says so.
+#[derive(Clone, Debug)]
+pub(super) struct Input {
+    pub(super) port: usize,
+    pub(super) from: Output,
+    pub(super) at: Location,
+}
+
+/// One stage names another in its inputs, whether or not that can be wired.
+#[derive(Clone, Debug)]
+pub(super) struct Mention {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    pub(super) at: Location,
+    /// Whether the name is wrong, and this is what was probably meant.
+    pub(super) guessed: bool,
+}
 
 /// Wires the inputs of one stage.
 pub(super) struct Binder<'a> {

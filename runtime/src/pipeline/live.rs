@@ -3,7 +3,7 @@
 use super::diagnostic::{Diagnostic, Problems};
 use super::document::{Entry, Item, Value};
 use super::nearest::{did_you_mean, quoted_list};
-use super::settings::{entries, text, wrong_type};
+use super::values::{entries, text, wrong_type};
 use crate::stage::StageKind;
 
 /// In which order stages take their inputs, and when a run ends.

@@ -1,14 +1,15 @@
 //! From the text of a pipeline file to a checked pipeline.
 
+use super::binding::{Input, Mention};
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
 use super::document::{self, Entry, Value};
 use super::nearest::did_you_mean;
 use super::order::order;
 use super::overrides::Overrides;
-use super::settings::{Settings, entries};
+use super::settings::Settings;
 use super::stage_section::{Draft, read_stage};
-use super::topics::check_distinct;
-use super::wiring::{Mention, Wiring, check_used};
+use super::values::entries;
+use super::wiring::{Wiring, check_topics_differ, check_used};
 use super::{Pipeline, StageSpec, Wire};
 use crate::stage::Registry;
 use std::collections::BTreeSet;
@@ -60,7 +61,7 @@ impl Pipeline {
             stages.iter().map(|stage| read_stage(stage, &settings, registry, &mut problems)).collect();
         let wiring = Wiring::new(&drafts, registry, &mut problems);
         check_used(&drafts, &wiring, &mut problems);
-        check_distinct(&drafts, |stage, port| wiring.is_read(stage, port), &mut problems);
+        check_topics_differ(&drafts, &wiring, &mut problems);
         let order = check_order(&drafts, &wiring.mentions, &mut problems);
 
         if problems.is_empty() { Ok(assemble(settings, drafts, &wiring, &order)) } else { Err(problems.into_errors()) }
@@ -127,11 +128,8 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
     let mut stages: Vec<(usize, StageSpec)> = Vec::with_capacity(drafts.len());
     for (index, draft) in drafts.into_iter().enumerate() {
         let Some(kind) = draft.kind else { continue };
-        let wire = |input: &super::wiring::Input| Wire {
-            port: input.port,
-            from_stage: place[input.from.stage],
-            from_port: input.from.port,
-        };
+        let wire =
+            |input: &Input| Wire { port: input.port, from_stage: place[input.from.stage], from_port: input.from.port };
         let spec = StageSpec {
             name: draft.name.to_owned(),
             kind: kind.clone(),

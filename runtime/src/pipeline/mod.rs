@@ -71,6 +71,7 @@ mod test_kinds;
 mod tests;
 mod text_layout;
 mod topics;
+mod values;
 mod wiring;
 mod write;
 

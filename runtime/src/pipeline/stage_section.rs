@@ -5,8 +5,9 @@ use super::document::{Entry, Item, Value};
 use super::live::{Mode, Overflow, Restart, check_is_live, read_overflow, read_word};
 use super::nearest::suggest;
 use super::parameters::{RESERVED_KEYS, read_parameters};
-use super::settings::{Settings, depth, text};
-use super::topics::read_topics;
+use super::settings::{Settings, depth};
+use super::topics::{Topic, read_topics};
+use super::values::text;
 use crate::stage::{Registry, StageKind};
 
 /// The longest name of a stage, in bytes. It is part of the names of topics and of links.
@@ -32,13 +33,6 @@ pub(super) struct Draft<'a> {
     /// For every output port of the kind.
     pub(super) overflow: Vec<Overflow>,
     pub(super) restart: Restart,
-}
-
-/// The topic of an output port, and where it was given.
-#[derive(Debug)]
-pub(super) struct Topic {
-    pub(super) template: String,
-    pub(super) at: Location,
 }
 
 /// Reads a stage of a pipeline with the given settings.

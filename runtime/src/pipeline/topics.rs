@@ -3,14 +3,19 @@
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item};
 use super::nearest::suggest;
-use super::settings::{entries, text};
-use super::stage_section::{Draft, Topic};
+use super::values::{entries, text};
 use crate::stage::StageKind;
-use std::collections::BTreeMap;
 
 /// What a message header has room for, in bytes.
 const LONGEST_TOPIC: usize = 128;
 const LONGEST_ROBOT: usize = 32;
+
+/// The topic of an output port, and where it was given.
+#[derive(Debug)]
+pub(super) struct Topic {
+    pub(super) template: String,
+    pub(super) at: Location,
+}
 
 /// The topics of a stage's outputs: the one given in `topics`, or else the port's own, or else
 /// `/{robot}/STAGE/PORT`.
@@ -77,33 +82,5 @@ fn check_length(topic: &Topic, port: &str, problems: &mut Problems) {
     if length > LONGEST_TOPIC {
         let label = format!("up to {length} bytes with the robot's name, and at most {LONGEST_TOPIC} fit");
         problems.push(Diagnostic::new(format!("the topic of the output `{port}` is too long")).at(&topic.at, label));
-    }
-}
-
-/// Two outputs that are read and have one topic would mix in a log. `is_read` is asked for stage and port.
-pub(super) fn check_distinct(drafts: &[Draft<'_>], is_read: impl Fn(usize, usize) -> bool, problems: &mut Problems) {
-    let mut first: BTreeMap<&str, (&Draft<'_>, &str, &Topic)> = BTreeMap::new();
-    for (stage, draft) in drafts.iter().enumerate() {
-        let ports = draft.kind.map(|kind| kind.outputs.as_slice()).unwrap_or_default();
-        for (port, (topic, output)) in draft.topics.iter().zip(ports).enumerate() {
-            if !is_read(stage, port) {
-                continue;
-            }
-            let Some((other, other_port, other_topic)) = first.get(topic.template.as_str()) else {
-                first.insert(&topic.template, (draft, output.name, topic));
-                continue;
-            };
-            let (name, port, template) = (draft.name, output.name, topic.template.as_str());
-            let other_name = other.name;
-            let problem =
-                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
-                    .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
-            let problem = match topic.at == other_topic.at {
-                true => problem,
-                false => problem.context(&other_topic.at, format!("`{other_name}.{other_port}` goes there too")),
-            };
-            let own = format!("/{name}/{port}");
-            problems.push(problem.help(format!("give one a topic of its own: `topics = {{ {port} = \"{own}\" }}`")));
-        }
     }
 }

@@ -1,29 +1,12 @@
 //! Which output feeds which input.
 
-use super::binding::Binder;
-use super::diagnostic::{Diagnostic, Location, Problems};
+use super::binding::{Binder, Input, Mention};
+use super::diagnostic::{Diagnostic, Problems};
 use super::reference::Output;
 use super::stage_section::Draft;
+use super::topics::Topic;
 use crate::stage::Registry;
-use std::collections::BTreeSet;
-
-/// What feeds an input port, and where the file says so.
-#[derive(Clone, Debug)]
-pub(super) struct Input {
-    pub(super) port: usize,
-    pub(super) from: Output,
-    pub(super) at: Location,
-}
-
-/// One stage names another in its inputs, whether or not that can be wired.
-#[derive(Clone, Debug)]
-pub(super) struct Mention {
-    pub(super) from: usize,
-    pub(super) to: usize,
-    pub(super) at: Location,
-    /// Whether the name is wrong, and this is what was probably meant.
-    pub(super) guessed: bool,
-}
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The wires of a pipeline.
 #[derive(Debug, Default)]
@@ -50,7 +33,7 @@ impl Wiring {
     }
 
     /// Whether an output feeds an input.
-    pub(super) fn is_read(&self, stage: usize, port: usize) -> bool {
+    fn is_read(&self, stage: usize, port: usize) -> bool {
         self.inputs.iter().flatten().any(|input| input.from == Output { stage, port })
     }
 }
@@ -71,5 +54,33 @@ pub(super) fn check_used(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut P
         let name = if outputs.len() == 1 { draft.name.to_owned() } else { format!("{}.{}", draft.name, first.name) };
         let problem = Diagnostic::new(title).at(draft.at, "no stage names it in its inputs");
         problems.push(problem.help(format!("add \"{name}\" to the inputs of another stage, or take this stage out")));
+    }
+}
+
+/// Two outputs that are read and have one topic would mix in a log.
+pub(super) fn check_topics_differ(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut Problems) {
+    let mut first: BTreeMap<&str, (&Draft<'_>, &str, &Topic)> = BTreeMap::new();
+    for (stage, draft) in drafts.iter().enumerate() {
+        let ports = draft.kind.map(|kind| kind.outputs.as_slice()).unwrap_or_default();
+        for (port, (topic, output)) in draft.topics.iter().zip(ports).enumerate() {
+            if !wiring.is_read(stage, port) {
+                continue;
+            }
+            let Some((other, other_port, other_topic)) = first.get(topic.template.as_str()) else {
+                first.insert(&topic.template, (draft, output.name, topic));
+                continue;
+            };
+            let (name, port, template) = (draft.name, output.name, topic.template.as_str());
+            let other_name = other.name;
+            let problem =
+                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
+                    .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
+            let problem = match topic.at == other_topic.at {
+                true => problem,
+                false => problem.context(&other_topic.at, format!("`{other_name}.{other_port}` goes there too")),
+            };
+            let own = format!("/{name}/{port}");
+            problems.push(problem.help(format!("give one a topic of its own: `topics = {{ {port} = \"{own}\" }}`")));
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::frame_solver::FrameSolverParameters;
-use crate::frame_solver::solve::{Solution, by_name, solve};
+use crate::frame_solver::solution::{Solution, by_name};
+use crate::frame_solver::solve::solve;
 use crate::frame_solver::team::Team;
 use crate::frame_solver::uncertain::error_vector;
 use proptest::prelude::*;

@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
 use gridweave_runtime::link::Histogram;
-use gridweave_runtime::link::board::{StageBoard, StageNumber, StageState, WireNumber};
+use gridweave_runtime::link::{StageBoard, StageNumber, StageState, WireNumber};
 use gridweave_runtime::pipeline::{Mode, Pipeline, Wire};
 use gridweave_runtime::stage::Registry;
 use serde_json::{Value, json};

@@ -6,7 +6,7 @@ use crate::engine::run_folder::RunFolder;
 use crate::engine::stage_thread::{Event, StageThread, tell};
 use crate::engine::work::working_for;
 use crate::engine::{Failure, RunError};
-use crate::link::board::Board;
+use crate::link::Board;
 use crate::link::{Control, LinkError};
 use crate::pipeline::Pipeline;
 use crate::stage::Registry;

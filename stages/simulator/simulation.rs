@@ -1,0 +1,206 @@
+//! A whole simulation: a building, its tags, the robots in it, and the truth.
+
+use super::floor_plan::FloorPlan;
+use super::parameters::SimulatorParameters;
+use super::robot::{RobotLog, simulate_robot};
+use super::route::share_rooms;
+use super::tags::Tag;
+use super::truth::Truth;
+use super::world::{SimulationError, World};
+use crate::geometry::Point2;
+use gridweave_runtime::stage::Parameters as _;
+use rayon::prelude::*;
+
+/// A simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// The building.
+    pub plan: FloorPlan,
+    /// Its tags.
+    pub tags: Vec<Tag>,
+    /// What each robot has logged.
+    pub robots: Vec<RobotLog>,
+    /// What a merge is measured against.
+    pub truth: Truth,
+}
+
+/// Makes a building, lets the robots drive through it, and says what is true. The same parameters and seed give the
+/// same simulation on any number of threads.
+///
+/// # Errors
+/// A parameter is out of its range, or the robots have no way to go or see nothing.
+pub fn simulate(parameters: &SimulatorParameters, seed: u64) -> Result<Simulation, SimulationError> {
+    if let Some(error) = parameters.check().into_iter().next() {
+        return Err(error.into());
+    }
+    let world = World::new(parameters, seed);
+    let rooms = share_rooms(world.plan.rooms.len(), parameters.robots as usize, parameters.overlap);
+    let robots = rooms
+        .into_par_iter()
+        .enumerate()
+        .map(|(robot, rooms)| simulate_robot(&world, robot, rooms, parameters))
+        .collect::<Vec<_>>();
+    // The first error by robot, whichever thread was first.
+    let robots = robots.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let truth = truth_of(&world.tags, &robots);
+    Ok(Simulation { plan: world.plan, tags: world.tags, robots, truth })
+}
+
+fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
+    let transform_building_first = robots.first().map(|robot| robot.transform_building_map).unwrap_or_default();
+    let frame = |robot: &RobotLog| transform_building_first.inv_mul(&robot.transform_building_map);
+    let last_map = |robot: &RobotLog| Some((robot.name.clone(), robot.maps.last()?.1.geometry));
+    let centres = robots.iter().filter_map(last_map).map(|(name, geometry)| {
+        let size = Point2::new(geometry.width as f64, geometry.height as f64);
+        (name, geometry.origin * (size * geometry.resolution / 2.0))
+    });
+    Truth {
+        resolution: robots.first().and_then(last_map).map_or(0.0, |(_, geometry)| geometry.resolution),
+        frames: robots.iter().map(|robot| (robot.name.clone(), frame(robot))).collect(),
+        tags: tags
+            .iter()
+            .map(|tag| (tag.id.clone(), transform_building_first.inverse_transform_point(&tag.place)))
+            .collect(),
+        centres: centres.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Cell, Grid, Pose2, is_occupied};
+    use gridweave_runtime::stage::ParameterError;
+
+    /// A small building with two robots, exact poses and an exact lidar.
+    fn small() -> SimulatorParameters {
+        SimulatorParameters {
+            robots: 2,
+            width: 12.0,
+            height: 10.0,
+            overlap: 0.8,
+            beams: 180,
+            drift: 0.0,
+            lidar_noise: 0.0,
+            tags: 12,
+            ..SimulatorParameters::default()
+        }
+    }
+
+    fn last_grid(robot: &RobotLog) -> Grid<'_> {
+        let map = &robot.maps.last().unwrap().1;
+        Grid::new(map.geometry, &map.cells).unwrap()
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_world_on_any_number_of_threads_and_another_seed_another() {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| simulate(&SimulatorParameters { drift: 0.005, lidar_noise: 0.02, ..small() }, 4).unwrap())
+        };
+        let one = on(1);
+        assert!(one == on(3));
+        let other = simulate(&small(), 5).unwrap();
+        assert!(one.plan != other.plan && one.robots[0].maps != other.robots[0].maps);
+    }
+
+    #[test]
+    fn walls_that_two_robots_have_seen_coincide_under_the_true_transform() {
+        for seed in 0..4 {
+            let simulation = simulate(&small(), seed).unwrap();
+            let [first, second] = [&simulation.robots[0], &simulation.robots[1]].map(last_grid);
+            let transform_first_second = simulation.truth.frames[1].1;
+            let (mut on_first, mut near_wall) = (0, 0);
+            for cell in second.occupied() {
+                let point = transform_first_second * second.geometry.centre(cell);
+                let Some(at) = first.geometry.cell(&point).filter(|at| first.value(*at) >= 0) else { continue };
+                on_first += 1;
+                let around = (0..3).flat_map(|row| (0..3).map(move |column| (column, row)));
+                near_wall += usize::from(around.into_iter().any(|(column, row)| {
+                    let column = (at.column + column).wrapping_sub(1);
+                    let row = (at.row + row).wrapping_sub(1);
+                    is_occupied(first.value(Cell { column, row }))
+                }));
+            }
+            assert!(on_first > 300, "seed {seed}: the maps have only {on_first} wall cells in common");
+            let share = f64::from(near_wall as u32) / f64::from(on_first);
+            assert!(share > 0.97, "seed {seed}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_truth_tells_tags_frames_and_centres() {
+        let simulation = simulate(&small(), 2).unwrap();
+        let truth = &simulation.truth;
+        assert_eq!(truth.frames[0].1, Pose2::identity());
+        for (robot, (name, transform_first_robot)) in simulation.robots.iter().zip(&truth.frames) {
+            assert_eq!(&robot.name, name);
+            let offs = robot.readings.iter().map(|(tick, reading)| {
+                let antenna = transform_first_robot * Point2::from(robot.poses[*tick].translation.vector);
+                (reading.range - (truth.tags[reading.tag].1 - antenna).norm()).abs()
+            });
+            let offs: Vec<f64> = offs.collect();
+            assert!(offs.len() > 100 && offs.iter().all(|off| *off < 5.5 * 0.05));
+        }
+        for (robot, (_, centre)) in simulation.robots.iter().zip(&truth.centres) {
+            let grid = last_grid(robot);
+            let middle = Cell { column: grid.geometry.width / 2, row: grid.geometry.height / 2 };
+            assert!((grid.geometry.centre(middle) - centre).norm() < grid.geometry.resolution);
+        }
+    }
+
+    #[test]
+    fn maps_grow_and_have_the_resolutions_asked_for() {
+        let parameters = SimulatorParameters { resolution: vec![0.05, 0.1], snapshots: 4, ..small() };
+        let simulation = simulate(&parameters, 1).unwrap();
+        for (robot, resolution) in simulation.robots.iter().zip([0.05, 0.1]) {
+            assert_eq!(robot.maps.len(), 4);
+            assert_eq!(robot.maps[3].0, robot.poses.len() - 1, "the last map holds the last scan");
+            let known = |map: &[i8]| map.iter().filter(|value| **value >= 0).count();
+            for pair in robot.maps.windows(2) {
+                assert!(pair[0].0 < pair[1].0 && known(&pair[0].1.cells) <= known(&pair[1].1.cells));
+            }
+            for (_, map) in &robot.maps {
+                assert_eq!(map.geometry.resolution, resolution);
+                assert_eq!(map.cells.len(), map.geometry.cell_count());
+                assert!(map.cells.iter().all(|value| (-1..=100).contains(value)));
+            }
+        }
+    }
+
+    #[test]
+    fn robots_stay_clear_of_everything_and_see_all_their_rooms() {
+        let simulation = simulate(&SimulatorParameters { clutter: 0.3, ..small() }, 3).unwrap();
+        let visited = |area: &crate::simulator::Rectangle| {
+            let robots = simulation.robots.iter().flat_map(|robot| &robot.true_poses);
+            robots.into_iter().any(|pose| area.contains(&Point2::from(pose.translation.vector)))
+        };
+        assert!(simulation.plan.rooms.iter().all(|room| visited(&room.bounds)));
+        for pose in simulation.robots.iter().flat_map(|robot| &robot.true_poses) {
+            let place = Point2::from(pose.translation.vector);
+            assert!(simulation.plan.solids.iter().all(|solid| solid.distance(&place) > 0.15));
+        }
+    }
+
+    #[test]
+    fn one_robot_no_tags_and_an_empty_building_are_worlds_too() {
+        let bare = SimulatorParameters { robots: 1, tags: 0, clutter: 0.0, map_yaw: 0.0, map_offset: 0.0, ..small() };
+        assert!(bare.check().is_empty());
+        let simulation = simulate(&bare, 1).unwrap();
+        assert_eq!((simulation.robots.len(), simulation.tags.len()), (1, 0));
+        assert!(simulation.robots[0].readings.is_empty());
+        assert_eq!(simulation.robots[0].transform_building_map.rotation.angle(), 0.0);
+    }
+
+    #[test]
+    fn a_parameter_out_of_range_is_an_error() {
+        let error = simulate(&SimulatorParameters { width: f64::NAN, ..small() }, 1).unwrap_err();
+        assert!(matches!(error, SimulationError::Parameter(ParameterError { field: "width", .. })));
+    }
+
+    #[test]
+    fn a_lidar_that_meets_nothing_is_an_error_that_says_what_to_change() {
+        let blind = SimulatorParameters { beams: 1, lidar_range: 0.5, duration: 1.0, dropped_beams: 0.99, ..small() };
+        let error = simulate(&blind, 1).unwrap_err();
+        assert!(error.to_string().contains("lidar_range"), "{error}");
+    }
+}
