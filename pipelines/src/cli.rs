@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
 use std::io::IsTerminal;
-use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::EnvFilter;
 use tracing_subscriber::prelude::*;
 
 /// Merges the maps of several robots that explore one building, each with a map frame of its own.
@@ -86,13 +86,12 @@ impl Cli {
 
 /// Sends what the libraries log to standard error: warnings, or all that `RUST_LOG` asks for.
 fn start_log(verbose: bool) {
-    let default = if verbose { LevelFilter::INFO } else { LevelFilter::WARN };
-    let asked = std::env::var("RUST_LOG").ok().and_then(|directives| directives.parse::<Targets>().ok());
+    let filter = EnvFilter::try_from_default_env();
+    let filter = filter.unwrap_or_else(|_| EnvFilter::new(if verbose { "info" } else { "warn" }));
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_target(false);
-    let filter = asked.unwrap_or_else(|| Targets::new().with_default(default));
     tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }

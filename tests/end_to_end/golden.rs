@@ -33,14 +33,10 @@ fn the_golden_files_are_small() {
 
 #[test]
 fn the_example_of_a_stage_of_ones_own_sends_what_is_expected() {
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["run", "--quiet", "--package", "gridweave", "--example", "own_stage"]);
-    if !cfg!(debug_assertions) {
-        cargo.arg("--release");
-    }
     let cases = "pipelines/examples/own_stage_golden";
-    cargo.args(["--", "golden", "--partial", "--cases", cases, "--differences", &differences("own_stage")]);
-    let ended = cargo.current_dir(repository()).output().unwrap();
+    let mut example = Command::new(env!("CARGO_BIN_EXE_own_stage"));
+    example.args(["golden", "--partial", "--cases", cases, "--differences", &differences("own_stage")]);
+    let ended = example.current_dir(repository()).output().unwrap();
     let text = String::from_utf8_lossy(&ended.stdout).into_owned() + &String::from_utf8_lossy(&ended.stderr);
     assert!(ended.status.success() && text.contains("ok       map_inflater/rooms"), "{text}");
 }
