@@ -1,6 +1,6 @@
 //! A run that is interrupted ends soon, fails, and leaves a log that can be read and says that it is not complete.
 #![cfg(unix)]
-use crate::support::{gridweave, left_over, signal, start, wait_until};
+use crate::support::{gridweave, left_over, part, signal, start, wait_until};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -32,7 +32,7 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
         let run =
             start(folder.path(), &["run", "endless.toml", "-o", output.to_str().unwrap(), "--engine", engine], &[]);
         let id = run.id();
-        wait_until("output", || fs::metadata(&output).is_ok_and(|file| file.len() > 100_000));
+        wait_until("output", || fs::metadata(part(&output)).is_ok_and(|file| file.len() > 100_000));
         signal(id, name);
         run.wait().assert(1, &["the run was interrupted"]);
         assert_eq!(left_over(id), Vec::<PathBuf>::new());

@@ -20,6 +20,7 @@ mod merge_map_files;
 mod merge_output;
 mod methods;
 mod mirrored_tag;
+mod output_files;
 mod processes;
 mod real_logs;
 mod support;

@@ -1,6 +1,7 @@
 //! `gridweave simulate`.
 
 use crate::job::progress::Progress;
+use crate::job::{RunOptions, check_outputs};
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use anyhow::Result;
@@ -57,6 +58,7 @@ pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, regi
     let file = truth.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", truth.display())))?;
     let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(file))]);
     pipeline.attach(&truth::kind(), parameters, "truth", |_, _, _| true);
+    check_outputs(&pipeline, &RunOptions::default())?;
     let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();

@@ -7,8 +7,9 @@ use crate::job::progress;
 use crate::status::Status;
 use anyhow::{Result, bail};
 use clap::Args;
+use gridweave_logs::file::check_writable;
 use gridweave_logs::schemas::schema_text;
-use gridweave_logs::sink::{LogOptions, LogWriter};
+use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{PortType, Registry};
@@ -37,7 +38,7 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Records links.
 pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
-    LogWriter::check_path(&args.output)?;
+    check_writable(&args.output)?;
     let running = find_run(&args.run, registry)?;
     let mut links = Vec::new();
     for name in &args.links {
@@ -75,14 +76,10 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
         (missed, 0) => Some(format!("{missed} messages were missed, as the recorder was too slow for them")),
         (_, untyped) => Some(format!("{missed} messages were missed, and {untyped} were of an unknown type")),
     };
-    writer.finish(
-        reason.as_deref().map_or(gridweave_logs::sink::Outcome::Complete, |reason| {
-            gridweave_logs::sink::Outcome::Incomplete(reason)
-        }),
-    )?;
-    println!("recorded {messages} messages of {} links to {}", links.len(), args.output.display());
+    let written = writer.finish(reason.as_deref().map_or(Outcome::Complete, Outcome::Incomplete))?;
+    println!("recorded {messages} messages of {} links to {}", links.len(), written.display());
     match reason {
-        Some(reason) => bail!("{}: {reason}", args.output.display()),
+        Some(reason) => bail!("{}: {reason}", written.display()),
         None => Ok(Status::Done),
     }
 }
