@@ -4,11 +4,11 @@ use super::damage::Damage;
 use super::error::ReadError;
 use super::guess::looks_like;
 use super::layout::Layout;
+use gridweave_runtime::input_file;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
 use memmap2::Mmap;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// One MCAP file, opened for reading.
@@ -92,7 +92,7 @@ impl LogFile {
 
 #[allow(unsafe_code)]
 fn map_file(path: &Path) -> std::io::Result<Mmap> {
-    let file = File::open(path)?;
+    let file = input_file::open(path)?;
     // SAFETY: the map is read-only and private to this process, and is only ever read as bytes, for which every value
     // is valid; every length and offset in it is checked against the map's size, which is fixed. What remains is that
     // another process changes the file meanwhile: a log is only appended to while it is recorded, which does not touch

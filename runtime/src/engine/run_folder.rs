@@ -408,8 +408,8 @@ mod tests {
         let node = folder.names().node::<ipc::Service>().unwrap();
         let files = shared_memory(&folder.prefix);
         assert!(files.len() > 1, "{files:?}");
-        let files = files.iter().chain([&folder.path, &folder.path.parent().unwrap().to_owned()]);
-        for path in files {
+        let folders = [folder.path.clone(), folder.path.join(LOCK), folder.pipeline(), user_folder::path()];
+        for path in files.iter().chain(&folders) {
             let mode = fs::metadata(path).unwrap().mode();
             assert_eq!(mode & 0o077, 0, "{} {mode:o}", path.display());
         }
