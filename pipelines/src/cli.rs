@@ -92,7 +92,9 @@ fn start_log(verbose: bool) {
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
-        .with_target(false);
+        .with_target(false)
+        // It would say on standard error that standard error cannot be written to.
+        .log_internal_errors(false);
     let filter = asked.unwrap_or_else(|| Targets::new().with_default(default));
     tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }

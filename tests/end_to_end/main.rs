@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod bad_input;
+mod closed_output;
 mod engines_agree;
 mod full_shared_memory;
 mod golden;

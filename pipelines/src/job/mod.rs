@@ -13,6 +13,7 @@ pub(crate) use outputs::check as check_outputs;
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
+use crate::terminal::{print, print_line};
 use anyhow::Result;
 use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
@@ -61,9 +62,9 @@ impl Job<'_> {
     pub(crate) fn run_and_print(&self) -> Result<Status> {
         let summary = self.run()?;
         match self.options.json {
-            true => println!("{}", summary.to_json()),
-            false => print!("{}", summary.to_text()),
-        }
+            true => print_line(summary.to_json()),
+            false => print(summary.to_text()),
+        }?;
         Ok(match summary.has_unmerged() {
             true => Status::NotAllMerged,
             false => Status::Done,

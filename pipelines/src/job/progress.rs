@@ -1,5 +1,6 @@
 //! How far a run is: a bar on a terminal, plain lines elsewhere.
 
+use crate::terminal::say;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::Mode;
@@ -29,7 +30,7 @@ pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBo
             if INTERRUPTED.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("interrupted: {what_follows}; a second signal ends the program at once");
+            say(format_args!("interrupted: {what_follows}; a second signal ends the program at once"));
         });
         if let Err(error) = handler {
             tracing::warn!("an interrupt will not close the output: {error}");
@@ -82,18 +83,18 @@ impl Observer for Progress {
         let Ok(mut last_line) = self.last_line.lock() else { return };
         if last_line.elapsed() >= LINE_INTERVAL {
             *last_line = Instant::now();
-            eprintln!("{:.0} %, {at}", share * 100.0);
+            say(format_args!("{:.0} %, {at}", share * 100.0));
         }
     }
 
     fn started(&self, prefix: &str) {
         if self.mode == Mode::Live {
-            eprintln!("the live run {prefix} has started; an interrupt (ctrl-c) ends it");
+            say(format_args!("the live run {prefix} has started; an interrupt (ctrl-c) ends it"));
         }
     }
 
     fn restarting(&self, stage: &str, failure: &str, after: Duration) {
-        eprintln!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64());
+        say(format_args!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64()));
     }
 
     fn should_stop(&self) -> bool {

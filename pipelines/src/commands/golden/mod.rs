@@ -20,6 +20,7 @@ mod source;
 
 use crate::job::progress;
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line};
 use anyhow::{Context, Result, bail};
 use check_case::{CaseOutcome, check_case};
 use clap::Args;
@@ -76,9 +77,9 @@ pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Status> {
     }
     let report = Report { cases: check_all(&cases, args, registry)?, kinds_without_a_case: without };
     match args.json {
-        true => println!("{:#}", report.to_json()),
-        false => print!("{}", report.to_text(&args.cases)),
-    }
+        true => print_line(format_args!("{:#}", report.to_json())),
+        false => print(report.to_text(&args.cases)),
+    }?;
     Ok(if report.has_failed() { Status::Failed } else { Status::Done })
 }
 

@@ -3,6 +3,7 @@
 use super::running::{RunChoice, Running, find_run};
 use crate::job::progress;
 use crate::status::{BadUse, Status};
+use crate::terminal::print_line;
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use gridweave_runtime::engine::{Feed, FeedStopper};
@@ -77,7 +78,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
         other => other?,
     }
     let is_taken = feed.wait_until_taken(READY_TIMEOUT);
-    println!("played {messages} messages into {}", running.name());
+    print_line(format_args!("played {messages} messages into {}", running.name()))?;
     if !running.run.is_running() {
         bail!("the run ended before the log did");
     }

@@ -5,6 +5,7 @@ use super::running::{RunChoice, Running, find_run};
 use super::tap::LOOK_INTERVAL;
 use crate::job::progress;
 use crate::status::Status;
+use crate::terminal::print_line;
 use anyhow::{Result, bail};
 use clap::Args;
 use gridweave_logs::file::check_writable;
@@ -77,7 +78,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
         (_, untyped) => Some(format!("{missed} messages were missed, and {untyped} were of an unknown type")),
     };
     let written = writer.finish(reason.as_deref().map_or(Outcome::Complete, Outcome::Incomplete))?;
-    println!("recorded {messages} messages of {} links to {}", links.len(), written.display());
+    print_line(format_args!("recorded {messages} messages of {} links to {}", links.len(), written.display()))?;
     match reason {
         Some(reason) => bail!("{}: {reason}", written.display()),
         None => Ok(Status::Done),

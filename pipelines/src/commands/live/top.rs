@@ -3,6 +3,7 @@
 use super::running::{RunChoice, Running, find_run};
 use crate::job::progress;
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line, say};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
@@ -57,19 +58,14 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
         let is_over = !running.run.is_running();
         let now = look();
         let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
-        match args.json {
-            true => println!("{}", to_json(&running, &stages)),
-            false => {
-                if is_redrawn {
-                    print!("{CLEAR}");
-                }
-                print!("{}", to_text(&running, &stages));
-            }
+        let is_read = match args.json {
+            true => print_line(to_json(&running, &stages))?,
+            false => print(format_args!("{}{}", if is_redrawn { CLEAR } else { "" }, to_text(&running, &stages)))?,
+        };
+        if is_over {
+            say("the run has ended");
         }
-        if args.once || is_over {
-            if is_over {
-                eprintln!("the run has ended");
-            }
+        if args.once || is_over || !is_read {
             return Ok(Status::Done);
         }
         (before, since) = (now, Instant::now());

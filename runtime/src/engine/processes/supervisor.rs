@@ -12,6 +12,7 @@ use crate::link::{LinkError, RunNames};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -189,7 +190,8 @@ impl Supervisor<'_> {
 
     fn note(&mut self, event: Event) {
         match event {
-            Event::Printed { line } => eprintln!("{line}"),
+            // A closed standard error is no reason to end the run.
+            Event::Printed { line } => drop(writeln!(io::stderr(), "{line}")),
             Event::Said { process, words } => {
                 self.processes[process].heard = Instant::now();
                 self.note_words(process, words);
