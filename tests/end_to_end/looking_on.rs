@@ -100,6 +100,28 @@ fn a_recording_holds_what_the_log_of_the_run_holds() {
 }
 
 #[test]
+fn what_a_sender_says_that_comes_and_goes_while_a_recorder_stalls_is_counted_as_missed() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let recorder = run.command(&["record", "-o", "recorded.mcap", "robots.pose"]);
+    wait_until("recording", || run.path("recorded.mcap.part").exists());
+    signal(recorder.id(), "STOP");
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
+    signal(recorder.id(), "CONT");
+    let done = run.interrupt();
+    let ended = recorder.wait();
+    ended.assert(1, &["messages were missed"]);
+    let number_before = |words: &str| {
+        let text = ended.text();
+        let before = text.split(words).next().unwrap().split_whitespace().next_back().unwrap();
+        before.parse::<usize>().unwrap()
+    };
+    let output = done.output();
+    let sent = output[POSES].len() + output["/robot2/pose"].len();
+    assert_eq!(number_before(" messages of 1 links") + number_before(" messages were missed"), sent);
+}
+
+#[test]
 fn a_recorder_does_not_overwrite_the_log_that_the_run_writes() {
     let run = Run::start(RECEIVE, &[]);
     run.simulate();
