@@ -7,6 +7,7 @@ use crate::support::{
 };
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const OUTPUT: &str = "out.mcap";
@@ -139,6 +140,21 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     let ended = run.wait();
     assert_eq!(ended.status, 0, "{ended:#?}");
     assert!(fs::read(folder.path().join(OUTPUT)).unwrap() == expected);
+}
+
+#[test]
+fn a_run_that_is_halted_as_a_whole_for_longer_than_a_stage_may_hang_goes_on() {
+    let folder = folder();
+    let run = run_diamond(folder.path(), "processes", &["source.count=20000"]);
+    wait_for_output(folder.path());
+    let all: Vec<u32> = processes(run.id()).into_iter().map(|(process, _)| process).chain([run.id()]).collect();
+    all.iter().for_each(|process| signal(*process, "STOP"));
+    let halted = Instant::now();
+    // The pipeline lets a stage hang for two seconds.
+    wait_until("end of the halt", || halted.elapsed() > Duration::from_secs(3));
+    all.iter().for_each(|process| signal(*process, "CONT"));
+    run.wait().assert(0, &[]);
+    assert_eq!(outcome(&folder.path().join(OUTPUT)).0, "");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The supervisor: starts the processes of a run, hears how they go, stops them, and removes what they leave.
 
 use super::Launch;
+use super::awake::Awake;
 use super::backoff::Backoff;
 use super::event::{Event, listen};
 use super::system::{describe, memory_of_process};
@@ -95,6 +96,7 @@ fn run_in(
         events: sender,
         processes: Vec::new(),
         draining: None,
+        awake: Awake::new(Instant::now()),
         reports: BTreeMap::new(),
         stopping: None,
         readers: Vec::new(),
@@ -114,6 +116,7 @@ struct Supervisor<'a> {
     processes: Vec<Process>,
     /// Since when a live run comes to its end.
     draining: Option<Instant>,
+    awake: Awake,
     reports: BTreeMap<String, StageReport>,
     stopping: Option<Stopping>,
     readers: Vec<thread::JoinHandle<()>>,
@@ -321,12 +324,13 @@ impl Supervisor<'_> {
     /// Kills a process that does not say that it is alive, as one does that was stopped as a whole, or that has taken
     /// more memory than it may.
     fn look_at_processes(&mut self) {
+        let awake_for = self.awake.look(Instant::now());
         if self.stopping.is_some() {
             return;
         }
         let Pipeline { stall_timeout, memory_limit, .. } = *self.pipeline;
         let trouble = |process: &Process| {
-            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed() > *longest) {
+            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed().min(awake_for) > *longest) {
                 return Some(Failure::Hung { seconds: longest.as_secs_f64() });
             }
             let limit = memory_limit?;
