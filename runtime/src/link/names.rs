@@ -2,6 +2,7 @@
 
 use super::LinkError;
 use super::heap::{HeapLink, HeapPayloads};
+use super::room::Room;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, ServiceName, SignalHandlingMode};
 use iceoryx2::service::Service;
@@ -56,6 +57,9 @@ impl RunNames {
     /// The iceoryx2 node of one thread or process of the run.
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
+        if self.is_shared() {
+            Room::default().take(0, || format!("open shared memory for the run {}", self.prefix))?;
+        }
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;
         // The prefix is this run's own: there are no nodes of others to look for.
