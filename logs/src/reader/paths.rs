@@ -4,7 +4,7 @@ use super::error::ReadError;
 use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// `metadata.yaml` of a ROS 2 bag, as far as it is needed.
 #[derive(Deserialize)]
@@ -78,6 +78,10 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     }
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));
+    }
+    let is_inside = |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if let Some(outside) = bag.relative_file_paths.iter().find(|path| !is_inside(path)) {
+        return Err(wrong(format!("{} leads out of the bag", outside.display())));
     }
     let folder = description.parent().unwrap_or(Path::new(""));
     Ok(bag.relative_file_paths.iter().map(|file| folder.join(file)).collect())
