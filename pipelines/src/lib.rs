@@ -14,6 +14,7 @@
 mod cli;
 mod commands;
 pub mod evaluate;
+mod interrupt;
 mod job;
 pub mod shipped;
 mod status;

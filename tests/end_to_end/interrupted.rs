@@ -27,8 +27,16 @@ inputs = ["source", "stage"]
 fn the_output_can_be_read_and_says_that_it_is_not_complete() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("endless.toml"), ENDLESS).unwrap();
-    for (engine, name) in [("single", "INT"), ("threads", "INT"), ("threads-ipc", "TERM")] {
-        let output = folder.path().join(format!("{engine}.mcap"));
+    for (engine, name) in [
+        ("single", "INT"),
+        ("threads", "INT"),
+        ("threads-ipc", "TERM"),
+        ("threads-ipc", "QUIT"),
+        ("processes", "USR1"),
+        ("threads", "ALRM"),
+        ("threads-ipc", "USR2"),
+    ] {
+        let output = folder.path().join(format!("{engine}-{name}.mcap"));
         let run =
             start(folder.path(), &["run", "endless.toml", "-o", output.to_str().unwrap(), "--engine", engine], &[]);
         let id = run.id();

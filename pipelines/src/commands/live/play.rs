@@ -1,7 +1,7 @@
 //! `gridweave play`: sends the messages of logs into a live pipeline at their own pace.
 
 use super::running::{RunChoice, Running, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::terminal::print_line;
 use anyhow::{Context as _, Result, bail};
@@ -62,7 +62,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let running = find_run(&args.run, registry)?;
     let stage = external_stage(&running, args.stage.as_deref())?;
     let player = Player { context: running.pipeline.context(stage), ..player };
-    let stop = progress::stop_on_interrupt("no more is sent");
+    let stop = stop_on_interrupt("no more is sent");
     let stopped = Arc::new(AtomicBool::new(false));
     let feed = Feed::join(&running.run, &running.pipeline, stage)?;
     if !feed.wait_for_readers(READY_TIMEOUT) {

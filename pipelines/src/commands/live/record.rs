@@ -3,7 +3,7 @@
 use super::link_choice::{Link, all_links, named_links};
 use super::running::{RunChoice, Running, find_run};
 use super::tap::LOOK_INTERVAL;
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
 use crate::terminal::print_line;
 use anyhow::{Result, bail};
@@ -50,7 +50,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
     }
     links.sort_by_key(|link| (link.stage, link.port));
     links.dedup();
-    let stop = progress::stop_on_interrupt("the recording is being closed");
+    let stop = stop_on_interrupt("the recording is being closed");
     let mut recorders = links.iter().map(|&link| Recorder::new(&running, link)).collect::<Result<Vec<_>>>()?;
     let mut writer = LogWriter::create(&args.output, LogOptions::default())?;
     let mut flushed = Instant::now();

@@ -2,7 +2,7 @@
 
 use super::link_choice::named_links;
 use super::running::{RunChoice, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::terminal::{print, say};
 use anyhow::Result;
@@ -47,7 +47,7 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
         let names: Vec<String> = links.iter().map(|link| link.name(&running.pipeline)).collect();
         return Err(BadUse(format!("`{}` has several outputs: choose one of {}", args.link, names.join(", "))).into());
     };
-    let stop = progress::stop_on_interrupt("the tap ends");
+    let stop = stop_on_interrupt("the tap ends");
     let mut watched = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
     let mut types = Types::new(running.pipeline.stages[link.stage].kind.outputs[link.port].port_type);
     let mut left = args.count.unwrap_or(u64::MAX);

@@ -1,7 +1,7 @@
 //! `gridweave top`: what the stages of a run do, redrawn in place.
 
 use super::running::{RunChoice, Running, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::terminal::{print, print_line, say};
 use anyhow::Result;
@@ -43,7 +43,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let interval = Duration::try_from_secs_f64(args.interval).ok().filter(|interval| !interval.is_zero());
     let Some(interval) = interval else { return Err(BadUse("--interval must be above 0 s".to_owned()).into()) };
     let running = find_run(&args.run, registry)?;
-    let stop = progress::stop_on_interrupt("the display ends");
+    let stop = stop_on_interrupt("the display ends");
     let boards = watch_stages(&running.run, &running.pipeline)?;
     let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
     let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
