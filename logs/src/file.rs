@@ -1,17 +1,70 @@
 //! Files that are replaced only once what takes their place is written.
+//!
+//! A file NAME is written beside as `NAME.part`, which its writer keeps locked. The system takes such a lock back when the
+//! writer dies, in whatever way. So a part that is locked belongs to a living writer, and nobody else touches it; one that
+//! is not locked is what a killed writer has left.
 
-use std::fs;
-use std::io;
+use rustix::fs::{Access, OFlags, access};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 /// A file could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {source}", path.display())]
-pub struct WriteError {
-    /// The file.
-    pub path: PathBuf,
-    /// Why.
-    pub source: io::Error,
+pub enum WriteError {
+    /// A living program writes it.
+    #[error("{} is being written by {writer}; wait for its end, or name another file", path.display())]
+    InUse {
+        /// The file.
+        path: PathBuf,
+        /// The process, where the system tells.
+        writer: String,
+    },
+    /// It is a device, a pipe or a socket.
+    #[error("{} is no regular file and may not be replaced by one; name another file", path.display())]
+    NotRegular {
+        /// What was named.
+        path: PathBuf,
+    },
+    /// The file system fails.
+    #[error("cannot write {}: {source}; see that its folder exists, may be written and has room", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+/// Where a file lies that is called `path`: the same for all names of a file, by links and through other folders. The file
+/// need not be there, but its folder must.
+///
+/// # Errors
+/// There is no such folder, or `path` is a link that leads nowhere.
+pub fn resolve(path: &Path) -> io::Result<PathBuf> {
+    if fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink()) {
+        return path.canonicalize();
+    }
+    let name = path.file_name().ok_or(ErrorKind::IsADirectory)?;
+    Ok(folder_of(path).canonicalize()?.join(name))
+}
+
+/// The folder that a file lies in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether a file could be written at `path`. Leaves what is there as it is, but for what a killed writer has left of it.
+///
+/// # Errors
+/// It could not.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    if let Some(mut left) = OutputFile::of_killed(path)? {
+        left.keep(false);
+    }
+    let folder = resolve(path).and_then(|place| Ok(access(folder_of(&place), Access::WRITE_OK | Access::EXEC_OK)?));
+    folder.map_err(|source| WriteError::Io { path: path.to_owned(), source })
 }
 
 /// Writes files that belong together. All are written beside before the first is put in its place, in the given order, so
@@ -20,44 +73,189 @@ pub struct WriteError {
 /// # Errors
 /// One of them cannot be written, or put in its place.
 pub fn replace(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
-    let parts = files.iter().map(|(path, bytes)| Part::write(path, bytes)).collect::<Result<Vec<_>, _>>()?;
-    parts.iter().try_for_each(Part::put_in_place)
+    let write = |(path, bytes): &(&Path, &[u8])| {
+        let output = OutputFile::create(path)?;
+        (&output.file).write_all(bytes).map_err(|source| output.error(source))?;
+        Ok(output)
+    };
+    let outputs = files.iter().map(write).collect::<Result<Vec<_>, _>>()?;
+    outputs.into_iter().try_for_each(|output| output.put_in_place().map(drop))
 }
 
-/// A file that was written under another name, which is gone with this unless it was put in place.
-struct Part<'a> {
-    path: &'a Path,
-    written: PathBuf,
+/// A file that is written beside the one whose place it takes. While this lives, no other program writes there.
+///
+/// It is gone with this, unless it was put in place or is meant to be kept.
+#[derive(Debug)]
+pub(crate) struct OutputFile {
+    /// As the user calls it.
+    path: PathBuf,
+    /// Where that is.
+    place: PathBuf,
+    part: PathBuf,
+    file: File,
+    /// Whether the part stays when this goes.
+    is_kept: bool,
 }
 
-impl<'a> Part<'a> {
-    fn write(path: &'a Path, bytes: &[u8]) -> Result<Self, WriteError> {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".part");
-        let part = Self { path, written: name.into() };
-        fs::write(&part.written, bytes).map_err(|source| part.error(source))?;
-        Ok(part)
+impl OutputFile {
+    /// Starts a file. What a killed writer has left of it is taken away.
+    pub(crate) fn create(path: &Path) -> Result<Self, WriteError> {
+        let of_path = |source| WriteError::Io { path: path.to_owned(), source };
+        let (place, part) = places(path)?;
+        loop {
+            // Not emptied but made anew: a program that reads what was left keeps what it reads.
+            let (file, is_made) = match options().create_new(true).open(&part) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => match options().open(&part) {
+                    Err(error) if error.kind() == ErrorKind::NotFound => continue,
+                    file => (file.map_err(of_path)?, false),
+                },
+                file => (file.map_err(of_path)?, true),
+            };
+            lock(&file, path, &part, is_made)?;
+            match is_at(&file, &part) {
+                // Another writer has put it in place, or has taken it away, before it was locked here.
+                false => {}
+                true if is_made => return Ok(Self { path: path.to_owned(), place, part, file, is_kept: false }),
+                true => fs::remove_file(&part).map_err(of_path)?,
+            }
+        }
     }
 
-    fn put_in_place(&self) -> Result<(), WriteError> {
-        fs::rename(&self.written, self.path).map_err(|source| self.error(source))
+    /// What a killed writer has left of the file at `path`; none if there is no such thing. It is kept.
+    pub(crate) fn of_killed(path: &Path) -> Result<Option<Self>, WriteError> {
+        let (place, part) = places(path)?;
+        let file = match options().open(&part) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            file => file.map_err(|source| WriteError::Io { path: path.to_owned(), source })?,
+        };
+        lock(&file, path, &part, false)?;
+        let path = path.to_owned();
+        Ok(is_at(&file, &part).then_some(Self { path, place, part, file, is_kept: true }))
     }
 
-    fn error(&self, source: io::Error) -> WriteError {
-        WriteError { path: self.path.to_owned(), source }
+    /// What is written.
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Where it lies until it is put in place.
+    pub(crate) fn part(&self) -> &Path {
+        &self.part
+    }
+
+    /// Whether what was written stays when this goes without having been put in place.
+    pub(crate) fn keep(&mut self, is_kept: bool) {
+        self.is_kept = is_kept;
+    }
+
+    /// Puts the file in its place, and takes away what was there. Gives it, still locked.
+    pub(crate) fn put_in_place(mut self) -> Result<File, WriteError> {
+        let put = || {
+            if self.place.exists() {
+                // Where the power fails, one of the two is there.
+                self.file.sync_data()?;
+            }
+            fs::rename(&self.part, &self.place)?;
+            self.file.try_clone()
+        };
+        let file = put().map_err(|source| self.error(source))?;
+        self.is_kept = true;
+        Ok(file)
+    }
+
+    /// Puts the file in its place if nothing is there; otherwise it stays beside. Gives where it lies.
+    pub(crate) fn put_in_free_place(mut self) -> Result<PathBuf, WriteError> {
+        self.is_kept = true;
+        if fs::symlink_metadata(&self.place).is_ok() {
+            return Ok(self.part.clone());
+        }
+        let path = self.path.clone();
+        self.put_in_place().map(|_| path)
+    }
+
+    pub(crate) fn error(&self, source: io::Error) -> WriteError {
+        WriteError::Io { path: self.path.clone(), source }
     }
 }
 
-impl Drop for Part<'_> {
+impl Drop for OutputFile {
     fn drop(&mut self) {
-        // Not there if it was put in place.
-        let _ = fs::remove_file(&self.written);
+        if !self.is_kept {
+            let _ = fs::remove_file(&self.part);
+        }
     }
+}
+
+/// No link is followed, and no pipe is waited for.
+fn options() -> OpenOptions {
+    let mut options = File::options();
+    options.read(true).write(true).custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
+    options
+}
+
+/// The place of the file that is called `path`, and where it is written until it is whole.
+fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
+    let of_path = |source| WriteError::Io { path: path.to_owned(), source };
+    let place = resolve(path).map_err(of_path)?;
+    match fs::symlink_metadata(&place) {
+        Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
+        Ok(metadata) if !metadata.is_file() => return Err(WriteError::NotRegular { path: path.to_owned() }),
+        // What may not be written may not be replaced either.
+        Ok(_) => drop(options().open(&place).map_err(of_path)?),
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(of_path(error)),
+        Err(_) => {}
+    }
+    let mut part = place.clone().into_os_string();
+    part.push(".part");
+    Ok((place, part.into()))
+}
+
+/// Locks a part.
+fn lock(file: &File, path: &Path, part: &Path, is_made: bool) -> Result<(), WriteError> {
+    let path = path.to_owned();
+    match file.metadata() {
+        Ok(metadata) if metadata.is_file() => {}
+        Ok(_) => return Err(WriteError::NotRegular { path: part.to_owned() }),
+        Err(source) => return Err(WriteError::Io { path, source }),
+    }
+    match file.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(WriteError::InUse { path, writer: writer_of(file) }),
+        // Where the file system knows no locks, the part itself tells that it is being written.
+        Err(TryLockError::Error(_)) if is_made => Ok(()),
+        Err(TryLockError::Error(_)) => {
+            let writer = format!("another program, unless {} was left by one that was killed", part.display());
+            Err(WriteError::InUse { path, writer })
+        }
+    }
+}
+
+/// Whether a file lies at `path`.
+fn is_at(file: &File, path: &Path) -> bool {
+    let (Ok(file), Ok(path)) = (file.metadata(), fs::symlink_metadata(path)) else { return false };
+    (file.dev(), file.ino()) == (path.dev(), path.ino())
+}
+
+/// The process that holds the lock of a file, by the system's list: `1: FLOCK ADVISORY WRITE 4711 08:01:1234 0 EOF`.
+fn writer_of(file: &File) -> String {
+    let find = || {
+        let inode = file.metadata().ok()?.ino();
+        let locks = fs::read_to_string("/proc/locks").ok()?;
+        let of_file = |line: &&str| {
+            let place = line.split_whitespace().nth(5);
+            line.contains(" FLOCK ") && place.and_then(|place| place.rsplit(':').next()) == Some(&inode.to_string())
+        };
+        let process = locks.lines().find(of_file)?.split_whitespace().nth(4)?;
+        process.parse::<u32>().ok().filter(|process| *process > 0)
+    };
+    find().map_or_else(|| "another program".to_owned(), |process| format!("process {process}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    use std::os::unix::fs::symlink;
 
     #[test]
     fn files_that_cannot_all_be_written_leave_those_that_were_there() {
@@ -65,9 +263,61 @@ mod tests {
         let (kept, missing) = (folder.path().join("a"), folder.path().join("none/b"));
         fs::write(&kept, "before").unwrap();
         let error = replace(&[(&kept, b"after"), (&missing, b"x")]).unwrap_err();
-        assert_eq!((error.path, fs::read_to_string(&kept).unwrap().as_str()), (missing, "before"));
+        assert!(error.to_string().contains("none/b"), "{error}");
+        assert_eq!(fs::read_to_string(&kept).unwrap(), "before");
         replace(&[(&kept, b"after")]).unwrap();
         assert_eq!(fs::read_to_string(&kept).unwrap(), "after");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_file_has_one_writer_at_a_time_by_whatever_name() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("sub")).unwrap();
+        let (path, link) = (folder.path().join("a"), folder.path().join("link"));
+        fs::write(&path, "before").unwrap();
+        symlink(&path, &link).unwrap();
+        let output = OutputFile::create(&path).unwrap();
+        (&output.file).write_all(b"after").unwrap();
+        for name in [&path, &link, &folder.path().join("sub/../a")] {
+            let error = replace(&[(name, b"other")]).unwrap_err().to_string();
+            assert!(error.contains(&format!("is being written by process {}", std::process::id())), "{error}");
+            assert!(matches!(OutputFile::of_killed(name), Err(WriteError::InUse { .. })));
+        }
+        output.put_in_place().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "after");
+        replace(&[(&link, b"through the link")]).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&path).unwrap(), "through the link");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn what_a_killed_writer_has_left_makes_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let mut killed = OutputFile::create(&path).unwrap();
+        killed.keep(true);
+        drop(killed);
+        assert!(OutputFile::of_killed(&path).unwrap().is_some());
+        replace(&[(&path, b"whole")]).unwrap();
+        assert!(OutputFile::of_killed(&path).unwrap().is_none());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn devices_pipes_and_links_that_lead_nowhere_are_refused_and_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let (pipe, link, part) = (folder.path().join("pipe"), folder.path().join("link"), folder.path().join("a.part"));
+        for pipe in [&pipe, &part] {
+            mknodat(CWD, pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        }
+        symlink(folder.path().join("nowhere/x"), &link).unwrap();
+        for path in [Path::new("/dev/full"), &pipe, &folder.path().join("a")] {
+            let error = replace(&[(path, b"x")]).unwrap_err();
+            assert!(matches!(error, WriteError::NotRegular { .. }), "{error}");
+        }
+        assert!(matches!(replace(&[(&link, b"x")]), Err(WriteError::Io { .. })));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 }

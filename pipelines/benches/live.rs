@@ -73,9 +73,9 @@ fn simulated(folder: &Path) -> PathBuf {
 
 /// The run that a process supervises.
 fn find(supervisor: &Child) -> RunningRun {
-    let prefix = format!("gw{}_0_", supervisor.id());
+    let prefix = format!("gw{}_", supervisor.id());
     loop {
-        match running_runs().into_iter().find(|run| run.prefix == prefix) {
+        match running_runs().unwrap_or_default().into_iter().find(|run| run.prefix.starts_with(&prefix)) {
             Some(run) => return run,
             None => sleep(Duration::from_millis(20)),
         }

@@ -1,6 +1,7 @@
 //! What the command line may say, and who does it.
 
 use crate::commands::{check, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate};
+use crate::interrupt;
 use crate::status::Status;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -59,10 +60,31 @@ enum Command {
     Stage(processes::StageArgs),
 }
 
+impl Command {
+    /// Whether it writes or sends something that must be brought to an end.
+    fn has_something_to_put_in_order(&self) -> bool {
+        matches!(
+            self,
+            Self::Run(_)
+                | Self::Merge(_)
+                | Self::Simulate(_)
+                | Self::Demo(_)
+                | Self::Golden(_)
+                | Self::Play(_)
+                | Self::Record(_)
+                | Self::Tap(_)
+                | Self::Top(_)
+        )
+    }
+}
+
 impl Cli {
     /// Does what the command line says, with the given stage kinds.
     pub(crate) fn execute(self, registry: &Registry) -> Result<Status> {
         start_log(self.verbose);
+        if self.command.has_something_to_put_in_order() {
+            interrupt::hold_back();
+        }
         match self.command {
             Command::Run(args) => run::run(&args, registry),
             Command::Merge(args) => merge::merge(&args, registry),
@@ -92,6 +114,8 @@ fn start_log(verbose: bool) {
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
-        .with_target(false);
+        .with_target(false)
+        // It would say on standard error that standard error cannot be written to.
+        .log_internal_errors(false);
     tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }

@@ -8,6 +8,7 @@
 use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
+use gridweave_runtime::input_file;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -106,7 +107,8 @@ pub fn evaluate_summary(summary: &Summary, truth: &Path) -> Result<Evaluation> {
 
 /// A JSON file.
 fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
-    let text = std::fs::read(path).with_context(|| format!("cannot read {what}: {}", path.display()))?;
+    let text = input_file::read(path, input_file::LONGEST_TEXT)
+        .with_context(|| format!("cannot read {what}: {}", path.display()))?;
     serde_json::from_slice(&text).with_context(|| format!("{} is not {what}", path.display()))
 }
 

@@ -11,17 +11,16 @@
 //! ```
 
 #![forbid(unsafe_code)]
-// A command prints its results.
-#![allow(clippy::print_stdout)]
-
 mod cli;
 mod commands;
 pub mod evaluate;
+mod interrupt;
 mod job;
 pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
+mod terminal;
 
 use clap::Parser;
 use gridweave_runtime::pipeline::PipelineErrors;
@@ -42,8 +41,8 @@ pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
         Ok(Status::NotAllMerged) => ExitCode::from(3),
         Err(error) => {
             match error.downcast_ref::<PipelineErrors>() {
-                Some(errors) => eprintln!("{}", errors.render(std::io::stderr().is_terminal())),
-                None => eprintln!("error: {error:#}"),
+                Some(errors) => terminal::say(errors.render(std::io::stderr().is_terminal())),
+                None => terminal::say(format_args!("error: {error:#}")),
             }
             ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })
         }

@@ -8,6 +8,7 @@
 //! This crate knows no file format and no algorithm.
 
 pub mod engine;
+pub mod input_file;
 pub mod link;
 pub mod message;
 pub mod pipeline;

@@ -54,7 +54,8 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
         let team = Team::new(robots, nearest, seed);
         let team = if agreeing { team.with_agreeing_mistakes(share) } else { team.with_mistakes(share) };
         let names: BTreeSet<String> = (0..robots).map(Team::name).collect();
-        let alignments = (0..team.edges.len()).filter_map(|index| frame_solver::solution::by_name(team.alignment(index)));
+        let alignments =
+            (0..team.edges.len()).filter_map(|index| frame_solver::solution::by_name(team.alignment(index)));
         let parameters =
             frame_solver::FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..Default::default() };
         let solution = frame_solver::solve::solve(

@@ -92,11 +92,15 @@ pub struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// A grid of `cells`, of which there must be width x height.
-    pub fn new(geometry: GridGeometry, cells: &'a [i8]) -> Result<Self, GridError> {
+    /// A grid of `cells`, of which there must be width x height. One without cells is 0 x 0, whatever its sides are said to
+    /// be: what is made of a grid takes memory by its sides.
+    pub fn new(mut geometry: GridGeometry, cells: &'a [i8]) -> Result<Self, GridError> {
         let GridGeometry { width, height, resolution, origin } = geometry;
         if width.checked_mul(height) != Some(cells.len()) {
             return Err(GridError::CellCount { actual: cells.len(), width, height });
+        }
+        if cells.is_empty() {
+            (geometry.width, geometry.height) = (0, 0);
         }
         if !(resolution.is_finite() && resolution > 0.0) {
             return Err(GridError::Resolution(resolution as f32));
@@ -207,6 +211,8 @@ mod tests {
             let geometry = GridGeometry { resolution, ..good };
             assert!(matches!(Grid::new(geometry, &[0; 600]), Err(GridError::Resolution(_))));
         }
+        let long = GridGeometry { width: 0, height: u32::MAX as usize, ..good };
+        assert_eq!(Grid::new(long, &[]).unwrap().geometry, GridGeometry { width: 0, height: 0, ..good });
         let geometry = GridGeometry { origin: pose(f64::NAN, 0.0, 0.0), ..good };
         assert_eq!(Grid::new(geometry, &[0; 600]).unwrap_err(), GridError::Origin);
     }

@@ -328,7 +328,7 @@ impl MergePlan {
     fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> Option<u64> {
         let (kept, moved) = (&self.groups[first], &self.groups[second]);
         let maps = [(Pose2::identity(), self.map_of(kept)?), (*transform_groups, self.map_of(moved)?)];
-        let joint = PreparedMap::of_raster(Raster::union(&maps.map(|(place, map)| (place, map.level(0)))));
+        let joint = PreparedMap::of_raster(Raster::union(&maps.map(|(place, map)| (place, map.level(0))))?);
         let mut members = kept.members.clone();
         members.extend(moved.members.iter().map(|(robot, place)| (robot.clone(), transform_groups * place)));
         let numbers = [kept.number, moved.number];
@@ -340,7 +340,7 @@ impl MergePlan {
     fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
         let maps = members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0))));
         let maps: Vec<(Pose2, &Raster)> = maps.collect();
-        let joint = (maps.len() > 1).then(|| PreparedMap::of_raster(Raster::union(&maps)));
+        let joint = if maps.len() > 1 { Raster::union(&maps).map(PreparedMap::of_raster) } else { None };
         self.add_joint(members, joint)
     }
 

@@ -105,12 +105,19 @@ impl Raster {
     }
 
     /// What several maps know together, in the frame that each is taken to by its transform. Where one has a wall there
-    /// is a wall. Cells are as wide as those of the first.
-    pub fn union(maps: &[(Pose2, &Self)]) -> Self {
-        let Some((_, first)) = maps.first() else { return Self::default() };
-        let (cell, mut bounds) = (first.cell, Bounds::default());
+    /// is a wall. Cells are as wide as those of the first. `None` if the maps lie so far apart that they cannot hang together,
+    /// as the union takes memory by that distance, and not by what is known.
+    pub fn union(maps: &[(Pose2, &Self)]) -> Option<Self> {
+        let Some((_, first)) = maps.first() else { return Some(Self::default()) };
+        let (cell, mut bounds, mut reach) = (first.cell, Bounds::default(), 0.0);
         for (transform, map) in maps {
             map.for_each_end(|point| bounds.add(&(transform * point)));
+            // Maps that meet reach no farther than their diagonals together; with twice that there is room for gaps.
+            reach += 2.0 * map.cell * (map.width as f64).hypot(map.height as f64);
+        }
+        // Written so that a place that is no number fails it.
+        if bounds.0.is_some_and(|(least, most)| !((most - least).max() <= reach)) {
+            return None;
         }
         // So the cells of a map that is not turned come to lie on cells.
         let mut union = Self::unknown(&bounds, cell, 0.0);
@@ -134,7 +141,7 @@ impl Raster {
             }
         }
         union.mark_beside_walls();
-        union
+        Some(union)
     }
 
     /// The number of cells of which anything is known.
@@ -259,13 +266,13 @@ mod tests {
     fn a_union_knows_what_its_maps_know() {
         let (geometry, cells) = map(0.0);
         let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.1, 100.0).unwrap();
-        let alone = Raster::union(&[(Pose2::identity(), &raster)]);
+        let alone = Raster::union(&[(Pose2::identity(), &raster)]).unwrap();
         for (index, content) in raster.cells.iter().enumerate() {
             let centre = raster.centre(index % raster.width, index / raster.width);
             assert_eq!(alone.at(&centre), *content, "{centre}");
         }
         let moved = pose(20.0, 5.0, 0.7);
-        let union = Raster::union(&[(Pose2::identity(), &raster), (moved, &raster)]);
+        let union = Raster::union(&[(Pose2::identity(), &raster), (moved, &raster)]).unwrap();
         for step in -28..28 {
             let along = 0.1 * f64::from(step);
             for place in [Pose2::identity(), moved] {
@@ -274,7 +281,10 @@ mod tests {
             }
         }
         assert!((union.known_cells() as f64 / raster.known_cells() as f64 - 2.0).abs() < 0.1);
-        assert_eq!(Raster::union(&[]).known_cells(), 0);
+        assert_eq!(Raster::union(&[]).unwrap().known_cells(), 0);
+        for far in [pose(10_000.0, 0.0, 0.0), pose(0.0, 1e300, 0.0), pose(f64::NAN, 0.0, 0.0)] {
+            assert_eq!(Raster::union(&[(Pose2::identity(), &raster), (far, &raster)]), None);
+        }
     }
 
     #[test]

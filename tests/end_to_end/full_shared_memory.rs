@@ -34,25 +34,25 @@ const FULL: &str =
     "mount -t tmpfs -o size=64k tmpfs /dev/shm && { cat /dev/zero >/dev/shm/zeros 2>&-; exec \"$0\" \"$@\"; }";
 
 /// A run with such a /dev/shm, in a folder of its own: how it ended, and its number.
-fn run_with(shared_memory: &str) -> (TempDir, Ended, u32) {
+fn run_with(shared_memory: &str, engine: &str) -> (TempDir, Ended, u32) {
     let own = ["--user", "--map-root-user", "--mount"];
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("large.toml"), LARGE).unwrap();
     let program = gridweave_program();
-    let run = ["run", "large.toml", "-o", "out.mcap", "--engine", "processes"];
+    let run = ["run", "large.toml", "-o", "out.mcap", "--engine", engine];
     let args = [&own, &["sh", "-c", shared_memory, program.to_str().unwrap()][..], &run].concat();
     let run = start_program("unshare".as_ref(), folder.path(), &args, &[]);
     let id = run.id();
     let ended = run.wait();
     assert_eq!(processes(id), []);
-    assert!(!run_folder(id).exists());
+    assert_eq!(run_folder(id), None);
     (folder, ended, id)
 }
 
 #[test]
 #[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
 fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
-    let (folder, ended, _) = run_with(SMALL);
+    let (folder, ended, _) = run_with(SMALL, "processes");
     ended.assert(1, &["stage `source`", "/dev/shm"]);
     let (reason, _) = outcome(&folder.path().join("out.mcap"));
     assert!(reason.contains("/dev/shm"), "{reason}");
@@ -61,6 +61,8 @@ fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
 #[test]
 #[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
 fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
-    let (_, ended, id) = run_with(FULL);
-    ended.assert(1, &["cannot make the board of the run", &format!("/dev/shm/gw{id}_0_board"), "No space left"]);
+    let (_, ended, id) = run_with(FULL, "processes");
+    ended.assert(1, &["cannot make the board of the run", &format!("/dev/shm/gw{id}_"), "No space left"]);
+    let (_, ended, _) = run_with(FULL, "threads-ipc");
+    ended.assert(1, &["there is no room left in /dev/shm"]);
 }

@@ -1,6 +1,6 @@
 //! A run that is interrupted ends soon, fails, and leaves a log that can be read and says that it is not complete.
 #![cfg(unix)]
-use crate::support::{gridweave, left_over, signal, start, wait_until};
+use crate::support::{gridweave, left_over, part, signal, start, wait_until};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -27,12 +27,20 @@ inputs = ["source", "stage"]
 fn the_output_can_be_read_and_says_that_it_is_not_complete() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("endless.toml"), ENDLESS).unwrap();
-    for (engine, name) in [("single", "INT"), ("threads", "INT"), ("threads-ipc", "TERM")] {
-        let output = folder.path().join(format!("{engine}.mcap"));
+    for (engine, name) in [
+        ("single", "INT"),
+        ("threads", "INT"),
+        ("threads-ipc", "TERM"),
+        ("threads-ipc", "QUIT"),
+        ("processes", "USR1"),
+        ("threads", "ALRM"),
+        ("threads-ipc", "USR2"),
+    ] {
+        let output = folder.path().join(format!("{engine}-{name}.mcap"));
         let run =
             start(folder.path(), &["run", "endless.toml", "-o", output.to_str().unwrap(), "--engine", engine], &[]);
         let id = run.id();
-        wait_until("output", || fs::metadata(&output).is_ok_and(|file| file.len() > 100_000));
+        wait_until("output", || fs::metadata(part(&output)).is_ok_and(|file| file.len() > 100_000));
         signal(id, name);
         run.wait().assert(1, &["the run was interrupted"]);
         assert_eq!(left_over(id), Vec::<PathBuf>::new());

@@ -1,7 +1,7 @@
 //! Who looks on at a run, live or a replay, sees what passes and changes nothing.
 use crate::support::{
-    DIAMOND, LOG, OUTPUT, RECEIVE, Run, Running, TROUBLED, gridweave_program, outcome, processes, read, run_name,
-    signal, simulate, start, wait_until,
+    DIAMOND, LOG, OUTPUT, POSES, RECEIVE, Run, Running, TROUBLED, gridweave_program, outcome, part, processes, read,
+    run_name, signal, simulate, start, wait_until,
 };
 use serde_json::Value;
 use std::fs;
@@ -16,7 +16,7 @@ fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
         let tap = run.command(&["tap", "middle", "--json"]);
         let (file, path) = (format!("{turn}.mcap"), run.path(&format!("{turn}.mcap")));
         let recorder = run.command(&["record", "-o", &file, "middle"]);
-        wait_until("recording", || path.exists());
+        wait_until("recording", || part(&path).exists());
         tap.wait_for_lines(1);
         [&tap, &recorder].into_iter().for_each(|program| signal(program.id(), "KILL"));
         tap.wait();
@@ -85,7 +85,7 @@ fn a_recording_holds_what_the_log_of_the_run_holds() {
     // Each of them has fewer messages than are kept for one who looks on, so none can be missed.
     let links = ["robots.map", "lines", "quadrants", "icp", "frames"];
     let recorder = run.command(&[&["record", "-o", "recorded.mcap"], &links[..]].concat());
-    wait_until("recording", || run.path("recorded.mcap").exists());
+    wait_until("recording", || run.path("recorded.mcap.part").exists());
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
     let done = run.interrupt();
     assert_eq!(outcome(&done.path(OUTPUT)).0, "");
@@ -100,11 +100,33 @@ fn a_recording_holds_what_the_log_of_the_run_holds() {
 }
 
 #[test]
+fn what_a_sender_says_that_comes_and_goes_while_a_recorder_stalls_is_counted_as_missed() {
+    let run = Run::start(RECEIVE, &[]);
+    run.simulate();
+    let recorder = run.command(&["record", "-o", "recorded.mcap", "robots.pose"]);
+    wait_until("recording", || run.path("recorded.mcap.part").exists());
+    signal(recorder.id(), "STOP");
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
+    signal(recorder.id(), "CONT");
+    let done = run.interrupt();
+    let ended = recorder.wait();
+    ended.assert(1, &["messages were missed"]);
+    let number_before = |words: &str| {
+        let text = ended.text();
+        let before = text.split(words).next().unwrap().split_whitespace().next_back().unwrap();
+        before.parse::<usize>().unwrap()
+    };
+    let output = done.output();
+    let sent = output[POSES].len() + output["/robot2/pose"].len();
+    assert_eq!(number_before(" messages of 1 links") + number_before(" messages were missed"), sent);
+}
+
+#[test]
 fn a_recorder_does_not_overwrite_the_log_that_the_run_writes() {
     let run = Run::start(RECEIVE, &[]);
     run.simulate();
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 7857 messages"]);
-    run.command(&["record", "-o", OUTPUT]).wait().assert(1, &["out.mcap is being written by another program"]);
+    run.command(&["record", "-o", OUTPUT]).wait().assert(1, &["out.mcap is being written by process"]);
     let done = run.interrupt();
     done.assert_done();
     assert_eq!(outcome(&done.path(OUTPUT)).1, 7857);
@@ -140,12 +162,12 @@ fn of_a_killed_recorder_all_but_the_last_moment_can_be_read() {
     let run = Run::start(RECEIVE, &[]);
     let (log, _) = run.simulate();
     let recorder = run.command(&["record", "-o", "recorded.mcap", "robots.map"]);
-    wait_until("recording", || run.path("recorded.mcap").exists());
+    wait_until("recording", || run.path("recorded.mcap.part").exists());
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played"]);
     let sent = read(&log);
     let sent = ["/robot1/map", "/robot2/map"].map(|topic| sent[topic].len()).iter().sum::<usize>();
     let words = format!("{sent} messages");
-    let info = || start(run.folder.path(), &["info", "recorded.mcap"], &[]).wait();
+    let info = || start(run.folder.path(), &["info", "recorded.mcap.part"], &[]).wait();
     // A moment later it is on disk, though nothing more comes.
     wait_until("recorded maps", || info().stdout.contains(&words));
     signal(recorder.id(), "KILL");
@@ -229,7 +251,7 @@ fn whoever_looks_on_at_a_replay_and_however_he_ends_its_result_is_the_same() {
     let recorder = watched.command(&["record", "-o", "recorded.mcap", "source", "join"]);
     let top = watched.command(&["top", "--json", "--interval", "0.1"]);
     // A few messages pass, and another one has a look, until all have seen some.
-    let recorded = watched.path("recorded.mcap");
+    let recorded = watched.path("recorded.mcap.part");
     let mut closed = gates.into_iter();
     while killed.lines() < 10 || halted.lines() < 10 || tap.lines() < 20 || !recorded.exists() {
         watched.open_gate(closed.next().unwrap());

@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod bad_input;
+mod closed_output;
 mod engines_agree;
 mod full_shared_memory;
 mod golden;
@@ -20,6 +21,7 @@ mod merge_map_files;
 mod merge_output;
 mod methods;
 mod mirrored_tag;
+mod output_files;
 mod processes;
 mod real_logs;
 mod support;

@@ -1,9 +1,13 @@
 //! Stages as processes: the same result as in one thread, and a failure that is told, closed and cleaned up, whatever
 //! dies and however.
 
-use crate::support::{DIAMOND, Ended, Running, left_over, outcome, processes, signal, start, wait_until};
+use crate::support::{
+    DIAMOND, Ended, Running, gridweave_program, left_over, outcome, part, processes, signal, start, start_program,
+    wait_until,
+};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const OUTPUT: &str = "out.mcap";
@@ -23,7 +27,7 @@ fn run_diamond(folder: &Path, engine: &str, settings: &[&str]) -> Running {
 
 /// Waits until some messages have come to the output.
 fn wait_for_output(folder: &Path) {
-    wait_until("some output", || fs::metadata(folder.join(OUTPUT)).is_ok_and(|file| file.len() > 20_000));
+    wait_until("some output", || fs::metadata(part(&folder.join(OUTPUT))).is_ok_and(|file| file.len() > 20_000));
 }
 
 /// A run has failed, and everything that must be so then is so.
@@ -139,6 +143,21 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
 }
 
 #[test]
+fn a_run_that_is_halted_as_a_whole_for_longer_than_a_stage_may_hang_goes_on() {
+    let folder = folder();
+    let run = run_diamond(folder.path(), "processes", &["source.count=20000"]);
+    wait_for_output(folder.path());
+    let all: Vec<u32> = processes(run.id()).into_iter().map(|(process, _)| process).chain([run.id()]).collect();
+    all.iter().for_each(|process| signal(*process, "STOP"));
+    let halted = Instant::now();
+    // The pipeline lets a stage hang for two seconds.
+    wait_until("end of the halt", || halted.elapsed() > Duration::from_secs(3));
+    all.iter().for_each(|process| signal(*process, "CONT"));
+    run.wait().assert(0, &[]);
+    assert_eq!(outcome(&folder.path().join(OUTPUT)).0, "");
+}
+
+#[test]
 fn an_interrupt_closes_the_log() {
     for name in ["INT", "TERM"] {
         let folder = folder();
@@ -229,11 +248,13 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
 
 #[test]
 fn a_full_disk_leaves_a_log_that_says_so() {
-    // /dev/full takes no byte; a small file system is more than a test may ask for.
+    // A small file system is more than a test may ask for; a limit of the size of files is not, where there is no other file.
     let folder = folder();
-    std::os::unix::fs::symlink("/dev/full", folder.path().join(OUTPUT)).unwrap();
-    let run = run_diamond(folder.path(), "processes", &["source.count=2000"]);
+    let limited = "trap '' XFSZ; ulimit -f 40; exec \"$0\" \"$@\"";
+    let program = gridweave_program().to_str().unwrap();
+    let args = ["-c", limited, program, "run", "diamond.toml", "-o", OUTPUT, "--engine", "threads"];
+    let run = start_program("sh".as_ref(), folder.path(), &args, &[]);
     let id = run.id();
-    run.wait().assert(1, &["stage `output` failed", "there is no room left"]);
-    assert_eq!((processes(id), left_over(id)), (vec![], vec![]));
+    assert_failed(folder.path(), id, &run.wait(), &["stage `output` failed", "there is no room left"]);
+    assert!(!part(&folder.path().join(OUTPUT)).exists());
 }

@@ -75,7 +75,8 @@ pub(super) fn write(members: &[Member<'_>], to: &Path) -> Result<()> {
             MessageHeader { channel_id, sequence, log_time: record.log_time, publish_time: record.publish_time };
         writer.write(&header, &record.data)?;
     }
-    Ok(writer.finish(Outcome::Complete)?)
+    writer.finish(Outcome::Complete)?;
+    Ok(())
 }
 
 fn read(member: &Member<'_>, into: &mut Vec<Record>) -> Result<()> {

@@ -5,7 +5,7 @@
 //! Each experiment is a file or a folder here. It prints its tables and writes them as CSV, and its curves as SVG, to a folder.
 //! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
 
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod align;
 mod cut;

@@ -1,5 +1,6 @@
 //! Why a map file cannot be read or written.
 
+use crate::file::WriteError;
 use std::path::PathBuf;
 
 /// Why a map file cannot be read or written.
@@ -50,11 +51,6 @@ pub enum MapFileError {
         problem: String,
     },
     /// A file cannot be written.
-    #[error("cannot write the map file {path}; see that its folder exists, may be written and has room")]
-    Write {
-        /// Which.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

@@ -1,7 +1,7 @@
 //! Writing a map.
 
 use super::{GridMap, MapFileError};
-use crate::file::{WriteError, replace};
+use crate::file::replace;
 use gridweave_runtime::ros::cell::{is_free, is_occupied};
 use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
@@ -30,8 +30,7 @@ pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
 
     // The image first, so that there is never a description of a map that is not there.
-    replace(&[(&image, &file), (yaml, text.as_bytes())])
-        .map_err(|WriteError { path, source }| MapFileError::Write { path, source })
+    Ok(replace(&[(&image, &file), (yaml, text.as_bytes())])?)
 }
 
 /// The image that [`save`] writes beside the YAML file at `yaml`.

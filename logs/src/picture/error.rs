@@ -1,6 +1,6 @@
 //! Why a picture cannot be made.
 
-use std::path::PathBuf;
+use crate::file::WriteError;
 
 /// Why a picture cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -20,11 +20,6 @@ pub enum PictureError {
     #[error("the picture cannot be encoded as PNG: {0}")]
     Png(String),
     /// The file cannot be written.
-    #[error("cannot write the picture {path}: {source}; see that its folder exists, may be written and has room")]
-    Write {
-        /// Which.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

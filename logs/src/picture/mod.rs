@@ -18,7 +18,7 @@ pub use error::PictureError;
 pub use layer::MapLayer;
 pub use sink::kind;
 
-use crate::file::{WriteError, replace};
+use crate::file::replace;
 use colour::{FREE, OCCUPIED, UNKNOWN};
 use image::{ImageFormat, Rgb, RgbImage};
 use layer::{Coverage, PlacedLayer};
@@ -49,7 +49,7 @@ impl Picture {
     /// Writes the picture as a PNG file.
     pub fn save_png(&self, path: &Path) -> Result<(), PictureError> {
         let png = self.png()?;
-        replace(&[(path, &png)]).map_err(|WriteError { path, source }| PictureError::Write { path, source })
+        Ok(replace(&[(path, &png)])?)
     }
 }
 

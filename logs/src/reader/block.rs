@@ -4,6 +4,7 @@
 use super::chunk::Chunk;
 use super::damage::ChunkFault;
 use super::definitions::Definitions;
+use super::file::LogFile;
 use super::record::{MessageRecord, record_at};
 use mcap::records::op;
 use std::borrow::Cow;
@@ -146,9 +147,9 @@ impl LoadedBlock {
     }
 
     /// The message with the given index.
-    pub(crate) fn message<'a>(&'a self, file: &'a [u8], index: usize) -> Option<MessageRecord<'a>> {
+    pub(crate) fn message<'a>(&'a self, file: &'a LogFile, index: usize) -> Option<MessageRecord<'a>> {
         let records = match &self.records {
-            LoadedRecords::File(range) => file.get(range.clone())?,
+            LoadedRecords::File(range) => file.bytes().get(range.clone())?,
             LoadedRecords::Memory(bytes) => bytes,
         };
         MessageRecord::parse(record_at(records, self.messages.get(index)?.position)?.body)

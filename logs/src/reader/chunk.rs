@@ -6,6 +6,13 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::ops::Range;
 
+/// The most bytes that the contents of a compressed chunk may have: no more than a log of ours can hold in one, and less than
+/// would harm a machine. A few bytes of a file can claim, and even hold, any number.
+pub(crate) const LARGEST: u64 = 1 << 30;
+/// The same for a chunk that is cut and does not say its size, as one does whose recorder was killed. Recorders close a chunk
+/// after 1 to 16 MB.
+const LARGEST_UNTOLD: u64 = 64 << 20;
+
 /// A chunk, as its header describes it.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
@@ -52,12 +59,16 @@ impl Chunk {
     /// The chunk's records, uncompressed and checked. Those of a chunk that is cut: as far as they go, unchecked.
     pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
         let data = file.get(self.data.clone()).ok_or(ChunkFault::Records)?;
+        if !self.compression.is_empty() && self.size > LARGEST {
+            return Err(ChunkFault::TooMuch { size: self.size });
+        }
+        let most = if self.size == 0 { LARGEST_UNTOLD } else { self.size };
         let contents = match (self.compression.as_str(), self.cut) {
             ("", _) => Cow::Borrowed(data),
             ("zstd", false) => Cow::Owned(decompress_zstd(data, self.size)?),
-            ("zstd", true) => Cow::Owned(decompress_cut(zstd::stream::read::Decoder::new(data))),
+            ("zstd", true) => Cow::Owned(decompress_cut(zstd::stream::read::Decoder::new(data), most)),
             ("lz4", false) => Cow::Owned(decompress_lz4(data, self.size)?),
-            ("lz4", true) => Cow::Owned(decompress_cut(lz4::Decoder::new(data))),
+            ("lz4", true) => Cow::Owned(decompress_cut(lz4::Decoder::new(data), most)),
             (other, _) => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };
         if !self.cut {
@@ -110,12 +121,36 @@ fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     Ok(buffer)
 }
 
-/// What a decoder gives until it fails or its input ends.
-fn decompress_cut(decoder: std::io::Result<impl Read>) -> Vec<u8> {
+/// What a decoder gives until it fails, its input ends, or it has given `most` bytes.
+fn decompress_cut(decoder: std::io::Result<impl Read>, most: u64) -> Vec<u8> {
     let mut buffer = Vec::new();
-    if let Ok(mut decoder) = decoder {
+    if let Ok(decoder) = decoder {
+        let mut decoder = decoder.take(most);
         // The error at the end is expected: the input breaks off. What came before it is kept.
         let _ = decoder.read_to_end(&mut buffer);
     }
     buffer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chunk_gives_no_more_than_it_says_and_no_more_than_is_read() {
+        let zeros = |size: u64| std::io::repeat(0).take(size);
+        let data = zstd::stream::encode_all(zeros(LARGEST_UNTOLD + 1), 1).unwrap();
+        let chunk = |size: u64, cut: bool| {
+            let compression = "zstd".to_owned();
+            Chunk { first_time: 0, last_time: 0, compression, size, checksum: 0, data: 0..data.len(), cut }
+        };
+        let length = |chunk: &Chunk| chunk.contents(&data).map(|contents| contents.len() as u64);
+        assert_eq!(length(&chunk(1 << 20, true)), Ok(1 << 20));
+        assert_eq!(length(&chunk(0, true)), Ok(LARGEST_UNTOLD));
+        assert_eq!(length(&chunk(1 << 20, false)), Err(ChunkFault::Decompression));
+        for cut in [false, true] {
+            assert_eq!(length(&chunk(LARGEST + 1, cut)), Err(ChunkFault::TooMuch { size: LARGEST + 1 }));
+        }
+        assert_eq!(length(&chunk(LARGEST_UNTOLD + 1, false)), Ok(LARGEST_UNTOLD + 1));
+    }
 }

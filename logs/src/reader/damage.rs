@@ -72,6 +72,12 @@ pub enum ChunkFault {
     /// It does not consist of whole records.
     #[error("it does not consist of whole records")]
     Records,
+    /// It would expand to more than is read.
+    #[error("its contents take {size} bytes, and {} are the most that is read", super::chunk::LARGEST)]
+    TooMuch {
+        /// Bytes that it claims.
+        size: u64,
+    },
     /// Its contents do not fit into memory.
     #[error("there is not enough memory for its contents")]
     TooLarge,

@@ -4,6 +4,7 @@ use super::damage::Damage;
 use super::error::ReadError;
 use super::guess::looks_like;
 use super::layout::Layout;
+use gridweave_runtime::input_file;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
 use memmap2::Mmap;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct LogFile {
     path: PathBuf,
+    file: File,
     map: Mmap,
     pub(crate) layout: Layout,
 }
@@ -23,7 +25,7 @@ impl LogFile {
     /// Opens a file and finds out what it consists of. Only what its own index leaves open is read through.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, ReadError> {
         let path = path.into();
-        let map = map_file(&path).map_err(|error| ReadError::io(&path, error))?;
+        let (file, map) = map_file(&path).map_err(|error| ReadError::io(&path, error))?;
         if map.is_empty() {
             return Err(ReadError::Empty { path });
         }
@@ -39,7 +41,7 @@ impl LogFile {
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
             Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
-            _ => Ok(Self { path, map, layout }),
+            _ => Ok(Self { path, file, map, layout }),
         }
     }
 
@@ -48,9 +50,15 @@ impl LogFile {
         &self.path
     }
 
-    /// The file's bytes.
+    /// The file's bytes; none if another program has cut it since it was opened, as what is mapped behind its end cannot be
+    /// read.
     pub fn bytes(&self) -> &[u8] {
-        &self.map
+        if self.is_cut() { &[] } else { &self.map }
+    }
+
+    /// Whether another program has cut the file since it was opened.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.file.metadata().is_ok_and(|file| file.len() < self.map.len() as u64)
     }
 
     /// The channel with the given number in this file.
@@ -91,12 +99,13 @@ impl LogFile {
 }
 
 #[allow(unsafe_code)]
-fn map_file(path: &Path) -> std::io::Result<Mmap> {
-    let file = File::open(path)?;
+fn map_file(path: &Path) -> std::io::Result<(File, Mmap)> {
+    let file = input_file::open(path)?;
     // SAFETY: the map is read-only and private to this process, and is only ever read as bytes, for which every value
     // is valid; every length and offset in it is checked against the map's size, which is fixed. What remains is that
     // another process changes the file meanwhile: a log is only appended to while it is recorded, which does not touch
-    // the bytes mapped here. (One that is cut short while it is read ends this process with SIGBUS, as with every
-    // program that maps files.)
-    unsafe { Mmap::map(&file) }
+    // the bytes mapped here, and whether one was cut is looked at before each use of its bytes. (One that is cut in that
+    // very moment ends this process with SIGBUS, as with every program that maps files.)
+    let map = unsafe { Mmap::map(&file) }?;
+    Ok((file, map))
 }

@@ -108,7 +108,7 @@ impl LogReader {
         let Reverse(due) = self.active.peek()?;
         self.given = true;
         let file = due.id.file;
-        let Some(message) = due.block.message(self.files.get(file)?.bytes(), due.index) else {
+        let Some(message) = due.block.message(self.files.get(file)?, due.index) else {
             // The message was there when its block was loaded.
             self.damage.push((file, Damage::Changed));
             return None;
@@ -155,6 +155,9 @@ impl LogReader {
                     if let Some(time) = block.time(0) {
                         self.active.push(Reverse(Active { time, id, index: 0, block }));
                     }
+                }
+                Err(_) if self.files.get(id.file).is_some_and(LogFile::is_cut) => {
+                    self.damage.push((id.file, Damage::Changed));
                 }
                 Err(fault) => self.damage.push((id.file, Damage::BadChunk { fault })),
             }

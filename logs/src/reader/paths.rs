@@ -1,9 +1,10 @@
 //! Which files a path stands for: itself, or the files of a ROS 2 bag.
 
 use super::error::ReadError;
+use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// `metadata.yaml` of a ROS 2 bag, as far as it is needed.
 #[derive(Deserialize)]
@@ -65,7 +66,7 @@ fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
 
 fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let wrong = |cause: String| ReadError::BagDescription { path: description.to_owned(), cause };
-    let text = std::fs::read_to_string(description).map_err(|error| ReadError::io(description, error))?;
+    let text = input_file::read_text(description).map_err(|error| ReadError::io(description, error))?;
     let bag: Description = serde_norway::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let bag = bag.rosbag2_bagfile_information;
     if bag.storage_identifier.starts_with("sqlite") {
@@ -77,6 +78,11 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     }
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));
+    }
+    let is_inside =
+        |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if let Some(outside) = bag.relative_file_paths.iter().find(|path| !is_inside(path)) {
+        return Err(wrong(format!("{} leads out of the bag", outside.display())));
     }
     let folder = description.parent().unwrap_or(Path::new(""));
     Ok(bag.relative_file_paths.iter().map(|file| folder.join(file)).collect())

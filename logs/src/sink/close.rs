@@ -2,11 +2,12 @@
 
 use super::log_writer::OUTCOME_RECORD;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
+use crate::file::OutputFile;
 use crate::reader::{Damage, LogFile, LogReader, ReadError};
 use mcap::MAGIC;
 use mcap::records::{MessageHeader, op};
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -19,45 +20,37 @@ pub enum CloseError {
     /// It cannot be written anew.
     #[error(transparent)]
     Write(#[from] LogWriteError),
-    /// The closed log cannot be put in place of the other.
-    #[error("cannot put the closed log in place of {}: {cause}", path.display())]
-    Replace {
-        /// The log.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
 }
 
-/// Closes the log at `path` if its writer was killed: what can be read of it is written anew, with an index, and with the
-/// `reason` why it is not complete. Where there is no room for that, it is closed in its place, without an index.
-/// Whether any of this was needed; a log that has an end is not touched.
-pub fn close_log(path: &Path, reason: &str) -> Result<bool, CloseError> {
-    let (file, end) = match LogFile::open(path) {
+/// Closes what a killed writer has left of the log at `path`, and gives where it then lies, as
+/// [`LogWriter::finish`] does; none if nothing was left. What can be read of it is written anew, with an index, and with the
+/// `reason` why it is not complete. Where there is no room for that, it is closed as it is, without an index.
+///
+/// # Errors
+/// The writer lives, what it has left is no log, or it cannot be written.
+pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseError> {
+    let Some(output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
+    let (file, end) = match LogFile::open(output.part()) {
         Ok(file) => match file.damage().iter().find_map(end_of_records) {
             Some(end) => (Some(file), Some(end)),
-            None => return Ok(false),
+            // It was killed before it could put it in place.
+            None => return place(output),
         },
         // It was killed before it had written a chunk.
         Err(ReadError::Empty { .. } | ReadError::NothingLeft { .. }) => (None, None),
         Err(error) => return Err(error.into()),
     };
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".closing");
-    let closing = path.with_file_name(name);
-    let written = copy(file, &closing, reason);
-    let replaced = written.and_then(|()| {
-        fs::rename(&closing, path).map_err(|cause| CloseError::Replace { path: path.to_owned(), cause })
-    });
-    if replaced.is_err() {
-        // It is of no use, and it may be a full disk that is in the way.
-        let _ = fs::remove_file(&closing);
-    }
-    match (replaced, end) {
-        (Err(CloseError::Write(LogWriteError::NoRoom(_))), Some(end)) => close_in_place(path, end, reason),
-        (replaced, _) => replaced,
-    }
-    .map(|()| true)
+    let closed = copy(file, output.part(), reason);
+    // While it is locked, nobody else takes it away.
+    let _locked = match (closed, end) {
+        (Err(LogWriteError::NoRoom(_)), Some(end)) => close_in_place(output.part(), end, reason).map(|()| None)?,
+        (closed, _) => closed.map(Some)?,
+    };
+    place(output)
+}
+
+fn place(output: OutputFile) -> Result<Option<PathBuf>, CloseError> {
+    Ok(Some(output.put_in_free_place().map_err(LogWriteError::from)?))
 }
 
 /// Where the last whole record of a log without an end stops.
@@ -70,7 +63,7 @@ fn end_of_records(damage: &Damage) -> Option<u64> {
 
 /// Puts the end of a log without an index (MCAP specification: metadata, data end, footer, magic) behind its last whole
 /// record. The rest of a record that stood there makes room for it.
-fn close_in_place(path: &Path, end: u64, reason: &str) -> Result<(), CloseError> {
+fn close_in_place(path: &Path, end: u64, reason: &str) -> Result<(), LogWriteError> {
     let mut metadata = Vec::new();
     push_text(&mut metadata, OUTCOME_RECORD);
     let mut pairs = Vec::new();
@@ -90,7 +83,7 @@ fn close_in_place(path: &Path, end: u64, reason: &str) -> Result<(), CloseError>
         file.seek(SeekFrom::Start(end))?;
         file.write_all(&bytes)
     };
-    write().map_err(|error| LogWriteError::from_io(path, error).into())
+    write().map_err(|error| LogWriteError::from_io(path, error))
 }
 
 fn push_text(bytes: &mut Vec<u8>, text: &str) {
@@ -102,8 +95,11 @@ fn push_length(bytes: &mut Vec<u8>, length: usize) {
     bytes.extend(u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes());
 }
 
-fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<(), CloseError> {
+/// Writes what can be read of a log in its place. Gives what was written, locked.
+fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<File, LogWriteError> {
     let mut log = LogWriter::create(path, LogOptions::default())?;
+    // Half of it is of no use, and it may be a full disk that is in the way.
+    log.keep(false);
     let mut reader = LogReader::new(file.into_iter().collect());
     let files = std::sync::Arc::clone(reader.files());
     let mut numbers: BTreeMap<u16, u16> = BTreeMap::new();
@@ -125,7 +121,7 @@ fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<(), CloseErr
         };
         log.write(&header, message.data)?;
     }
-    Ok(log.finish(Outcome::Incomplete(reason))?)
+    Ok(log.end(Outcome::Incomplete(reason))?.put_in_place()?)
 }
 
 #[cfg(test)]
@@ -144,20 +140,26 @@ mod tests {
         log.finish(Outcome::Complete).unwrap();
     }
 
+    /// What is beside the log while it is written.
+    fn part(path: &Path) -> PathBuf {
+        path.with_extension("mcap.part")
+    }
+
     #[test]
     fn what_is_left_of_a_log_is_closed_and_says_why_it_ends() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         write(&path, 100);
-        assert!(!close_log(&path, "nothing").unwrap(), "it has an end");
+        assert_eq!(close_log(&path, "nothing").unwrap(), None, "it has an end");
         let whole = fs::read(&path).unwrap();
         for length in [0, 5, 8, 30, whole.len() / 2, whole.len() - 20] {
-            fs::write(&path, &whole[..length]).unwrap();
-            let expected = LogFile::open(&path).map_or(0, |file| {
+            fs::remove_file(&path).unwrap();
+            fs::write(part(&path), &whole[..length]).unwrap();
+            let expected = LogFile::open(&part(&path)).map_or(0, |file| {
                 let mut reader = LogReader::new(vec![file]);
                 std::iter::from_fn(|| reader.next_message().map(|message| message.log_time)).count()
             });
-            assert!(close_log(&path, "it was killed").unwrap(), "{length}");
+            assert_eq!(close_log(&path, "it was killed").unwrap(), Some(path.clone()), "{length}");
             let bytes = fs::read(&path).unwrap();
             let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count();
             assert_eq!(messages, expected, "{length}");
@@ -166,6 +168,32 @@ mod tests {
             assert_eq!(record.metadata["reason"], "it was killed");
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left");
         }
+    }
+
+    #[test]
+    fn the_log_of_a_living_writer_is_not_touched() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        let log = LogWriter::create(&path, LogOptions::default()).unwrap();
+        let error = close_log(&path, "it was killed").unwrap_err().to_string();
+        assert!(error.contains(&format!("is being written by process {}", std::process::id())), "{error}");
+        log.finish(Outcome::Complete).unwrap();
+        let whole = fs::read(&path).unwrap();
+        assert_eq!(close_log(&path, "it was killed").unwrap(), None);
+        assert!(fs::read(&path).unwrap() == whole);
+    }
+
+    #[test]
+    fn what_a_killed_writer_has_left_does_not_take_the_place_of_an_earlier_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        write(&path, 100);
+        let whole = fs::read(&path).unwrap();
+        fs::write(part(&path), &whole[..whole.len() / 2]).unwrap();
+        assert_eq!(close_log(&path, "it was killed").unwrap(), Some(part(&path).canonicalize().unwrap()));
+        assert!(fs::read(&path).unwrap() == whole);
+        let closed = LogFile::open(&part(&path)).unwrap();
+        assert_eq!(closed.damage(), [Damage::Incomplete { reason: "it was killed".into() }]);
     }
 
     #[test]
@@ -188,9 +216,9 @@ mod tests {
     #[test]
     fn what_is_no_log_is_not_touched() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.txt");
-        fs::write(&path, "this is no log").unwrap();
+        let path = folder.path().join("a.mcap");
+        fs::write(part(&path), "this is no log").unwrap();
         assert!(matches!(close_log(&path, "x"), Err(CloseError::Read(_))));
-        assert_eq!(fs::read(&path).unwrap(), b"this is no log");
+        assert_eq!(fs::read(part(&path)).unwrap(), b"this is no log");
     }
 }

@@ -1,5 +1,6 @@
 //! Why a log cannot be written.
 
+use crate::file::{WriteError, folder_of};
 use mcap::McapError;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -16,9 +17,9 @@ pub enum LogWriteError {
     /// The user has no right to write there.
     #[error("{0} may not be written; change its permissions, or name a file elsewhere")]
     Denied(PathBuf),
-    /// Another program writes to it.
-    #[error("{0} is being written by another program; name another file")]
-    InUse(PathBuf),
+    /// Another program writes it, or it is no regular file.
+    #[error(transparent)]
+    Output(WriteError),
     /// There is no room.
     #[error("there is no room left for {0}; make room on its disk, or name a file elsewhere")]
     NoRoom(PathBuf),
@@ -40,6 +41,15 @@ pub enum LogWriteError {
     },
 }
 
+impl From<WriteError> for LogWriteError {
+    fn from(error: WriteError) -> Self {
+        match error {
+            WriteError::Io { path, source } => Self::from_io(&path, source),
+            other => Self::Output(other),
+        }
+    }
+}
+
 impl LogWriteError {
     pub(super) fn from_io(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
@@ -58,9 +68,4 @@ impl LogWriteError {
             other => Self::Format { path: path.to_owned(), message: other.to_string() },
         }
     }
-}
-
-/// The folder that a file lies in.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

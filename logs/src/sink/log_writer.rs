@@ -1,13 +1,13 @@
 //! Writing a log: an MCAP file that can be read up to the last closed chunk whatever happens to the program.
 
-use super::error::folder_of;
 use super::{Compression, LogWriteError};
+use crate::file::OutputFile;
 use gridweave_runtime::message::Channel;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{WriteOptions, Writer};
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufWriter, ErrorKind};
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// The bytes that a message takes in a chunk beside its own: opcode, length and header.
@@ -42,44 +42,34 @@ pub enum Outcome<'a> {
 
 /// Writes a log: an MCAP file with profile `ros2`, chunked and indexed, with checksums.
 ///
-/// A chunk is written in one piece when it is closed. Dropped before [`finish`](Self::finish), the log can be read but
-/// does not say that it is complete.
+/// It is written beside, as `NAME.part`, and takes its name when it is [finished](Self::finish). A chunk is written in one
+/// piece when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it is
+/// complete.
 pub struct LogWriter {
     path: PathBuf,
+    output: OutputFile,
     writer: Writer<BufWriter<File>>,
     chunk_size: u64,
     open_bytes: u64,
 }
 
 impl LogWriter {
-    /// Whether a log could be written at `path`, as far as that can be told without touching anything.
-    pub fn check_path(path: &Path) -> Result<(), LogWriteError> {
-        if !folder_of(path).is_dir() {
-            return Err(LogWriteError::NoFolder(folder_of(path).to_owned()));
-        }
-        match fs::metadata(path) {
-            Ok(metadata) if metadata.is_dir() => Err(LogWriteError::IsFolder(path.to_owned())),
-            Ok(metadata) if metadata.is_file() => {
-                let file = OpenOptions::new().write(true).open(path);
-                let file = file.map_err(|error| LogWriteError::from_io(path, error))?;
-                match file.try_lock_shared() {
-                    Err(TryLockError::WouldBlock) => Err(LogWriteError::InUse(path.to_owned())),
-                    // Not every file system knows locks.
-                    _ => Ok(()),
-                }
-            }
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(LogWriteError::from_io(path, error)),
-            _ => Ok(()),
-        }
-    }
-
-    /// Starts a log at `path`, in place of a file that has this name.
+    /// Starts a log at `path`, which takes the place of a file that has this name when it is complete.
+    ///
+    /// # Errors
+    /// Another program writes it, it is a folder or a device, or the file system does not allow it.
     pub fn create(path: &Path, options: LogOptions) -> Result<Self, LogWriteError> {
-        Self::check_path(path)?;
-        let file = create_anew(path).map_err(|error| LogWriteError::from_io(path, error))?;
+        let mut output = OutputFile::create(path)?;
+        let file = output.file().try_clone().map_err(|error| LogWriteError::from_io(path, error))?;
         let writer = write_options(options).create(BufWriter::new(file));
         let writer = writer.map_err(|error| LogWriteError::from_mcap(path, error))?;
-        Ok(Self { path: path.to_owned(), writer, chunk_size: options.chunk_size, open_bytes: 0 })
+        output.keep(true);
+        Ok(Self { path: path.to_owned(), output, writer, chunk_size: options.chunk_size, open_bytes: 0 })
+    }
+
+    /// Whether what was written stays if the log is not finished; at first it does.
+    pub(super) fn keep(&mut self, is_kept: bool) {
+        self.output.keep(is_kept);
     }
 
     /// The number of a channel in this log. A channel that is there already keeps its number.
@@ -118,15 +108,34 @@ impl LogWriter {
         self.writer.write_metadata(&record).map_err(|error| LogWriteError::from_mcap(&self.path, error))
     }
 
-    /// Ends the log and says in it how the run ended.
-    pub fn finish(mut self, outcome: Outcome<'_>) -> Result<(), LogWriteError> {
+    /// Ends the log, says in it how the run ended, and gives where it lies. One that is complete takes the place of a file
+    /// that has its name. One that is not only takes a free place, and otherwise stays beside, as `NAME.part`: what was there
+    /// may be of more use.
+    ///
+    /// # Errors
+    /// It cannot be written, or put in its place.
+    pub fn finish(self, outcome: Outcome<'_>) -> Result<PathBuf, LogWriteError> {
+        let path = self.path.clone();
+        let output = self.end(outcome)?;
+        match outcome {
+            Outcome::Complete => output.put_in_place().map(|_| path),
+            Outcome::Incomplete(_) => output.put_in_free_place(),
+        }
+        .map_err(LogWriteError::from)
+    }
+
+    /// Ends the log, which stays beside its place.
+    pub(super) fn end(mut self, outcome: Outcome<'_>) -> Result<OutputFile, LogWriteError> {
         let mut metadata = BTreeMap::from([("complete".to_owned(), (outcome == Outcome::Complete).to_string())]);
         if let Outcome::Incomplete(reason) = outcome {
             metadata.insert("reason".to_owned(), reason.to_owned());
         }
         let record = Metadata { name: OUTCOME_RECORD.to_owned(), metadata };
         let written = self.writer.write_metadata(&record).and_then(|()| self.writer.finish());
-        written.map(drop).map_err(|error| LogWriteError::from_mcap(&self.path, error))
+        written.map_err(|error| LogWriteError::from_mcap(&self.path, error))?;
+        let flushed = self.writer.into_inner().flush();
+        flushed.map_err(|error| LogWriteError::from_io(&self.path, error))?;
+        Ok(self.output)
     }
 
     /// Writes all that has been handed over to the disk, so that it can be read whatever happens.
@@ -141,21 +150,6 @@ impl LogWriter {
         self.open_bytes = 0;
         self.writer.flush().map_err(|error| LogWriteError::from_mcap(&self.path, error))
     }
-}
-
-/// An empty file. A file that has the name is taken away, not emptied: a program that has it mapped, be it a viewer or
-/// the source of this very run, keeps what it reads. It is locked, so that no other program takes it away while it is
-/// written.
-fn create_anew(path: &Path) -> io::Result<File> {
-    if fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_file()) {
-        fs::remove_file(path)?;
-    }
-    let file = File::create(path)?;
-    if file.metadata()?.is_file() {
-        // Not every file system knows locks.
-        let _ = file.lock();
-    }
-    Ok(file)
 }
 
 fn write_options(options: LogOptions) -> WriteOptions {

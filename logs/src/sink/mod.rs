@@ -53,7 +53,7 @@ pub struct SinkParameters {
     /// How chunks are compressed.
     pub compression: Compression,
     /// A chunk is closed when it holds this many bytes before compression. If the program is killed, the open chunk is
-    /// lost. 1 KiB to 1 GiB.
+    /// lost. 1 KiB to 512 MiB.
     pub chunk_size: u64,
 }
 
@@ -67,8 +67,8 @@ impl Default for SinkParameters {
 impl Parameters for SinkParameters {
     fn check(&self) -> Vec<ParameterError> {
         let mut errors = Vec::new();
-        if !(1 << 10..=1 << 30).contains(&self.chunk_size) {
-            errors.push(ParameterError::new("chunk_size", "must be 1024 to 1073741824 bytes"));
+        if !(1 << 10..=1 << 29).contains(&self.chunk_size) {
+            errors.push(ParameterError::new("chunk_size", "must be 1024 to 536870912 bytes"));
         }
         errors
     }

@@ -5,7 +5,6 @@ use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::stage::{Context, Output, StageError, match_robot};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// A channel of the log.
 struct Lane {
@@ -30,18 +29,17 @@ fn failure(error: LogWriteError) -> StageError {
 
 /// Writes all that comes in to a log.
 ///
-/// The log is started with the first message, so that a run that cannot begin leaves the log of an earlier one alone.
+/// The log is claimed at once, so that of two runs with one output the later one ends before it has done anything.
 pub(super) struct McapSink {
-    file: PathBuf,
-    options: LogOptions,
     pass_input: bool,
     /// Empty for all.
     only_topics: Vec<String>,
     result_topics: ResultTopics,
     input_types: Vec<String>,
+    /// None once it has ended, or cannot be written any more.
     log: Option<LogWriter>,
-    /// Whether the log was started: it is not started twice.
-    started: bool,
+    /// Whether anything was written: there is no log of a run that could not begin.
+    begun: bool,
     lanes: Vec<Lane>,
     /// By wire and number: numbers are given by each source for itself.
     announced: BTreeMap<(usize, u32), Target>,
@@ -56,21 +54,18 @@ impl McapSink {
             let doing = format!("write the log of stage `{}`", context.stage);
             return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
         }
-        let sink = Self {
-            options: LogOptions { compression, chunk_size },
+        let log = LogWriter::create(&file, LogOptions { compression, chunk_size }).map_err(failure)?;
+        Ok(Self {
             pass_input,
             only_topics,
             result_topics: ResultTopics::new(context),
             input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
-            log: None,
-            started: false,
+            log: Some(log),
+            begun: false,
             lanes: Vec::new(),
             announced: BTreeMap::new(),
             results: BTreeMap::new(),
-            file,
-        };
-        LogWriter::check_path(&sink.file).map_err(failure)?;
-        Ok(sink)
+        })
     }
 
     fn is_wanted(&self, topic: &str) -> bool {
@@ -109,16 +104,8 @@ impl McapSink {
         Ok(lane)
     }
 
-    fn start(&mut self) -> Result<(), StageError> {
-        if !self.started {
-            self.started = true;
-            self.log = Some(LogWriter::create(&self.file, self.options).map_err(failure)?);
-        }
-        Ok(())
-    }
-
     fn write(&mut self, lane: usize, message: &Message) -> Result<(), StageError> {
-        self.start()?;
+        self.begun = true;
         let log = self.log.as_mut().ok_or_else(|| StageError::new("write the log", "it is closed already"))?;
         let lane = &mut self.lanes[lane];
         let channel_id = match lane.id {
@@ -140,11 +127,8 @@ impl McapSink {
     }
 
     pub(super) fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
-        self.start()?;
-        match self.log.take() {
-            Some(log) => log.finish(outcome).map_err(failure),
-            None => Ok(()),
-        }
+        let Some(log) = self.log.take() else { return Ok(()) };
+        log.finish(outcome).map(drop).map_err(failure)
     }
 }
 
@@ -187,20 +171,20 @@ impl McapSink {
     }
 
     pub(super) fn abort(&mut self, reason: &str) {
-        // A run that has not begun leaves the log of an earlier one alone.
-        if self.log.is_some()
-            && let Err(error) = self.end(Outcome::Incomplete(reason))
-        {
-            tracing::warn!("{error}");
+        let Some(mut log) = self.log.take() else { return };
+        match self.begun {
+            true => match log.finish(Outcome::Incomplete(reason)) {
+                Ok(path) => tracing::info!("what there is of the log is in {}", path.display()),
+                Err(error) => tracing::warn!("{error}"),
+            },
+            false => log.keep(false),
         }
     }
 }
 
 impl Drop for McapSink {
     fn drop(&mut self) {
-        if self.log.is_some() {
-            self.abort("the run was stopped before its end");
-        }
+        self.abort("the run was stopped before its end");
     }
 }
 

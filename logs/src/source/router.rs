@@ -167,7 +167,7 @@ impl Router {
         Ok(())
     }
 
-    /// The index of the message's route; `None` if the log does not describe its channel.
+    /// The index of the message's route; `None` if the log does not describe its channel, or if it cannot be passed on.
     fn route(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let number = usize::from(message.channel);
         let known = self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten());
@@ -182,7 +182,10 @@ impl Router {
         };
         let index = match self.by_channel.get(&channel) {
             Some(&index) => index,
-            None => self.add_route(channel, output)?,
+            None => match self.add_route(channel, output)? {
+                Some(index) => index,
+                None => return Ok(None),
+            },
         };
         if let Some(file) = self.by_number.get_mut(message.file) {
             file.resize(file.len().max(number + 1), None);
@@ -191,15 +194,28 @@ impl Router {
         Ok(Some(index))
     }
 
-    fn add_route(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Result<usize, StageError> {
+    /// Adds a route for a channel; `None` if its name is too long, and nothing that this program does needs it.
+    fn add_route(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let index = self.routes.len();
         let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
         let classified = classify(&self.robots, &channel);
+        let topic = match FixedText::new(&channel.topic) {
+            Err(error) if classified.role == Role::Other => {
+                output.warn(format!("messages on a topic were left out: its name {error}"));
+                return Ok(None);
+            }
+            topic => topic.map_err(|error| StageError::new(doing("name"), error))?,
+        };
+        let robot = match FixedText::new(classified.robot) {
+            // What is passed on as it is needs no robot.
+            Err(_) if classified.role == Role::Other => FixedText::EMPTY,
+            robot => robot.map_err(|error| StageError::new(doing("robot's name"), error))?,
+        };
         let header = MessageHeader {
             // 0 stands for messages that no log has described.
             channel: index as u32 + 1,
-            robot: FixedText::new(classified.robot).map_err(|error| StageError::new(doing("robot's name"), error))?,
-            topic: FixedText::new(&channel.topic).map_err(|error| StageError::new(doing("name"), error))?,
+            robot,
+            topic,
             ..Default::default()
         };
         if let Some(mismatch) = classified.mismatch {
@@ -209,7 +225,7 @@ impl Router {
         self.by_channel.insert(channel.clone(), index);
         let latch = Latch::of(&channel, role == Role::Map);
         self.routes.push(Route { channel, role, robot, header, latch, announced: false, messages: 0, unreadable: 0 });
-        Ok(index)
+        Ok(Some(index))
     }
 
     /// Warns of what the logs were expected to hold, and do not.

@@ -333,3 +333,31 @@ fn a_source_that_is_done_has_done_all_its_work() {
     while source.node().advance().unwrap() {}
     assert_eq!(source.node().progress(), Some(1.0));
 }
+
+#[test]
+fn a_name_that_is_too_long_is_warned_of_where_nobody_needs_it() {
+    let (long, robot) = (format!("/{}", "x".repeat(128)), "r".repeat(63));
+    let (_folder, files) = write(|log| {
+        log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
+        log.raw(&long, "p/msg/A", 2, b"a");
+        log.raw(&long, "p/msg/A", 3, b"a");
+        // It fits the topics of poses, but carries something else.
+        log.raw(&format!("/{robot}/pose"), "p/msg/A", 4, b"a");
+        log.raw(&long[..128], "p/msg/A", 5, b"a");
+    });
+    let run = run(files);
+    assert_eq!((run.times("map"), run.times("other")), (vec![1], vec![4, 5]));
+    let warned: Vec<u64> =
+        run.warnings.iter().filter(|(text, _)| text.contains("at most 128 fit")).map(|(_, count)| *count).collect();
+    assert_eq!(warned, [2], "{:?}", run.warnings);
+}
+
+#[test]
+fn a_robot_whose_name_is_too_long_and_whose_map_is_needed_is_an_error() {
+    let topic = format!("/{}/map", "r".repeat(63));
+    let (_folder, files) = write(|log| {
+        log.add(&topic, OccupancyGrid::NAME, 1, &grid());
+    });
+    let error = try_run(files, "", RobotTopics::default()).err().unwrap().to_string();
+    assert!(error.contains("robot's name is too long"), "{error}");
+}

@@ -2,6 +2,7 @@
 
 use crate::shipped;
 use crate::status::Status;
+use crate::terminal::{print_line, say};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::Overrides;
@@ -22,9 +23,11 @@ pub(crate) fn check(args: &CheckArgs, registry: &Registry) -> Result<Status> {
     let mut status = Status::Done;
     for path in &args.pipelines {
         match shipped::load(path, &Overrides::default(), registry) {
-            Ok(pipeline) => println!("{}: {} stages, no errors", path.display(), pipeline.stages.len()),
+            Ok(pipeline) => {
+                print_line(format_args!("{}: {} stages, no errors", path.display(), pipeline.stages.len()))?;
+            }
             Err(errors) => {
-                eprintln!("{}", errors.render(std::io::stderr().is_terminal()));
+                say(errors.render(std::io::stderr().is_terminal()));
                 status = Status::BadUse;
             }
         }

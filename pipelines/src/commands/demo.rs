@@ -4,6 +4,7 @@ use crate::commands::simulate;
 use crate::evaluate::evaluate;
 use crate::job::{Job, Output, RunOptions};
 use crate::status::Status;
+use crate::terminal::{print, print_line};
 use anyhow::{Context, Result};
 use clap::Args;
 use gridweave_runtime::engine::EngineKind;
@@ -30,12 +31,12 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
     let folder = &args.out;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let (log, truth) = (folder.join("robots.mcap"), folder.join("robots.truth.json"));
-    println!("simulating three robots in one building ...");
+    print_line("simulating three robots in one building ...")?;
     let mut overrides = Overrides::default();
     overrides.seed = Some(args.seed);
     simulate::write_log(&log, &truth, overrides, registry)?;
 
-    println!("merging their maps ...\n");
+    print_line("merging their maps ...\n")?;
     let options = RunOptions {
         summary: Some(folder.join("summary.json")),
         map: Some(folder.join("merged.yaml")),
@@ -53,11 +54,11 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
         registry,
     };
     let summary = job.run()?;
-    print!("{}", summary.to_text());
+    print(summary.to_text())?;
 
     let evaluation = evaluate(&folder.join("summary.json"), &truth)?;
-    println!("\nerrors against the truth:\n{}", evaluation.to_text());
-    println!("look at {0}/merged.png, or open {0}/merged.mcap in Foxglove", folder.display());
+    print_line(format_args!("\nerrors against the truth:\n{}", evaluation.to_text()))?;
+    print_line(format_args!("look at {0}/merged.png, or open {0}/merged.mcap in Foxglove", folder.display()))?;
     Ok(match summary.has_unmerged() {
         true => Status::NotAllMerged,
         false => Status::Done,

@@ -2,6 +2,7 @@
 
 use crate::evaluate::evaluate;
 use crate::status::Status;
+use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -23,8 +24,8 @@ pub(crate) struct EvaluateArgs {
 pub(crate) fn command(args: &EvaluateArgs) -> Result<Status> {
     let evaluation = evaluate(&args.summary, &args.truth)?;
     match args.json {
-        true => println!("{}", serde_json::to_string_pretty(&evaluation)?),
-        false => print!("{}", evaluation.to_text()),
-    }
+        true => print_line(serde_json::to_string_pretty(&evaluation)?),
+        false => print(evaluation.to_text()),
+    }?;
     Ok(Status::Done)
 }

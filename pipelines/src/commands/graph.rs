@@ -2,6 +2,7 @@
 
 use crate::shipped;
 use crate::status::Status;
+use crate::terminal::print;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use gridweave_runtime::pipeline::Overrides;
@@ -33,14 +34,11 @@ pub(crate) enum GraphFormat {
 /// Shows a pipeline.
 pub(crate) fn graph(args: &GraphArgs, registry: &Registry) -> Result<Status> {
     let pipeline = shipped::load(&args.pipeline, &Overrides::default(), registry)?;
-    print!(
-        "{}",
-        match args.format {
-            GraphFormat::Text => pipeline.to_text(),
-            GraphFormat::Mermaid => pipeline.to_mermaid(),
-            GraphFormat::Dot => pipeline.to_dot(),
-            GraphFormat::Toml => pipeline.to_toml(),
-        }
-    );
+    print(match args.format {
+        GraphFormat::Text => pipeline.to_text(),
+        GraphFormat::Mermaid => pipeline.to_mermaid(),
+        GraphFormat::Dot => pipeline.to_dot(),
+        GraphFormat::Toml => pipeline.to_toml(),
+    })?;
     Ok(Status::Done)
 }

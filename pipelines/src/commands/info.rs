@@ -3,6 +3,7 @@
 use crate::shipped;
 use crate::status::Status;
 use crate::table::Table;
+use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info::{self, LogInfo, TopicInfo};
@@ -34,9 +35,9 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
     };
     let found = info::inspect(&args.logs, &robots)?;
     match args.json {
-        true => println!("{}", serde_json::to_string_pretty(&found)?),
-        false => print!("{}", to_text(&found)),
-    }
+        true => print_line(serde_json::to_string_pretty(&found)?),
+        false => print(to_text(&found)),
+    }?;
     Ok(Status::Done)
 }
 

@@ -1,6 +1,7 @@
 //! `gridweave kinds`: the stage kinds with their ports and parameters.
 
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text};
@@ -29,9 +30,9 @@ pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Status> {
         }
     };
     match (args.json, &args.kind) {
-        (true, _) => println!("{}", serde_json::to_string_pretty(&kinds_json(&registry))?),
-        (false, Some(_)) => registry.kinds().for_each(|kind| print!("{}", kind_text(kind))),
-        (false, None) => print!("{}", kinds_text(&registry)),
-    }
+        (true, _) => print_line(serde_json::to_string_pretty(&kinds_json(&registry))?),
+        (false, Some(_)) => print(registry.kinds().map(kind_text).collect::<String>()),
+        (false, None) => print(kinds_text(&registry)),
+    }?;
     Ok(Status::Done)
 }

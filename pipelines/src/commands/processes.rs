@@ -2,6 +2,7 @@
 
 use crate::shipped;
 use crate::status::Status;
+use crate::terminal::print_line;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use gridweave_runtime::engine::{self, processes};
@@ -32,10 +33,11 @@ pub(crate) fn clean() -> Result<Status> {
     let cleaned = engine::clean()?;
     for left in &cleaned {
         let megabytes = left.bytes as f64 / 1e6;
-        println!("removed {} with {} files of shared memory ({megabytes:.1} MB)", left.folder.display(), left.files);
+        let what = left.folder.display();
+        print_line(format_args!("removed {what} with {} files of shared memory ({megabytes:.1} MB)", left.files))?;
     }
     if cleaned.is_empty() {
-        println!("nothing is left over");
+        print_line("nothing is left over")?;
     }
     Ok(Status::Done)
 }

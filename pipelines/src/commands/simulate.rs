@@ -1,8 +1,10 @@
 //! `gridweave simulate`.
 
 use crate::job::progress::Progress;
+use crate::job::{RunOptions, check_outputs};
 use crate::shipped;
 use crate::status::{BadUse, Status};
+use crate::terminal::print_line;
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::truth;
@@ -45,7 +47,8 @@ pub(crate) fn simulate(args: &SimulateArgs, registry: &Registry) -> Result<Statu
     let report = write_log(&args.output, &truth, overrides, registry)?;
     let logged = report.stages.iter().filter(|stage| stage.kind == "mcap_sink");
     let messages: u64 = logged.map(|stage| stage.messages_in).sum();
-    println!("wrote {messages} messages to {} and the truth to {}", args.output.display(), truth.display());
+    let (log, truth) = (args.output.display(), truth.display());
+    print_line(format_args!("wrote {messages} messages to {log} and the truth to {truth}"))?;
     Ok(Status::Done)
 }
 
@@ -57,6 +60,7 @@ pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, regi
     let file = truth.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", truth.display())))?;
     let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(file))]);
     pipeline.attach(&truth::kind(), parameters, "truth", |_, _, _| true);
+    check_outputs(&pipeline, &RunOptions::default())?;
     let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();

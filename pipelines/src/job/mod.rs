@@ -8,10 +8,12 @@ mod results;
 
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
+pub(crate) use outputs::check as check_outputs;
 
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
+use crate::terminal::{print, print_line};
 use anyhow::Result;
 use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
@@ -21,7 +23,6 @@ use gridweave_runtime::stage::Registry;
 use progress::Progress;
 use results::ResultSinks;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 /// The kind of stage that writes logs.
 const LOG_SINK: &str = "mcap_sink";
@@ -61,9 +62,9 @@ impl Job<'_> {
     pub(crate) fn run_and_print(&self) -> Result<Status> {
         let summary = self.run()?;
         match self.options.json {
-            true => println!("{}", summary.to_json()),
-            false => print!("{}", summary.to_text()),
-        }
+            true => print_line(summary.to_json()),
+            false => print(summary.to_text()),
+        }?;
         Ok(match summary.has_unmerged() {
             true => Status::NotAllMerged,
             false => Status::Done,
@@ -79,7 +80,6 @@ impl Job<'_> {
         outputs::check(&pipeline, self.options)?;
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         let progress = Progress::new(pipeline.mode);
-        let start = SystemTime::now();
         let by_mode = match pipeline.mode {
             Mode::Replay => EngineKind::default(),
             Mode::Live => EngineKind::Processes,
@@ -87,7 +87,7 @@ impl Job<'_> {
         let report = engine::run(&pipeline, self.options.engine.unwrap_or(by_mode), &progress);
         progress.finish();
         if let Err(error) = &report {
-            close_outputs(&pipeline, start, &error.to_string());
+            close_outputs(&pipeline, &error.to_string());
         }
         let report = report?;
         let summary = RunSummary::new(sinks.summary()?, &report);
@@ -127,13 +127,14 @@ fn text_of(path: &Path) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// A sink whose process was killed has not closed its output: it is closed here, and says why it is not complete.
-fn close_outputs(pipeline: &Pipeline, start: SystemTime, reason: &str) {
-    for stage in pipeline.stages.iter().filter(|stage| stage.kind.name == LOG_SINK) {
-        let Some(file) = stage.parameters.get("file").and_then(|file| file.as_str()).map(Path::new) else { continue };
-        let is_of_this_run = file.metadata().and_then(|file| file.modified()).is_ok_and(|time| time >= start);
-        if is_of_this_run && let Err(error) = close_log(file, reason) {
-            tracing::warn!("the output {} has no end: {error}", file.display());
+/// A sink whose process was killed has not closed its log: it is closed here, and says why it is not complete. What another
+/// run writes is locked, and what one had left that was killed before was taken away when this run began.
+fn close_outputs(pipeline: &Pipeline, reason: &str) {
+    for log in outputs::logs(pipeline) {
+        match close_log(&log, reason) {
+            Ok(Some(closed)) => tracing::info!("what there is of {} is in {}", log.display(), closed.display()),
+            Ok(None) => {}
+            Err(error) => tracing::warn!("{} could not be closed: {error}", log.display()),
         }
     }
 }

@@ -1,18 +1,20 @@
-//! What a run would write, checked before it begins: no input is overwritten, no file is written twice, and every folder
-//! is there.
+//! What a run would write, checked before it begins: no input is overwritten, no file is written twice, none is another
+//! run's, and all can be written.
 
 use super::options::RunOptions;
 use crate::status::BadUse;
 use anyhow::{Result, bail};
+use gridweave_logs::file::{check_writable, resolve};
 use gridweave_logs::map_file;
 use gridweave_runtime::pipeline::Pipeline;
-use std::path::{Path, PathBuf, absolute};
+use std::path::{Path, PathBuf};
 
 /// Checks all files that the sinks of a pipeline and the options name.
 ///
 /// # Errors
 ///
-/// One of them is an input, under whatever name, or lies in one; two are the same; the folder of one is not there.
+/// One of them is an input, under whatever name, or lies in one; two are the same; one cannot be written, or is being
+/// written by another run.
 pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let inputs = inputs(pipeline);
     let outputs = outputs(pipeline, options);
@@ -30,7 +32,14 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
             bail!("cannot write {}: there is no folder {}; make it first", output.display(), folder.display());
         }
     }
+    // Only once nothing else is wrong, as it takes away what killed runs have left.
+    outputs.iter().try_for_each(|output| check_writable(output))?;
     Ok(())
+}
+
+/// The logs that a pipeline writes.
+pub(crate) fn logs(pipeline: &Pipeline) -> Vec<PathBuf> {
+    files_of(pipeline, "mcap_sink", "file")
 }
 
 /// All that the sources read.
@@ -46,7 +55,13 @@ fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
 
 /// All that the sinks and the command write.
 fn outputs(pipeline: &Pipeline, options: &RunOptions) -> Vec<PathBuf> {
-    let mut outputs = files_of(pipeline, "mcap_sink", "file");
+    let mut outputs = logs(pipeline);
+    for kind in ["picture_sink", "summary_sink", "truth_sink"] {
+        outputs.extend(files_of(pipeline, kind, "file"));
+    }
+    for map in files_of(pipeline, "map_file_sink", "file") {
+        outputs.extend([map_file::image_beside(&map), map]);
+    }
     let image = options.map.as_deref().map(map_file::image_beside);
     outputs.extend([&options.map, &image, &options.picture, &options.summary].into_iter().flatten().cloned());
     outputs
@@ -71,7 +86,7 @@ fn is_or_holds(input: &Path, output: &Path) -> bool {
 
 /// Whether two paths name the same file, which may not be there.
 fn is_same_name(one: &Path, other: &Path) -> bool {
-    matches!((absolute(one), absolute(other)), (Ok(one), Ok(other)) if one == other)
+    matches!((resolve(one), resolve(other)), (Ok(one), Ok(other)) if one == other || same_file(&one, &other))
 }
 
 #[cfg(unix)]

@@ -1,5 +1,7 @@
 //! How far a run is: a bar on a terminal, plain lines elsewhere.
 
+use crate::interrupt::{OUTPUT_IS_CLOSED, stop_on_interrupt};
+use crate::terminal::say;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::Mode;
@@ -13,30 +15,6 @@ use std::time::{Duration, Instant};
 const STEPS: f64 = 1000.0;
 /// Without a terminal, a line is written at most this often.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
-
-/// Set by the first interrupt of the user.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// What happens on an interrupt where a run ends early.
-pub(crate) const OUTPUT_IS_CLOSED: &str = "the output is being closed";
-
-/// Lets a program end in order on SIGINT or SIGTERM; `what_follows` tells the user how it does. A second signal ends it at
-/// once.
-pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBool {
-    static HANDLER: AtomicBool = AtomicBool::new(false);
-    if !HANDLER.swap(true, Ordering::Relaxed) {
-        let handler = ctrlc::set_handler(move || {
-            if INTERRUPTED.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-            eprintln!("interrupted: {what_follows}; a second signal ends the program at once");
-        });
-        if let Err(error) = handler {
-            tracing::warn!("an interrupt will not close the output: {error}");
-        }
-    }
-    &INTERRUPTED
-}
 
 /// Shows how far a run is.
 pub(crate) struct Progress {
@@ -82,18 +60,18 @@ impl Observer for Progress {
         let Ok(mut last_line) = self.last_line.lock() else { return };
         if last_line.elapsed() >= LINE_INTERVAL {
             *last_line = Instant::now();
-            eprintln!("{:.0} %, {at}", share * 100.0);
+            say(format_args!("{:.0} %, {at}", share * 100.0));
         }
     }
 
     fn started(&self, prefix: &str) {
         if self.mode == Mode::Live {
-            eprintln!("the live run {prefix} has started; an interrupt (ctrl-c) ends it");
+            say(format_args!("the live run {prefix} has started; an interrupt (ctrl-c) ends it"));
         }
     }
 
     fn restarting(&self, stage: &str, failure: &str, after: Duration) {
-        eprintln!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64());
+        say(format_args!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64()));
     }
 
     fn should_stop(&self) -> bool {

@@ -12,6 +12,7 @@ mod runner;
 mod single;
 mod stage_thread;
 mod threads;
+mod user_folder;
 mod watch;
 mod work;
 

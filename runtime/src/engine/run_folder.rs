@@ -1,30 +1,30 @@
 //! The folder of a run whose shared memory other processes can see, and what is left of runs that were killed.
 //!
-//! A run has a folder of its own below `/tmp/gridweave-UID/`, called by its prefix. The folder holds iceoryx2's files,
-//! what the processes of the run must know, and a file that every process of the run keeps locked for as long as it
-//! lives. The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has locked
-//! is left over, and so is all that bears its prefix in `/dev/shm`.
+//! A run has a folder of its own below that of its user ([`user_folder`]), called by its prefix. The folder holds
+//! iceoryx2's files, what the processes of the run must know, and a file that every process of the run keeps locked for as
+//! long as it lives. The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has
+//! locked is left over, and so is all that bears its prefix in `/dev/shm`: whoever gets the lock for himself may remove it,
+//! and nobody else. A prefix is random, as machines that share these folders (containers) give the same process numbers.
 
 use super::links::board_shape;
+use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
 use crate::link::Board;
 use crate::link::RunNames;
 use crate::pipeline::Pipeline;
-use std::fs::{self, File, TryLockError};
-use std::io;
+use rustix::rand::{GetRandomFlags, getrandom};
+use std::fs::{self, DirBuilder, File, TryLockError};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, SystemTime};
 
 /// The file that the processes of a run keep locked.
 const LOCK: &str = "lock";
 /// The pipeline of the run.
 const PIPELINE: &str = "pipeline.toml";
-/// Folders that begin so are being made.
-const UNFINISHED: &str = "new-";
-/// A folder that has been in the making for so long was given up.
-const GIVEN_UP: Duration = Duration::from_secs(60);
 const SHARED_MEMORY: &str = "/dev/shm";
+/// Digits of the random number in a prefix.
+const RANDOM_DIGITS: usize = 16;
 
 /// The folder of a run, kept from being taken for left over while this value lives.
 #[derive(Debug)]
@@ -49,26 +49,34 @@ fn failed(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunFold
 }
 
 impl RunFolder {
-    /// Makes a folder for a run of this process. Its prefix is the run's own on this machine.
+    /// Makes a folder for a run. Its prefix is the run's own.
+    ///
+    /// # Errors
+    /// The folder of this user cannot be made or is not to be trusted, or there is no room.
     pub fn create() -> Result<Self, RunFolderError> {
-        static COUNTER: AtomicU64 = AtomicU64::new(0);
-        let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-        let prefix = format!("gw{}_{number}_", std::process::id());
-        let parent = parent();
-        let (unfinished, path) = (parent.join(format!("{UNFINISHED}{prefix}")), parent.join(&prefix));
-        // An earlier process may have had this number, and have been killed.
-        remove(&path, &prefix).map_err(failed("remove the folder", &path))?;
-        fs::create_dir_all(&unfinished).map_err(failed("make the folder", &unfinished))?;
-        let lock = File::create(unfinished.join(LOCK)).map_err(failed("write to the folder", &unfinished))?;
-        lock.lock_shared().map_err(failed("lock a file in the folder", &unfinished))?;
-        fs::rename(&unfinished, &path).map_err(failed("make the folder", &path))?;
-        Ok(Self { prefix, path, _lock: lock })
+        let parent = user_folder::path();
+        user_folder::make(&parent).map_err(failed("use the folder", &parent))?;
+        loop {
+            let prefix = new_prefix().map_err(failed("name a run in", &parent))?;
+            let path = parent.join(&prefix);
+            DirBuilder::new().mode(OWN_FOLDER).create(&path).map_err(failed("make the folder", &path))?;
+            if let Some(lock) = lock_for_run(&path).map_err(failed("lock a file in the folder", &path))? {
+                return Ok(Self { prefix, path, _lock: lock });
+            }
+        }
     }
 
     /// Joins a run that another process has started.
+    ///
+    /// # Errors
+    /// It is not there, or is being removed.
     pub fn join(path: &Path) -> Result<Self, RunFolderError> {
         let lock = File::open(path.join(LOCK)).map_err(failed("open the run's folder", path))?;
-        lock.lock_shared().map_err(failed("lock a file in the folder", path))?;
+        let locked = lock.try_lock_shared().map_err(|error| match error {
+            TryLockError::WouldBlock => io::Error::other("the run has ended, and is being removed"),
+            TryLockError::Error(error) => error,
+        });
+        locked.map_err(failed("lock a file in the folder", path))?;
         let prefix = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Self { prefix, path: path.to_owned(), _lock: lock })
     }
@@ -96,7 +104,8 @@ impl RunFolder {
     /// Writes the pipeline of the run.
     pub fn write_pipeline(&self, text: &str) -> Result<(), RunFolderError> {
         let path = self.pipeline();
-        fs::write(&path, text).map_err(failed("write", &path))
+        let file = File::options().write(true).create_new(true).mode(OWN_FILE).open(&path);
+        file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed("write", &path))
     }
 
     /// Makes the board of the run.
@@ -150,29 +159,32 @@ impl RunningRun {
     /// Removes what a program outside of the run may have left in shared memory that was still there when the run ended.
     /// Does nothing while the run goes on.
     pub fn remove_traces(&self) {
-        if !self.is_running() {
-            // What cannot be removed harms nobody but takes memory, until the machine is started again.
-            let _ = remove(&self.folder, &self.prefix);
-        }
+        // What cannot be removed harms nobody but takes memory, until the machine is started again.
+        let _ = match lock_for_removal(&self.folder) {
+            Ok(Removal::Dead(_lock)) => remove(&self.folder, &self.prefix),
+            // It was removed, and its prefix is nobody else's.
+            Ok(Removal::Gone) => remove(&self.folder, &self.prefix),
+            Ok(Removal::Alive) | Err(_) => Ok(()),
+        };
     }
 
     /// Whether it still goes on.
     pub fn is_running(&self) -> bool {
-        is_locked(&self.folder).unwrap_or(false)
+        let lock = File::open(self.folder.join(LOCK));
+        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 }
 
 /// The runs of this user on the engine `processes` that are going on, by prefix.
-pub fn running_runs() -> Vec<RunningRun> {
-    let entries = fs::read_dir(parent()).into_iter().flatten().flatten();
-    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-    folders.sort();
-    let run = |folder: PathBuf| {
-        let prefix = folder.file_name()?.to_str()?.to_owned();
+///
+/// # Errors
+/// The folder of this user is not to be trusted, or cannot be read.
+pub fn running_runs() -> Result<Vec<RunningRun>, RunFolderError> {
+    let run = |(folder, prefix)| {
         let run = RunningRun { prefix, folder };
-        (!run.prefix.starts_with(UNFINISHED) && run.pipeline().exists() && run.is_running()).then_some(run)
+        (run.pipeline().exists() && run.is_running()).then_some(run)
     };
-    folders.into_iter().filter_map(run).collect()
+    Ok(run_folders()?.into_iter().filter_map(run).collect())
 }
 
 /// What is left of one run of which no process lives.
@@ -187,46 +199,104 @@ pub struct LeftOver {
 }
 
 /// Removes what runs of this user have left behind that were killed. A run of which a process lives is not touched.
+///
+/// # Errors
+/// The folder of this user is not to be trusted, or something cannot be removed.
 pub fn clean() -> Result<Vec<LeftOver>, RunFolderError> {
-    let parent = parent();
     let mut cleaned = Vec::new();
-    let entries = match fs::read_dir(&parent) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(cleaned),
-        Err(error) => return Err(failed("look into the folder", &parent)(error)),
-    };
-    let mut folders: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    folders.sort();
-    for folder in folders {
-        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let prefix = name.strip_prefix(UNFINISHED).unwrap_or(&name);
-        if !is_left_over(&folder, name != prefix) {
-            continue;
-        }
-        let files = shared_memory(prefix);
+    for (folder, prefix) in run_folders()? {
+        let locked = lock_for_removal(&folder).map_err(failed("lock a file in the folder", &folder))?;
+        let Removal::Dead(_lock) = locked else { continue };
+        let files = shared_memory(&prefix);
         let bytes = files.iter().filter_map(|file| allocated(file)).sum();
-        remove(&folder, prefix).map_err(failed("remove the folder", &folder))?;
+        remove(&folder, &prefix).map_err(failed("remove the folder", &folder))?;
         cleaned.push(LeftOver { folder, files: files.len(), bytes });
     }
     Ok(cleaned)
 }
 
-/// Whether no process has the folder locked.
-fn is_left_over(folder: &Path, unfinished: bool) -> bool {
-    if unfinished {
-        let age = fs::metadata(folder).and_then(|metadata| metadata.modified()).ok();
-        let age = age.and_then(|modified| SystemTime::now().duration_since(modified).ok());
-        return age.is_some_and(|age| age > GIVEN_UP);
+/// The folders of runs of this user and their prefixes, by name. What is called otherwise than a run is passed over.
+fn run_folders() -> Result<Vec<(PathBuf, String)>, RunFolderError> {
+    let parent = user_folder::path();
+    match user_folder::check(&parent) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        checked => checked.map_err(failed("use the folder", &parent))?,
     }
-    match is_locked(folder) {
-        Ok(locked) => !locked,
-        Err(error) => error.kind() == io::ErrorKind::NotFound && folder.is_dir(),
-    }
+    let entries = fs::read_dir(&parent).map_err(failed("look into the folder", &parent))?;
+    let folders = entries.flatten().filter_map(|entry| {
+        let prefix = entry.file_name().into_string().ok().filter(|name| is_prefix(name))?;
+        let metadata = fs::symlink_metadata(entry.path()).ok()?;
+        (metadata.is_dir() && is_own(&metadata)).then(|| (entry.path(), prefix))
+    });
+    let mut folders: Vec<(PathBuf, String)> = folders.collect();
+    folders.sort();
+    Ok(folders)
 }
 
-/// Whether a process keeps the folder of a run locked.
-fn is_locked(folder: &Path) -> io::Result<bool> {
-    Ok(matches!(File::open(folder.join(LOCK))?.try_lock(), Err(TryLockError::WouldBlock)))
+/// A prefix that no other run has: `gw`, the number of the process for those who look at it, and a random number.
+fn new_prefix() -> io::Result<String> {
+    let mut random = [0; RANDOM_DIGITS / 2];
+    // So few bytes come at once, or not at all.
+    getrandom(&mut random, GetRandomFlags::empty())?;
+    Ok(format!("gw{}_{:016x}_", std::process::id(), u64::from_le_bytes(random)))
+}
+
+/// Whether a name has exactly the form of a prefix.
+fn is_prefix(name: &str) -> bool {
+    let parts = name.strip_prefix("gw").and_then(|rest| rest.strip_suffix('_')).and_then(|rest| rest.split_once('_'));
+    let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+    parts.is_some_and(|(process, random)| {
+        (1..=10).contains(&process.len())
+            && process.bytes().all(|byte| byte.is_ascii_digit())
+            && random.len() == RANDOM_DIGITS
+            && random.bytes().all(is_digit)
+    })
+}
+
+fn lock_options() -> fs::OpenOptions {
+    let mut options = File::options();
+    options.read(true).write(true).mode(OWN_FILE);
+    options
+}
+
+/// Makes the lock of a folder and locks it for the run; none if a program that cleans up was quicker.
+fn lock_for_run(folder: &Path) -> io::Result<Option<File>> {
+    let lock = match lock_options().create_new(true).open(folder.join(LOCK)) {
+        Err(error) if matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::NotFound) => return Ok(None),
+        lock => lock?,
+    };
+    match lock.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => return Ok(None),
+        Err(TryLockError::Error(error)) => return Err(error),
+        Ok(()) => {}
+    }
+    // It may have been removed before it was locked.
+    let is_there =
+        fs::metadata(folder.join(LOCK)).is_ok_and(|there| there.ino() == lock.metadata().map_or(0, |m| m.ino()));
+    Ok(is_there.then_some(lock))
+}
+
+/// What may be done with the folder of a run.
+enum Removal {
+    /// A process of it lives.
+    Alive,
+    /// No process of it lives, and nobody but the owner of this lock removes it.
+    Dead(File),
+    /// It is not there.
+    Gone,
+}
+
+fn lock_for_removal(folder: &Path) -> io::Result<Removal> {
+    // Where there is no lock it is made, so that a run that is just being made sees that it was not quick enough.
+    let lock = match lock_options().create(true).truncate(false).open(folder.join(LOCK)) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Removal::Gone),
+        lock => lock?,
+    };
+    match lock.try_lock() {
+        Ok(()) => Ok(Removal::Dead(lock)),
+        Err(TryLockError::WouldBlock) => Ok(Removal::Alive),
+        Err(TryLockError::Error(error)) => Err(error),
+    }
 }
 
 fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
@@ -238,30 +308,25 @@ fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
 
 fn ignore_missing(result: io::Result<()>) -> io::Result<()> {
     match result {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }
 }
 
-/// The files in shared memory that bear a run's prefix.
+/// The files of this user in shared memory that bear a run's prefix.
 fn shared_memory(prefix: &str) -> Vec<PathBuf> {
+    if !is_prefix(prefix) {
+        return Vec::new();
+    }
     let Ok(entries) = fs::read_dir(SHARED_MEMORY) else { return Vec::new() };
     let files = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix));
-    files.map(|entry| entry.path()).collect()
+    let is_own_file = |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && is_own(&file));
+    files.map(|entry| entry.path()).filter(is_own_file).collect()
 }
 
 /// The bytes that a sparse file really takes.
 fn allocated(file: &Path) -> Option<u64> {
-    use std::os::unix::fs::MetadataExt;
     Some(fs::metadata(file).ok()?.blocks() * 512)
-}
-
-/// The folder that holds those of all runs of this user. The path is short, because sockets lie in it, whose paths may
-/// not be longer than 108 bytes.
-fn parent() -> PathBuf {
-    use std::os::unix::fs::MetadataExt;
-    let user = fs::metadata("/proc/self").map_or(0, |metadata| metadata.uid());
-    PathBuf::from(format!("/tmp/gridweave-{user}"))
 }
 
 #[cfg(test)]
@@ -283,6 +348,73 @@ mod tests {
         assert!(cleaned.iter().all(|left| left.folder != joined.path));
         assert!(joined.path.exists() && !dead_path.exists() && !file.exists());
         joined.remove().unwrap();
+    }
+
+    #[test]
+    fn what_is_not_named_as_a_run_is_never_touched() {
+        let made = new_prefix().unwrap();
+        assert!(is_prefix(&made), "{made}");
+        let digits = "0123456789abcdef";
+        let wrong = [
+            String::new(),
+            "o".into(),
+            "new-".into(),
+            "gw".into(),
+            "gw1_0_".into(),
+            format!("gw1_{digits}"),
+            format!("gw1_{digits}0_"),
+            format!("gw_{digits}_"),
+            format!("gwx_{digits}_"),
+            format!("gw1_{}_", digits.to_uppercase()),
+            format!("new-gw1_{digits}_"),
+        ];
+        for name in wrong {
+            assert!(!is_prefix(&name) && shared_memory(&name).is_empty(), "{name}");
+        }
+        let parent = user_folder::path();
+        user_folder::make(&parent).unwrap();
+        let strange = parent.join(format!("o{}", std::process::id()));
+        fs::create_dir(&strange).unwrap();
+        clean().unwrap();
+        assert!(strange.exists());
+        fs::remove_dir(strange).unwrap();
+    }
+
+    #[test]
+    fn two_runs_of_one_process_number_have_names_of_their_own() {
+        assert_ne!(new_prefix().unwrap(), new_prefix().unwrap());
+    }
+
+    #[test]
+    fn a_folder_that_was_never_locked_is_removed_and_a_run_that_comes_too_late_sees_it() {
+        let parent = user_folder::path();
+        user_folder::make(&parent).unwrap();
+        let folder = parent.join(new_prefix().unwrap());
+        fs::create_dir(&folder).unwrap();
+        let Removal::Dead(lock) = lock_for_removal(&folder).unwrap() else { panic!("it is dead") };
+        assert!(lock_for_run(&folder).unwrap().is_none());
+        drop(lock);
+        clean().unwrap();
+        assert!(!folder.exists());
+        assert!(lock_for_run(&folder).unwrap().is_none());
+    }
+
+    #[test]
+    fn nobody_else_can_read_what_a_run_has_or_write_to_it() {
+        use iceoryx2::service::ipc;
+        let folder = RunFolder::create().unwrap();
+        folder.write_pipeline("").unwrap();
+        Board::create(&board_path(&folder.prefix), &[(0, 1)]).unwrap();
+        let node = folder.names().node::<ipc::Service>().unwrap();
+        let files = shared_memory(&folder.prefix);
+        assert!(files.len() > 1, "{files:?}");
+        let folders = [folder.path.clone(), folder.path.join(LOCK), folder.pipeline(), user_folder::path()];
+        for path in files.iter().chain(&folders) {
+            let mode = fs::metadata(path).unwrap().mode();
+            assert_eq!(mode & 0o077, 0, "{} {mode:o}", path.display());
+        }
+        drop(node);
+        folder.remove().unwrap();
     }
 
     #[test]

@@ -24,7 +24,16 @@ pub struct WatchedLink {
     observer: Observer<Service>,
     /// For each sender the number of its next message.
     next: BTreeMap<u64, u64>,
+    /// How many messages were missed between others of their senders.
     missed: u64,
+    /// How many came, each counted once.
+    taken: u64,
+    /// The stage that owns the link, and which of its ports that is.
+    board: StageBoard,
+    port: usize,
+    /// What that had counted when this began to look on: messages, and programs that have sent.
+    sent_before: u64,
+    senders_before: u64,
     _node: Node<Service>,
 }
 
@@ -57,15 +66,18 @@ impl WatchedLink {
                 }
             }
         };
+        let board = board.stage(stage);
         if pipeline.mode == Mode::Live {
-            board.stage(stage).greet();
+            board.greet();
         }
-        Ok(Self { observer, next: BTreeMap::new(), missed: 0, _node: node })
+        let (sent_before, senders_before) = (board.sent(port), board.senders(port));
+        let (next, missed, taken) = (BTreeMap::new(), 0, 0);
+        Ok(Self { observer, next, missed, taken, board, port, sent_before, senders_before, _node: node })
     }
 
     /// Takes the messages that have passed since the last call: each once, with the header of its sample.
     pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), RunError> {
-        let (next, missed) = (&mut self.next, &mut self.missed);
+        let (next, missed, taken) = (&mut self.next, &mut self.missed, &mut self.taken);
         let taken = self.observer.take(|sample, message| {
             let sequence = message.header().sequence;
             let is_repeated = message.header().flags.contains(crate::message::MessageFlags::REPEATED);
@@ -80,6 +92,7 @@ impl WatchedLink {
                 None if is_repeated => {}
                 None => drop(next.insert(sample.origin, sequence.saturating_add(1))),
             }
+            *taken += u64::from(message.header().flags.contains(crate::message::MessageFlags::DATA));
             take(sample, message);
         });
         taken.map_err(RunError::of_run)
@@ -87,7 +100,12 @@ impl WatchedLink {
 
     /// How many messages it was too slow for.
     pub fn missed(&self) -> u64 {
-        self.missed
+        if self.board.senders(self.port) == self.senders_before {
+            return self.missed;
+        }
+        // Of a program that came and went meanwhile nothing may have been seen, but the owner of the link has counted it.
+        let passed = self.board.sent(self.port).saturating_sub(self.sent_before);
+        self.missed.max(passed.saturating_sub(self.taken))
     }
 }
 

@@ -12,6 +12,7 @@ use rustix::thread::futex;
 use rustix::time::{ClockId, Timespec, clock_gettime};
 use std::fs::File;
 use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
@@ -109,7 +110,7 @@ impl Board {
     /// # Errors
     /// There is such a file, or no room for it.
     pub fn create(path: &Path, stages: &[(usize, usize)]) -> io::Result<Arc<Self>> {
-        let mut file = File::options().read(true).write(true).create_new(true).open(path)?;
+        let mut file = File::options().read(true).write(true).create_new(true).mode(0o600).open(path)?;
         let (places, words) = places(stages);
         // Written, and not only made as long: where there is no room, that is an error here, and later a signal.
         file.write_all(&vec![0; words * size_of::<u64>()])?;

@@ -44,6 +44,14 @@ pub enum LinkError {
         /// Its size.
         bytes: usize,
     },
+    /// There is no room in the shared memory of the machine.
+    #[error(
+        "cannot {doing}: there is no room left in /dev/shm; make room there, or use `--engine threads`, which needs none"
+    )]
+    Full {
+        /// What was being done.
+        doing: String,
+    },
     /// As many programs as can send on a link, or look on at it, do so already.
     #[error("cannot {doing} {link}: {most} programs do so already, and no more can; end one of them")]
     Crowded {

@@ -61,6 +61,7 @@ mod protocol;
 #[cfg(test)]
 mod protocol_model;
 mod receiver;
+mod room;
 mod sample;
 mod sender;
 mod sequence;

@@ -2,9 +2,13 @@
 
 use super::LinkError;
 use super::heap::{HeapLink, HeapPayloads};
+use super::room::Room;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, ServiceName, SignalHandlingMode};
 use iceoryx2::service::Service;
+use std::fs::{self, Permissions};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What keeps the services of one run apart from those of all others.
@@ -53,6 +57,9 @@ impl RunNames {
     /// The iceoryx2 node of one thread or process of the run.
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
+        if self.is_shared() {
+            Room::default().take(0, || format!("open shared memory for the run {}", self.prefix))?;
+        }
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;
         // The prefix is this run's own: there are no nodes of others to look for.
@@ -62,11 +69,27 @@ impl RunNames {
             let root = Path::new(root.as_bytes()).map_err(|e| doing()(&e))?;
             config.global.set_root_path(&root);
         }
-        NodeBuilder::new()
+        let node = NodeBuilder::new()
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .config(&config)
             .create::<S>()
-            .map_err(|e| doing()(&e))
+            .map_err(|e| doing()(&e))?;
+        if self.is_shared() {
+            self.close_to_others().map_err(|e| doing()(&e))?;
+        }
+        Ok(node)
+    }
+
+    /// Takes from other users the right to the segment in which iceoryx2 numbers the nodes, which it gives to everybody.
+    fn close_to_others(&self) -> io::Result<()> {
+        for entry in fs::read_dir("/dev/shm")?.flatten() {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            if name.starts_with(&self.prefix) && name.ends_with(".global_mgmt") {
+                fs::set_permissions(entry.path(), Permissions::from_mode(0o600))?;
+            }
+        }
+        Ok(())
     }
 
     /// The service of an output port.

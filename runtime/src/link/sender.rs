@@ -5,6 +5,7 @@ use super::heap::HeapLink;
 use super::kept::Kept;
 use super::protocol::{NOTHING_HEARD, ring};
 use super::receiver::ReaderEnd;
+use super::room::Room;
 use super::sample::Batch;
 use super::service::origin;
 use super::service::{FIRST_PLACE, LinkShape, PortBoard};
@@ -77,6 +78,8 @@ pub struct LinkSender<S: Service> {
     kept: Option<Kept<S>>,
     /// Where large payloads travel; none if that is in the samples.
     heap: Option<HeapLink>,
+    /// Where samples take room; none if they do not leave the process.
+    room: Option<Room>,
     origin: u64,
     /// The number of the next sample.
     number: u64,
@@ -115,6 +118,7 @@ impl<S: Service + 'static> LinkSender<S> {
         let reader = |end: ReaderEnd| Reader { end, limit: 0, started: 0, first: 0 };
         Ok(Self {
             heap: names.heap_link(&name),
+            room: names.is_shared().then(Room::default),
             publisher,
             name,
             order: shape.order,
@@ -310,6 +314,9 @@ impl<S: Service + 'static> LinkSender<S> {
     }
 
     fn loan(&self, length: usize) -> Result<SampleMutUninit<S, [MaybeUninit<u8>], SampleHeader>, LinkError> {
+        if let Some(room) = &self.room {
+            room.take(length, || format!("send {length} bytes on {}", self.name))?;
+        }
         self.publisher.loan_slice_uninit(length).map_err(|e| self.failed(&e))
     }
 

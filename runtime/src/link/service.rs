@@ -1,6 +1,7 @@
 //! The service of a link, as all of its ends open it.
 
 use super::board::MAX_SENDERS;
+use super::room::Room;
 use super::stage_board::StageBoard;
 use super::{LinkError, Order, RunNames, SampleHeader};
 use crate::pipeline::Overflow;
@@ -81,6 +82,9 @@ impl LinkShape<'_> {
         names: &RunNames,
     ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {}", self.name()))(cause);
+        if names.is_shared() {
+            Room::default().take(0, || format!("open the link {}", self.name()))?;
+        }
         // Nobody sees a link from outside that does not leave the process.
         let (observers, mut buffer) = match names.is_shared() {
             true => (MAX_OBSERVERS, self.buffer(self.depth).max(OBSERVER_BUFFER)),

@@ -11,6 +11,7 @@ use super::stage_section::{Draft, read_stage};
 use super::values::entries;
 use super::wiring::{Wiring, check_topics_differ, check_used};
 use super::{Pipeline, StageSpec, Wire};
+use crate::input_file;
 use crate::stage::Registry;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,12 +24,8 @@ impl Pipeline {
     /// Everything that is wrong with it, or that it cannot be read.
     pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
         let name = path.display().to_string();
-        let problem = match std::fs::read(path).map(String::from_utf8) {
-            Ok(Ok(text)) => return Self::parse(&name, &text, registry, overrides),
-            Ok(Err(error)) => {
-                let byte = error.utf8_error().valid_up_to();
-                format!("cannot read the pipeline `{name}`: byte {byte} is not UTF-8 text")
-            }
+        let problem = match input_file::read_text(path) {
+            Ok(text) => return Self::parse(&name, &text, registry, overrides),
             Err(error) => format!("cannot read the pipeline `{name}`: {error}"),
         };
         let mut problems = Problems::new(name, "");

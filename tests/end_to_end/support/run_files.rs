@@ -36,33 +36,42 @@ kind = "mcap_sink"
 inputs = ["join"]
 "#;
 
-/// The name of the run of the supervisor with this process number.
+/// What the name of the run of the supervisor with this process number begins with.
 pub(crate) fn run_name(run: u32) -> String {
-    format!("gw{run}_0_")
+    format!("gw{run}_")
 }
 
-/// The folder of a run's files.
-pub(crate) fn run_folder(run: u32) -> PathBuf {
+/// The folder of the files of all runs of this user.
+fn user_folder() -> PathBuf {
     use std::os::unix::fs::MetadataExt;
     let user = fs::metadata("/proc/self").unwrap().uid();
-    Path::new(&format!("/tmp/gridweave-{user}")).join(run_name(run))
+    let own = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    let own = own.filter(|folder| fs::metadata(folder).is_ok_and(|folder| folder.uid() == user));
+    own.map_or_else(|| PathBuf::from(format!("/tmp/gridweave-{user}")), |folder| folder.join("gridweave"))
+}
+
+/// The folder of a run's files, if it is there.
+pub(crate) fn run_folder(run: u32) -> Option<PathBuf> {
+    let entries = fs::read_dir(user_folder()).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    let name = format!("/{}", run_name(run));
+    entries.into_iter().find(|path| path.to_string_lossy().contains(&name))
 }
 
 /// What a run has left in shared memory and in its folder.
 pub(crate) fn left_over(run: u32) -> Vec<PathBuf> {
     let is_of_run = |path: &PathBuf| path.to_string_lossy().contains(&format!("/gw{run}_"));
     let shared = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path()).filter(is_of_run);
-    shared.chain(Some(run_folder(run)).filter(|folder| folder.exists())).collect()
+    shared.chain(run_folder(run)).collect()
 }
 
 /// The processes of a run, by name.
 pub(crate) fn processes(run: u32) -> Vec<(u32, String)> {
-    let folder = run_folder(run).to_string_lossy().into_owned();
+    let name = format!("/{}", run_name(run));
     let of_process = |id: u32| {
         let line = fs::read(format!("/proc/{id}/cmdline")).ok()?;
         let words: Vec<String> =
             line.split(|byte| *byte == 0).map(|word| String::from_utf8_lossy(word).into()).collect();
-        let place = words.iter().position(|word| *word == folder)?;
+        let place = words.iter().position(|word| word.contains(&name))?;
         Some((id, words.get(place + 1)?.clone()))
     };
     let ids = fs::read_dir("/proc").unwrap().filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
@@ -82,6 +91,13 @@ pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
         assert!(start.elapsed() < Duration::from_secs(60), "no {what}");
         thread::park_timeout(Duration::from_millis(2));
     }
+}
+
+/// Where a file lies while it is written.
+pub(crate) fn part(file: &Path) -> PathBuf {
+    let mut name = file.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
 }
 
 /// What the log says of its end, and how many messages it holds.

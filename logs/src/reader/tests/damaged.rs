@@ -182,3 +182,21 @@ fn an_index_with_a_wrong_checksum_is_not_used() {
     assert_eq!(seen.len(), 12);
     assert_eq!(damage, [Damage::BadIndex]);
 }
+
+#[test]
+fn a_file_that_is_cut_while_it_is_read_says_so() {
+    let mut log = TestLog::new(mcap::WriteOptions::new().use_chunks(false));
+    for time in 0..20 {
+        log.raw("/a", "p/msg/A", time, &[time as u8; 100_000]);
+    }
+    let folder = Folder::new();
+    let path = folder.write("in.mcap", &log.finish());
+    let mut reader = LogReader::new(vec![LogFile::open(&path).unwrap()]);
+    // Into the last run of records, so that nothing is read ahead any more.
+    for _ in 0..15 {
+        assert!(reader.next_message().is_some());
+    }
+    std::fs::File::options().write(true).open(&path).unwrap().set_len(10).unwrap();
+    let (seen, damage) = read_all(reader);
+    assert_eq!((seen.len(), damage), (0, vec![Damage::Changed]));
+}

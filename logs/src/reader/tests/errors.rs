@@ -76,6 +76,11 @@ fn a_bag_folder_is_read_in_the_order_of_its_description() {
     )
     .unwrap();
     assert!(error(folder.path()).to_string().contains("ros2 bag convert"));
+    for outside in ["../bag_0.mcap", "/etc/passwd", "bag/../../bag_0.mcap"] {
+        let text = format!("rosbag2_bagfile_information: {{relative_file_paths: [{outside}]}}");
+        std::fs::write(&description, text).unwrap();
+        assert!(error(folder.path()).to_string().contains("leads out of the bag"), "{outside}");
+    }
     std::fs::write(&description, "hello: [").unwrap();
     assert!(matches!(error(folder.path()), ReadError::BagDescription { .. }));
 }

@@ -4,7 +4,7 @@ use gridweave_runtime::message::{LogTime, MessageHeader};
 use gridweave_runtime::ros::{self, OccupancyGrid, Segments, TFMessage};
 use gridweave_runtime::stage::{InputWire, LoneStage};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 const GRID: &str = "nav_msgs/msg/OccupancyGrid";
@@ -289,7 +289,7 @@ fn what_was_closed_can_be_read_while_the_run_goes_on() {
     for time in 0..100 {
         run.result(2, "/map", time, &[7; 100]).unwrap();
     }
-    let bytes = fs::read(run.file()).unwrap();
+    let bytes = fs::read(run.folder.path().join("out.mcap.part")).unwrap();
     let options = mcap::read::Options::IgnoreEndMagic.into();
     let stream = mcap::MessageStream::new_with_options(&bytes, options).unwrap();
     let readable = stream.map_while(Result::ok).count();
@@ -336,15 +336,25 @@ fn bad_paths_are_refused_with_what_would_mend_them() {
     assert!(error(&at("file").join("out.mcap")).contains("there is no folder"));
 }
 
-#[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_an_error() {
-    let mut sink = make(Path::new("/dev/full"), "chunk_size = 1024").unwrap();
-    let message = Message::from_vec(MessageHeader::default(), vec![0; 5000]).on_wire(2);
-    let received = sink.give_message("messages", message);
-    let error = received.and_then(|()| sink.finish(LogTime(0))).unwrap_err().to_string();
-    assert!(error.contains("there is no room left for /dev/full; make room on its disk"), "{error}");
-    sink.node().abort("no room");
+fn of_two_sinks_with_one_file_the_second_is_refused_and_touches_nothing() {
+    let mut run = Run::new("");
+    let error = make(&run.file(), "").err().unwrap().to_string();
+    assert!(error.contains("out.mcap is being written by process"), "{error}");
+    run.result(2, "/map", 1, b"grid").unwrap();
+    run.finish();
+    assert_eq!(run.log().topics(), ["/map"]);
+}
+
+#[test]
+fn a_failed_run_does_not_take_the_place_of_an_earlier_log() {
+    let mut run = Run::new("");
+    fs::write(run.file(), "earlier").unwrap();
+    run.result(2, "/map", 1, b"grid").unwrap();
+    run.sink.node().abort("stage `lines` failed");
+    assert_eq!(fs::read(run.file()).unwrap(), b"earlier");
+    let log = Log::read(&run.folder.path().join("out.mcap.part"));
+    assert_eq!((log.topics(), log.outcome["complete"].as_str()), (vec!["/map"], "false"));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::expect::Expect;
 use super::find::CaseFolder;
 use anyhow::{Context, Result, bail};
+use gridweave_runtime::input_file;
 use gridweave_runtime::pipeline::{SingleStage, quoted_list, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use serde::Deserialize;
@@ -74,7 +75,7 @@ impl Case {
     pub(super) fn load(folder: &CaseFolder, registry: &Registry) -> Result<Self> {
         let path = folder.path.join("stage.toml");
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {name}"))?;
+        let text = input_file::read_text(&path).with_context(|| format!("cannot read {name}"))?;
         let stage = SingleStage::parse(&name, &text, registry, &OWN_SECTIONS)?;
         if stage.kind.name != folder.kind {
             bail!(

@@ -18,8 +18,9 @@ mod run_case;
 mod sink;
 mod source;
 
-use crate::job::progress;
+use crate::interrupt::{OUTPUT_IS_CLOSED, stop_on_interrupt};
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line};
 use anyhow::{Context, Result, bail};
 use check_case::{CaseOutcome, check_case};
 use clap::Args;
@@ -76,9 +77,9 @@ pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Status> {
     }
     let report = Report { cases: check_all(&cases, args, registry)?, kinds_without_a_case: without };
     match args.json {
-        true => println!("{:#}", report.to_json()),
-        false => print!("{}", report.to_text(&args.cases)),
-    }
+        true => print_line(format_args!("{:#}", report.to_json())),
+        false => print(report.to_text(&args.cases)),
+    }?;
     Ok(if report.has_failed() { Status::Failed } else { Status::Done })
 }
 
@@ -86,7 +87,7 @@ pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Status> {
 fn check_all(cases: &[CaseFolder], args: &GoldenArgs, registry: &Registry) -> Result<Vec<CaseOutcome>> {
     // A pool of its own: a case waits for its stages, and they may need the threads of the common pool.
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads for the cases")?;
-    let stop = progress::stop_on_interrupt(progress::OUTPUT_IS_CLOSED);
+    let stop = stop_on_interrupt(OUTPUT_IS_CLOSED);
     let check = |case: &CaseFolder| check_case(case, args, registry, stop);
     let outcomes = pool.install(|| cases.par_iter().map(check).collect());
     match stop.load(Ordering::Relaxed) {

@@ -110,7 +110,8 @@ impl Recording {
             let warnings = self.warnings.iter().map(|(warning, count)| (warning.clone(), count.to_string()));
             log.metadata(WARNINGS, warnings.collect())?;
         }
-        Ok(log.finish(Outcome::Complete)?)
+        log.finish(Outcome::Complete)?;
+        Ok(())
     }
 
     /// The messages of every topic, by log time.

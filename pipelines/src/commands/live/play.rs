@@ -1,13 +1,15 @@
 //! `gridweave play`: sends the messages of logs into a live pipeline at their own pace.
 
 use super::running::{RunChoice, Running, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
+use crate::terminal::print_line;
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
+use gridweave_logs::schemas::schema_text;
 use gridweave_runtime::engine::{Feed, FeedStopper};
 use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader, Write};
-use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, Registry, StageError};
+use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, PortType, Registry, StageError};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -61,7 +63,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let running = find_run(&args.run, registry)?;
     let stage = external_stage(&running, args.stage.as_deref())?;
     let player = Player { context: running.pipeline.context(stage), ..player };
-    let stop = progress::stop_on_interrupt("no more is sent");
+    let stop = stop_on_interrupt("no more is sent");
     let stopped = Arc::new(AtomicBool::new(false));
     let feed = Feed::join(&running.run, &running.pipeline, stage)?;
     if !feed.wait_for_readers(READY_TIMEOUT) {
@@ -77,7 +79,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
         other => other?,
     }
     let is_taken = feed.wait_until_taken(READY_TIMEOUT);
-    println!("played {messages} messages into {}", running.name());
+    print_line(format_args!("played {messages} messages into {}", running.name()))?;
     if !running.run.is_running() {
         bail!("the run ended before the log did");
     }
@@ -161,7 +163,9 @@ impl Player<'_> {
         let links = kind.outputs.iter().map(|output| {
             let port = spec.kind.outputs.iter().position(|port| port.name == output.name);
             let link = port.and_then(|port| feed.output(port));
-            let sink = link.map(|link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link }) });
+            let has_stamp = matches!(output.port_type, PortType::Ros(name) if begins_with_header(name));
+            let paced = |link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link, has_stamp }) };
+            let sink = link.map(paced);
             OutputEnd { topic: port.and_then(|port| spec.topics.get(port)).cloned().unwrap_or_default(), sink }
         });
         Ok(links.collect())
@@ -251,6 +255,8 @@ impl Pace {
 struct Paced {
     pace: Rc<RefCell<Pace>>,
     link: Box<dyn OutputSink>,
+    /// Whether its messages begin with a header, whose stamp is made later with them. What is of any type stays as it is.
+    has_stamp: bool,
 }
 
 impl Paced {
@@ -271,8 +277,7 @@ impl Paced {
 
 impl OutputSink for Paced {
     fn send(&mut self, mut header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
-        // What is logged on a channel of its own is of any type, and stays as it is.
-        let has_stamp = header.flags.contains(MessageFlags::DATA) && header.channel == 0;
+        let has_stamp = self.has_stamp && header.flags.contains(MessageFlags::DATA);
         match self.prepare(&mut header)? {
             later if later > 0 && has_stamp => {
                 let mut bytes = bytes.to_vec();
@@ -284,13 +289,20 @@ impl OutputSink for Paced {
     }
 
     fn send_in_place(&mut self, mut header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
-        let later = self.prepare(&mut header)?;
+        let (later, has_stamp) = (self.prepare(&mut header)?, self.has_stamp);
         self.link.send_in_place(header, &mut |blank| {
             let mut filled = write(blank)?;
-            make_later(&mut filled, later);
+            if has_stamp {
+                make_later(&mut filled, later);
+            }
             Ok(filled)
         })
     }
+}
+
+/// Whether the messages of a type have a header as their first field.
+fn begins_with_header(type_name: &str) -> bool {
+    schema_text(type_name).is_some_and(|text| text.starts_with("std_msgs/Header "))
 }
 
 /// Makes the stamp of a message with a header later, so that the stages do not see time go back. The header is the first
@@ -318,6 +330,42 @@ mod tests {
         make_later(&mut bytes, 1_000_000_002);
         assert_eq!(decode::<PoseStamped>(&bytes).unwrap(), message(3_000_000_001));
         make_later(&mut [1, 2, 3], 1);
+    }
+
+    #[test]
+    fn the_messages_of_every_channel_of_a_loop_become_later() {
+        use gridweave_runtime::message::MessageHeader;
+        use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, TagRange};
+
+        struct Sent(Rc<RefCell<Vec<Vec<u8>>>>);
+        impl OutputSink for Sent {
+            fn send(&mut self, _: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
+                self.0.borrow_mut().push(bytes.to_vec());
+                Ok(())
+            }
+
+            fn send_in_place(&mut self, _: MessageHeader, _: &mut Write<'_>) -> Result<(), StageError> {
+                Ok(())
+            }
+        }
+        for name in [PoseStamped::NAME, OccupancyGrid::NAME, TagRange::NAME] {
+            assert!(begins_with_header(name), "{name}");
+        }
+        assert!(!begins_with_header(TFMessage::NAME) && !begins_with_header("p/msg/Unknown"));
+
+        let reading = |time| TagRange { header: Header::new(LogTime(time), "robot1"), ..Default::default() };
+        let sent = Rc::default();
+        let pace = Rc::new(RefCell::new(Pace { later: 7, ..Pace::new(0.0) }));
+        let mut link = Paced { pace, link: Box::new(Sent(Rc::clone(&sent))), has_stamp: true };
+        // Messages of a log are on channels of their own, and those that the source makes are not.
+        for channel in [0, 3] {
+            let header = MessageHeader { channel, log_time: LogTime(5), ..Default::default() };
+            link.send(header, &encode(&reading(5)).unwrap()).unwrap();
+        }
+        for bytes in sent.borrow().iter() {
+            assert_eq!(decode::<TagRange>(bytes).unwrap(), reading(12));
+        }
+        assert_eq!(sent.borrow().len(), 2);
     }
 
     #[test]

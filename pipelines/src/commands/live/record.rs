@@ -3,12 +3,14 @@
 use super::link_choice::{Link, all_links, named_links};
 use super::running::{RunChoice, Running, find_run};
 use super::tap::LOOK_INTERVAL;
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
+use crate::terminal::print_line;
 use anyhow::{Result, bail};
 use clap::Args;
+use gridweave_logs::file::check_writable;
 use gridweave_logs::schemas::schema_text;
-use gridweave_logs::sink::{LogOptions, LogWriter};
+use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{PortType, Registry};
@@ -37,7 +39,7 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Records links.
 pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
-    LogWriter::check_path(&args.output)?;
+    check_writable(&args.output)?;
     let running = find_run(&args.run, registry)?;
     let mut links = Vec::new();
     for name in &args.links {
@@ -48,7 +50,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
     }
     links.sort_by_key(|link| (link.stage, link.port));
     links.dedup();
-    let stop = progress::stop_on_interrupt("the recording is being closed");
+    let stop = stop_on_interrupt("the recording is being closed");
     let mut recorders = links.iter().map(|&link| Recorder::new(&running, link)).collect::<Result<Vec<_>>>()?;
     let mut writer = LogWriter::create(&args.output, LogOptions::default())?;
     let mut flushed = Instant::now();
@@ -75,14 +77,10 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
         (missed, 0) => Some(format!("{missed} messages were missed, as the recorder was too slow for them")),
         (_, untyped) => Some(format!("{missed} messages were missed, and {untyped} were of an unknown type")),
     };
-    writer.finish(
-        reason.as_deref().map_or(gridweave_logs::sink::Outcome::Complete, |reason| {
-            gridweave_logs::sink::Outcome::Incomplete(reason)
-        }),
-    )?;
-    println!("recorded {messages} messages of {} links to {}", links.len(), args.output.display());
+    let written = writer.finish(reason.as_deref().map_or(Outcome::Complete, Outcome::Incomplete))?;
+    print_line(format_args!("recorded {messages} messages of {} links to {}", links.len(), written.display()))?;
     match reason {
-        Some(reason) => bail!("{}: {reason}", args.output.display()),
+        Some(reason) => bail!("{}: {reason}", written.display()),
         None => Ok(Status::Done),
     }
 }

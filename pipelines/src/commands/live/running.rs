@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 /// Which of the runs that are going on is meant.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct RunChoice {
-    /// Which run, if there are several: the name of its pipeline, or its own name as `top` shows it.
+    /// Which run, if there are several: the name of its pipeline, or what its own begins with, as `top` shows
+    /// it.
     #[arg(long, value_name = "NAME")]
     pub(crate) run: Option<String>,
     /// Wait for so many seconds until there is such a run.
@@ -50,11 +51,11 @@ pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Runnin
     }
     let start = Instant::now();
     loop {
-        let mut runs = all_runs(registry);
+        let mut runs = all_runs(registry)?;
         let names = |runs: &[Running]| runs.iter().map(Running::name).collect::<Vec<_>>().join(", ");
         let going_on = names(&runs);
         if let Some(name) = &choice.run {
-            runs.retain(|running| running.pipeline.name == *name || running.run.prefix == *name);
+            runs.retain(|running| running.pipeline.name == *name || running.run.prefix.starts_with(name));
         }
         match (runs.len(), runs.pop()) {
             (1, Some(running)) => return Ok(running),
@@ -69,10 +70,10 @@ pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Runnin
 }
 
 /// A run whose pipeline cannot be read has just ended, or has been started by another program.
-fn all_runs(registry: &Registry) -> Vec<Running> {
+fn all_runs(registry: &Registry) -> Result<Vec<Running>> {
     let load = |run: RunningRun| {
         let pipeline = Pipeline::load(&run.pipeline(), registry, &Overrides::default()).ok()?;
         Some(Running { run, pipeline })
     };
-    running_runs().into_iter().filter_map(load).collect()
+    Ok(running_runs()?.into_iter().filter_map(load).collect())
 }

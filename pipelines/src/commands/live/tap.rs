@@ -2,8 +2,9 @@
 
 use super::link_choice::named_links;
 use super::running::{RunChoice, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, say};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::dynamic::{JsonOptions, Schema};
@@ -13,7 +14,6 @@ use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{PortType, Registry};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::{ErrorKind, Write};
 use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
@@ -47,11 +47,10 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
         let names: Vec<String> = links.iter().map(|link| link.name(&running.pipeline)).collect();
         return Err(BadUse(format!("`{}` has several outputs: choose one of {}", args.link, names.join(", "))).into());
     };
-    let stop = progress::stop_on_interrupt("the tap ends");
+    let stop = stop_on_interrupt("the tap ends");
     let mut watched = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
     let mut types = Types::new(running.pipeline.stages[link.stage].kind.outputs[link.port].port_type);
     let mut left = args.count.unwrap_or(u64::MAX);
-    let mut closed = false;
     loop {
         // What has passed before the run ended is still there after it.
         let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
@@ -63,19 +62,13 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
                 lines.push('\n');
             }
         })?;
-        let written = std::io::stdout().write_all(lines.as_bytes()).and_then(|()| std::io::stdout().flush());
-        match written {
-            // The program that reads what is printed has had enough.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => closed = true,
-            other => other?,
-        }
-        if left == 0 || is_last_look || closed {
+        if !print(lines)? || left == 0 || is_last_look {
             break;
         }
         thread::sleep(LOOK_INTERVAL);
     }
     if watched.missed() > 0 {
-        eprintln!("{} messages were missed, as this program was too slow for them", watched.missed());
+        say(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
     }
     Ok(Status::Done)
 }

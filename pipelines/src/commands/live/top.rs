@@ -1,8 +1,9 @@
 //! `gridweave top`: what the stages of a run do, redrawn in place.
 
 use super::running::{RunChoice, Running, find_run};
-use crate::job::progress;
+use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line, say};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
@@ -42,7 +43,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let interval = Duration::try_from_secs_f64(args.interval).ok().filter(|interval| !interval.is_zero());
     let Some(interval) = interval else { return Err(BadUse("--interval must be above 0 s".to_owned()).into()) };
     let running = find_run(&args.run, registry)?;
-    let stop = progress::stop_on_interrupt("the display ends");
+    let stop = stop_on_interrupt("the display ends");
     let boards = watch_stages(&running.run, &running.pipeline)?;
     let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
     let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
@@ -57,19 +58,14 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
         let is_over = !running.run.is_running();
         let now = look();
         let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
-        match args.json {
-            true => println!("{}", to_json(&running, &stages)),
-            false => {
-                if is_redrawn {
-                    print!("{CLEAR}");
-                }
-                print!("{}", to_text(&running, &stages));
-            }
+        let is_read = match args.json {
+            true => print_line(to_json(&running, &stages))?,
+            false => print(format_args!("{}{}", if is_redrawn { CLEAR } else { "" }, to_text(&running, &stages)))?,
+        };
+        if is_over {
+            say("the run has ended");
         }
-        if args.once || is_over {
-            if is_over {
-                eprintln!("the run has ended");
-            }
+        if args.once || is_over || !is_read {
             return Ok(Status::Done);
         }
         (before, since) = (now, Instant::now());

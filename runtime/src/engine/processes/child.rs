@@ -1,5 +1,6 @@
 //! One process of a run: its stages in threads, and its words with the supervisor.
 
+use super::awake::Awake;
 use super::words::{Said, Told, say};
 use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
@@ -104,6 +105,7 @@ impl Process<'_> {
     fn report(&self, supervisor: &mut Supervisor<'_>, events: &Receiver<Event>, stop_reason: &OnceLock<String>) {
         let mut running = self.stages.len();
         let mut hung = false;
+        let mut awake = Awake::new(Instant::now());
         while running > 0 {
             let words = match events.recv_timeout(ALIVE_INTERVAL) {
                 Ok(Event::Progress { stage, share, log_time }) => {
@@ -128,7 +130,8 @@ impl Process<'_> {
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
             };
-            if !hung && let Some(words) = self.hung() {
+            let awake_for = awake.look(Instant::now());
+            if !hung && let Some(words) = self.hung(awake_for) {
                 hung = true;
                 supervisor.tell(&words);
             }
@@ -139,9 +142,9 @@ impl Process<'_> {
         }
     }
 
-    /// The first stage that has worked on one message for longer than the pipeline allows.
-    fn hung(&self) -> Option<Said> {
-        let longest = self.pipeline.stall_timeout?;
+    /// The first stage that has worked on one message for longer than the pipeline allows, while the process was awake.
+    fn hung(&self, awake_for: Duration) -> Option<Said> {
+        let longest = self.pipeline.stall_timeout.filter(|longest| awake_for > *longest)?;
         let is_hung = |stage: usize| working_for(&self.board.stage(stage)).is_some_and(|time| time > longest);
         let stage = self.stages.iter().copied().find(|&stage| is_hung(stage))?;
         let failure = Failure::Hung { seconds: longest.as_secs_f64() };

@@ -17,6 +17,7 @@
 //! what the process has left in shared memory and starts it again after a while. A live run ends when the observer asks
 //! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end.
 
+mod awake;
 mod backoff;
 mod child;
 mod event;

@@ -1,6 +1,7 @@
 //! The supervisor: starts the processes of a run, hears how they go, stops them, and removes what they leave.
 
 use super::Launch;
+use super::awake::Awake;
 use super::backoff::Backoff;
 use super::event::{Event, listen};
 use super::system::{describe, memory_of_process};
@@ -12,6 +13,7 @@ use crate::link::{StageBoard, StageNumber, StageState};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -94,6 +96,7 @@ fn run_in(
         events: sender,
         processes: Vec::new(),
         draining: None,
+        awake: Awake::new(Instant::now()),
         reports: BTreeMap::new(),
         stopping: None,
         readers: Vec::new(),
@@ -113,6 +116,7 @@ struct Supervisor<'a> {
     processes: Vec<Process>,
     /// Since when a live run comes to its end.
     draining: Option<Instant>,
+    awake: Awake,
     reports: BTreeMap<String, StageReport>,
     stopping: Option<Stopping>,
     readers: Vec<thread::JoinHandle<()>>,
@@ -189,7 +193,8 @@ impl Supervisor<'_> {
 
     fn note(&mut self, event: Event) {
         match event {
-            Event::Printed { line } => eprintln!("{line}"),
+            // A closed standard error is no reason to end the run.
+            Event::Printed { line } => drop(writeln!(io::stderr(), "{line}")),
             Event::Said { process, words } => {
                 self.processes[process].heard = Instant::now();
                 self.note_words(process, words);
@@ -319,12 +324,13 @@ impl Supervisor<'_> {
     /// Kills a process that does not say that it is alive, as one does that was stopped as a whole, or that has taken
     /// more memory than it may.
     fn look_at_processes(&mut self) {
+        let awake_for = self.awake.look(Instant::now());
         if self.stopping.is_some() {
             return;
         }
         let Pipeline { stall_timeout, memory_limit, .. } = *self.pipeline;
         let trouble = |process: &Process| {
-            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed() > *longest) {
+            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed().min(awake_for) > *longest) {
                 return Some(Failure::Hung { seconds: longest.as_secs_f64() });
             }
             let limit = memory_limit?;

@@ -1,0 +1,92 @@
+//! Outputs: a run owns the files that it writes, touches no others, and what was there stays until there is something better.
+
+use crate::support::{DIAMOND, Running, gridweave, outcome, part, signal, start, wait_until};
+use std::fs;
+use std::os::unix::fs::{FileTypeExt, symlink};
+use std::path::Path;
+use std::process::Command;
+use tempfile::TempDir;
+
+const OUTPUT: &str = "out.mcap";
+
+fn folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("diamond.toml"), DIAMOND).unwrap();
+    folder
+}
+
+/// A run that sends 3,000 messages and waits at the 2,000th until it may go on.
+fn run(folder: &Path, engine: &str) -> Running {
+    let settings = ["--set", "source.count=3000", "--set", "source.pause=0", "--set", "source.gates=[2000]"];
+    start(folder, &[&["run", "diamond.toml", "-o", OUTPUT, "--engine", engine], &settings[..]].concat(), &[])
+}
+
+#[test]
+fn of_two_runs_with_one_output_the_second_is_refused_and_the_first_keeps_its_log() {
+    for engine in ["threads", "processes"] {
+        let folder = folder();
+        let output = folder.path().join(OUTPUT);
+        let first = run(folder.path(), engine);
+        wait_until("output", || part(&output).exists());
+        // Whoever writes it is one of the first run's processes.
+        for second in ["single", "threads", "processes"] {
+            run(folder.path(), second).wait().assert(1, &["out.mcap is being written by process"]);
+        }
+        fs::write(folder.path().join("gate_2000"), b"").unwrap();
+        first.wait().assert(0, &[]);
+        let (reason, messages) = outcome(&output);
+        assert_eq!((reason.as_str(), messages > 3000), ("", true), "{messages}");
+        assert!(!part(&output).exists());
+    }
+}
+
+#[test]
+fn a_run_that_fails_leaves_the_earlier_output_in_its_place() {
+    let folder = folder();
+    let output = folder.path().join(OUTPUT);
+    fs::write(folder.path().join("gate_2000"), b"").unwrap();
+    run(folder.path(), "single").wait().assert(0, &[]);
+    let earlier = fs::read(&output).unwrap();
+    fs::remove_file(folder.path().join("gate_2000")).unwrap();
+    for engine in ["threads", "processes"] {
+        let failing = run(folder.path(), engine);
+        wait_until("output", || part(&output).exists());
+        wait_until("messages", || fs::metadata(part(&output)).is_ok_and(|file| file.len() > 0));
+        signal(failing.id(), "INT");
+        failing.wait().assert(1, &["was interrupted"]);
+        assert!(fs::read(&output).unwrap() == earlier, "{engine}");
+        assert!(outcome(&part(&output)).0.contains("interrupted"));
+    }
+    fs::write(folder.path().join("gate_2000"), b"").unwrap();
+    run(folder.path(), "threads").wait().assert(0, &[]);
+    assert!(fs::read(&output).unwrap() == earlier && !part(&output).exists());
+}
+
+#[test]
+fn outputs_that_are_one_file_by_another_name_are_refused() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    symlink(folder.path().join("real"), folder.path().join("link")).unwrap();
+    fs::write(folder.path().join("real"), "earlier").unwrap();
+    for (log, other) in [("o", "sub/../o"), ("real", "link"), ("link", "sub/../real")] {
+        let twice = &["would be written twice"];
+        gridweave(folder.path(), &["run", "diamond.toml", "-o", log, "--summary", other]).assert(2, twice);
+        gridweave(folder.path(), &["simulate", "-o", log, "--truth", other]).assert(2, twice);
+    }
+    assert_eq!(fs::read(folder.path().join("real")).unwrap(), b"earlier");
+    assert!(!folder.path().join("o").exists());
+}
+
+#[test]
+fn what_is_no_regular_file_is_refused_as_an_output_and_stays() {
+    let folder = folder();
+    let pipe = folder.path().join("pipe.yaml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for option in ["--map", "--picture", "--summary"] {
+        let args = ["run", "diamond.toml", "-o", OUTPUT, option, "pipe.yaml"];
+        gridweave(folder.path(), &args).assert(1, &["is no regular file"]);
+    }
+    fs::rename(&pipe, folder.path().join(OUTPUT)).unwrap();
+    gridweave(folder.path(), &["run", "diamond.toml", "-o", OUTPUT]).assert(1, &["is no regular file"]);
+    assert!(fs::metadata(folder.path().join(OUTPUT)).unwrap().file_type().is_fifo());
+}
