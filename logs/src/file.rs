@@ -4,7 +4,7 @@
 //! writer dies, in whatever way. So a part that is locked belongs to a living writer, and nobody else touches it; one that
 //! is not locked is what a killed writer has left.
 
-use rustix::fs::OFlags;
+use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
@@ -60,7 +60,11 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 /// # Errors
 /// It could not.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
-    OutputFile::create(path).map(drop)
+    if let Some(mut left) = OutputFile::of_killed(path)? {
+        left.keep(false);
+    }
+    let folder = resolve(path).and_then(|place| Ok(access(folder_of(&place), Access::WRITE_OK | Access::EXEC_OK)?));
+    folder.map_err(|source| WriteError::Io { path: path.to_owned(), source })
 }
 
 /// Writes files that belong together. All are written beside before the first is put in its place, in the given order, so

@@ -1,7 +1,7 @@
 //! Who looks on at a run, live or a replay, sees what passes and changes nothing.
 use crate::support::{
-    DIAMOND, LOG, OUTPUT, RECEIVE, Run, Running, TROUBLED, gridweave_program, outcome, processes, read, run_name,
-    signal, simulate, start, wait_until,
+    DIAMOND, LOG, OUTPUT, POSES, RECEIVE, Run, Running, TROUBLED, gridweave_program, outcome, part, processes, read,
+    run_name, signal, simulate, start, wait_until,
 };
 use serde_json::Value;
 use std::fs;
@@ -16,7 +16,7 @@ fn programs_that_are_killed_while_they_look_on_leave_room_for_others() {
         let tap = run.command(&["tap", "middle", "--json"]);
         let (file, path) = (format!("{turn}.mcap"), run.path(&format!("{turn}.mcap")));
         let recorder = run.command(&["record", "-o", &file, "middle"]);
-        wait_until("recording", || path.exists());
+        wait_until("recording", || part(&path).exists());
         tap.wait_for_lines(1);
         [&tap, &recorder].into_iter().for_each(|program| signal(program.id(), "KILL"));
         tap.wait();

@@ -79,7 +79,8 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));
     }
-    let is_inside = |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    let is_inside =
+        |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if let Some(outside) = bag.relative_file_paths.iter().find(|path| !is_inside(path)) {
         return Err(wrong(format!("{} leads out of the bag", outside.display())));
     }

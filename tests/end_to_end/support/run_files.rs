@@ -42,7 +42,7 @@ pub(crate) fn run_name(run: u32) -> String {
 }
 
 /// The folder of the files of all runs of this user.
-pub(crate) fn user_folder() -> PathBuf {
+fn user_folder() -> PathBuf {
     use std::os::unix::fs::MetadataExt;
     let user = fs::metadata("/proc/self").unwrap().uid();
     let own = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
