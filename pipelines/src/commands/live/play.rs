@@ -302,7 +302,9 @@ impl OutputSink for Paced {
 
 /// Whether the messages of a type have a header as their first field.
 fn begins_with_header(type_name: &str) -> bool {
-    schema_text(type_name).is_some_and(|text| text.starts_with("std_msgs/Header "))
+    let is_field = |line: &&str| !line.is_empty() && !line.starts_with('#');
+    let text = schema_text(type_name).unwrap_or_default();
+    text.lines().map(str::trim).find(is_field).is_some_and(|field| field.starts_with("std_msgs/Header "))
 }
 
 /// Makes the stamp of a message with a header later, so that the stages do not see time go back. The header is the first
