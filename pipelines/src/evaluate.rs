@@ -23,7 +23,7 @@ const RIGHT_DEGREES: f64 = 1.0;
 /// What became of one robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum RobotOutcome {
     /// It is merged, and where it belongs.
     Right,
     /// It is merged, and not where it belongs.
@@ -42,7 +42,7 @@ pub struct RobotResult {
     /// The robot.
     pub robot: String,
     /// What became of it.
-    pub outcome: Outcome,
+    pub outcome: RobotOutcome,
     /// Error at the middle of its map, metres; none if there is nothing to compare.
     pub error_m: Option<f64>,
     /// Error of its direction, degrees, 0 to 180; none if there is nothing to compare.
@@ -134,13 +134,15 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
             (metres, (expected.inverse() * found).rotation.angle().abs().to_degrees())
         });
         let outcome = match (found, errors) {
-            (Some(_), Some((metres, degrees))) if metres < RIGHT_METRES && degrees < RIGHT_DEGREES => Outcome::Right,
-            (Some(_), Some(_)) => Outcome::Wrong,
-            (Some(_), None) if related => Outcome::NoTruth,
-            (Some(_), None) => Outcome::Wrong,
-            (None, _) if expected.is_some() => Outcome::Refused,
-            (None, _) if related => Outcome::NoTruth,
-            (None, _) => Outcome::RightlyRefused,
+            (Some(_), Some((metres, degrees))) if metres < RIGHT_METRES && degrees < RIGHT_DEGREES => {
+                RobotOutcome::Right
+            }
+            (Some(_), Some(_)) => RobotOutcome::Wrong,
+            (Some(_), None) if related => RobotOutcome::NoTruth,
+            (Some(_), None) => RobotOutcome::Wrong,
+            (None, _) if expected.is_some() => RobotOutcome::Refused,
+            (None, _) if related => RobotOutcome::NoTruth,
+            (None, _) => RobotOutcome::RightlyRefused,
         };
         let reason = match found {
             Some(_) => None,
@@ -157,18 +159,18 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
     };
     let robots: Vec<RobotResult> =
         names.iter().filter(|robot| Some(**robot) != run.reference.as_ref()).map(one).collect();
-    let count = |outcomes: &[Outcome]| robots.iter().filter(|robot| outcomes.contains(&robot.outcome)).count();
+    let count = |outcomes: &[RobotOutcome]| robots.iter().filter(|robot| outcomes.contains(&robot.outcome)).count();
     Ok(Evaluation {
         reference: run.reference.clone(),
         related,
-        right: count(&[Outcome::Right]),
-        wrong: count(&[Outcome::Wrong]),
-        refused: count(&[Outcome::Refused, Outcome::RightlyRefused]),
+        right: count(&[RobotOutcome::Right]),
+        wrong: count(&[RobotOutcome::Wrong]),
+        refused: count(&[RobotOutcome::Refused, RobotOutcome::RightlyRefused]),
         robots,
     })
 }
 
-impl Outcome {
+impl RobotOutcome {
     /// For people.
     pub fn words(self) -> &'static str {
         match self {
@@ -215,7 +217,7 @@ mod tests {
         evaluate(&summary_path, &truth_path)
     }
 
-    fn outcomes(evaluation: &Evaluation) -> Vec<(&str, Outcome)> {
+    fn outcomes(evaluation: &Evaluation) -> Vec<(&str, RobotOutcome)> {
         evaluation.robots.iter().map(|robot| (robot.robot.as_str(), robot.outcome)).collect()
     }
 
@@ -239,7 +241,7 @@ mod tests {
             "unmerged": {}, "alignments": [], "stages": {},
         });
         let evaluation = run(&summary, &truth()).unwrap();
-        assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Right), ("robot3", Outcome::Right)]);
+        assert_eq!(outcomes(&evaluation), [("robot2", RobotOutcome::Right), ("robot3", RobotOutcome::Right)]);
         let robot2 = &evaluation.robots[0];
         assert!((robot2.error_m.unwrap() - 0.2).abs() < 1e-3, "0.01 rad over 20 m");
         assert!((robot2.error_deg.unwrap() - 0.573).abs() < 1e-3);
@@ -256,7 +258,7 @@ mod tests {
                 "unmerged": {"robot3": "no tags in common"},
             });
             let evaluation = run(&summary, &truth()).unwrap();
-            assert_eq!(outcomes(&evaluation), [("robot2", Outcome::Wrong), ("robot3", Outcome::Refused)]);
+            assert_eq!(outcomes(&evaluation), [("robot2", RobotOutcome::Wrong), ("robot3", RobotOutcome::Refused)]);
             assert_eq!(evaluation.robots[1].reason.as_deref(), Some("no tags in common"));
             assert_eq!((evaluation.right, evaluation.wrong, evaluation.refused), (0, 1, 1));
         }
@@ -274,7 +276,7 @@ mod tests {
             },
         });
         let evaluation = run(&summary, &truth()).unwrap();
-        assert_eq!(outcomes(&evaluation), [("robot1", Outcome::Right), ("robot3", Outcome::Right)]);
+        assert_eq!(outcomes(&evaluation), [("robot1", RobotOutcome::Right), ("robot3", RobotOutcome::Right)]);
         assert!(evaluation.robots.iter().all(|robot| robot.error_m.unwrap() < 1e-9));
     }
 
@@ -288,9 +290,9 @@ mod tests {
         });
         let truth = json!({"frames": {}});
         let evaluation = run(&refused, &truth).unwrap();
-        assert_eq!(outcomes(&evaluation), [("robot2", Outcome::RightlyRefused)]);
+        assert_eq!(outcomes(&evaluation), [("robot2", RobotOutcome::RightlyRefused)]);
         assert!(!evaluation.related);
-        assert_eq!(outcomes(&run(&merged, &truth).unwrap()), [("robot2", Outcome::Wrong)]);
+        assert_eq!(outcomes(&run(&merged, &truth).unwrap()), [("robot2", RobotOutcome::Wrong)]);
     }
 
     #[test]
@@ -302,10 +304,10 @@ mod tests {
         });
         let evaluation = run(&summary, &truth()).unwrap();
         let expected = [
-            ("robot2", Outcome::Refused),
-            ("robot3", Outcome::Refused),
-            ("robot7", Outcome::NoTruth),
-            ("robot8", Outcome::NoTruth),
+            ("robot2", RobotOutcome::Refused),
+            ("robot3", RobotOutcome::Refused),
+            ("robot7", RobotOutcome::NoTruth),
+            ("robot8", RobotOutcome::NoTruth),
         ];
         assert_eq!(outcomes(&evaluation), expected);
         assert_eq!(evaluation.refused, 2);

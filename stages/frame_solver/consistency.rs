@@ -24,7 +24,7 @@ const SEARCHED_DEPTH: usize = 6;
 
 /// What the cycles say of one alignment.
 #[derive(Clone, Debug)]
-pub enum Verdict {
+pub enum EdgeVerdict {
     /// It agrees with every cycle it is in.
     Right,
     /// It contradicts the others, which agree with each other. The cycle is one that it closes with them.
@@ -37,8 +37,8 @@ pub enum Verdict {
 ///
 /// `known` marks edges that were right when the rest was judged before: they agree with each other. It saves work, and
 /// may mark none.
-pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Verdict> {
-    let mut verdicts = vec![Verdict::Right; edges.len()];
+pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<EdgeVerdict> {
+    let mut verdicts = vec![EdgeVerdict::Right; edges.len()];
     let neighbours = Neighbours::new(robots, edges);
     let is_open = |cycle: &Cycle| cycle.remainder.distance_from_identity() > gate;
     // A long cycle may hide what a short one shows.
@@ -73,9 +73,9 @@ pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Ve
             let shown = contradictions.iter().find(|cycle| cycle.edges.contains(&index)).or(contradictions.first());
             let is_in_all = removals.iter().all(|set| set.contains(&index));
             verdicts[index] = match (is_in_all, neighbours.cycle(edges, index, |index| right.contains(&index)), shown) {
-                (true, Some(cycle), _) => Verdict::Wrong(cycle),
-                (_, _, Some(cycle)) => Verdict::Disputed(cycle.clone()),
-                (_, _, None) => Verdict::Right,
+                (true, Some(cycle), _) => EdgeVerdict::Wrong(cycle),
+                (_, _, Some(cycle)) => EdgeVerdict::Disputed(cycle.clone()),
+                (_, _, None) => EdgeVerdict::Right,
             };
         }
     }
@@ -83,7 +83,14 @@ pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Ve
 }
 
 /// Judges a group of edges that share cycles, however many contradictions there are.
-fn judge_by_moves(robots: usize, edges: &[Edge], known: &[bool], gate: f64, group: &[usize], verdicts: &mut [Verdict]) {
+fn judge_by_moves(
+    robots: usize,
+    edges: &[Edge],
+    known: &[bool],
+    gate: f64,
+    group: &[usize],
+    verdicts: &mut [EdgeVerdict],
+) {
     let own: Vec<Edge> = group.iter().map(|&index| edges[index]).collect();
     let known = group.iter().map(|&index| known[index]).collect();
     let neighbours = Neighbours::new(robots, &own);
@@ -96,10 +103,10 @@ fn judge_by_moves(robots: usize, edges: &[Edge], known: &[bool], gate: f64, grou
     };
     for (index, &place) in group.iter().enumerate().filter(|(index, _)| !is_right(*index)) {
         verdicts[place] = match disputed.get(&index) {
-            Some(cycle) => Verdict::Disputed(in_all_edges(cycle.clone())),
+            Some(cycle) => EdgeVerdict::Disputed(in_all_edges(cycle.clone())),
             None => match neighbours.cycle(&own, index, is_right) {
-                Some(cycle) => Verdict::Wrong(in_all_edges(cycle)),
-                None => Verdict::Right,
+                Some(cycle) => EdgeVerdict::Wrong(in_all_edges(cycle)),
+                None => EdgeVerdict::Right,
             },
         };
     }
@@ -158,7 +165,7 @@ mod tests {
         pairs.iter().enumerate().map(edge).collect()
     }
 
-    fn judge_all(robots: usize, edges: &[Edge]) -> Vec<Verdict> {
+    fn judge_all(robots: usize, edges: &[Edge]) -> Vec<EdgeVerdict> {
         judge(robots, edges, &vec![false; edges.len()], 4.0)
     }
 
@@ -167,11 +174,11 @@ mod tests {
         letters(&judge_all(robots, &edges(pairs, wrong)))
     }
 
-    fn letters(verdicts: &[Verdict]) -> String {
-        let letter = |verdict: &Verdict| match verdict {
-            Verdict::Right => '.',
-            Verdict::Wrong(_) => 'x',
-            Verdict::Disputed(_) => '?',
+    fn letters(verdicts: &[EdgeVerdict]) -> String {
+        let letter = |verdict: &EdgeVerdict| match verdict {
+            EdgeVerdict::Right => '.',
+            EdgeVerdict::Wrong(_) => 'x',
+            EdgeVerdict::Disputed(_) => '?',
         };
         verdicts.iter().map(letter).collect()
     }
@@ -279,8 +286,8 @@ mod tests {
     fn among_many_robots_with_many_mistakes_no_wrong_alignment_counts_as_right() {
         let team = Team::new(32, 6, 3).with_mistakes(0.2);
         let verdicts = judge_all(32, &team.edges);
-        assert!(team.wrong.iter().all(|&index| !matches!(verdicts[index], Verdict::Right)));
-        let right = verdicts.iter().filter(|verdict| matches!(verdict, Verdict::Right)).count();
+        assert!(team.wrong.iter().all(|&index| !matches!(verdicts[index], EdgeVerdict::Right)));
+        let right = verdicts.iter().filter(|verdict| matches!(verdict, EdgeVerdict::Right)).count();
         assert!(right > 70 * (team.edges.len() - team.wrong.len()) / 100, "{right} of {}", team.edges.len());
     }
 
@@ -290,7 +297,7 @@ mod tests {
             let team = Team::new(10, 9, seed).with_agreeing_mistakes(0.1);
             assert_eq!(team.wrong.len(), 4);
             for (index, verdict) in judge_all(10, &team.edges).iter().enumerate() {
-                assert_eq!(matches!(verdict, Verdict::Wrong(_)), team.wrong.contains(&index), "{seed} {index}");
+                assert_eq!(matches!(verdict, EdgeVerdict::Wrong(_)), team.wrong.contains(&index), "{seed} {index}");
             }
         }
     }

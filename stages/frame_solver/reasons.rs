@@ -36,7 +36,7 @@ pub(super) fn unmerged(
     let Solution { frames, groups, left_out, .. } = solution;
     let outside: BTreeSet<&str> =
         robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
-    let refusals = Refusals::new(&outside, alignments, left_out);
+    let refusals = UnusedAlignments::new(&outside, alignments, left_out);
     let reason = |robot: &str| {
         if let Some(reason) = disputed.get(robot) {
             return reason.clone();
@@ -55,7 +55,7 @@ pub(super) fn unmerged(
     outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
 }
 
-fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &Refusals<'_>) -> String {
+fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
     refusals.telling(robot, frames).unwrap_or_else(|| {
         format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that others know")
     })
@@ -63,18 +63,19 @@ fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &Refu
 
 /// An alignment that was not used, as one of its robots sees it.
 #[derive(Clone, Copy)]
-struct Refusal<'a> {
+struct UnusedAlignment<'a> {
     other: &'a str,
     score: f64,
     reason: &'a str,
 }
 
 /// For every robot outside, its alignments that were not used. Gathered once: there are as many as pairs of robots.
-struct Refusals<'a>(BTreeMap<&'a str, Vec<Refusal<'a>>>);
+struct UnusedAlignments<'a>(BTreeMap<&'a str, Vec<UnusedAlignment<'a>>>);
 
-impl<'a> Refusals<'a> {
+impl<'a> UnusedAlignments<'a> {
     fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<RobotPair, String>) -> Self {
-        let mut by_robot: BTreeMap<&str, Vec<Refusal<'_>>> = outside.iter().map(|robot| (*robot, Vec::new())).collect();
+        let mut by_robot: BTreeMap<&str, Vec<UnusedAlignment<'_>>> =
+            outside.iter().map(|robot| (*robot, Vec::new())).collect();
         for (pair, alignment) in alignments {
             let reason = match alignment.accepted {
                 true => left_out.get(pair),
@@ -83,7 +84,7 @@ impl<'a> Refusals<'a> {
             let Some(reason) = reason else { continue };
             for (robot, other) in [(&pair.a, &pair.b), (&pair.b, &pair.a)] {
                 if let Some(refusals) = by_robot.get_mut(robot.as_str()) {
-                    refusals.push(Refusal { other, score: alignment.score, reason });
+                    refusals.push(UnusedAlignment { other, score: alignment.score, reason });
                 }
             }
         }

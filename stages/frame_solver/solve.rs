@@ -1,6 +1,6 @@
 //! From alignments of pairs to one pose for every robot.
 
-use super::consistency::{Verdict, judge};
+use super::consistency::{EdgeVerdict, judge};
 use super::graph::{Cycle, Edge, Forest};
 use super::reasons;
 use super::solution::{Alignments, Group, OpenCycle, Solution};
@@ -55,9 +55,9 @@ pub fn solve(
     let mut disputed = BTreeMap::new();
     for ((verdict, edge), pair) in verdicts.iter().zip(&edges).zip(&pairs) {
         let reason = match verdict {
-            Verdict::Right => continue,
-            Verdict::Wrong(cycle) => reasons::contradicts(&describe(cycle, &pairs)),
-            Verdict::Disputed(cycle) => {
+            EdgeVerdict::Right => continue,
+            EdgeVerdict::Wrong(cycle) => reasons::contradicts(&describe(cycle, &pairs)),
+            EdgeVerdict::Disputed(cycle) => {
                 let reason = reasons::disputed(&describe(cycle, &pairs));
                 for robot in [edge.a, edge.b] {
                     disputed.entry(names[robot].to_owned()).or_insert_with(|| reason.clone());
@@ -68,7 +68,7 @@ pub fn solve(
         left_out.insert((*pair).clone(), format!("left out: {reason}"));
     }
 
-    let is_right = |verdict: &Verdict| matches!(verdict, Verdict::Right);
+    let is_right = |verdict: &EdgeVerdict| matches!(verdict, EdgeVerdict::Right);
     let right: Vec<Edge> =
         verdicts.iter().zip(&edges).filter(|(verdict, _)| is_right(verdict)).map(|(_, edge)| *edge).collect();
     let used = verdicts.iter().zip(&edges).zip(&pairs).filter(|((verdict, _), _)| is_right(verdict));

@@ -1,6 +1,6 @@
 //! Refines the alignment of two maps by ICP on their walls (Tsardoulias et al., section 4.3).
 //!
-//! [`register`] moves map b until its walls lie on those of map a, where they lie near each other; [`Refusal`] says why
+//! [`register`] moves map b until its walls lie on those of map a, where they lie near each other; [`IcpRefusal`] says why
 //! the outcome may not be used. [`refine`] does both. Whether the maps agree there is for `merge_verifier` to say.
 
 mod first_guess;
@@ -20,7 +20,7 @@ mod tests;
 pub use first_guess::FirstGuess;
 pub use parameters::{IcpParameters, Metric, Weighting};
 pub use refine::{Refinement, refine};
-pub use refusal::Refusal;
+pub use refusal::IcpRefusal;
 pub(crate) use registration::approach;
 pub use registration::{Registration, register};
 

@@ -1,6 +1,6 @@
 //! The whole of it: register, and judge the registration.
 
-use super::{FirstGuess, IcpParameters, Refusal, Registration, register};
+use super::{FirstGuess, IcpParameters, IcpRefusal, Registration, register};
 use crate::walls::WallMap;
 
 /// A refined alignment and the judgement on it.
@@ -9,7 +9,7 @@ pub struct Refinement {
     /// How the maps were brought together.
     pub registration: Registration,
     /// Why the alignment may not be used; none if it may.
-    pub refusal: Option<Refusal>,
+    pub refusal: Option<IcpRefusal>,
 }
 
 impl Refinement {
@@ -26,6 +26,6 @@ impl Refinement {
 /// there is another question, which `merge_verifier` answers.
 pub fn refine(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Refinement {
     let registration = register(a, b, first_guess, parameters);
-    let refusal = Refusal::of(&registration, parameters);
+    let refusal = IcpRefusal::of(&registration, parameters);
     Refinement { registration, refusal }
 }

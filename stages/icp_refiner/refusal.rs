@@ -8,7 +8,7 @@ const MOST_SWEEPS: usize = 100;
 
 /// Why a refined alignment may not be used. The texts are for the people who run the robots.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refusal {
+pub enum IcpRefusal {
     /// Nothing to align.
     #[error("the maps have no walls that lie near each other")]
     NoWalls,
@@ -52,7 +52,7 @@ pub enum Refusal {
     },
 }
 
-impl Refusal {
+impl IcpRefusal {
     /// The first reason against a registration, if there is one.
     pub fn of(registration: &Registration, parameters: &IcpParameters) -> Option<Self> {
         let (along, direction) =

@@ -1,6 +1,6 @@
 //! Registration and judgement on drawn floor plans.
 
-use super::{FirstGuess, IcpParameters, Metric, Refusal, Weighting, refine, register};
+use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
 use crate::geometry::{Grid, GridGeometry, Pose2, pose};
 use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
 use crate::walls::WallMap;
@@ -143,7 +143,7 @@ fn a_grid_without_cells_is_refused() {
     let grid = Grid::new(geometry, &[]).unwrap();
     let map = WallMap::new(&grid, 0.2);
     let refinement = refine(&map, &map, &guess(Pose2::identity(), 0.0, 0.0, 0.0), &IcpParameters::default());
-    assert_eq!(refinement.refusal, Some(Refusal::NoWalls));
+    assert_eq!(refinement.refusal, Some(IcpRefusal::NoWalls));
 }
 
 #[test]
@@ -170,7 +170,9 @@ fn along_a_bare_corridor_the_first_guess_stays_and_says_how_well_it_is_known() {
             - truth * b.transform_world_map.inverse() * nalgebra::Point2::new(30.0, 0.0));
     assert!(shift.y.abs() < 0.02, "{shift}");
     assert!((shift.x - 0.5).abs() < 0.15, "{shift}");
-    let Some(Refusal::OpenPosition { direction, .. }) = refinement.refusal else { panic!("{:?}", refinement.refusal) };
+    let Some(IcpRefusal::OpenPosition { direction, .. }) = refinement.refusal else {
+        panic!("{:?}", refinement.refusal)
+    };
     assert!((direction.to_radians() + 0.5).abs() < 0.02, "{direction}");
     assert!(refinement.reason().contains("bare corridor"));
 }
@@ -183,7 +185,7 @@ fn points_that_pull_on_points_do_not_close_a_bare_corridor() {
     let first_guess = guess(a.transform_to(&b), 0.0, 0.0, 0.0);
     let parameters = IcpParameters { metric: Metric::PointToPoint, max_iterations: 200, ..Default::default() };
     let refinement = refine(&a.walls, &b.walls, &first_guess, &parameters);
-    assert!(matches!(refinement.refusal, Some(Refusal::OpenPosition { .. })), "{}", refinement.reason());
+    assert!(matches!(refinement.refusal, Some(IcpRefusal::OpenPosition { .. })), "{}", refinement.reason());
 }
 
 #[test]
@@ -204,7 +206,7 @@ fn maps_that_fit_far_from_a_sure_first_guess_are_refused() {
     first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-6));
     let parameters = IcpParameters { max_step: 3.0, ..Default::default() };
     let refinement = refine(&a.walls, &b.walls, &first_guess, &parameters);
-    assert!(matches!(refinement.refusal, Some(Refusal::Step { .. })), "{}", refinement.reason());
+    assert!(matches!(refinement.refusal, Some(IcpRefusal::Step { .. })), "{}", refinement.reason());
 }
 
 #[test]

@@ -115,8 +115,9 @@ impl Raster {
             // Maps that meet reach no farther than their diagonals together; with twice that there is room for gaps.
             reach += 2.0 * map.cell * (map.width as f64).hypot(map.height as f64);
         }
-        // Written so that a place that is no number fails it.
-        if bounds.0.is_some_and(|(least, most)| !((most - least).max() <= reach)) {
+        // A place that is no number is not within reach.
+        let is_within_reach = bounds.0.is_none_or(|(least, most)| (most - least).max() <= reach);
+        if !is_within_reach {
             return None;
         }
         // So the cells of a map that is not turned come to lie on cells.

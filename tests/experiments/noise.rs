@@ -10,7 +10,7 @@ use super::statistics::{median, quantile, wilson_interval};
 use super::trial::World;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use gridweave::evaluate::Outcome;
+use gridweave::evaluate::RobotOutcome;
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
@@ -132,7 +132,7 @@ impl Property {
 /// What became of one world.
 struct Trial {
     seed: u64,
-    outcome: Outcome,
+    outcome: RobotOutcome,
     error_m: Option<f64>,
     error_deg: Option<f64>,
     reason: String,
@@ -154,7 +154,7 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
     let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
         let trials = trials(sweep, value, args, registry)?;
-        let outcomes = [Outcome::Right, Outcome::Wrong, Outcome::Refused];
+        let outcomes = [RobotOutcome::Right, RobotOutcome::Wrong, RobotOutcome::Refused];
         let counts = outcomes.map(|outcome| trials.iter().filter(|trial| trial.outcome == outcome).count());
         for ((share, band), count) in shares.iter_mut().zip(&mut bands).zip(counts) {
             let (low, high) = wilson_interval(count, trials.len());

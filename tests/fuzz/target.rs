@@ -5,6 +5,7 @@ use super::input::{Input, inputs};
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestError, TestRunner};
 use rustix::process::{Resource, Rlimit, setrlimit};
 use std::fs;
+use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -36,7 +37,7 @@ fn watch(name: &'static str, folder: PathBuf) -> Sender<()> {
         let mut answered = u64::MAX;
         while end.recv_timeout(WATCHDOG) == Err(RecvTimeoutError::Timeout) {
             if answered == ANSWERED.load(Ordering::Relaxed) {
-                eprintln!("{name} hangs on the input in {}", folder.display());
+                let _ = writeln!(std::io::stderr(), "{name} hangs on the input in {}", folder.display());
                 std::process::abort();
             }
             answered = ANSWERED.load(Ordering::Relaxed);

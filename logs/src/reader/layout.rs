@@ -6,7 +6,7 @@ use super::damage::{ChunkFault, Damage};
 use super::definitions::Definitions;
 use super::outcome;
 use super::record::{Fields, MessageRecord, Record, record_at};
-use super::summary::Summary;
+use super::summary::SummarySection;
 use mcap::MAGIC;
 use mcap::records::op;
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ pub(crate) struct Layout {
 impl Layout {
     /// Finds the blocks of `file`, which begins with the magic bytes.
     pub(crate) fn of(file: &[u8]) -> Self {
-        let summary = Summary::read(file);
+        let summary = SummarySection::read(file);
         let mut walk = Walk { layout: Self::default(), unsure: Vec::new(), run: None };
         walk.data_section(file, &summary);
         let Walk { mut layout, mut unsure, .. } = walk;
@@ -81,7 +81,7 @@ struct Walk {
 }
 
 impl Walk {
-    fn data_section(&mut self, file: &[u8], summary: &Summary) {
+    fn data_section(&mut self, file: &[u8], summary: &SummarySection) {
         let mut index = ChunkTimes::default();
         let mut position = MAGIC.len();
         loop {

@@ -10,7 +10,7 @@ const FOOTER: usize = 20;
 
 /// What stands behind the messages of a file.
 #[derive(Debug, Default)]
-pub(crate) struct Summary {
+pub(crate) struct SummarySection {
     /// Whether the file ends as a file that was closed does.
     pub(crate) closed: bool,
     /// Whether the summary is there and its checksum is wrong.
@@ -23,7 +23,7 @@ pub(crate) struct Summary {
     pub(crate) chunk_starts: Vec<usize>,
 }
 
-impl Summary {
+impl SummarySection {
     /// Reads the summary of a whole file; of a file without one, nothing.
     pub(crate) fn read(file: &[u8]) -> Self {
         let mut summary = Self::default();

@@ -5,7 +5,7 @@ use crate::plot::{Axis, Plot, Series, Shape};
 use crate::results::Results;
 use crate::statistics::{median, quantile, wilson_interval};
 use anyhow::Result;
-use gridweave::evaluate::Outcome;
+use gridweave::evaluate::RobotOutcome;
 use gridweave::table::Table;
 
 /// Least overlap of the worlds for which the goal of 95 % is set.
@@ -15,7 +15,7 @@ const ENOUGH: f64 = 0.3;
 struct Counts<'a>(Vec<&'a PairTrial>);
 
 impl Counts<'_> {
-    fn of(&self, outcome: Outcome) -> usize {
+    fn of(&self, outcome: RobotOutcome) -> usize {
         self.0.iter().filter(|trial| trial.outcome == outcome).count()
     }
 
@@ -33,10 +33,10 @@ impl Counts<'_> {
     ];
 
     fn cells(&self) -> impl Iterator<Item = String> {
-        let right = self.of(Outcome::Right);
-        let refused = self.of(Outcome::Refused) + self.of(Outcome::RightlyRefused);
+        let right = self.of(RobotOutcome::Right);
+        let refused = self.of(RobotOutcome::Refused) + self.of(RobotOutcome::RightlyRefused);
         let (low, high) = wilson_interval(right, self.0.len());
-        let is_related = self.0.iter().any(|trial| trial.outcome != Outcome::RightlyRefused);
+        let is_related = self.0.iter().any(|trial| trial.outcome != RobotOutcome::RightlyRefused);
         let interval =
             if is_related { format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high) } else { "-".to_owned() };
         let errors = |error: fn(&PairTrial) -> Option<f64>| -> Vec<f64> {
@@ -44,7 +44,7 @@ impl Counts<'_> {
         };
         let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
-        let counts = [self.0.len(), right, self.of(Outcome::Wrong), refused].map(|count| count.to_string());
+        let counts = [self.0.len(), right, self.of(RobotOutcome::Wrong), refused].map(|count| count.to_string());
         let errors = [median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number);
         counts.into_iter().chain([interval]).chain(errors)
     }
@@ -99,7 +99,7 @@ fn curve(
     results: &mut Results,
 ) -> Result<()> {
     let mut table = Table::new([axis].into_iter().chain(Counts::HEADS));
-    let outcomes = [("right", Outcome::Right), ("wrong", Outcome::Wrong), ("refused", Outcome::Refused)];
+    let outcomes = [("right", RobotOutcome::Right), ("wrong", RobotOutcome::Wrong), ("refused", RobotOutcome::Refused)];
     let mut curves = outcomes.map(|(name, outcome)| (name, outcome, Vec::new(), Vec::new()));
     for (number, bin) in borders.windows(2).enumerate() {
         let is_last = number + 2 == borders.len();

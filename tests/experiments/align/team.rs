@@ -5,7 +5,7 @@ use crate::results::Results;
 use crate::statistics::{median, quantile};
 use crate::trial::World;
 use anyhow::Result;
-use gridweave::evaluate::Outcome;
+use gridweave::evaluate::RobotOutcome;
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 
@@ -60,7 +60,7 @@ pub(super) fn run(
         let world = World::simulate(&settings, seeds.seed(TEAM, u64::from(robots)), registry)?;
         let merge = world.merge(pipeline, &[], registry)?;
         let all = &merge.evaluation.robots;
-        let count = |outcome: Outcome| all.iter().filter(|robot| robot.outcome == outcome).count().to_string();
+        let count = |outcome: RobotOutcome| all.iter().filter(|robot| robot.outcome == outcome).count().to_string();
         let metres: Vec<f64> = all.iter().filter_map(|robot| robot.error_m).collect();
         let degrees: Vec<f64> = all.iter().filter_map(|robot| robot.error_deg).collect();
         let seconds = |name: &str| {
@@ -70,7 +70,7 @@ pub(super) fn run(
         let total: f64 = merge.report.stages.iter().map(|stage| stage.busy.as_secs_f64()).sum();
         let searches = merge.report.stages.iter().find_map(|stage| stage.counts.get("searches"));
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
-        let outcomes = [Outcome::Right, Outcome::Wrong, Outcome::Refused].map(count);
+        let outcomes = [RobotOutcome::Right, RobotOutcome::Wrong, RobotOutcome::Refused].map(count);
         let errors = [median(&metres), quantile(&metres, 1.0), median(&degrees), quantile(&degrees, 1.0)].map(number);
         let times = ["aligner", "icp", "verifier", "frames", "fuser"].map(|stage| format!("{:.2}", seconds(stage)));
         table.row(

@@ -3,7 +3,7 @@
 use super::worlds::PairWorld;
 use crate::log::{last_maps, read_messages};
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Evaluation, Outcome, evaluate_summary};
+use gridweave::evaluate::{Evaluation, RobotOutcome, evaluate_summary};
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
@@ -31,7 +31,7 @@ pub(super) struct Judged {
 #[derive(Clone, Debug)]
 pub(super) struct PairTrial {
     name: String,
-    pub(super) outcome: Outcome,
+    pub(super) outcome: RobotOutcome,
     pub(super) error_m: Option<f64>,
     pub(super) error_deg: Option<f64>,
     reason: String,

@@ -3,7 +3,7 @@
 use crate::log::read_messages;
 use crate::trial::World;
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Outcome, evaluate_summary};
+use gridweave::evaluate::{RobotOutcome, evaluate_summary};
 use gridweave::table::Table;
 use gridweave_logs::summary::{Pair, Summary};
 use gridweave_runtime::ros::{RobotFrames, RosMessage, decode};
@@ -16,7 +16,7 @@ const PIPELINE: &str = "tag_merge";
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PairOutcome {
     /// What it came to.
-    pub(super) outcome: Outcome,
+    pub(super) outcome: RobotOutcome,
     /// Whether the robots were merged wrongly at any time, if only until the next message.
     pub(super) ever_wrong: bool,
     /// Metres, and degrees, if both are known.
@@ -103,18 +103,18 @@ impl Count {
     /// Right, of these by few tags, wrong, wrong at any time, refused.
     pub(super) fn cells(&self) -> [String; 5] {
         [
-            self.number(|pair| pair.outcome == Outcome::Right),
-            self.number(|pair| pair.outcome == Outcome::Right && pair.is_provisional),
+            self.number(|pair| pair.outcome == RobotOutcome::Right),
+            self.number(|pair| pair.outcome == RobotOutcome::Right && pair.is_provisional),
             self.wrong(),
             self.ever_wrong(),
-            self.number(|pair| matches!(pair.outcome, Outcome::Refused | Outcome::RightlyRefused)),
+            self.number(|pair| matches!(pair.outcome, RobotOutcome::Refused | RobotOutcome::RightlyRefused)),
         ]
         .map(|count| count.to_string())
     }
 
     /// How many are wrong in the end.
     pub(super) fn wrong(&self) -> usize {
-        self.number(|pair| pair.outcome == Outcome::Wrong)
+        self.number(|pair| pair.outcome == RobotOutcome::Wrong)
     }
 
     /// How many were merged wrongly at any time.
@@ -125,7 +125,8 @@ impl Count {
     /// How many the tags, the directions and the walls have refused.
     pub(super) fn refusals(&self) -> [String; 3] {
         ["tags", "directions", "walls"].map(|by| {
-            let is_refused = |pair: &PairOutcome| matches!(pair.outcome, Outcome::Refused | Outcome::RightlyRefused);
+            let is_refused =
+                |pair: &PairOutcome| matches!(pair.outcome, RobotOutcome::Refused | RobotOutcome::RightlyRefused);
             self.number(|pair| is_refused(pair) && pair.refused_by() == by).to_string()
         })
     }
@@ -133,7 +134,7 @@ impl Count {
     /// The greatest errors of those that are right: metres and degrees.
     pub(super) fn worst(&self) -> [String; 2] {
         let errors =
-            || self.outcomes.iter().filter(|pair| pair.outcome == Outcome::Right).filter_map(|pair| pair.errors);
+            || self.outcomes.iter().filter(|pair| pair.outcome == RobotOutcome::Right).filter_map(|pair| pair.errors);
         let most = |values: &mut dyn Iterator<Item = f64>| values.reduce(f64::max);
         [most(&mut errors().map(|both| both.0)), most(&mut errors().map(|both| both.1))]
             .map(|worst| worst.map_or_else(|| "-".to_owned(), |worst| format!("{worst:.3}")))
@@ -148,10 +149,10 @@ pub(super) fn all_trials() -> Table {
 /// Adds a trial.
 pub(super) fn add_trial(table: &mut Table, set: &str, trial: &str, needed: usize, pair: &PairOutcome) {
     let outcome = match pair.outcome {
-        Outcome::Right => "right",
-        Outcome::Wrong => "wrong",
-        Outcome::Refused | Outcome::RightlyRefused => "refused",
-        Outcome::NoTruth => "no truth",
+        RobotOutcome::Right => "right",
+        RobotOutcome::Wrong => "wrong",
+        RobotOutcome::Refused | RobotOutcome::RightlyRefused => "refused",
+        RobotOutcome::NoTruth => "no truth",
     };
     let error =
         |which: fn((f64, f64)) -> f64| pair.errors.map_or_else(String::new, |both| format!("{:.4}", which(both)));

@@ -3,7 +3,7 @@
 use super::one_alignment::{AlignmentTime, OneAlignment, PairMaps};
 use super::wall_distance::wall_distance;
 use crate::trial::Merge;
-use gridweave::evaluate::{Outcome, RobotResult};
+use gridweave::evaluate::{RobotOutcome, RobotResult};
 use gridweave::table::Table;
 use gridweave_stages::geometry::{Grid, Pose2, pose};
 
@@ -21,7 +21,7 @@ pub(super) struct Record {
     /// The paper's number of the method, 1 to 3.
     pub(super) method: usize,
     /// What became of it.
-    pub(super) outcome: Outcome,
+    pub(super) outcome: RobotOutcome,
     /// Why it is not merged.
     reason: String,
     /// How wrong it lies; none if it is not merged, or the truth does not know it.

@@ -7,7 +7,7 @@ use crate::plot::{Axis, Plot, Series, Shape};
 use crate::results::Results;
 use crate::statistics::{mean, median, quantile};
 use anyhow::Result;
-use gridweave::evaluate::Outcome;
+use gridweave::evaluate::RobotOutcome;
 use gridweave::table::Table;
 
 /// Table 4 of the paper: mean square error of five experiments, px^2.
@@ -102,7 +102,7 @@ fn errors(sets: &[Set]) -> Table {
                 let values = error_values(set, method, value);
                 [median(&values), mean(&values), quantile(&values, 1.0)].map(significant).join(" / ")
             };
-            let count = |outcome: Outcome| {
+            let count = |outcome: RobotOutcome| {
                 of_method(set, method).filter(|record| record.outcome == outcome).count().to_string()
             };
             table.row([
@@ -112,10 +112,10 @@ fn errors(sets: &[Set]) -> Table {
                 error(|error| error.square_metres),
                 error(|error| error.metres),
                 error(|error| error.degrees),
-                count(Outcome::Right),
-                count(Outcome::Wrong),
-                count(Outcome::Refused),
-                count(Outcome::RightlyRefused),
+                count(RobotOutcome::Right),
+                count(RobotOutcome::Wrong),
+                count(RobotOutcome::Refused),
+                count(RobotOutcome::RightlyRefused),
             ]);
         }
     }
@@ -185,7 +185,7 @@ fn run_times(sets: &[Set]) -> Table {
 /// that were not merged.
 fn distribution(set: &Set) -> Plot {
     let series = METHODS.iter().enumerate().map(|(method, pipeline)| {
-        let all = of_method(set, method).filter(|record| record.outcome != Outcome::RightlyRefused).count();
+        let all = of_method(set, method).filter(|record| record.outcome != RobotOutcome::RightlyRefused).count();
         let mut errors = error_values(set, method, |error| error.square_cells);
         errors.sort_by(f64::total_cmp);
         let points = errors.iter().zip(1..).map(|(error, rank)| (*error, f64::from(rank) / all as f64)).collect();

@@ -81,7 +81,7 @@ fn a_chunk_of_an_unknown_compression_is_skipped_with_its_name() {
 fn a_broken_length_in_the_middle_loses_one_chunk_only() {
     for options in &layouts()[1..] {
         let whole = three_chunks(options.clone());
-        let summary = summary::Summary::read(&whole);
+        let summary = summary::SummarySection::read(&whole);
         let [_, second, third] = summary.chunk_starts[..] else { panic!() };
         for length in [u64::MAX, 1 << 40, 20, 0] {
             let mut bytes = whole.clone();
@@ -99,7 +99,7 @@ fn a_broken_length_in_the_middle_loses_one_chunk_only() {
 fn lengths_in_chunks_that_nothing_can_have_lose_these_chunks_only() {
     for options in &layouts()[1..] {
         let whole = three_chunks(options.clone());
-        let summary = summary::Summary::read(&whole);
+        let summary = summary::SummarySection::read(&whole);
         let [_, second, third] = summary.chunk_starts[..] else { panic!() };
         // Behind the record's head: two times, the size of the contents, their checksum, the compression, their length.
         let size = |chunk: usize| chunk + record::HEAD + 16;

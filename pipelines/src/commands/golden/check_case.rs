@@ -59,7 +59,7 @@ fn check(folder: &CaseFolder, args: &GoldenArgs, registry: &Registry, observer: 
     let mut problems: Vec<String> =
         case.expects.iter().filter_map(|expect| expect.check(&got, case.float_tolerance).err()).collect();
     let holds = problems.is_empty();
-    let Verdict { comparison, wrong } = compare(&case, &got, args.limit);
+    let CaseVerdict { comparison, wrong } = compare(&case, &got, args.limit);
     let status = match wrong {
         None if holds => Status::Passed,
         None => Status::Failed,
@@ -84,7 +84,7 @@ fn check(folder: &CaseFolder, args: &GoldenArgs, registry: &Registry, observer: 
 }
 
 /// What the expected log says of what was sent.
-struct Verdict {
+struct CaseVerdict {
     /// What differs, if there is an expected log that can be read.
     comparison: Option<Comparison>,
     /// `None` if nothing differs.
@@ -99,8 +99,8 @@ struct Wrong {
     blessing: String,
 }
 
-fn compare(case: &Case, got: &Recording, limit: usize) -> Verdict {
-    let unusable = |problem: String, blessing: String| Verdict {
+fn compare(case: &Case, got: &Recording, limit: usize) -> CaseVerdict {
+    let unusable = |problem: String, blessing: String| CaseVerdict {
         comparison: None,
         wrong: Some(Wrong { problem: Some(problem), blessing }),
     };
@@ -116,7 +116,7 @@ fn compare(case: &Case, got: &Recording, limit: usize) -> Verdict {
         Ok(expected) => {
             let comparison = Comparison::new(&expected, got, case.float_tolerance, limit);
             let wrong = Wrong { problem: None, blessing: comparison.summary() };
-            Verdict { wrong: (!comparison.is_empty()).then_some(wrong), comparison: Some(comparison) }
+            CaseVerdict { wrong: (!comparison.is_empty()).then_some(wrong), comparison: Some(comparison) }
         }
     }
 }
