@@ -155,7 +155,7 @@ mod tests {
         for length in [0, 5, 8, 30, whole.len() / 2, whole.len() - 20] {
             fs::remove_file(&path).unwrap();
             fs::write(part(&path), &whole[..length]).unwrap();
-            let expected = LogFile::open(&part(&path)).map_or(0, |file| {
+            let expected = LogFile::open(part(&path)).map_or(0, |file| {
                 let mut reader = LogReader::new(vec![file]);
                 std::iter::from_fn(|| reader.next_message().map(|message| message.log_time)).count()
             });
@@ -192,7 +192,7 @@ mod tests {
         fs::write(part(&path), &whole[..whole.len() / 2]).unwrap();
         assert_eq!(close_log(&path, "it was killed").unwrap(), Some(part(&path).canonicalize().unwrap()));
         assert!(fs::read(&path).unwrap() == whole);
-        let closed = LogFile::open(&part(&path)).unwrap();
+        let closed = LogFile::open(part(&path)).unwrap();
         assert_eq!(closed.damage(), [Damage::Incomplete { reason: "it was killed".into() }]);
     }
 
