@@ -146,6 +146,6 @@ fn walls_on(
     WallLengths { on_wall: on_wall as f64 * length, on_free: on_free as f64 * length, centre }
 }
 
-fn value_at(grid: &Grid<'_>, point: &Point2) -> i8 {
+pub(super) fn value_at(grid: &Grid<'_>, point: &Point2) -> i8 {
     grid.geometry.cell(point).map_or(UNKNOWN, |cell| grid.value(cell))
 }

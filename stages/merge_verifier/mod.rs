@@ -12,6 +12,7 @@ mod agreement;
 mod judge;
 mod parameters;
 mod refusal;
+pub mod regions;
 mod rivals;
 mod score;
 mod stage;

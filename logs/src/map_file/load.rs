@@ -1,6 +1,7 @@
 //! Reading a map.
 
 use super::description::Description;
+use super::reading::{Remark, Thresholds};
 use super::shades::Shades;
 use super::{GridMap, MapFileError};
 use gridweave_runtime::ros::{MapMetaData, Pose};
@@ -8,8 +9,21 @@ use nalgebra::{Isometry2, Vector2};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Reads the map that the YAML file at `yaml` describes.
+/// Reads the map that the YAML file at `yaml` describes, by its thresholds.
+///
+/// # Errors
+///
+/// A file cannot be read, or is no map.
 pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
+    Ok(load_as(yaml, Thresholds::Literal)?.0)
+}
+
+/// Reads the map that the YAML file at `yaml` describes, and says if that is not as the file's thresholds have it.
+///
+/// # Errors
+///
+/// A file cannot be read, or is no map.
+pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<Remark>), MapFileError> {
     let Description { image: path, resolution, origin: [x, y, yaw], reading } = describe(yaml)?;
     let shades =
         fs::read(&path).map_err(image::ImageError::from).and_then(|bytes| Shades::decode(&bytes)).map_err(|error| {
@@ -18,7 +32,11 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };
-    Ok(GridMap { info, cells: shades.cells(&reading) })
+    let (reading, remark) = match thresholds {
+        Thresholds::Literal => (reading, None),
+        Thresholds::ByPicture => reading.by_picture(&shades),
+    };
+    Ok((GridMap { info, cells: shades.cells(&reading) }, remark))
 }
 
 /// The image of the map that the YAML file at `yaml` describes, which may not be there.
