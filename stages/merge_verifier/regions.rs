@@ -13,6 +13,10 @@ use std::collections::BTreeMap;
 
 /// Walls that cross by more than this are not the same wall: the cosine of 30 degrees.
 const LEAST_NORMAL_AGREEMENT: f64 = 0.866;
+/// Two maps show the same face of a wall if both know free space so far before it, metres, or so many cells of the coarser
+/// one. Wherever the ends of two buildings are laid back to back, wall lies on wall, too.
+const BEFORE_WALL: f64 = 0.2;
+const CELLS_BEFORE_WALL: f64 = 3.0;
 /// Points by which a region is registered at the most.
 const POINTS: usize = 120;
 /// Rounds of the registration of a region, and how far partners lie apart at the most in each, metres.
@@ -24,62 +28,79 @@ const DEVIATION: f64 = 0.05;
 
 /// What two maps say of each other in one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Region {
-    /// Length of wall of one map that lies on wall of the other that runs alike, metres; the mean of both ways.
-    pub wall_on_wall: f64,
-    /// The part of it that lies within half the tolerance, metres.
-    pub sharp: f64,
+pub(super) struct Region {
+    /// Length of wall of one map that lies on wall of the other that runs alike and is seen from the same side, metres; the
+    /// mean of both ways.
+    pub(super) wall_on_wall: f64,
     /// Length of wall of one map where the other knows free space, metres; the mean of both ways.
-    pub wall_on_free: f64,
-    /// How far walls of map b slide there to lie on those of map a, frame a, metres.
-    pub slide: Vector2<f64>,
+    pub(super) wall_on_free: f64,
 }
 
 /// How regions are compared.
 #[derive(Clone, Copy, Debug)]
-pub struct RegionComparison {
+pub(super) struct RegionComparison {
     /// The side of a region, metres.
-    pub side: f64,
+    pub(super) side: f64,
     /// Standard deviation of how far a region slides along x and along y, metres.
-    pub slide_deviation: f64,
+    pub(super) slide_deviation: f64,
     /// Walls within this distance agree, metres.
-    pub tolerance: f64,
+    pub(super) tolerance: f64,
+    /// At most so many points of the walls of each map are looked at.
+    pub(super) most_points: usize,
 }
 
 impl RegionComparison {
-    /// Compares two maps at an alignment, in squares of frame a.
-    pub fn regions(&self, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> Vec<Region> {
+    /// Compares two maps at an alignment, in squares of frame a; and the middle of the walls of map b that lie on walls of
+    /// map a, frame a.
+    pub(super) fn regions(&self, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> (Vec<Region>, Point2) {
         let mut parts: BTreeMap<(i32, i32), Part> = BTreeMap::new();
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
-        for (index, point) in b.walls.walls.points().iter().enumerate() {
-            let moved = transform_a_b * point;
-            if is_known(value_at(&a.grid, &moved)) {
-                parts.entry(key(&moved)).or_default().of_b.push(index);
+        for index in self.sample(b.walls) {
+            let point = transform_a_b * b.walls.walls.points()[index];
+            if is_known(value_at(&a.grid, &point)) {
+                parts.entry(key(&point)).or_default().of_b.push(index);
             }
         }
         let transform_b_a = transform_a_b.inverse();
-        for (index, point) in a.walls.walls.points().iter().enumerate() {
+        for index in self.sample(a.walls) {
+            let point = a.walls.walls.points()[index];
             if is_known(value_at(&b.grid, &(transform_b_a * point))) {
-                parts.entry(key(point)).or_default().of_a.push(index);
+                parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
-        parts.values().map(|part| self.compare(part, a, b, transform_a_b)).collect()
+        let mut centre = Centre::default();
+        let regions = parts.values().map(|part| self.compare(part, a, b, transform_a_b, &mut centre)).collect();
+        (regions, centre.middle())
     }
 
-    fn compare(&self, part: &Part, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> Region {
+    /// The numbers of the points of some walls that are looked at.
+    fn sample(&self, walls: &WallMap) -> impl Iterator<Item = usize> {
+        let count = walls.walls.points().len();
+        (0..count).step_by(stride(count, self.most_points))
+    }
+
+    fn compare(
+        &self,
+        part: &Part,
+        a: &MapView<'_>,
+        b: &MapView<'_>,
+        transform_a_b: &Pose2,
+        centre: &mut Centre,
+    ) -> Region {
         let slide = self.register(&part.of_b, a.walls, b.walls, transform_a_b);
         let slid = Pose2::from_parts((transform_a_b.translation.vector + slide).into(), transform_a_b.rotation);
-        let mut region = Region { slide, ..Region::default() };
-        self.add(&part.of_b, b.walls, a, &slid, &mut region);
-        self.add(&part.of_a, a.walls, b, &slid.inverse(), &mut region);
+        let mut region = Region::default();
+        self.add(&part.of_b, b, a, &slid, &mut region, |point| centre.add(point));
+        self.add(&part.of_a, a, b, &slid.inverse(), &mut region, |_| ());
         region
     }
 
     /// How far some walls of map b slide to lie on those of map a: registration from point to line, where nothing but the
     /// translation is open, and no slide is likelier than a small one.
     fn register(&self, points: &[usize], a: &WallMap, b: &WallMap, transform_a_b: &Pose2) -> Vector2<f64> {
+        let every = stride(b.walls.points().len(), self.most_points);
         let stride = stride(points.len(), POINTS);
-        let share = (stride as f64 * b.spacing / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
+        let share = (stride as f64 * every as f64 * b.spacing / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
         let prior = Matrix2::identity() / self.slide_deviation.powi(2);
         let mut slide = Vector2::zeros();
         for distance in ROUNDS {
@@ -101,24 +122,38 @@ impl RegionComparison {
         slide
     }
 
-    /// Adds what `map` says of some walls of another map.
-    fn add(&self, points: &[usize], other: &WallMap, map: &MapView<'_>, transform: &Pose2, region: &mut Region) {
+    /// Adds what `map` says of some walls of `other`.
+    fn add(
+        &self,
+        points: &[usize],
+        other: &MapView<'_>,
+        map: &MapView<'_>,
+        transform: &Pose2,
+        region: &mut Region,
+        mut on_wall: impl FnMut(&Point2),
+    ) {
         // Both ways are added up.
-        let length = 0.5 * other.spacing;
+        let count = other.walls.walls.points().len();
+        let length = 0.5 * other.walls.spacing * stride(count, self.most_points) as f64;
+        let coarser = map.grid.geometry.resolution.max(other.grid.geometry.resolution);
+        let ahead = BEFORE_WALL.max(CELLS_BEFORE_WALL * coarser);
         for &index in points {
-            let point = transform * other.walls.points()[index];
+            let own = other.walls.walls.points()[index];
+            let point = transform * own;
             if let Some(partner) = map.walls.walls.nearest(&point, self.tolerance) {
-                let (one, another) = (map.walls.normals[partner.index], transform.rotation * other.normals[index]);
+                let (normal, of_partner) = (other.walls.normals[index], map.walls.normals[partner.index]);
+                let turned = transform.rotation * normal;
                 // Ends and corners of walls have no direction, and may be those of any.
-                if one == Vector2::zeros()
-                    || another == Vector2::zeros()
-                    || one.dot(&another).abs() >= LEAST_NORMAL_AGREEMENT
-                {
+                if turned.dot(&of_partner).abs() < LEAST_NORMAL_AGREEMENT {
+                    continue;
+                }
+                let is_seen_from = |side: f64| {
+                    is_free(value_at(&other.grid, &(own + normal * (side * ahead))))
+                        && is_free(value_at(&map.grid, &(point + turned * (side * ahead))))
+                };
+                if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.wall_on_wall += length;
-                    let distance = (map.walls.walls.points()[partner.index] - point).norm();
-                    if distance <= 0.5 * self.tolerance {
-                        region.sharp += length;
-                    }
+                    on_wall(&point);
                 }
             } else if is_free(value_at(&map.grid, &point)) {
                 region.wall_on_free += length;
@@ -132,4 +167,22 @@ impl RegionComparison {
 struct Part {
     of_a: Vec<usize>,
     of_b: Vec<usize>,
+}
+
+/// The middle of some points.
+#[derive(Default)]
+struct Centre {
+    sum: Vector2<f64>,
+    count: usize,
+}
+
+impl Centre {
+    fn add(&mut self, point: &Point2) {
+        self.sum += point.coords;
+        self.count += 1;
+    }
+
+    fn middle(&self) -> Point2 {
+        Point2::from(self.sum / self.count.max(1) as f64)
+    }
 }
