@@ -1,11 +1,15 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::refusal::{Hypotheses, Hypothesis};
-use super::{Agreement, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare};
+use super::{
+    Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
+};
 use gridweave_runtime::ros::Alignment;
 
 /// Evidence that a rival's is a share of is at least this: below, either is as good as none.
 const LEAST_EVIDENCE: f64 = 1.0;
+/// Another place is like one if the share of the walls that agree is less by this at the most.
+const LIKENESS_MARGIN: f64 = 0.15;
 
 /// A hypothesis, and what the maps say of each other there.
 #[derive(Clone, Copy, Debug)]
@@ -121,17 +125,31 @@ fn judge_one<'a>(
     // A stage that has looked for others has sent the best of them.
     if alignment.accepted && !is_told && alignment.hypotheses == 0 {
         let nearby = best_rival_nearby(a, b, &transform_a_b, &agreement.centre, parameters);
-        rival = rival.into_iter().chain(nearby).max_by(by_evidence);
+        // Wherever more of the maps meets there is more evidence; what fits worse is not like it.
+        let is_alike =
+            |nearby: &Rival| nearby.agreement.wall_agreement() + LIKENESS_MARGIN > agreement.wall_agreement();
+        rival = rival.into_iter().chain(nearby.filter(is_alike)).max_by(by_evidence);
     }
     let elsewhere = rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
     let evidence_elsewhere = (elsewhere / agreement.evidence.max(LEAST_EVIDENCE)).min(2.0);
     let origin = origin(alignment);
-    let odds = Odds::new(agreement.evidence, evidence_elsewhere, origin, found_too_by.is_some(), is_told);
+    let odds = Odds::new(&Grounds {
+        origin,
+        found_too: found_too_by.is_some(),
+        evidence: agreement.evidence,
+        wall_agreement: agreement.wall_agreement(),
+        evidence_elsewhere,
+    });
     let score = odds.probability();
-    let refusal = match rival.filter(|_| odds.likeness <= odds.chance) {
+    let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {
         _ if !alignment.accepted => Some(Refusal::Before(alignment.reason.clone())),
         _ if score >= parameters.accept => None,
         Some(rival) => Some(likeness(candidate, &rival, another.filter(|_| is_told), evidence_elsewhere, all)),
+        None if odds.part < odds.chance => Some(Refusal::Contradiction {
+            agree: agreement.wall_on_wall,
+            against: agreement.wall_on_free,
+            share: agreement.wall_agreement(),
+        }),
         None => Some(Refusal::Chance {
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,

@@ -27,7 +27,7 @@ pub use judge::{Candidate, Verdict, judge};
 pub use parameters::MergeVerifierParameters;
 pub use refusal::{Hypotheses, Hypothesis, Refusal};
 pub use rivals::{Rival, best_rival_nearby};
-pub use score::{Odds, Origin};
+pub use score::{Grounds, Odds, Origin};
 
 use gridweave_runtime::stage::StageKind;
 use stage::MergeVerifier;

@@ -23,6 +23,20 @@ pub enum Refusal {
         /// What is asked for.
         accept: f64,
     },
+    /// Walls lie where the other map knows free space.
+    #[error(
+        "the maps contradict each other: {agree:.1} m of wall agree, but {against:.1} m of wall lie on the other map's \
+         free space ({:.0} % agree)",
+        share * 100.0
+    )]
+    Contradiction {
+        /// Metres of wall on which the maps agree.
+        agree: f64,
+        /// Metres of wall on free space.
+        against: f64,
+        /// The share that agrees, 0 to 1.
+        share: f64,
+    },
     /// Another hypothesis fits nearly as well.
     #[error(
         "the maps fit at several places, and it cannot be told which is right: with map b moved by {shift:.1} m and turned \

@@ -1,6 +1,6 @@
 //! How probable it is that an alignment is right.
 //!
-//! There are two ways to be wrong, and what is left of certainty after both is the probability:
+//! There are three ways to be wrong, and what is left of certainty after all is the probability:
 //!
 //! - **by chance**: maps that have nothing to do with each other, or parts of one map that do not, agree somewhere. The
 //!   more places were looked at, the better they agree at the best. How well that is, the other places of the same pair tell:
@@ -8,6 +8,9 @@
 //!   has, so that a lead of `t` has the probability `exp(-t)` by chance (Gumbel 1958); and the evidence of walls in places that
 //!   do not depend on each other counts against it.
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
+//! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
+//!   search over all places has come to this one, agreement must clearly be more than half. Tags have not looked at walls,
+//!   and ask for more of them.
 //!
 //! The weights are those of a logistic model that was fitted to pairs of published maps, of recorded logs and of unrelated
 //! buildings, and rounded; see the experiments.
@@ -30,6 +33,13 @@ const LIKE_SHARE: f64 = 0.7;
 const LIKE_SHARE_BESIDE_TAGS: f64 = 1.3;
 /// Per unit of that share.
 const BY_SHARE: f64 = 35.0;
+
+/// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
+const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same for a place that tags tell.
+const AGREEMENT_OF_HALVES_BY_TAGS: f64 = 0.75;
+/// Per unit of that share.
+const BY_AGREEMENT: f64 = 140.0;
 
 /// What makes places stand out from all others, before the maps are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,29 +68,53 @@ impl Origin {
     }
 }
 
-/// The odds, as logarithms, that an alignment is none of the two kinds of wrong.
+/// What an alignment is judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grounds {
+    /// What it was found from.
+    pub origin: Origin,
+    /// Whether another source has found the same.
+    pub found_too: bool,
+    /// The evidence of walls, see [`Agreement`](super::Agreement).
+    pub evidence: f64,
+    /// The share of the walls that agree, 0 to 1.
+    pub wall_agreement: f64,
+    /// The most evidence at another place, as a share of that here.
+    pub evidence_elsewhere: f64,
+}
+
+/// The odds, as logarithms, that an alignment is not wrong in one way each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odds {
     /// Against chance.
     pub chance: f64,
     /// Against a place that is like it.
     pub likeness: f64,
+    /// Against a place at which the maps agree in part.
+    pub part: f64,
 }
 
 impl Odds {
-    /// Of an alignment with the evidence of walls, the most evidence at another place as a share of that, and what it was
-    /// found from. `is_told` says that tags or another source have told it from places that are like it.
-    pub fn new(evidence: f64, evidence_elsewhere: f64, origin: Origin, found_too: bool, is_told: bool) -> Self {
+    /// Of an alignment.
+    pub fn new(grounds: &Grounds) -> Self {
+        let Grounds { origin, found_too, evidence, wall_agreement, evidence_elsewhere } = *grounds;
+        // Tags, and another source, tell a place from those that are like it.
+        let is_told = origin == Origin::Tags || found_too;
         let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
+        let halves = match origin {
+            Origin::Search { .. } => AGREEMENT_OF_HALVES,
+            Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
+        };
         Self {
             chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * origin.lead(found_too),
             likeness: BY_SHARE * (like - evidence_elsewhere),
+            part: BY_AGREEMENT * (wall_agreement - halves),
         }
     }
 
     /// The probability that it is right, 0 to 1.
     pub fn probability(&self) -> f64 {
-        1.0 / (1.0 + (-self.chance).exp() + (-self.likeness).exp())
+        1.0 / (1.0 + (-self.chance).exp() + (-self.likeness).exp() + (-self.part).exp())
     }
 }
 
@@ -88,9 +122,9 @@ impl Odds {
 mod tests {
     use super::*;
 
-    fn probability(evidence: f64, elsewhere: f64, origin: Origin) -> f64 {
-        let is_told = origin == Origin::Tags;
-        Odds::new(evidence, elsewhere, origin, false, is_told).probability()
+    fn probability(evidence: f64, evidence_elsewhere: f64, origin: Origin) -> f64 {
+        let grounds = Grounds { origin, found_too: false, evidence, wall_agreement: 0.9, evidence_elsewhere };
+        Odds::new(&grounds).probability()
     }
 
     #[test]
@@ -111,7 +145,20 @@ mod tests {
         assert!(probability(20.0, 0.0, Origin::FewTags) < 0.999 && probability(60.0, 0.0, Origin::FewTags) > 0.999);
         assert!(probability(60.0, 1.0, Origin::FewTags) < 0.01);
         assert!(probability(-20.0, 0.0, Origin::Tags) < 0.9);
-        let found_too = Odds::new(40.0, 1.0, Origin::Search { lead: 4.0 }, true, true).probability();
-        assert!(found_too > 0.999, "{found_too}");
+        let origin = Origin::Search { lead: 4.0 };
+        let grounds = Grounds { origin, found_too: true, evidence: 40.0, wall_agreement: 0.8, evidence_elsewhere: 1.0 };
+        assert!(Odds::new(&grounds).probability() > 0.999);
+    }
+
+    #[test]
+    fn maps_that_contradict_each_other_as_much_as_they_agree_are_not_of_one_place() {
+        let with = |wall_agreement: f64, origin: Origin| {
+            let evidence_elsewhere = 0.0;
+            Odds::new(&Grounds { origin, found_too: false, evidence: 300.0, wall_agreement, evidence_elsewhere })
+                .probability()
+        };
+        let searched = Origin::Search { lead: 20.0 };
+        assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
+        assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
     }
 }
