@@ -23,7 +23,9 @@ pub(super) fn cases() -> Vec<Case> {
             }
             log.map(1.0, "robot1", &map);
         }),
-        case("clean_already", |log| log.map(1.0, "robot1", &FloorPlan::office().draw(&left()))),
+        case("clean_already", |log| {
+            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
+        }),
         case("empty_map", |log| {
             log.map(1.0, "robot1", &TestMap::filled(100, 80, CELL, -1));
             log.map(2.0, "robot1", &TestMap::filled(0, 0, CELL, 0));
