@@ -11,6 +11,7 @@ pub mod hypotheses;
 pub mod icp_refiner;
 pub mod line_extractor;
 pub mod map_aligner;
+pub mod map_cleaner;
 pub mod merge_verifier;
 pub mod quadrant_classifier;
 pub mod robot_maps;
@@ -32,6 +33,7 @@ pub fn kinds() -> Vec<StageKind> {
         icp_refiner::kind(),
         line_extractor::kind(),
         map_aligner::kind(),
+        map_cleaner::kind(),
         merge_verifier::kind(),
         quadrant_classifier::kind(),
         simulator::kind(),

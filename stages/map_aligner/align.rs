@@ -1,5 +1,6 @@
 //! The whole of it: search, judge, refine.
 
+use super::lead::{OTHERS, lead};
 use super::peaks::{JUDGED, change, is_near, overlay};
 use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, Refusal, covariance, refine_peak};
 use crate::geometry::{Grid, Pose2};
@@ -20,6 +21,9 @@ pub struct MapAlignment {
     pub score: f64,
     /// The score as a share of that of the best guess, 0 to 1.
     pub share: f64,
+    /// How far the score lies above that of the best place elsewhere, in units of the spread of all others; below 0 if it
+    /// does not. By chance it is more than `t` with the probability `exp(-t)`.
+    pub lead: f64,
     /// About the length of wall on which the maps agree, metres.
     pub wall_in_common: f64,
     /// The share of the walls of map b that meet walls, and not free space, of map a, 0 to 1.
@@ -102,11 +106,12 @@ pub fn align_prepared(
 }
 
 /// The guess at the peak near a place that is known from elsewhere, without a search. `None` if the walls of the maps do
-/// not meet there, or contradict each other as much.
+/// not meet there, or contradict each other as much. `lead` is that of the search in which it was found.
 pub fn align_near(
     a: &PreparedMap,
     b: &PreparedMap,
     transform_a_b: &Pose2,
+    lead: f64,
     parameters: &MapAlignerParameters,
 ) -> Option<MapAlignment> {
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
@@ -115,6 +120,7 @@ pub fn align_near(
     let mut found = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
     found.score = judged.score(&found.transform_a_b);
     found.share = 1.0;
+    found.lead = lead;
     (found.score > 0.0).then_some(found)
 }
 
@@ -127,17 +133,19 @@ fn hypotheses(
     parameters: &MapAlignerParameters,
 ) -> Vec<Hypothesis> {
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
+    let looked_at = parameters.max_hypotheses.saturating_add(SPARE);
     let mut apart: Vec<(Place, CommonWalls)> = Vec::new();
     for peak in peaks.all() {
         let is_same = |(known, common): &(Place, CommonWalls)| {
             is_near(&known.transform_a_b, &peak.transform_a_b, &common.centre, parameters)
         };
-        if !apart.iter().any(is_same) && apart.len() < parameters.max_hypotheses.saturating_add(SPARE) {
+        if apart.len() <= OTHERS.max(looked_at) && !apart.iter().any(is_same) {
             apart.extend(judged.common_walls(&peak.transform_a_b).map(|common| (*peak, common)));
         }
     }
-    let refined =
-        apart.par_iter().filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
+    let refined = apart[..apart.len().min(looked_at)]
+        .par_iter()
+        .filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
     for found in refined.collect::<Vec<_>>() {
         // Places on the slope of a peak lead to its top.
@@ -148,6 +156,11 @@ fn hypotheses(
         }
     }
     hypotheses.truncate(parameters.max_hypotheses);
+    for found in &mut hypotheses {
+        let others = apart.iter().filter(|(peak, _)| !found.is_near(&peak.transform_a_b, parameters));
+        let others: Vec<f64> = others.map(|(peak, _)| peak.score).collect();
+        found.alignment.lead = lead(found.alignment.score, &others);
+    }
     hypotheses
 }
 
@@ -176,6 +189,7 @@ impl Hypothesis {
             covariance: covariance(&overlay(JUDGED), &transform_a_b, &common),
             score: peak.score,
             share: peak.score / best_score,
+            lead: 0.0,
             wall_in_common: common.length,
             wall_agreement: common.agreement,
         };

@@ -23,8 +23,8 @@ pub struct MapAlignerParameters {
     /// Another place differs from the best by more than this in the middle of the walls in common, metres, or by
     /// `apart_yaw`.
     pub apart: f64,
-    /// About the least length of wall on which the maps must agree, metres. `merge_verifier` measures it exactly, and asks
-    /// for more.
+    /// About the least length of wall on which the maps must agree, metres: on less there is nothing to weigh for
+    /// `merge_verifier`.
     pub min_wall_length: f64,
     /// At most so many guesses are made for a pair of maps, each away from the others.
     pub max_hypotheses: usize,
@@ -66,7 +66,7 @@ impl Default for MapAlignerParameters {
             free_space_penalty: 1.2,
             apart_yaw: TAU / 36.0,
             apart: 1.0,
-            min_wall_length: 15.0,
+            min_wall_length: 4.0,
             max_hypotheses: 4,
             least_share: 0.5,
             tie_runner_up: 0.5,

@@ -163,7 +163,7 @@ impl MergePlan {
             }
         };
         let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && !self.has_alike(&found);
-        let best = found.hypotheses.first()?.transform_a_b;
+        let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
             statements.push(Statement::of(pair, Ok(with_reasons(&found))));
             return if is_clear { self.unite(first, second, &best) } else { None };
@@ -171,7 +171,7 @@ impl MergePlan {
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
         if is_clear {
             let is_supported = self.supports(&found);
-            let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b)));
+            let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), lead));
             let told = told.map(|told| Statement { is_supported, ..told });
             let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
             self.predictions += told.len() as u64;
@@ -221,8 +221,14 @@ impl MergePlan {
     }
 
     /// The guess for a pair of robots where their groups put it.
-    fn predicted(&self, PairInCommon { pair, transform_a_b, .. }: &PairInCommon, others: usize) -> Option<Statement> {
-        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, &self.parameters)?;
+    /// The lead is that of the search in which the groups were found to lie so.
+    fn predicted(
+        &self,
+        PairInCommon { pair, transform_a_b, .. }: &PairInCommon,
+        others: usize,
+        lead: f64,
+    ) -> Option<Statement> {
+        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, lead, &self.parameters)?;
         if found.wall_in_common < self.parameters.min_wall_length {
             return None;
         }
@@ -257,7 +263,7 @@ impl MergePlan {
             let (map_a, map_b) = (self.map(&statement.pair.a)?, self.map(&statement.pair.b)?);
             let mut refined = Vec::new();
             for (before, reason) in found {
-                let again = align_near(map_a, map_b, &before.transform_a_b, &self.parameters)?;
+                let again = align_near(map_a, map_b, &before.transform_a_b, before.lead, &self.parameters)?;
                 if again.score < KEPT_SCORE * before.score {
                     return None;
                 }

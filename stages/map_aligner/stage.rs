@@ -13,7 +13,8 @@ pub(super) struct Guesses {
 
 impl Outputs for Guesses {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let summary = "First guesses for each pair of robots, the best first, or why there is none.";
+        let summary = "First guesses for each pair of robots, the best first, or why there is none. The score is the probability that the \
+                       best of as many places would lead the others by less if all fitted by chance.";
         Self { alignment: ports.output("alignment", summary) }
     }
 }
@@ -74,7 +75,7 @@ impl MapAligner {
         for (rank, (found, reason)) in (0..).zip(guesses) {
             let mut alignment = Alignment {
                 covariance: row_by_row(&found.covariance),
-                score: found.share,
+                score: 1.0 - (-found.lead.max(0.0)).exp(),
                 accepted: true,
                 provisional: self.provisional && !statement.is_supported,
                 rank,

@@ -2,10 +2,14 @@
 
 use super::refusal::{Hypotheses, Hypothesis};
 use super::{
-    Agreement, MapView, MergeVerifierParameters, Refusal, Rival, best_rival_nearby, compare, evidence_elsewhere,
-    probability,
+    Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
 };
 use gridweave_runtime::ros::Alignment;
+
+/// Evidence that a rival's is a share of is at least this: below, either is as good as none.
+const LEAST_EVIDENCE: f64 = 1.0;
+/// Another place is like one if the share of the walls that agree is less by this at the most.
+const LIKENESS_MARGIN: f64 = 0.15;
 
 /// A hypothesis, and what the maps say of each other there.
 #[derive(Clone, Copy, Debug)]
@@ -14,8 +18,6 @@ pub struct Candidate<'a> {
     pub alignment: &'a Alignment,
     /// What the maps say.
     pub agreement: Agreement,
-    /// Metres of wall that speak for it, see [`Agreement::evidence`].
-    pub evidence: f64,
 }
 
 /// The judgement on all hypotheses for a pair.
@@ -29,7 +31,7 @@ pub struct Verdict<'a> {
     pub rival: Option<Rival>,
     /// The most evidence for another place, as a share of that for this one.
     pub evidence_elsewhere: f64,
-    /// The probability that it is right, 0 to 1, see [`probability`].
+    /// The probability that it is right, 0 to 1, see [`Odds`].
     pub score: f64,
     /// Another source that has found the same place.
     pub found_too_by: Option<&'a str>,
@@ -53,17 +55,15 @@ impl Verdict<'_> {
         });
         format!(
             "{found}{too}; the maps confirm it: {wall_on_wall:.0} m of wall agree and {wall_on_free:.0} m lie on free space, in \
-             {overlap:.0} m2 that both maps know (acceptance index {:.3}){elsewhere}",
-            self.candidate.agreement.acceptance_index(),
+             {overlap:.0} m2 that both maps know{elsewhere}"
         )
     }
 }
 
 /// Judges the hypotheses of all sources for one pair. `None` if none of them has a place.
 ///
-/// The first that meets all that is asked of it is accepted: those that rest on enough tags, and then the others, by their
-/// evidence. A provisional one must be the best by far of all places that anybody has proposed; one that rests on enough
-/// tags only must not be much worse than another.
+/// The first whose probability is as high as is asked for is accepted: those that rest on enough tags come first, and then
+/// the others, by their evidence. If there is none, the most probable is the answer, refused.
 pub fn judge<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
@@ -73,26 +73,26 @@ pub fn judge<'a>(
     let mut candidates: Vec<Candidate<'a>> = hypotheses
         .iter()
         .filter(|alignment| has_place(alignment))
-        .map(|alignment| {
-            let agreement = compare(a, b, &alignment.transform_a_b(), parameters);
-            Candidate { alignment, agreement, evidence: agreement.evidence(parameters.free_space_penalty) }
-        })
+        .map(|alignment| Candidate { alignment, agreement: compare(a, b, &alignment.transform_a_b(), parameters) })
         .collect();
-    // The sort is stable, so that equals stay in the order of their sources and ranks. What rests on enough tags is believed
-    // first, where the maps do not speak against it.
+    // The sort is stable, so that equals stay in the order of their sources and ranks.
     let is_provisional = |candidate: &Candidate<'_>| candidate.alignment.provisional;
     candidates.sort_by(|one, other| {
-        is_provisional(one).cmp(&is_provisional(other)).then(other.evidence.total_cmp(&one.evidence))
+        is_provisional(one)
+            .cmp(&is_provisional(other))
+            .then(other.agreement.evidence.total_cmp(&one.agreement.evidence))
     });
-    let mut first = None;
+    let mut best: Option<Verdict<'a>> = None;
     for candidate in &candidates {
         let verdict = judge_one(a, b, candidate, &candidates, parameters);
         if verdict.refusal.is_none() {
             return Some(verdict);
         }
-        first.get_or_insert(verdict);
+        if best.as_ref().is_none_or(|best| verdict.score > best.score) {
+            best = Some(verdict);
+        }
     }
-    first
+    best
 }
 
 /// Whether an alignment says where map b lies, in numbers.
@@ -107,7 +107,7 @@ fn judge_one<'a>(
     all: &[Candidate<'a>],
     parameters: &MergeVerifierParameters,
 ) -> Verdict<'a> {
-    let Candidate { alignment, agreement, .. } = candidate;
+    let Candidate { alignment, agreement } = candidate;
     let transform_a_b = alignment.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
         Rival::of(&transform_a_b, &agreement.centre, &other.alignment.transform_a_b(), || other.agreement)
@@ -117,100 +117,81 @@ fn judge_one<'a>(
         .filter(|other| other.alignment.accepted && other.alignment.source != alignment.source)
         .find(|other| rival_of(other).is_none())
         .map(|other| other.alignment.source.as_str());
-    let elsewhere = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
-    let another = elsewhere.max_by(|(one, _), (other, _)| one.evidence.total_cmp(&other.evidence));
-    let is_strict = alignment.provisional && found_too_by.is_none();
+    let by_evidence = |one: &Rival, other: &Rival| one.agreement.evidence.total_cmp(&other.agreement.evidence);
+    let another = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
+    let another = another.max_by(|(_, one), (_, other)| by_evidence(one, other));
+    let is_told = !alignment.provisional || found_too_by.is_some();
     let mut rival = another.map(|(_, rival)| rival);
-
-    let bounds = match is_strict {
-        true => parameters.provisional_bounds(alignment.hypotheses > 0),
-        false => parameters.bounds(),
+    // A stage that has looked for others has sent the best of them.
+    if alignment.accepted && !is_told && alignment.hypotheses == 0 {
+        let nearby = best_rival_nearby(a, b, &transform_a_b, &agreement.centre, parameters);
+        // Wherever more of the maps meets there is more evidence; what fits worse is not like it.
+        let is_alike =
+            |nearby: &Rival| nearby.agreement.wall_agreement() + LIKENESS_MARGIN > agreement.wall_agreement();
+        rival = rival.into_iter().chain(nearby.filter(is_alike)).max_by(by_evidence);
+    }
+    let elsewhere = rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
+    let evidence_elsewhere = (elsewhere / agreement.evidence.max(LEAST_EVIDENCE)).min(2.0);
+    let origin = origin(alignment);
+    let odds = Odds::new(&Grounds {
+        origin,
+        found_too: found_too_by.is_some(),
+        evidence: agreement.evidence,
+        wall_agreement: agreement.wall_agreement(),
+        evidence_elsewhere,
+    });
+    let score = odds.probability();
+    let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {
+        _ if !alignment.accepted => Some(Refusal::Before(alignment.reason.clone())),
+        _ if score >= parameters.accept => None,
+        Some(rival) => Some(likeness(candidate, &rival, another.filter(|_| is_told), evidence_elsewhere, all)),
+        None if odds.part < odds.chance => Some(Refusal::Contradiction {
+            agree: agreement.wall_on_wall,
+            against: agreement.wall_on_free,
+            share: agreement.wall_agreement(),
+        }),
+        None => Some(Refusal::Chance {
+            agree: agreement.wall_on_wall,
+            against: agreement.wall_on_free,
+            probability: score,
+            accept: parameters.accept,
+        }),
     };
-    let refusal = match alignment.accepted {
-        false => Some(Refusal::Before(alignment.reason.clone())),
-        true => Refusal::by_bounds(agreement, &bounds)
-            .or_else(|| {
-                let (other, rival) = another?;
-                match is_strict {
-                    true => ambiguity(candidate, other, &rival, all, parameters),
-                    false => contradiction(candidate, other, &rival, parameters),
-                }
-            })
-            .or_else(|| {
-                if !is_strict {
-                    return None;
-                }
-                // A stage that has looked for others has sent the best of them.
-                let alike = match alignment.hypotheses {
-                    0 => best_rival_nearby(a, b, &transform_a_b, &agreement.centre, parameters)?,
-                    _ => all
-                        .iter()
-                        .filter_map(rival_of)
-                        .filter(|rival| rival.counts(parameters))
-                        .max_by(Rival::by_share)?,
-                };
-                rival = Some(alike);
-                by_rival(agreement, &alike, parameters)
-            }),
-    };
-    let rivals = all.iter().filter_map(rival_of).chain(rival);
-    let evidence_elsewhere = evidence_elsewhere(agreement, rivals, parameters.free_space_penalty);
-    let score = probability(agreement, evidence_elsewhere);
     Verdict { candidate: *candidate, refusal, rival, evidence_elsewhere, score, found_too_by }
 }
 
-/// A provisional hypothesis must be better by far than the best elsewhere.
-fn ambiguity(
+/// What makes an alignment stand out before the maps are compared. A stage that has looked for all other places says by its
+/// score how probable it is that the best of as many would not lead by as much by chance.
+fn origin(alignment: &Alignment) -> Origin {
+    match alignment.hypotheses > 0 && alignment.source == "maps" {
+        true => Origin::Search { lead: -(1.0 - alignment.score.clamp(0.0, 1.0)).max(f64::MIN_POSITIVE).ln() },
+        false if alignment.provisional => Origin::FewTags,
+        false => Origin::Tags,
+    }
+}
+
+/// The refusal for another place that fits as well; or far better, where tags have told this one.
+fn likeness(
     candidate: &Candidate<'_>,
-    other: &Candidate<'_>,
     rival: &Rival,
+    told_against: Option<(&Candidate<'_>, Rival)>,
+    share: f64,
     all: &[Candidate<'_>],
-    parameters: &MergeVerifierParameters,
-) -> Option<Refusal> {
-    let most = parameters.max_rival_evidence;
-    let is_clear = other.evidence <= most * candidate.evidence;
-    (!is_clear).then(|| Refusal::Ambiguous {
-        shift: rival.shift,
-        turn: rival.turn.to_degrees(),
-        share: other.evidence / candidate.evidence,
-        most,
-        hypotheses: Hypotheses(all.iter().map(hypothesis).collect()),
-    })
-}
-
-/// Tags that put the maps where they fit far worse than where another source has them are wrong somewhere, or the maps are.
-fn contradiction(
-    candidate: &Candidate<'_>,
-    other: &Candidate<'_>,
-    rival: &Rival,
-    parameters: &MergeVerifierParameters,
-) -> Option<Refusal> {
-    let is_sound = Refusal::by_bounds(&other.agreement, &parameters.provisional_bounds(false)).is_none();
-    let is_far_worse = candidate.evidence <= parameters.max_rival_evidence * other.evidence;
-    (is_sound && is_far_worse).then(|| Refusal::Elsewhere {
-        source_of_rival: other.alignment.source.clone(),
-        shift: rival.shift,
-        turn: rival.turn.to_degrees(),
-        rival: other.agreement.wall_on_wall,
-        here: candidate.agreement.wall_on_wall,
-    })
-}
-
-/// Wherever else enough of the maps meets, a smaller share of the walls must agree: where as large a share does, what a
-/// robot happens to have seen of the one place and not of the other is all that speaks for the one.
-fn by_rival(agreement: &Agreement, rival: &Rival, parameters: &MergeVerifierParameters) -> Option<Refusal> {
-    let (share, margin) = (agreement.wall_agreement(), parameters.rival_margin);
-    let is_clear = share - rival.agreement.wall_agreement() >= margin;
-    (!is_clear).then(|| Refusal::Rival {
-        share,
-        rival: rival.agreement.wall_agreement(),
-        shift: rival.shift,
-        turn: rival.turn.to_degrees(),
-        margin,
-    })
+) -> Refusal {
+    let (shift, turn) = (rival.shift, rival.turn.to_degrees());
+    match told_against {
+        Some((other, _)) => Refusal::Elsewhere {
+            source_of_rival: other.alignment.source.clone(),
+            shift,
+            turn,
+            rival: other.agreement.wall_on_wall,
+            here: candidate.agreement.wall_on_wall,
+        },
+        None => Refusal::Ambiguous { shift, turn, share, hypotheses: Hypotheses(all.iter().map(hypothesis).collect()) },
+    }
 }
 
 fn hypothesis(candidate: &Candidate<'_>) -> Hypothesis {
     let Alignment { x, y, yaw, .. } = *candidate.alignment;
-    Hypothesis { x, y, yaw: yaw.to_degrees(), evidence: candidate.evidence }
+    Hypothesis { x, y, yaw: yaw.to_degrees(), wall_on_wall: candidate.agreement.wall_on_wall }
 }

@@ -6,12 +6,13 @@
 //! - [`compare`]: what two maps say of each other at one alignment.
 //! - [`best_rival_nearby`]: where else they fit, for alignments of which nobody has looked for others.
 //! - [`judge`]: all hypotheses for a pair against each other; [`Refusal`] says why none is accepted.
-//! - [`probability`]: how probable it is that an alignment is right.
+//! - [`Odds`]: how probable it is that an alignment is right.
 
 mod agreement;
 mod judge;
 mod parameters;
 mod refusal;
+mod regions;
 mod rivals;
 mod score;
 mod stage;
@@ -23,10 +24,10 @@ mod tests;
 
 pub use agreement::{Agreement, MapView, compare, compare_sampled};
 pub use judge::{Candidate, Verdict, judge};
-pub use parameters::{Bounds, MergeVerifierParameters};
+pub use parameters::MergeVerifierParameters;
 pub use refusal::{Hypotheses, Hypothesis, Refusal};
 pub use rivals::{Rival, best_rival_nearby};
-pub use score::{evidence_elsewhere, probability};
+pub use score::{Grounds, Odds, Origin};
 
 use gridweave_runtime::stage::StageKind;
 use stage::MergeVerifier;
@@ -36,8 +37,8 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "merge_verifier",
         "Judges all alignments that were proposed for each pair of robots, from tags and from maps, against each other and \
-         by the maps: walls must lie on walls and not on free space, enough of them, and no other place may fit nearly as \
-         well. It accepts one or none, says why, and how probable it is that it is right.",
+         by the maps: how probable is it that walls lie on walls, and not on free space, for another reason than that it \
+         is the place? It accepts one or none, from a probability on, and says why.",
         |parameters: MergeVerifierParameters, _| Ok(MergeVerifier::new(parameters)),
     )
     .input("map", "The robots' maps.", MergeVerifier::receive_map)

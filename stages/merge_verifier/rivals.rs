@@ -5,7 +5,6 @@ use super::{Agreement, MapView, MergeVerifierParameters};
 use crate::geometry::{Point2, Pose2};
 use crate::icp_refiner::{FirstGuess, IcpParameters, approach};
 use nalgebra::{Matrix3, UnitComplex, Vector2};
-use std::cmp::Ordering;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 /// An alignment whose middle lies within this many metres of another, and that is turned by less than [`SAME_TURN`], is
@@ -38,21 +37,9 @@ impl Rival {
         let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
         (shift >= SAME_PLACE || turn.abs() >= SAME_TURN).then(|| Self { shift, turn, agreement: compare() })
     }
-
-    /// Whether the maps have enough area and walls in common there for their agreement to mean something
-    /// (`min_overlap`, `min_wall_length`).
-    pub(super) fn counts(&self, parameters: &MergeVerifierParameters) -> bool {
-        self.agreement.overlap >= parameters.min_overlap && self.agreement.wall_on_wall >= parameters.min_wall_length
-    }
-
-    /// By the share of the walls that agree.
-    pub(super) fn by_share(&self, other: &Self) -> Ordering {
-        self.agreement.wall_agreement().total_cmp(&other.agreement.wall_agreement())
-    }
 }
 
-/// The rival near an alignment `T_a_b` on whose walls the maps agree best, if there is any at which they have enough area
-/// and walls in common (`min_overlap`, `min_wall_length`).
+/// The rival near an alignment `T_a_b` for which the walls speak most, if any do.
 ///
 /// Map b is turned by quarter turns about `centre`, a place in frame a, and moved by up to `rival_reach`; each of these is
 /// registered and compared, both by a sample of the points. In a building whose rooms are alike the maps fit at many
@@ -73,7 +60,8 @@ pub fn best_rival_nearby(
         let rival_a_b = approach(a.walls, b.walls, &guess, &icp);
         let compare = || compare_sampled(a, b, &rival_a_b, parameters, icp.coarse_points);
         let Some(rival) = Rival::of(transform_a_b, centre, &rival_a_b, compare) else { continue };
-        if rival.counts(parameters) && best.is_none_or(|best| rival.by_share(&best).is_gt()) {
+        let evidence = rival.agreement.evidence;
+        if evidence > best.map_or(0.0, |best| best.agreement.evidence) {
             best = Some(rival);
         }
     }

@@ -1,53 +1,164 @@
 //! How probable it is that an alignment is right.
+//!
+//! There are three ways to be wrong, and what is left of certainty after all is the probability:
+//!
+//! - **by chance**: maps that have nothing to do with each other, or parts of one map that do not, agree somewhere. The
+//!   more places were looked at, the better they agree at the best. How well that is, the other places of the same pair tell:
+//!   by extreme value theory the best of many alike leads the next by as many units of their spread as an exponential variable
+//!   has, so that a lead of `t` has the probability `exp(-t)` by chance (Gumbel 1958); and the evidence of walls in places that
+//!   do not depend on each other counts against it.
+//! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
+//! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
+//!   search over all places has come to this one, agreement must clearly be more than half. Tags have not looked at walls,
+//!   and ask for more of them.
+//!
+//! The weights are those of a logistic model that was fitted to pairs of published maps, of recorded logs and of unrelated
+//! buildings, and rounded; see the experiments.
 
-use super::{Agreement, Rival};
+/// The logarithm of the odds of an alignment for which nothing speaks.
+const PRIOR: f64 = -5.0;
+/// Per unit of the evidence of walls: much less than 1, as walls of a building depend on each other.
+const BY_EVIDENCE: f64 = 0.2;
+/// Per unit of the lead.
+const BY_LEAD: f64 = 1.0;
+/// No lead says more: from there on the model of chance itself is in doubt.
+const MOST_LEAD: f64 = 10.0;
+/// The lead of a place that enough tags, which agree with each other, tell by themselves.
+const LEAD_OF_TAGS: f64 = 10.0;
+/// The lead of a place that too few tags tell to be believed alone, and what another source adds that has found the same.
+const LEAD_OF_FEW_TAGS: f64 = 5.0;
+/// The share of the evidence that a rival has where it is as likely to be right, if nothing else tells them apart.
+const LIKE_SHARE: f64 = 0.7;
+/// The same where tags speak for one of the two.
+const LIKE_SHARE_BESIDE_TAGS: f64 = 1.3;
+/// Per unit of that share.
+const BY_SHARE: f64 = 35.0;
 
-/// Weights of the logistic model, fitted to simulated pairs of maps by the experiment `align --tuning --calibrate`.
-const INTERCEPT: f64 = -2.869;
-/// Per natural logarithm of the metres of wall that agree.
-const BY_LENGTH: f64 = 1.128;
-/// Per unit of the share of the walls that agree.
-const BY_AGREEMENT: f64 = 11.789;
-/// Per unit of [`evidence_elsewhere`].
-const BY_EVIDENCE_ELSEWHERE: f64 = -6.339;
-/// About the share of the walls that parts right alignments from wrong ones; subtracted, so that the weights hardly
-/// depend on one another.
-const MIDDLE_AGREEMENT: f64 = 0.8;
+/// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
+const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same for a place that tags tell.
+const AGREEMENT_OF_HALVES_BY_TAGS: f64 = 0.75;
+/// Per unit of that share.
+const BY_AGREEMENT: f64 = 140.0;
 
-/// The most evidence for another place that is known, as a share of that for an alignment, 0 to 2.
-pub fn evidence_elsewhere(agreement: &Agreement, rivals: impl Iterator<Item = Rival>, penalty: f64) -> f64 {
-    let here = agreement.evidence(penalty).max(1.0);
-    rivals.fold(0.0, |most, rival| most.max((rival.agreement.evidence(penalty) / here).min(2.0)))
+/// What makes places stand out from all others, before the maps are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Origin {
+    /// A search over all places; how far this one leads the others, in units of their spread.
+    Search {
+        /// The lead.
+        lead: f64,
+    },
+    /// Enough tags.
+    Tags,
+    /// Few tags.
+    FewTags,
 }
 
-/// The probability that an alignment is right (within 0.5 m and 1 degree of the truth), 0 to 1: a logistic model of the
-/// length of the walls that agree, of their share, and of the [`evidence_elsewhere`].
-pub fn probability(agreement: &Agreement, evidence_elsewhere: f64) -> f64 {
-    let odds = INTERCEPT
-        + BY_LENGTH * agreement.wall_on_wall.max(1.0).ln()
-        + BY_AGREEMENT * (agreement.wall_agreement() - MIDDLE_AGREEMENT)
-        + BY_EVIDENCE_ELSEWHERE * evidence_elsewhere;
-    1.0 / (1.0 + (-odds).exp())
+impl Origin {
+    /// The lead that it stands for, with another source that has found the same or without.
+    fn lead(self, found_too: bool) -> f64 {
+        let own = match self {
+            Self::Search { lead } => lead,
+            Self::Tags => LEAD_OF_TAGS,
+            Self::FewTags => LEAD_OF_FEW_TAGS,
+        };
+        let more = if found_too { LEAD_OF_FEW_TAGS } else { 0.0 };
+        (own + more).clamp(0.0, MOST_LEAD)
+    }
+}
+
+/// What an alignment is judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grounds {
+    /// What it was found from.
+    pub origin: Origin,
+    /// Whether another source has found the same.
+    pub found_too: bool,
+    /// The evidence of walls, see [`Agreement`](super::Agreement).
+    pub evidence: f64,
+    /// The share of the walls that agree, 0 to 1.
+    pub wall_agreement: f64,
+    /// The most evidence at another place, as a share of that here.
+    pub evidence_elsewhere: f64,
+}
+
+/// The odds, as logarithms, that an alignment is not wrong in one way each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Odds {
+    /// Against chance.
+    pub chance: f64,
+    /// Against a place that is like it.
+    pub likeness: f64,
+    /// Against a place at which the maps agree in part.
+    pub part: f64,
+}
+
+impl Odds {
+    /// Of an alignment.
+    pub fn new(grounds: &Grounds) -> Self {
+        let Grounds { origin, found_too, evidence, wall_agreement, evidence_elsewhere } = *grounds;
+        // Tags, and another source, tell a place from those that are like it.
+        let is_told = origin == Origin::Tags || found_too;
+        let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
+        let halves = match origin {
+            Origin::Search { .. } => AGREEMENT_OF_HALVES,
+            Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
+        };
+        Self {
+            chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * origin.lead(found_too),
+            likeness: BY_SHARE * (like - evidence_elsewhere),
+            part: BY_AGREEMENT * (wall_agreement - halves),
+        }
+    }
+
+    /// The probability that it is right, 0 to 1.
+    pub fn probability(&self) -> f64 {
+        1.0 / (1.0 + (-self.chance).exp() + (-self.likeness).exp() + (-self.part).exp())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn agreement(wall_on_wall: f64, wall_on_free: f64) -> Agreement {
-        Agreement { overlap: 200.0, wall_on_wall, wall_on_free, ..Default::default() }
+    fn probability(evidence: f64, evidence_elsewhere: f64, origin: Origin) -> f64 {
+        let grounds = Grounds { origin, found_too: false, evidence, wall_agreement: 0.9, evidence_elsewhere };
+        Odds::new(&grounds).probability()
     }
 
     #[test]
-    fn more_wall_fewer_contradictions_and_poorer_rivals_make_an_alignment_more_probable() {
-        let sure = probability(&agreement(200.0, 4.0), 0.0);
-        assert!(sure > 0.99, "{sure}");
-        assert!(probability(&agreement(60.0, 1.2), 0.0) < sure);
-        assert!(probability(&agreement(200.0, 60.0), 0.0) < sure);
-        let rival = Rival { shift: 5.0, turn: 0.0, agreement: agreement(190.0, 6.0) };
-        let alike = evidence_elsewhere(&agreement(200.0, 4.0), std::iter::once(rival), 2.0);
-        assert!((alike - 178.0 / 192.0).abs() < 1e-9);
-        assert!(probability(&agreement(200.0, 4.0), alike) < 0.7);
-        assert!(probability(&Agreement::default(), 0.0) < 0.5);
+    fn more_evidence_a_longer_lead_and_poorer_rivals_make_an_alignment_more_probable() {
+        let searched =
+            |evidence: f64, lead: f64, elsewhere: f64| probability(evidence, elsewhere, Origin::Search { lead });
+        let sure = searched(60.0, 8.0, 0.1);
+        assert!(sure > 0.999, "{sure}");
+        assert!(searched(10.0, 8.0, 0.1) < sure && searched(60.0, 0.0, 0.1) < sure && searched(60.0, 8.0, 0.9) < 0.01);
+        assert!(searched(0.0, 0.0, 0.0) < 0.01);
+        assert!((searched(60.0, 1e9, 0.1) - searched(60.0, MOST_LEAD, 0.1)).abs() < 1e-12);
+        assert!(searched(f64::NEG_INFINITY, 1.0, 0.0) == 0.0);
+    }
+
+    #[test]
+    fn tags_need_less_wall_and_tell_a_place_from_its_like() {
+        assert!(probability(20.0, 1.0, Origin::Tags) > 0.999);
+        assert!(probability(20.0, 0.0, Origin::FewTags) < 0.999 && probability(60.0, 0.0, Origin::FewTags) > 0.999);
+        assert!(probability(60.0, 1.0, Origin::FewTags) < 0.01);
+        assert!(probability(-20.0, 0.0, Origin::Tags) < 0.9);
+        let origin = Origin::Search { lead: 4.0 };
+        let grounds = Grounds { origin, found_too: true, evidence: 40.0, wall_agreement: 0.8, evidence_elsewhere: 1.0 };
+        assert!(Odds::new(&grounds).probability() > 0.999);
+    }
+
+    #[test]
+    fn maps_that_contradict_each_other_as_much_as_they_agree_are_not_of_one_place() {
+        let with = |wall_agreement: f64, origin: Origin| {
+            let evidence_elsewhere = 0.0;
+            Odds::new(&Grounds { origin, found_too: false, evidence: 300.0, wall_agreement, evidence_elsewhere })
+                .probability()
+        };
+        let searched = Origin::Search { lead: 20.0 };
+        assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
+        assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
     }
 }

@@ -1,7 +1,8 @@
 //! The YAML file of a map.
 
+use super::reading::Reading;
 use super::{MapFileError, Mode};
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 use serde_norway::Value;
 use std::path::{Path, PathBuf};
 
@@ -17,29 +18,31 @@ pub(super) struct Description {
     pub(super) reading: Reading,
 }
 
-/// How a shade is read as occupancy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Reading {
-    pub(super) mode: Mode,
-    /// Whether white stands for occupied.
-    pub(super) negate: bool,
-    /// Occupied above this occupancy, 0 to 1.
-    pub(super) occupied_thresh: f64,
-    /// Free below this occupancy, 0 to 1.
-    pub(super) free_thresh: f64,
-}
-
 /// The file as it stands. Other fields, which some programs add, are passed over.
 #[derive(Deserialize)]
 struct Fields {
     image: PathBuf,
-    resolution: f64,
-    origin: Vec<f64>,
-    occupied_thresh: f64,
-    free_thresh: f64,
+    resolution: Number,
+    origin: Vec<Number>,
+    occupied_thresh: Number,
+    free_thresh: Number,
     #[serde(default)]
     negate: Value,
     mode: Option<String>,
+}
+
+/// A number, which some programs put in quotes.
+struct Number(f64);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        let number = match &value {
+            Value::String(text) => text.trim().parse().ok(),
+            value => value.as_f64(),
+        };
+        number.map(Self).ok_or_else(|| serde::de::Error::custom(format!("expected a number, not {value:?}")))
+    }
 }
 
 impl Description {
@@ -49,15 +52,17 @@ impl Description {
             .map_err(|error| MapFileError::Yaml { path: path.to_owned(), message: error.to_string() })?;
         let wrong = |field, problem: String| MapFileError::Field { path: path.to_owned(), field, problem };
 
-        let Fields { image, origin, occupied_thresh, free_thresh, .. } = fields;
+        let Fields { image, resolution: Number(metres), origin, .. } = fields;
+        let (Number(occupied_thresh), Number(free_thresh)) = (fields.occupied_thresh, fields.free_thresh);
         if image.as_os_str().is_empty() {
             return Err(wrong("image", "is empty; name the image beside the file".into()));
         }
-        let resolution = fields.resolution as f32;
+        let resolution = metres as f32;
         if !(resolution.is_finite() && resolution > 0.0) {
-            let problem = format!("is {}; it must be the size of a cell in metres, above 0", fields.resolution);
+            let problem = format!("is {metres}; it must be the size of a cell in metres, above 0");
             return Err(wrong("resolution", problem));
         }
+        let origin: Vec<f64> = origin.into_iter().map(|Number(value)| value).collect();
         let origin = <[f64; 3]>::try_from(origin)
             .ok()
             .filter(|origin| origin.iter().all(|value| value.is_finite()))
@@ -76,13 +81,16 @@ impl Description {
             Value::Bool(negate) => *negate,
             Value::Number(number) if number.as_u64() == Some(0) => false,
             Value::Number(number) if number.as_u64() == Some(1) => true,
+            Value::String(text) if ["0", "false"].contains(&text.trim()) => false,
+            Value::String(text) if ["1", "true"].contains(&text.trim()) => true,
             _ => return Err(wrong("negate", "must be 0 or 1".into())),
         };
         let mode = match fields.mode.as_deref() {
             None => Mode::default(),
             Some(name) => Mode::from_name(name).ok_or_else(|| wrong("mode", unknown_mode(name)))?,
         };
-        Ok(Self { image, resolution, origin, reading: Reading { mode, negate, occupied_thresh, free_thresh } })
+        let reading = Reading { mode, negate, occupied_thresh, free_thresh, unknown: None };
+        Ok(Self { image, resolution, origin, reading })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Reading a map.
 
 use super::description::Description;
+use super::reading::{Remark, Thresholds};
 use super::shades::Shades;
 use super::{GridMap, MapFileError};
 use gridweave_runtime::input_file;
@@ -11,8 +12,21 @@ use std::path::{Path, PathBuf};
 /// The most bytes of an image file that are read: as many as the pixels of the largest image that is decoded.
 const LARGEST_IMAGE: u64 = 512 << 20;
 
-/// Reads the map that the YAML file at `yaml` describes.
+/// Reads the map that the YAML file at `yaml` describes, by its thresholds.
+///
+/// # Errors
+///
+/// A file cannot be read, or is no map.
 pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
+    Ok(load_as(yaml, Thresholds::Literal)?.0)
+}
+
+/// Reads the map that the YAML file at `yaml` describes, and says if that is not as the file's thresholds have it.
+///
+/// # Errors
+///
+/// A file cannot be read, or is no map.
+pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<Remark>), MapFileError> {
     let Description { image: path, resolution, origin: [x, y, yaw], reading } = describe(yaml)?;
     let shades = input_file::read(&path, LARGEST_IMAGE)
         .map_err(image::ImageError::from)
@@ -25,7 +39,11 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };
-    Ok(GridMap { info, cells: shades.cells(&reading) })
+    let (reading, remark) = match thresholds {
+        Thresholds::Literal => (reading, None),
+        Thresholds::ByPicture => reading.by_picture(&shades),
+    };
+    Ok((GridMap { info, cells: shades.cells(&reading) }, remark))
 }
 
 /// The image of the map that the YAML file at `yaml` describes, which may not be there.

@@ -6,12 +6,14 @@
 mod description;
 mod error;
 mod load;
+mod reading;
 mod save;
 mod shades;
 mod sink;
 
 pub use error::MapFileError;
-pub use load::{image_of, load};
+pub use load::{image_of, load, load_as};
+pub use reading::{Remark, Thresholds};
 pub use save::{image_beside, save};
 pub use sink::kind;
 

@@ -1,7 +1,6 @@
 //! The image of a map: from shades to cells, as nav2's map server reads them.
 
-use super::Mode;
-use super::description::Reading;
+use super::reading::Reading;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use std::io::{self, Cursor};
 
@@ -9,6 +8,10 @@ use std::io::{self, Cursor};
 const DENSEST_PNM: u64 = 8;
 /// The same for a PNG: its compression, deflate, makes at most 1032 bytes of one, and each may be eight pixels.
 const DENSEST_PNG: u64 = 8 * 1032;
+/// The same for a JPEG: a bit for a block of 8 x 8 pixels of each of three colours, two of them at half the width and height.
+const DENSEST_JPEG: u64 = 1024;
+/// The same for a BMP: a run of 255 pixels of three colours in two bytes.
+const DENSEST_BMP: u64 = 384;
 /// No image takes more, bytes.
 const LARGEST: u64 = 512 << 20;
 
@@ -16,13 +19,20 @@ const LARGEST: u64 = 512 << 20;
 pub(super) struct Shades {
     image: DynamicImage,
     white: f64,
+    is_lossy: bool,
 }
 
 impl Shades {
-    /// Decodes an image file: PGM, PPM, PBM or PNG, told by its first bytes.
+    /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, told by its first bytes.
     pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-        let densest = if reader.format() == Some(ImageFormat::Png) { DENSEST_PNG } else { DENSEST_PNM };
+        let format = reader.format();
+        let densest = match format {
+            Some(ImageFormat::Png) => DENSEST_PNG,
+            Some(ImageFormat::Jpeg) => DENSEST_JPEG,
+            Some(ImageFormat::Bmp) => DENSEST_BMP,
+            _ => DENSEST_PNM,
+        };
         let decoder = reader.into_decoder()?;
         // The size is the file's word only.
         if decoder.total_bytes() > densest.saturating_mul(bytes.len() as u64).min(LARGEST) {
@@ -32,12 +42,47 @@ impl Shades {
         }
         let image = DynamicImage::from_decoder(decoder)?;
         let bytes_a_channel = image.color().bytes_per_pixel() / image.color().channel_count();
-        Ok(Self { image, white: if bytes_a_channel == 1 { 255.0 } else { 65535.0 } })
+        let white = if bytes_a_channel == 1 { 255.0 } else { 65535.0 };
+        Ok(Self { image, white, is_lossy: format == Some(ImageFormat::Jpeg) })
     }
 
     /// Columns and rows.
     pub(super) fn size(&self) -> (u32, u32) {
         (self.image.width(), self.image.height())
+    }
+
+    /// Whether shades are near those that were written, and not the same.
+    pub(super) fn is_lossy(&self) -> bool {
+        self.is_lossy
+    }
+
+    /// Whether pixels have an opacity.
+    pub(super) fn has_opacity(&self) -> bool {
+        self.image.color().has_alpha()
+    }
+
+    /// How many pixels have each shade of grey, 0 for black to 255 for white.
+    pub(super) fn greys(&self) -> [u64; 256] {
+        let mut greys = [0; 256];
+        match &self.image {
+            DynamicImage::ImageLuma8(grey) => grey.as_raw().iter().for_each(|shade| greys[usize::from(*shade)] += 1),
+            image => {
+                let channels = usize::from(image.color().channel_count()).max(1);
+                let colours = if self.has_opacity() { channels - 1 } else { channels };
+                let mut add = |sum: f64| {
+                    let shade = 255.0 * sum / (colours.max(1) as f64) / self.white;
+                    greys[(shade.round() as usize).min(255)] += 1;
+                };
+                if let Some(flat) = image.as_flat_samples_u8() {
+                    let pixels = flat.samples.chunks_exact(channels);
+                    pixels.for_each(|pixel| add(pixel[..colours].iter().map(|value| f64::from(*value)).sum()));
+                } else if let Some(flat) = image.as_flat_samples_u16() {
+                    let pixels = flat.samples.chunks_exact(channels);
+                    pixels.for_each(|pixel| add(pixel[..colours].iter().map(|value| f64::from(*value)).sum()));
+                }
+            }
+        }
+        greys
     }
 
     /// The cells, row by row from the image's last row to its first.
@@ -65,46 +110,5 @@ impl Shades {
         let row = (self.image.width() as usize * channels).max(1);
         let rows = samples.chunks_exact(row).rev();
         rows.flat_map(|row| row.chunks_exact(channels.max(1))).map(cell).collect()
-    }
-}
-
-impl Reading {
-    /// The cell of a pixel: grey or three colours, the last of an even number being its opacity.
-    fn pixel<T: Copy + Into<f64>>(&self, pixel: &[T], white: f64) -> i8 {
-        let mut values = [0.0; 4];
-        values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample.into());
-        let count = pixel.len().min(4);
-        match count % 2 {
-            0 if count > 0 => self.cell(&values[..count - 1], Some(values[count - 1]), white),
-            _ => self.cell(&values[..count], None, white),
-        }
-    }
-
-    /// The cell of a pixel with the given colours and opacity.
-    fn cell(&self, colours: &[f64], opacity: Option<f64>, white: f64) -> i8 {
-        let mean_of = |sum: f64, count: usize| (sum / (count.max(1) as f64) / white).min(1.0);
-        let (sum, count) = (colours.iter().sum::<f64>(), colours.len());
-        let shade = match (self.mode, opacity) {
-            // The map server counts opacity as one more channel beside red, green and blue here.
-            (Mode::Trinary, Some(opacity)) if count == 1 => mean_of(3.0 * sum + opacity, 4),
-            (Mode::Trinary, Some(opacity)) => mean_of(sum + opacity, count + 1),
-            _ => mean_of(sum, count),
-        };
-        let occupancy = if self.negate { shade } else { 1.0 - shade };
-        match self.mode {
-            Mode::Raw => match (shade * 255.0).round() {
-                value if value <= 100.0 => value as i8,
-                _ => -1,
-            },
-            Mode::Scale if opacity.is_some_and(|opacity| opacity < white) => -1,
-            _ if occupancy > self.occupied_thresh => 100,
-            _ if occupancy < self.free_thresh => 0,
-            Mode::Trinary => -1,
-            Mode::Scale => {
-                let span = self.occupied_thresh - self.free_thresh;
-                let share = if span > 0.0 { (occupancy - self.free_thresh) / span } else { 1.0 };
-                (share * 100.0).round_ties_even() as i8
-            }
-        }
     }
 }

@@ -89,6 +89,51 @@ fn png_is_read_with_its_opacity() {
 }
 
 #[test]
+fn numbers_may_stand_in_quotes() {
+    let quoted = "image: map.pgm\nresolution: '0.05'\norigin: ['1', \"-2.5\", 0.5]\noccupied_thresh: '0.65'\n\
+                  free_thresh: \"0.25\"\nnegate: '0'";
+    assert_eq!(cells(quoted), cells(&yaml("")));
+    assert!(error(&yaml("").replace("0.05", "wide")).contains("expected a number"));
+}
+
+#[test]
+fn what_the_image_shows_goes_before_the_thresholds_and_is_told() {
+    let read = |bytes: &[u8], more: &str| {
+        let (folder, path) = folder(&yaml(more));
+        fs::write(folder.path().join("map.pgm"), bytes).unwrap();
+        let (map, remark) = load_as(&path, Thresholds::ByPicture).unwrap();
+        (map.cells, remark.map(|remark| remark.to_string()).unwrap_or_default())
+    };
+    let (cells, remark) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "");
+    assert_eq!(cells, [100, -1, -1, 0]);
+    assert!(remark.starts_with("2 cells of grey 205 are read as unknown, not as free as free_thresh 0.25"), "{remark}");
+    assert!(remark.ends_with("--literal-thresholds takes the file at its word"), "{remark}");
+    // Other modes have no shade for unknown, and where white is occupied 205 is a wall.
+    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale"), (vec![100, 0, 0, 0], String::new()));
+    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1"), (vec![0, 100, 100, 100], String::new()));
+    // One of a gradient.
+    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcc\xcd\xce", "").0, [100, 0, 0, 0]);
+    let (cells, remark) = read(b"P5\n4 1\n255\n\x6e\x6e\xcd\xfe", "");
+    assert_eq!(cells, [100, 100, -1, 0]);
+    assert!(remark.contains("the darkest cells, of occupancy 0.57, are read as walls"), "{remark}");
+}
+
+#[test]
+fn bmp_and_jpeg_are_read() {
+    let (folder, path) = folder("");
+    // Blocks of eight pixels, as a JPEG cuts them.
+    let shades = [0u8, 205, 254];
+    let image = ImageBuffer::from_fn(24, 8, |x, _| Luma([shades[x as usize / 8]]));
+    for name in ["map.bmp", "map.jpg"] {
+        DynamicImage::ImageLuma8(image.clone()).save(folder.path().join(name)).unwrap();
+        fs::write(&path, yaml("").replace("map.pgm", name)).unwrap();
+        let (map, remark) = load_as(&path, Thresholds::ByPicture).unwrap();
+        let middle: Vec<i8> = [4, 12, 20].map(|column| map.cells[3 * 24 + column]).into();
+        assert_eq!(middle, [100, -1, 0], "{name}: {remark:?}");
+    }
+}
+
+#[test]
 fn a_map_comes_back_with_every_digit_of_its_origin() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a map: \"two\".yaml");

@@ -278,12 +278,12 @@ fn what_is_latched_before_the_start_is_carried_over() {
 
 #[test]
 fn names_that_are_too_long_are_an_error_that_says_which() {
-    let robot = "r".repeat(33);
+    let robot = "r".repeat(65);
     let (_folder, files) = write(|log| {
         log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, 1, &grid());
     });
     let error = try_run(files, "", RobotTopics::default()).err().unwrap().to_string();
-    assert!(error.contains("robot's name") && error.contains("32"), "{error}");
+    assert!(error.contains("robot's name") && error.contains("64"), "{error}");
     let (_folder, files) = write(|log| {
         log.raw(&format!("/{}", "t".repeat(128)), "p/msg/X", 1, b"");
     });

@@ -15,7 +15,9 @@ pub(crate) enum Inputs {
 impl Inputs {
     /// Tells by the names of the files. An error if there are some of both, or images of maps.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
-        if let Some(image) = paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm"])) {
+        if let Some(image) =
+            paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm", "bmp", "jpg", "jpeg"]))
+        {
             let text = format!("{} is an image: give the YAML file that describes the map", image.display());
             return Err(BadUse(text));
         }

@@ -17,6 +17,7 @@ use crate::terminal::{print, print_line};
 use anyhow::Result;
 use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
+use gridweave_logs::source::map_file::robot_names;
 use gridweave_runtime::engine::{self, EngineKind};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
@@ -101,9 +102,17 @@ impl Job<'_> {
         Ok(summary)
     }
 
+    /// The reference robot: its name, or its map file as it was typed among the inputs.
+    fn reference(&self) -> Option<String> {
+        let typed = self.options.reference.clone()?;
+        let file = self.inputs.iter().position(|input| input.as_os_str() == typed.as_str());
+        let names = file.and_then(|file| robot_names(self.inputs).ok()?.into_iter().nth(file));
+        Some(names.unwrap_or(typed))
+    }
+
     fn overrides(&self) -> Result<Overrides> {
         let mut overrides = Overrides::default();
-        overrides.reference.clone_from(&self.options.reference);
+        overrides.reference = self.reference();
         overrides.seed = self.options.seed;
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
@@ -111,6 +120,9 @@ impl Job<'_> {
         }
         if let Output::Log(output) = self.output {
             overrides.set_for_kind(LOG_SINK, "file", text_of(output)?);
+        }
+        if self.options.literal_thresholds {
+            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "literal_thresholds", true);
         }
         if self.options.results_only {
             overrides.set_for_kind(LOG_SINK, "pass_input", false);

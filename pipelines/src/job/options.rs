@@ -26,6 +26,9 @@ pub(crate) struct RunOptions {
     /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     #[arg(long, value_name = "ROBOT")]
     pub(crate) reference: Option<String>,
+    /// Read map files by their thresholds to the letter, also where these make unknown cells free or leave no walls.
+    #[arg(long)]
+    pub(crate) literal_thresholds: bool,
     /// Set a parameter of a stage.
     #[arg(long, value_name = "STAGE.PARAMETER=VALUE")]
     pub(crate) set: Vec<String>,

@@ -13,7 +13,7 @@
 //! `local` between threads, `ipc` between processes. One protocol serves replays and live runs. What differs is a setting:
 //! the [`Order`] in which a stage takes its inputs, and for a live link what becomes of a message for which there is no room.
 //!
-//! # The protocol, version 3
+//! # The protocol, version 4
 //!
 //! All names stand below the run's prefix. A link is a publish-subscribe service `PREFIX/link/STAGE/PORT`. The stage is its
 //! *owner*. The payload is `[u8]`, aligned to 8 as its user header is, a [`SampleHeader`]. What its ends tell each other beside

@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use std::rc::Rc;
 
 /// The version of the link protocol. A reader refuses samples of another one.
-pub const PROTOCOL_VERSION: u32 = 3;
+pub const PROTOCOL_VERSION: u32 = 4;
 
 /// Where each message of a batch begins.
 const RECORD_ALIGNMENT: usize = 8;

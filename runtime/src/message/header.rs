@@ -28,7 +28,7 @@ impl MessageFlags {
 
 /// What goes with every message.
 ///
-/// In shared memory it is laid out as `#[repr(C)]`, little-endian, 208 bytes; it is part of version 1 of the link
+/// In shared memory it is laid out as `#[repr(C)]`, little-endian, 240 bytes; it is part of version 4 of the link
 /// protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
@@ -50,14 +50,14 @@ pub struct MessageHeader {
     /// Zero.
     pub reserved: u32,
     /// The robot it is about; empty if none in particular.
-    pub robot: FixedText<32>,
+    pub robot: FixedText<64>,
     /// The topic that it has, or will have, in a log.
     pub topic: FixedText<128>,
 }
 
 impl MessageHeader {
     /// The size in memory, bytes.
-    pub const SIZE: usize = 208;
+    pub const SIZE: usize = 240;
 
     /// The header as it lies in memory.
     pub fn to_bytes(&self) -> [u8; Self::SIZE] {
@@ -70,8 +70,8 @@ impl MessageHeader {
         for (place, half) in bytes[32..48].chunks_exact_mut(4).zip(halves) {
             place.copy_from_slice(&half.to_le_bytes());
         }
-        bytes[48..80].copy_from_slice(self.robot.as_bytes());
-        bytes[80..].copy_from_slice(self.topic.as_bytes());
+        bytes[48..112].copy_from_slice(self.robot.as_bytes());
+        bytes[112..].copy_from_slice(self.topic.as_bytes());
         bytes
     }
 
@@ -89,8 +89,8 @@ impl MessageHeader {
             channel: half(36)?,
             log_sequence: half(40)?,
             reserved: half(44)?,
-            robot: FixedText::from_bytes(bytes[48..80].try_into().ok()?),
-            topic: FixedText::from_bytes(bytes[80..].try_into().ok()?),
+            robot: FixedText::from_bytes(bytes[48..112].try_into().ok()?),
+            topic: FixedText::from_bytes(bytes[112..].try_into().ok()?),
         })
     }
 }
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(std::mem::size_of::<MessageHeader>(), MessageHeader::SIZE);
         assert_eq!(std::mem::offset_of!(MessageHeader, flags), 32);
         assert_eq!(std::mem::offset_of!(MessageHeader, robot), 48);
-        assert_eq!(std::mem::offset_of!(MessageHeader, topic), 80);
+        assert_eq!(std::mem::offset_of!(MessageHeader, topic), 112);
     }
 
     #[test]

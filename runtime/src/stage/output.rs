@@ -330,12 +330,12 @@ impl<T> Out<T> {
 /// A topic with a place for the robot's name, and the last name that was put in.
 struct TopicTemplate {
     template: String,
-    last: Option<(FixedText<32>, FixedText<128>)>,
+    last: Option<(FixedText<64>, FixedText<128>)>,
 }
 
 impl TopicTemplate {
     /// A message about no robot in particular leaves the robot's part of the path out.
-    fn topic(&mut self, robot: FixedText<32>) -> Result<FixedText<128>, StageError> {
+    fn topic(&mut self, robot: FixedText<64>) -> Result<FixedText<128>, StageError> {
         if let Some((last_robot, topic)) = self.last
             && last_robot == robot
         {

@@ -49,10 +49,6 @@ pub(super) struct AlignArgs {
     /// Use the seeds on which the parameters were chosen.
     #[arg(long)]
     tuning: bool,
-    /// Fit the weights of the verifier's score to the outcomes, and print them. They must not be taken from seeds that are to
-    /// be judged by.
-    #[arg(long, requires = "tuning")]
-    calibrate: bool,
 }
 
 /// Does the experiment.
@@ -82,7 +78,7 @@ pub(super) fn run(args: &AlignArgs, registry: &Registry, results: &mut Results) 
         }
         results.data("align_trials", &table)?;
         let judged: Vec<&PairTrial> = sets.iter().flat_map(|(_, trials)| trials.iter()).collect();
-        Calibration::of(&judged).report(args.calibrate, results)?;
+        Calibration::of(&judged).report(results)?;
     }
     team::run(&args.teams, seeds, &args.pipeline, registry, results)
 }

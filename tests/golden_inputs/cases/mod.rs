@@ -9,6 +9,7 @@ mod icp_refiner;
 mod line_extractor;
 mod logs;
 mod map_aligner;
+mod map_cleaner;
 mod merge_verifier;
 mod quadrant_classifier;
 mod result_sinks;
@@ -51,6 +52,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         line_extractor::cases(),
         logs::cases(),
         map_aligner::cases(),
+        map_cleaner::cases(),
         merge_verifier::cases(),
         quadrant_classifier::cases(),
         result_sinks::cases(),

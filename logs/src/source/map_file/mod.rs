@@ -6,6 +6,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+pub use names::{NameError, robot_names};
 pub use stage::MapFileSource;
 
 use gridweave_runtime::ros::OccupancyGrid;
@@ -22,6 +23,10 @@ pub struct MapFileSourceParameters {
     /// ending; files that are called alike are told apart by the folders that they lie in. `--input` on the command line
     /// stands in for it.
     pub files: Vec<PathBuf>,
+    /// Whether the thresholds of the files are taken at their word. Else the shade 205, as which map savers write unknown
+    /// cells, is unknown in trinary files even where `free_thresh` would make it free, as the usual 0.25 does; and where no
+    /// cell reaches `occupied_thresh`, the darkest are the walls. `--literal-thresholds` on the command line.
+    pub literal_thresholds: bool,
 }
 
 impl Parameters for MapFileSourceParameters {}

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why map files give no names.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum NameError {
+pub enum NameError {
     /// One file would be two robots' map.
     #[error("{0} is given twice; give every map once")]
     GivenTwice(PathBuf),
@@ -25,8 +25,12 @@ pub(super) enum NameError {
 }
 
 /// The name of a robot for every map file, in the order of the files: that of the file without its ending or, where
-/// several are called alike, that of its folder. Names are parts of topics: what may not stand there becomes `_`.
-pub(super) fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
+/// several are called alike, that of its folder. Names are parts of topics: what cannot stand there becomes `_`.
+///
+/// # Errors
+///
+/// A file is given twice, or two robots would have one name.
+pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
     check_once(files)?;
     let stems: Vec<String> = files.iter().map(|file| topic_part(file.file_stem())).collect();
     let count = |stem: &String| stems.iter().filter(|other| *other == stem).count();
@@ -61,14 +65,15 @@ fn folder_of(file: &Path) -> PathBuf {
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// A name as ROS 2 allows it for a part of a topic: letters, digits and `_`, the first no digit.
+/// A name as it can stand between the slashes of a topic. ROS 2 allows letters, digits and `_` only; but a log may have
+/// others, and a name that is not the file's would have to be guessed.
 fn topic_part(name: Option<&std::ffi::OsStr>) -> String {
     let name = name.map(|name| name.to_string_lossy()).unwrap_or_default();
-    let part: String = name.chars().map(|char| if char.is_ascii_alphanumeric() { char } else { '_' }).collect();
-    match part.chars().next() {
-        Some(first) if !first.is_ascii_digit() => part,
-        _ => format!("map_{part}"),
-    }
+    let part: String = name
+        .chars()
+        .map(|char| if char == '/' || char.is_control() || char == char::REPLACEMENT_CHARACTER { '_' } else { char })
+        .collect();
+    if part.is_empty() { "map".to_owned() } else { part }
 }
 
 #[cfg(test)]
@@ -100,10 +105,10 @@ mod tests {
     }
 
     #[test]
-    fn names_fit_a_topic() {
+    fn a_name_stays_as_it_was_typed() {
         assert_eq!(
-            names(&["ground floor.v2.yaml", "2.yaml", "küche.yaml"]).unwrap(),
-            ["ground_floor_v2", "map_2", "k_che"]
+            names(&["ground floor.v2.yaml", "2.yaml", "küche-1.yaml", "a\tb.yaml"]).unwrap(),
+            ["ground floor.v2", "2", "küche-1", "a_b"]
         );
     }
 
@@ -130,8 +135,7 @@ mod tests {
         #[test]
         fn every_name_is_a_part_of_a_topic(name in "\\PC*") {
             let part = topic_part(Some(std::ffi::OsStr::new(&name)));
-            prop_assert!(part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_'));
-            prop_assert!(part.chars().all(|char| char.is_ascii_alphanumeric() || char == '_'));
+            prop_assert!(!part.is_empty() && part.chars().all(|char| char != '/' && !char.is_control()));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::names::robot_names;
 use super::{FileMaps, MapFileSourceParameters};
-use crate::map_file;
+use crate::map_file::{self, Thresholds};
 use crate::qos;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
@@ -26,6 +26,7 @@ struct NamedMap {
     robot: String,
     file: PathBuf,
     topic: String,
+    thresholds: Thresholds,
 }
 
 impl MapFileSource {
@@ -37,9 +38,10 @@ impl MapFileSource {
             return Err(StageError::new(doing(), "no file is given").with_help(help));
         }
         let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
         let named = |(robot, file): (String, PathBuf)| {
             let topic = context.robots.map.replace("{robot}", &robot);
-            NamedMap { robot, file, topic }
+            NamedMap { robot, file, topic, thresholds }
         };
         let mut maps: Vec<NamedMap> = names.into_iter().zip(parameters.files).map(named).collect();
         maps.sort_by(|one, other| one.robot.cmp(&other.robot));
@@ -68,7 +70,11 @@ impl NamedMap {
     /// Sends the map on a channel of its own, as a log would.
     fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
         let doing = || format!("send the map {}", self.file.display());
-        let map = map_file::load(&self.file).map_err(|error| StageError::new("read a map file", error))?;
+        let loaded = map_file::load_as(&self.file, self.thresholds);
+        let (map, remark) = loaded.map_err(|error| StageError::new("read a map file", error))?;
+        if let Some(remark) = remark {
+            output.warn(format!("{}: {remark}", self.file.display()));
+        }
         let time = output.log_time();
         let header = Header::new(time, format!("{}/map", self.robot));
         let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };

@@ -65,7 +65,7 @@ fn files_that_are_no_maps_are_errors_that_name_them() {
     fs::write(&empty, "").unwrap();
     let without_image = save(folder.path(), "alone.yaml", &map(0.05, 0.0, &[0]));
     fs::remove_file(without_image.with_extension("pgm")).unwrap();
-    let long = save(folder.path(), &format!("{}.yaml", "long".repeat(9)), &map(0.05, 0.0, &[0]));
+    let long = save(folder.path(), &format!("{}.yaml", "long".repeat(20)), &map(0.05, 0.0, &[0]));
     let missing = folder.path().join("missing.yaml");
     for (bad, word) in [
         (&empty, "empty.yaml"),
@@ -79,4 +79,22 @@ fn files_that_are_no_maps_are_errors_that_name_them() {
         assert!(error.contains(word), "{error}");
     }
     assert!(run(Vec::new(), RobotTopics::default()).unwrap_err().to_string().contains("--input"));
+}
+
+#[test]
+fn unknown_cells_in_grey_205_are_unknown_unless_the_file_is_taken_at_its_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = save(folder.path(), "a-b.yaml", &map(0.05, 0.0, &[0, 100, -1]));
+    let text = fs::read_to_string(&file).unwrap().replace("free_thresh: 0.196", "free_thresh: 0.25");
+    fs::write(&file, text).unwrap();
+    for (more, cells, warnings) in [("", vec![0, 100, -1], 1), ("literal_thresholds = true", vec![0, 100, 0], 0)] {
+        let parameters = format!("files = [{:?}]\n{more}", file.to_str().unwrap());
+        let mut source = LoneStage::with_context(&kind(), &parameters, &Context::default()).unwrap();
+        while source.node().advance().unwrap() {}
+        let sent = source.take_messages("map");
+        let message = sent.iter().find(|message| message.header().flags.contains(MessageFlags::DATA)).unwrap();
+        assert_eq!(message.robot(), "a-b", "as it was typed");
+        assert_eq!(GridMap::from_message(&message.decode().unwrap()).cells, cells);
+        assert_eq!(source.warnings().len(), warnings, "{:?}", source.warnings());
+    }
 }

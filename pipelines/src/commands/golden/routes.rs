@@ -24,7 +24,7 @@ pub(super) struct Feed {
 #[derive(Clone, Debug)]
 pub(super) struct FedChannel {
     /// The robot that its messages are about.
-    pub(super) robot: FixedText<32>,
+    pub(super) robot: FixedText<64>,
     pub(super) topic: FixedText<128>,
     pub(super) channel: Channel,
 }

@@ -1,0 +1,145 @@
+//! How the shades of a map's image are read as occupancy.
+
+use super::Mode;
+use super::shades::Shades;
+use std::fmt;
+
+/// The shade in which map savers write unknown cells.
+const UNKNOWN_SHADE: usize = 205;
+/// The least occupancy, above that of unknown, at which the darkest shade of an image is that of its walls.
+const LEAST_CONTRAST: f64 = 0.1;
+
+/// Whether the thresholds of a map file are believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Thresholds {
+    /// As they stand, as a map server reads them.
+    Literal,
+    /// Where the image of a trinary file tells otherwise, the image is believed: nav2's map saver writes unknown cells in
+    /// grey 205 with `free_thresh: 0.25`, which makes them free; and walls that are all drawn in grey may lie below
+    /// `occupied_thresh`.
+    #[default]
+    ByPicture,
+}
+
+/// How a shade is read as occupancy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reading {
+    pub(super) mode: Mode,
+    /// Whether white stands for occupied.
+    pub(super) negate: bool,
+    /// Occupied above this occupancy, 0 to 1.
+    pub(super) occupied_thresh: f64,
+    /// Free below this occupancy, 0 to 1.
+    pub(super) free_thresh: f64,
+    /// Shades of grey that are unknown whatever the thresholds, 0 for black to 1 for white, first and last.
+    pub(super) unknown: Option<(f64, f64)>,
+}
+
+/// What was read otherwise than the thresholds of a file have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Remark {
+    /// Cells of grey 205 that are unknown though `free_thresh`, which follows, would make them free.
+    pub unknown: Option<(u64, f64)>,
+    /// The occupancy from which cells are walls, though `occupied_thresh`, which follows, leaves none.
+    pub walls: Option<(f64, f64)>,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some((cells, free_thresh)) = self.unknown {
+            write!(
+                text,
+                "{cells} cells of grey 205 are read as unknown, not as free as free_thresh {free_thresh} has it; "
+            )?;
+        }
+        if let Some((from, occupied_thresh)) = self.walls {
+            write!(text, "the darkest cells, of occupancy {from:.2}, are read as walls, as none reaches ")?;
+            write!(text, "occupied_thresh {occupied_thresh}; ")?;
+        }
+        write!(text, "--literal-thresholds takes the file at its word")
+    }
+}
+
+impl Reading {
+    /// The same as the image has it, and what that changes.
+    pub(super) fn by_picture(self, shades: &Shades) -> (Self, Option<Remark>) {
+        if self.mode != Mode::Trinary || self.negate {
+            return (self, None);
+        }
+        let greys = shades.greys();
+        let spread = if shades.is_lossy() { 4 } else { 0 };
+        let range = UNKNOWN_SHADE - spread..=UNKNOWN_SHADE + spread;
+        let cells: u64 = greys[range.clone()].iter().sum();
+        // A shade of its own, and not one of a gradient.
+        let stands_out =
+            greys[UNKNOWN_SHADE] > greys[UNKNOWN_SHADE - spread - 1].max(greys[UNKNOWN_SHADE + spread + 1]);
+        let unknown = occupancy_of(UNKNOWN_SHADE);
+        let is_free = unknown < self.free_thresh || shades.has_opacity();
+        let is_misread = stands_out && cells > 0 && is_free;
+        let darkest = greys.iter().position(|count| *count > 0).map_or(0.0, occupancy_of);
+        let above = self.free_thresh.max(unknown);
+        let has_grey_walls = darkest <= self.occupied_thresh && darkest > above + LEAST_CONTRAST;
+        let reading = Self {
+            unknown: is_misread.then(|| (grey_of(*range.start()), grey_of(*range.end()))),
+            occupied_thresh: if has_grey_walls { (above + darkest) / 2.0 } else { self.occupied_thresh },
+            ..self
+        };
+        let remark = Remark {
+            unknown: is_misread.then_some((cells, self.free_thresh)),
+            walls: has_grey_walls.then_some((darkest, self.occupied_thresh)),
+        };
+        (reading, (is_misread || has_grey_walls).then_some(remark))
+    }
+
+    /// The cell of a pixel: grey or three colours, the last of an even number being its opacity.
+    pub(super) fn pixel<T: Copy + Into<f64>>(&self, pixel: &[T], white: f64) -> i8 {
+        let mut values = [0.0; 4];
+        values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample.into());
+        let count = pixel.len().min(4);
+        match count % 2 {
+            0 if count > 0 => self.cell(&values[..count - 1], Some(values[count - 1]), white),
+            _ => self.cell(&values[..count], None, white),
+        }
+    }
+
+    /// The cell of a pixel with the given colours and opacity.
+    pub(super) fn cell(&self, colours: &[f64], opacity: Option<f64>, white: f64) -> i8 {
+        let mean_of = |sum: f64, count: usize| (sum / (count.max(1) as f64) / white).min(1.0);
+        let (sum, count) = (colours.iter().sum::<f64>(), colours.len());
+        let grey = mean_of(sum, count);
+        if self.unknown.is_some_and(|(first, last)| (first - 1e-3..=last + 1e-3).contains(&grey)) {
+            return -1;
+        }
+        let shade = match (self.mode, opacity) {
+            // The map server counts opacity as one more channel beside red, green and blue here.
+            (Mode::Trinary, Some(opacity)) if count == 1 => mean_of(3.0 * sum + opacity, 4),
+            (Mode::Trinary, Some(opacity)) => mean_of(sum + opacity, count + 1),
+            _ => grey,
+        };
+        let occupancy = if self.negate { shade } else { 1.0 - shade };
+        match self.mode {
+            Mode::Raw => match (shade * 255.0).round() {
+                value if value <= 100.0 => value as i8,
+                _ => -1,
+            },
+            Mode::Scale if opacity.is_some_and(|opacity| opacity < white) => -1,
+            _ if occupancy > self.occupied_thresh => 100,
+            _ if occupancy < self.free_thresh => 0,
+            Mode::Trinary => -1,
+            Mode::Scale => {
+                let span = self.occupied_thresh - self.free_thresh;
+                let share = if span > 0.0 { (occupancy - self.free_thresh) / span } else { 1.0 };
+                (share * 100.0).round_ties_even() as i8
+            }
+        }
+    }
+}
+
+/// A shade from 0 to 255 as a share of white.
+fn grey_of(shade: usize) -> f64 {
+    shade as f64 / 255.0
+}
+
+fn occupancy_of(shade: usize) -> f64 {
+    1.0 - grey_of(shade)
+}

@@ -1,0 +1,188 @@
+//! How well two maps agree region by region, each of which may slide a little.
+//!
+//! The map of a SLAM is right in every room and bent as a whole, by decimetres over a building. Where walls of one place
+//! are compared, what counts is whether they lie on each other in each room; that a whole room has slid by a few
+//! centimetres counts little.
+
+use super::MapView;
+use super::agreement::value_at;
+use crate::geometry::{Point2, Pose2, is_free, is_known};
+use crate::walls::{WallMap, stride};
+use nalgebra::{Matrix2, Vector2};
+use std::collections::BTreeMap;
+
+/// Walls that cross by more than this are not the same wall: the cosine of 30 degrees.
+const LEAST_NORMAL_AGREEMENT: f64 = 0.866;
+/// Two maps show the same face of a wall if both know free space so far before it, metres, or so many cells of the coarser
+/// one. Wherever the ends of two buildings are laid back to back, wall lies on wall, too.
+const BEFORE_WALL: f64 = 0.2;
+const CELLS_BEFORE_WALL: f64 = 3.0;
+/// Points by which a region is registered at the most.
+const POINTS: usize = 120;
+/// Rounds of the registration of a region, and how far partners lie apart at the most in each, metres.
+const ROUNDS: [f64; 4] = [0.4, 0.3, 0.2, 0.2];
+/// The length of wall that counts as one measurement of where a region lies, metres.
+const CORRELATION_LENGTH: f64 = 0.5;
+/// Standard deviation of such a measurement, metres.
+const DEVIATION: f64 = 0.05;
+
+/// What two maps say of each other in one region.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Region {
+    /// Length of wall of one map that lies on wall of the other that runs alike and is seen from the same side, metres; the
+    /// mean of both ways.
+    pub(super) wall_on_wall: f64,
+    /// Length of wall of one map where the other knows free space, metres; the mean of both ways.
+    pub(super) wall_on_free: f64,
+}
+
+/// How regions are compared.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RegionComparison {
+    /// The side of a region, metres.
+    pub(super) side: f64,
+    /// Standard deviation of how far a region slides along x and along y, metres.
+    pub(super) slide_deviation: f64,
+    /// Walls within this distance agree, metres.
+    pub(super) tolerance: f64,
+    /// At most so many points of the walls of each map are looked at.
+    pub(super) most_points: usize,
+}
+
+impl RegionComparison {
+    /// Compares two maps at an alignment, in squares of frame a; and the middle of the walls of map b that lie on walls of
+    /// map a, frame a.
+    pub(super) fn regions(&self, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> (Vec<Region>, Point2) {
+        let mut parts: BTreeMap<(i32, i32), Part> = BTreeMap::new();
+        let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
+        for index in self.sample(b.walls) {
+            let point = transform_a_b * b.walls.walls.points()[index];
+            if is_known(value_at(&a.grid, &point)) {
+                parts.entry(key(&point)).or_default().of_b.push(index);
+            }
+        }
+        let transform_b_a = transform_a_b.inverse();
+        for index in self.sample(a.walls) {
+            let point = a.walls.walls.points()[index];
+            if is_known(value_at(&b.grid, &(transform_b_a * point))) {
+                parts.entry(key(&point)).or_default().of_a.push(index);
+            }
+        }
+        let mut centre = Centre::default();
+        let regions = parts.values().map(|part| self.compare(part, a, b, transform_a_b, &mut centre)).collect();
+        (regions, centre.middle())
+    }
+
+    /// The numbers of the points of some walls that are looked at.
+    fn sample(&self, walls: &WallMap) -> impl Iterator<Item = usize> {
+        let count = walls.walls.points().len();
+        (0..count).step_by(stride(count, self.most_points))
+    }
+
+    fn compare(
+        &self,
+        part: &Part,
+        a: &MapView<'_>,
+        b: &MapView<'_>,
+        transform_a_b: &Pose2,
+        centre: &mut Centre,
+    ) -> Region {
+        let slide = self.register(&part.of_b, a.walls, b.walls, transform_a_b);
+        let slid = Pose2::from_parts((transform_a_b.translation.vector + slide).into(), transform_a_b.rotation);
+        let mut region = Region::default();
+        self.add(&part.of_b, b, a, &slid, &mut region, |point| centre.add(point));
+        self.add(&part.of_a, a, b, &slid.inverse(), &mut region, |_| ());
+        region
+    }
+
+    /// How far some walls of map b slide to lie on those of map a: registration from point to line, where nothing but the
+    /// translation is open, and no slide is likelier than a small one.
+    fn register(&self, points: &[usize], a: &WallMap, b: &WallMap, transform_a_b: &Pose2) -> Vector2<f64> {
+        let every = stride(b.walls.points().len(), self.most_points);
+        let stride = stride(points.len(), POINTS);
+        let share = (stride as f64 * every as f64 * b.spacing / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
+        let prior = Matrix2::identity() / self.slide_deviation.powi(2);
+        let mut slide = Vector2::zeros();
+        for distance in ROUNDS {
+            let (mut information, mut vector) = (prior, Vector2::zeros());
+            for &index in points.iter().step_by(stride) {
+                let point = transform_a_b * b.walls.points()[index];
+                let Some(partner) = a.walls.nearest(&(point + slide), distance) else { continue };
+                let normal = a.normals[partner.index];
+                let turned = transform_a_b.rotation * b.normals[index];
+                if normal.dot(&turned).abs() < LEAST_NORMAL_AGREEMENT {
+                    continue;
+                }
+                let residual = normal.dot(&(a.walls.points()[partner.index] - point));
+                information += share * normal * normal.transpose();
+                vector += share * residual * normal;
+            }
+            slide = information.try_inverse().map_or(slide, |covariance| covariance * vector);
+        }
+        slide
+    }
+
+    /// Adds what `map` says of some walls of `other`.
+    fn add(
+        &self,
+        points: &[usize],
+        other: &MapView<'_>,
+        map: &MapView<'_>,
+        transform: &Pose2,
+        region: &mut Region,
+        mut on_wall: impl FnMut(&Point2),
+    ) {
+        // Both ways are added up.
+        let count = other.walls.walls.points().len();
+        let length = 0.5 * other.walls.spacing * stride(count, self.most_points) as f64;
+        let coarser = map.grid.geometry.resolution.max(other.grid.geometry.resolution);
+        let ahead = BEFORE_WALL.max(CELLS_BEFORE_WALL * coarser);
+        for &index in points {
+            let own = other.walls.walls.points()[index];
+            let point = transform * own;
+            if let Some(partner) = map.walls.walls.nearest(&point, self.tolerance) {
+                let (normal, of_partner) = (other.walls.normals[index], map.walls.normals[partner.index]);
+                let turned = transform.rotation * normal;
+                // Ends and corners of walls have no direction, and may be those of any.
+                if turned.dot(&of_partner).abs() < LEAST_NORMAL_AGREEMENT {
+                    continue;
+                }
+                let is_seen_from = |side: f64| {
+                    is_free(value_at(&other.grid, &(own + normal * (side * ahead))))
+                        && is_free(value_at(&map.grid, &(point + turned * (side * ahead))))
+                };
+                if is_seen_from(1.0) || is_seen_from(-1.0) {
+                    region.wall_on_wall += length;
+                    on_wall(&point);
+                }
+            } else if is_free(value_at(&map.grid, &point)) {
+                region.wall_on_free += length;
+            }
+        }
+    }
+}
+
+/// Walls in one region, by their numbers.
+#[derive(Default)]
+struct Part {
+    of_a: Vec<usize>,
+    of_b: Vec<usize>,
+}
+
+/// The middle of some points.
+#[derive(Default)]
+struct Centre {
+    sum: Vector2<f64>,
+    count: usize,
+}
+
+impl Centre {
+    fn add(&mut self, point: &Point2) {
+        self.sum += point.coords;
+        self.count += 1;
+    }
+
+    fn middle(&self) -> Point2 {
+        Point2::from(self.sum / self.count.max(1) as f64)
+    }
+}
