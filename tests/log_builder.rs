@@ -131,4 +131,16 @@ impl TestMap {
         }
         map
     }
+
+    /// The room with more walls inside, so that it looks like itself from one side only.
+    pub fn flat() -> Self {
+        let mut map = Self::room();
+        let width = map.info.width as usize;
+        for (rows, columns) in [(60..62, 130..200), (110..160, 120..122), (30..32, 0..40)] {
+            for row in rows {
+                map.cells[row * width..][columns.clone()].fill(100);
+            }
+        }
+        map
+    }
 }

@@ -116,7 +116,7 @@ impl Raster {
             reach += 2.0 * map.cell * (map.width as f64).hypot(map.height as f64);
         }
         // A place that is no number is not within reach.
-        let is_within_reach = bounds.0.is_none_or(|(least, most)| (most - least).max() <= reach);
+        let is_within_reach = bounds.0.is_none_or(|(least, most)| (most - least).iter().all(|side| *side <= reach));
         if !is_within_reach {
             return None;
         }

@@ -70,7 +70,7 @@ fn a_log_without_messages() {
 
 #[test]
 fn a_log_without_tags() {
-    merged(|log| log.map(0.0, "robot1", &TestMap::room()).map(0.0, "robot2", &TestMap::room()))
+    merged(|log| log.map(0.0, "robot1", &TestMap::flat()).map(0.0, "robot2", &TestMap::flat()))
         .assert(0, &["merged 2 of 2", "maps+icp", "no reading of a tag was found"]);
 }
 

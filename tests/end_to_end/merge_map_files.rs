@@ -62,7 +62,7 @@ fn two_rooms() -> TempDir {
 }
 
 fn save_room(path: &Path) {
-    let TestMap { info, cells } = TestMap::room();
+    let TestMap { info, cells } = TestMap::flat();
     map_file::save(path, &GridMap { info, cells }).unwrap();
 }
 

@@ -68,7 +68,7 @@ fn what_stands_in_the_way_of_a_merge_is_told() {
 #[test]
 fn a_log_whose_run_ended_early_says_so() {
     let folder = Folder::new();
-    let path = folder.write("a.mcap", b"");
+    let path = folder.path().join("a.mcap");
     for (outcome, expected) in [
         (Outcome::Incomplete("it was late"), Some("ended early, and the log with it: it was late")),
         (Outcome::Complete, None),

@@ -59,10 +59,14 @@ impl Chunk {
     /// The chunk's records, uncompressed and checked. Those of a chunk that is cut: as far as they go, unchecked.
     pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
         let data = file.get(self.data.clone()).ok_or(ChunkFault::Records)?;
-        if !self.compression.is_empty() && self.size > LARGEST {
-            return Err(ChunkFault::TooMuch { size: self.size });
+        let most = match self.size {
+            // What recorders write before a chunk is whole.
+            0 | u64::MAX if self.cut => LARGEST_UNTOLD,
+            size => size,
+        };
+        if !self.compression.is_empty() && most > LARGEST {
+            return Err(ChunkFault::TooMuch { size: most });
         }
-        let most = if self.size == 0 { LARGEST_UNTOLD } else { self.size };
         let contents = match (self.compression.as_str(), self.cut) {
             ("", _) => Cow::Borrowed(data),
             ("zstd", false) => Cow::Owned(decompress_zstd(data, self.size)?),
@@ -146,7 +150,9 @@ mod tests {
         };
         let length = |chunk: &Chunk| chunk.contents(&data).map(|contents| contents.len() as u64);
         assert_eq!(length(&chunk(1 << 20, true)), Ok(1 << 20));
-        assert_eq!(length(&chunk(0, true)), Ok(LARGEST_UNTOLD));
+        for untold in [0, u64::MAX] {
+            assert_eq!(length(&chunk(untold, true)), Ok(LARGEST_UNTOLD));
+        }
         assert_eq!(length(&chunk(1 << 20, false)), Err(ChunkFault::Decompression));
         for cut in [false, true] {
             assert_eq!(length(&chunk(LARGEST + 1, cut)), Err(ChunkFault::TooMuch { size: LARGEST + 1 }));

@@ -3,6 +3,12 @@
 use super::{FixedText, LogTime};
 use iceoryx2::prelude::ZeroCopySend;
 
+/// The most bytes of a robot's name.
+pub const LONGEST_ROBOT_NAME: usize = 64;
+
+/// The most bytes of a topic's name.
+pub const LONGEST_TOPIC: usize = 128;
+
 /// What a message is, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
@@ -50,9 +56,9 @@ pub struct MessageHeader {
     /// Zero.
     pub reserved: u32,
     /// The robot it is about; empty if none in particular.
-    pub robot: FixedText<64>,
+    pub robot: FixedText<LONGEST_ROBOT_NAME>,
     /// The topic that it has, or will have, in a log.
-    pub topic: FixedText<128>,
+    pub topic: FixedText<LONGEST_TOPIC>,
 }
 
 impl MessageHeader {

@@ -9,7 +9,7 @@ mod time;
 pub(crate) use blank::write_all;
 pub use blank::{Blank, Filled, Write, write_vec};
 pub use channel::Channel;
-pub use header::{MessageFlags, MessageHeader};
+pub use header::{LONGEST_ROBOT_NAME, LONGEST_TOPIC, MessageFlags, MessageHeader};
 pub use text::{FixedText, TextTooLong};
 pub use time::LogTime;
 

@@ -5,7 +5,7 @@ use super::document::{Entry, Item};
 use super::live::{Mode, read_word};
 use super::overrides::Overrides;
 use super::values::{entries, text, unknown_key, wrong_type};
-use crate::message::FixedText;
+use crate::message::{FixedText, LONGEST_ROBOT_NAME};
 use crate::stage::{RobotTopics, TfFrames};
 use std::time::Duration;
 
@@ -191,7 +191,7 @@ fn check_reference(robot: &str, at: &Location, problems: &mut Problems) {
     if robot.is_empty() {
         let problem = empty("the reference robot", at);
         problems.push(problem.help("leave `reference` out to take the first robot by name".to_owned()));
-    } else if let Err(error) = FixedText::<32>::new(robot) {
+    } else if let Err(error) = FixedText::<LONGEST_ROBOT_NAME>::new(robot) {
         problems.push(Diagnostic::new("the name of the reference robot is too long").at(at, error.to_string()));
     } else if robot.contains('/') {
         let label = "a robot's name is one part of a path";

@@ -4,11 +4,8 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item};
 use super::nearest::suggest;
 use super::values::{entries, text};
+use crate::message::{LONGEST_ROBOT_NAME, LONGEST_TOPIC};
 use crate::stage::StageKind;
-
-/// What a message header has room for, in bytes.
-const LONGEST_TOPIC: usize = 128;
-const LONGEST_ROBOT: usize = 32;
 
 /// The topic of an output port, and where it was given.
 #[derive(Debug)]
@@ -78,7 +75,7 @@ fn check_form(topic: &Topic, problems: &mut Problems) {
 
 fn check_length(topic: &Topic, port: &str, problems: &mut Problems) {
     let length = topic.template.replace("{robot}", "").len()
-        + if topic.template.contains("{robot}") { LONGEST_ROBOT } else { 0 };
+        + if topic.template.contains("{robot}") { LONGEST_ROBOT_NAME } else { 0 };
     if length > LONGEST_TOPIC {
         let label = format!("up to {length} bytes with the robot's name, and at most {LONGEST_TOPIC} fit");
         problems.push(Diagnostic::new(format!("the topic of the output `{port}` is too long")).at(&topic.at, label));

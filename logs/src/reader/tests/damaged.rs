@@ -153,7 +153,7 @@ fn what_a_killed_recorder_has_written_is_read() {
         let (seen, damage) = read_all(open(&[copy]).unwrap());
         assert!(seen.len() >= 100);
         assert_eq!(times(&seen), (0..seen.len() as u64).collect::<Vec<_>>());
-        assert!(matches!(damage[..], [Damage::NoEnd { .. }]));
+        assert!(matches!(damage[..], [Damage::NoEnd { .. }]), "{damage:?}");
         assert_eq!(read_all(open(&[path]).unwrap()).0.len(), 200);
     }
 }

@@ -361,7 +361,8 @@ mod tests {
         let mut link = Paced { pace, link: Box::new(Sent(Rc::clone(&sent))), has_stamp: true };
         // Messages of a log are on channels of their own, and those that the source makes are not.
         for channel in [0, 3] {
-            let header = MessageHeader { channel, log_time: LogTime(5), ..Default::default() };
+            let flags = MessageFlags::DATA;
+            let header = MessageHeader { channel, flags, log_time: LogTime(5), ..Default::default() };
             link.send(header, &encode(&reading(5)).unwrap()).unwrap();
         }
         for bytes in sent.borrow().iter() {

@@ -233,7 +233,7 @@ fn a_topic_is_a_path_of_bounded_length() {
         ("/{robot}/a/{robot}", "at most once"),
         ("/{robot}", "and more than that"),
         (&long, "up to 129 bytes"),
-        (&robot, "up to 134 bytes with the robot's name, and at most 128 fit"),
+        (&robot, "up to 166 bytes with the robot's name, and at most 128 fit"),
     ];
     for (topic, says) in cases {
         let line = format!("topics = {{ segments = \"{topic}\" }}\nmin_length");
