@@ -272,8 +272,8 @@ fn a_pipeline_has_stages() {
 fn the_reference_is_the_name_of_a_robot() {
     assert_error(("\"robot1\"", "\"\""), "4:13", "\"\"", &["the reference robot is empty", "leave `reference` out"]);
     assert_error(("\"robot1\"", "\"a/b\""), "4:13", "\"a/b\"", &["one part of a path"]);
-    let long = format!("\"{}\"", "r".repeat(33));
-    assert_error(("\"robot1\"", &long), "4:13", &long, &["at most 32 fit"]);
+    let long = format!("\"{}\"", "r".repeat(65));
+    assert_error(("\"robot1\"", &long), "4:13", &long, &["at most 64 fit"]);
     assert_error(("\"walls\"", "\"\""), "3:8", "\"\"", &["the name of the pipeline is empty"]);
 }
 
