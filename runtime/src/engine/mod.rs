@@ -8,6 +8,8 @@ mod links;
 pub mod processes;
 mod report;
 mod run_folder;
+mod run_lock;
+mod run_prefix;
 mod runner;
 mod single;
 mod stage_thread;

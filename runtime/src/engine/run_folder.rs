@@ -1,30 +1,23 @@
 //! The folder of a run whose shared memory other processes can see, and what is left of runs that were killed.
 //!
 //! A run has a folder of its own below that of its user ([`user_folder`]), called by its prefix. The folder holds
-//! iceoryx2's files, what the processes of the run must know, and a file that every process of the run keeps locked for as
-//! long as it lives. The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has
-//! locked is left over, and so is all that bears its prefix in `/dev/shm`: whoever gets the lock for himself may remove it,
-//! and nobody else. A prefix is random, as machines that share these folders (containers) give the same process numbers.
+//! iceoryx2's files, what the processes of the run must know, and a file that they keep locked ([`run_lock`](super::run_lock)).
+//! A folder that nobody has locked is left over, and so is all that bears its prefix in `/dev/shm`.
 
 use super::links::board_shape;
+use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
+use super::run_prefix::{board_path, is_prefix, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
-use crate::link::Board;
-use crate::link::RunNames;
+use crate::link::{Board, RunNames};
 use crate::pipeline::Pipeline;
-use rustix::rand::{GetRandomFlags, getrandom};
 use std::fs::{self, DirBuilder, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The file that the processes of a run keep locked.
-const LOCK: &str = "lock";
 /// The pipeline of the run.
 const PIPELINE: &str = "pipeline.toml";
-const SHARED_MEMORY: &str = "/dev/shm";
-/// Digits of the random number in a prefix.
-const RANDOM_DIGITS: usize = 16;
 
 /// The folder of a run, kept from being taken for left over while this value lives.
 #[derive(Debug)]
@@ -131,11 +124,6 @@ pub(super) fn open_board(prefix: &str, pipeline: &Pipeline) -> Result<Arc<Board>
     Board::open(&path, &board_shape(pipeline)).map_err(failed("open the board of the run", &path))
 }
 
-/// The board lies in shared memory, and goes with the rest of the run that lies there.
-fn board_path(prefix: &str) -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("{prefix}board"))
-}
-
 /// A run of processes that is going on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunningRun {
@@ -233,72 +221,6 @@ fn run_folders() -> Result<Vec<(PathBuf, String)>, RunFolderError> {
     Ok(folders)
 }
 
-/// A prefix that no other run has: `gw`, the number of the process for those who look at it, and a random number.
-fn new_prefix() -> io::Result<String> {
-    let mut random = [0; RANDOM_DIGITS / 2];
-    // So few bytes come at once, or not at all.
-    getrandom(&mut random, GetRandomFlags::empty())?;
-    Ok(format!("gw{}_{:016x}_", std::process::id(), u64::from_le_bytes(random)))
-}
-
-/// Whether a name has exactly the form of a prefix.
-fn is_prefix(name: &str) -> bool {
-    let parts = name.strip_prefix("gw").and_then(|rest| rest.strip_suffix('_')).and_then(|rest| rest.split_once('_'));
-    let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
-    parts.is_some_and(|(process, random)| {
-        (1..=10).contains(&process.len())
-            && process.bytes().all(|byte| byte.is_ascii_digit())
-            && random.len() == RANDOM_DIGITS
-            && random.bytes().all(is_digit)
-    })
-}
-
-fn lock_options() -> fs::OpenOptions {
-    let mut options = File::options();
-    options.read(true).write(true).mode(OWN_FILE);
-    options
-}
-
-/// Makes the lock of a folder and locks it for the run; none if a program that cleans up was quicker.
-fn lock_for_run(folder: &Path) -> io::Result<Option<File>> {
-    let lock = match lock_options().create_new(true).open(folder.join(LOCK)) {
-        Err(error) if matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::NotFound) => return Ok(None),
-        lock => lock?,
-    };
-    match lock.try_lock_shared() {
-        Err(TryLockError::WouldBlock) => return Ok(None),
-        Err(TryLockError::Error(error)) => return Err(error),
-        Ok(()) => {}
-    }
-    // It may have been removed before it was locked.
-    let is_there =
-        fs::metadata(folder.join(LOCK)).is_ok_and(|there| there.ino() == lock.metadata().map_or(0, |m| m.ino()));
-    Ok(is_there.then_some(lock))
-}
-
-/// What may be done with the folder of a run.
-enum Removal {
-    /// A process of it lives.
-    Alive,
-    /// No process of it lives, and nobody but the owner of this lock removes it.
-    Dead(File),
-    /// It is not there.
-    Gone,
-}
-
-fn lock_for_removal(folder: &Path) -> io::Result<Removal> {
-    // Where there is no lock it is made, so that a run that is just being made sees that it was not quick enough.
-    let lock = match lock_options().create(true).truncate(false).open(folder.join(LOCK)) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Removal::Gone),
-        lock => lock?,
-    };
-    match lock.try_lock() {
-        Ok(()) => Ok(Removal::Dead(lock)),
-        Err(TryLockError::WouldBlock) => Ok(Removal::Alive),
-        Err(TryLockError::Error(error)) => Err(error),
-    }
-}
-
 fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
     for file in shared_memory(prefix) {
         ignore_missing(fs::remove_file(file))?;
@@ -311,17 +233,6 @@ fn ignore_missing(result: io::Result<()>) -> io::Result<()> {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }
-}
-
-/// The files of this user in shared memory that bear a run's prefix.
-fn shared_memory(prefix: &str) -> Vec<PathBuf> {
-    if !is_prefix(prefix) {
-        return Vec::new();
-    }
-    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else { return Vec::new() };
-    let files = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix));
-    let is_own_file = |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && is_own(&file));
-    files.map(|entry| entry.path()).filter(is_own_file).collect()
 }
 
 /// The bytes that a sparse file really takes.
@@ -338,7 +249,7 @@ mod tests {
         let alive = RunFolder::create().unwrap();
         let dead = RunFolder::create().unwrap();
         let (dead_path, dead_prefix) = (dead.path.clone(), dead.prefix.clone());
-        let file = Path::new(SHARED_MEMORY).join(format!("{dead_prefix}segment"));
+        let file = board_path(&dead_prefix);
         fs::write(&file, [1; 5000]).unwrap();
         drop(dead);
         let joined = RunFolder::join(&alive.path).unwrap();
@@ -352,25 +263,6 @@ mod tests {
 
     #[test]
     fn what_is_not_named_as_a_run_is_never_touched() {
-        let made = new_prefix().unwrap();
-        assert!(is_prefix(&made), "{made}");
-        let digits = "0123456789abcdef";
-        let wrong = [
-            String::new(),
-            "o".into(),
-            "new-".into(),
-            "gw".into(),
-            "gw1_0_".into(),
-            format!("gw1_{digits}"),
-            format!("gw1_{digits}0_"),
-            format!("gw_{digits}_"),
-            format!("gwx_{digits}_"),
-            format!("gw1_{}_", digits.to_uppercase()),
-            format!("new-gw1_{digits}_"),
-        ];
-        for name in wrong {
-            assert!(!is_prefix(&name) && shared_memory(&name).is_empty(), "{name}");
-        }
         let parent = user_folder::path();
         user_folder::make(&parent).unwrap();
         let strange = parent.join(format!("o{}", std::process::id()));
@@ -378,11 +270,6 @@ mod tests {
         clean().unwrap();
         assert!(strange.exists());
         fs::remove_dir(strange).unwrap();
-    }
-
-    #[test]
-    fn two_runs_of_one_process_number_have_names_of_their_own() {
-        assert_ne!(new_prefix().unwrap(), new_prefix().unwrap());
     }
 
     #[test]

@@ -8,7 +8,8 @@ use super::LinkError;
 use rustix::fs::statvfs;
 use std::cell::Cell;
 
-const SHARED_MEMORY: &str = "/dev/shm";
+/// Where the files of shared memory lie.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 /// What must be free beyond what is asked for, bytes: for what iceoryx2 writes beside it.
 const SPARE: u64 = 256 << 10;
 /// After it was asked, this share of what was free may be used before it is asked again.

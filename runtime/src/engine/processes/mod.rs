@@ -21,6 +21,7 @@ mod awake;
 mod backoff;
 mod child;
 mod event;
+mod process;
 mod supervisor;
 mod system;
 mod words;

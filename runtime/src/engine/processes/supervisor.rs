@@ -4,8 +4,9 @@ use super::Launch;
 use super::awake::Awake;
 use super::backoff::Backoff;
 use super::event::{Event, listen};
-use super::system::{describe, memory_of_process};
-use super::words::{Said, Told, say};
+use super::process::Process;
+use super::system::describe;
+use super::words::{Said, Told};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{LinkError, RunNames};
@@ -30,33 +31,6 @@ const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// So long may a live run take to handle what is on its way when it is to end.
 const DRAIN_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// A process, as the supervisor knows it.
-struct Process {
-    name: String,
-    child: Child,
-    stdin: Option<ChildStdin>,
-    /// The indexes of its stages.
-    stages: Vec<usize>,
-    /// The stages that have not ended.
-    running: Vec<String>,
-    heard: Instant,
-    ended: bool,
-    /// Whether it is started again when it fails.
-    restarts: bool,
-    backoff: Backoff,
-    /// Why it has failed, if it was able to say so.
-    failure: Option<(String, Failure)>,
-    /// When it is to be started again.
-    start_at: Option<Instant>,
-}
-
-impl Process {
-    /// Whether anything is to be expected of it.
-    fn is_over(&self) -> bool {
-        self.ended && self.start_at.is_none()
-    }
-}
 
 /// A run that has failed.
 struct Stopping {
@@ -279,7 +253,7 @@ impl Supervisor<'_> {
                         process.stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect();
                     process.backoff.start();
                     if self.draining.is_some() {
-                        tell(process, &Told::Drain);
+                        process.tell(&Told::Drain);
                     }
                 }
                 Err(failure) => self.fail(RunError::of_stage(&name, failure)),
@@ -295,7 +269,7 @@ impl Supervisor<'_> {
                 self.processes
                     .iter_mut()
                     .filter(|process| !process.ended)
-                    .for_each(|process| tell(process, &Told::Drain));
+                    .for_each(|process| process.tell(&Told::Drain));
             }
             Some(since) if since.elapsed() > DRAIN_TIMEOUT => self.fail(RunError::of_run(Failure::Interrupted)),
             Some(_) => {}
@@ -328,18 +302,10 @@ impl Supervisor<'_> {
         if self.stopping.is_some() {
             return;
         }
-        let Pipeline { stall_timeout, memory_limit, .. } = *self.pipeline;
-        let trouble = |process: &Process| {
-            if let Some(longest) = stall_timeout.filter(|longest| process.heard.elapsed().min(awake_for) > *longest) {
-                return Some(Failure::Hung { seconds: longest.as_secs_f64() });
-            }
-            let limit = memory_limit?;
-            let taken = memory_of_process(process.child.id()).filter(|taken| *taken > limit)?;
-            Some(Failure::Memory { taken, limit })
-        };
         let living =
             self.processes.iter().enumerate().filter(|(_, process)| !process.ended && process.failure.is_none());
-        let troubled = living.filter_map(|(place, process)| Some((place, trouble(process)?))).next();
+        let troubled =
+            living.filter_map(|(place, process)| Some((place, process.trouble(self.pipeline, awake_for)?))).next();
         if let Some((place, failure)) = troubled {
             let process = &self.processes[place];
             let stage = process.running.first().unwrap_or(&process.name).clone();
@@ -367,7 +333,7 @@ impl Supervisor<'_> {
             stopping.told = true;
             stopping.since = Instant::now();
             let words = Told::Stop { reason: stopping.error.to_string() };
-            self.processes.iter_mut().filter(|process| !process.ended).for_each(|process| tell(process, &words));
+            self.processes.iter_mut().filter(|process| !process.ended).for_each(|process| process.tell(&words));
         }
         if stopping.told && stopping.since.elapsed() > STOP_TIMEOUT {
             for process in self.processes.iter_mut().filter(|process| !process.ended) {
@@ -386,11 +352,6 @@ impl Supervisor<'_> {
         let stages = self.pipeline.stages.iter().map(|stage| reports.remove(&stage.name).unwrap_or_default());
         Ok(RunReport { stages: stages.collect() })
     }
-}
-
-/// Tells a process something. One that cannot be told has died, which is heard in another way.
-fn tell(process: &mut Process, words: &Told) {
-    let _ = process.stdin.as_mut().map(|stdin| say(stdin, words));
 }
 
 /// Removes what killed processes of a run hold in shared memory, so that others can take their place. Should it fail, the
