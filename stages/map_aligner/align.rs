@@ -2,7 +2,7 @@
 
 use super::lead::{OTHERS, lead};
 use super::peaks::{JUDGED, change, is_near, overlay};
-use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, Refusal, covariance, refine_peak};
+use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, SearchRefusal, covariance, refine_peak};
 use crate::geometry::{Grid, Pose2};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ pub fn align_maps(
     a: &NamedMap<'_>,
     b: &NamedMap<'_>,
     parameters: &MapAlignerParameters,
-) -> Result<MapAlignments, Refusal> {
+) -> Result<MapAlignments, SearchRefusal> {
     let least = PreparedMap::least_cell(&a.grid).max(PreparedMap::least_cell(&b.grid));
     let cell = least.max(0.5 * parameters.cell);
     let prepare = |map: &NamedMap<'_>| PreparedMap::new(map.robot, &map.grid, cell, parameters.max_extent);
@@ -86,14 +86,14 @@ pub fn align_prepared(
     a: &PreparedMap,
     b: &PreparedMap,
     parameters: &MapAlignerParameters,
-) -> Result<MapAlignments, Refusal> {
+) -> Result<MapAlignments, SearchRefusal> {
     let peaks = Peaks::find(a, b, parameters);
-    let best = peaks.all().first().ok_or(Refusal::NoFit)?;
+    let best = peaks.all().first().ok_or(SearchRefusal::NoFit)?;
     let hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
-    let best_found = hypotheses.first().ok_or(Refusal::NoFit)?;
+    let best_found = hypotheses.first().ok_or(SearchRefusal::NoFit)?;
     let (length, least) = (best_found.alignment.wall_in_common, parameters.min_wall_length);
     if length < least {
-        return Err(Refusal::TooLittleInCommon { length, least });
+        return Err(SearchRefusal::TooLittleInCommon { length, least });
     }
     let centre = &best_found.common.centre;
     let elsewhere = peaks.best_elsewhere(&best.transform_a_b, centre, parameters);

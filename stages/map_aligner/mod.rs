@@ -48,7 +48,7 @@ pub use peaks::Peaks;
 pub use plan::MergePlan;
 pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
-pub use refusal::Refusal;
+pub use refusal::SearchRefusal;
 pub use search::{Place, search};
 pub use statement::Statement;
 

@@ -3,7 +3,7 @@
 use super::peaks::{JUDGED, is_near, overlay};
 use super::statement::{Statement, with_reasons};
 use super::{
-    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, Raster, Refusal, align_near,
+    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, Raster, SearchRefusal, align_near,
     align_prepared,
 };
 use crate::geometry::{Grid, Pose2};
@@ -40,7 +40,7 @@ pub struct MergePlan {
 }
 
 struct Robot {
-    map: Result<PreparedMap, Refusal>,
+    map: Result<PreparedMap, SearchRefusal>,
     /// Known cells when it was searched last.
     searched_cells: usize,
 }

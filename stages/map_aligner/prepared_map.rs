@@ -1,6 +1,6 @@
 //! A map as the search takes it.
 
-use super::{Raster, Refusal, Walls};
+use super::{Raster, SearchRefusal, Walls};
 use crate::geometry::Grid;
 
 /// Rasters of a map, each in cells twice as wide as the one before.
@@ -29,11 +29,11 @@ impl PreparedMap {
     }
 
     /// The map of `robot`, its finest raster in cells of `cell` metres.
-    pub fn new(robot: &str, grid: &Grid<'_>, cell: f64, max_extent: f64) -> Result<Self, Refusal> {
+    pub fn new(robot: &str, grid: &Grid<'_>, cell: f64, max_extent: f64) -> Result<Self, SearchRefusal> {
         let raster = Raster::new(grid, cell.max(Self::least_cell(grid)), max_extent)
-            .ok_or_else(|| Refusal::TooLarge { robot: robot.to_owned(), most: max_extent })?;
+            .ok_or_else(|| SearchRefusal::TooLarge { robot: robot.to_owned(), most: max_extent })?;
         let map = Self::of_raster(raster);
-        if map.walls.is_empty() { Err(Refusal::NoWalls { robot: robot.to_owned() }) } else { Ok(map) }
+        if map.walls.is_empty() { Err(SearchRefusal::NoWalls { robot: robot.to_owned() }) } else { Ok(map) }
     }
 
     /// A map of which there is a raster.

@@ -2,7 +2,7 @@
 
 /// Why there is no first guess for two maps. The texts are for the people who run the robots.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Refusal {
+pub enum SearchRefusal {
     /// A map without walls.
     #[error("the map of {robot} has no walls")]
     NoWalls {

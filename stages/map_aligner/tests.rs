@@ -1,21 +1,21 @@
 //! Maps of known places, aligned.
 
-use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, Refusal, align_maps};
+use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, SearchRefusal, align_maps};
 use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-fn align_grids(a: Grid<'_>, b: Grid<'_>, parameters: &MapAlignerParameters) -> Result<MapAlignments, Refusal> {
+fn align_grids(a: Grid<'_>, b: Grid<'_>, parameters: &MapAlignerParameters) -> Result<MapAlignments, SearchRefusal> {
     align_maps(&NamedMap { robot: "robot1", grid: a }, &NamedMap { robot: "robot2", grid: b }, parameters)
 }
 
-fn hypotheses(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignments, Refusal> {
+fn hypotheses(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignments, SearchRefusal> {
     align_grids(a.view().grid, b.view().grid, &MapAlignerParameters::default())
 }
 
 /// The best guess.
-fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, Refusal> {
+fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, SearchRefusal> {
     Ok(hypotheses(a, b)?.hypotheses[0].clone())
 }
 
@@ -156,7 +156,7 @@ fn maps_of_other_buildings_and_mirrored_ones_fit_nowhere_better_than_elsewhere()
         let b = other.draw(all(), drawing(12.0, 6.0, -2.1));
         match hypotheses(&a, &b) {
             Ok(found) => assert!(found.runner_up_share > 0.6, "{found:?}"),
-            Err(refusal) => assert!(matches!(refusal, Refusal::TooLittleInCommon { .. }), "{refusal}"),
+            Err(refusal) => assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. }), "{refusal}"),
         }
     }
 }
@@ -169,7 +169,7 @@ fn maps_with_a_corner_in_common_have_too_little() {
     assert!(align(&a, &b).unwrap().lead < 1.0, "a corner fits at many places");
     let parameters = MapAlignerParameters { min_wall_length: 15.0, ..Default::default() };
     let refusal = align_grids(a.view().grid, b.view().grid, &parameters).unwrap_err();
-    assert!(matches!(refusal, Refusal::TooLittleInCommon { .. }), "{refusal}");
+    assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. }), "{refusal}");
     assert!(refusal.to_string().contains("too little in common"));
 }
 
@@ -181,7 +181,7 @@ fn maps_without_walls_or_without_anything_known_are_refused() {
         let empty = Grid::new(geometry, &cells).unwrap();
         for (a, b, robot) in [(empty, office.view().grid, "robot1"), (office.view().grid, empty, "robot2")] {
             let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
-            assert_eq!(refusal, Refusal::NoWalls { robot: robot.into() });
+            assert_eq!(refusal, SearchRefusal::NoWalls { robot: robot.into() });
         }
     }
 }
@@ -195,7 +195,7 @@ fn a_map_of_one_point_is_refused() {
         let point = Grid::new(geometry, &cells).unwrap();
         for (a, b) in [(point, office.view().grid), (office.view().grid, point), (point, point)] {
             let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
-            assert!(matches!(refusal, Refusal::TooLittleInCommon { .. } | Refusal::NoFit), "{refusal}");
+            assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. } | SearchRefusal::NoFit), "{refusal}");
         }
     }
 }
@@ -207,9 +207,9 @@ fn a_map_that_is_too_long_is_refused_and_unknown_cells_do_not_count() {
     let (geometry, mut cells) = filled(1000, 20, UNKNOWN);
     cells[..10].fill(100);
     let aligned = |cells: &[i8]| align_grids(office.view().grid, Grid::new(geometry, cells).unwrap(), &parameters);
-    assert!(matches!(aligned(&cells), Err(Refusal::TooLittleInCommon { .. } | Refusal::NoFit)));
+    assert!(matches!(aligned(&cells), Err(SearchRefusal::TooLittleInCommon { .. } | SearchRefusal::NoFit)));
     cells[999] = 0;
-    assert_eq!(aligned(&cells), Err(Refusal::TooLarge { robot: "robot2".into(), most: 30.0 }));
+    assert_eq!(aligned(&cells), Err(SearchRefusal::TooLarge { robot: "robot2".into(), most: 30.0 }));
 }
 
 #[test]

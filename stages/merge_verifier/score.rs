@@ -12,8 +12,9 @@
 //!   search over all places has come to this one, agreement must clearly be more than half. Tags have not looked at walls,
 //!   and ask for more of them.
 //!
-//! The weights are those of a logistic model that was fitted to pairs of published maps, of recorded logs and of unrelated
-//! buildings, and rounded; see the experiments.
+//! The form is that of a logistic model. Its weights were chosen on pairs of published maps, of recorded logs and of unrelated
+//! buildings, which `tests/experiments/README.md` names; on other maps they have not been judged. What comes out orders
+//! alignments by how sure they are, and is a probability only as far as those pairs stand for others.
 
 /// The logarithm of the odds of an alignment for which nothing speaks.
 const PRIOR: f64 = -5.0;

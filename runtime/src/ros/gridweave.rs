@@ -163,7 +163,8 @@ pub struct Alignment {
     pub yaw: f64,
     /// Covariance of (x, y, yaw), 3 x 3, metres and radians.
     pub covariance: [f64; 9],
-    /// How well the maps agree, 0 to 1.
+    /// How well the maps agree, 0 to 1, as far as the stage that sends it can tell. One that has looked for all other places
+    /// gives the probability that this one does not lead them by chance.
     pub score: f64,
     /// How it was found, step by step, as in `tags+directions+icp`. For people to read.
     pub method: String,
