@@ -138,6 +138,7 @@ fn judge_one<'a>(
         found_too: found_too_by.is_some(),
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
+        overlap: agreement.overlap,
         evidence_elsewhere,
     });
     let score = odds.probability();

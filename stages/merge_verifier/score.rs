@@ -9,8 +9,9 @@
 //!   do not depend on each other counts against it.
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
-//!   search over all places has come to this one, agreement must clearly be more than half. Tags have not looked at walls,
-//!   and ask for more of them.
+//!   search over all places has come to this one, agreement must clearly be more than half, and where the maps share no more
+//!   than a room, nearly all: rooms of other buildings have the same corners and sizes, while a map is right in every room,
+//!   however it is bent as a whole. Tags have not looked at walls, and ask for more of them.
 //!
 //! The form is that of a logistic model. Its weights were chosen on pairs of published maps, of recorded logs and of unrelated
 //! buildings, which `tests/experiments/README.md` names; on other maps they have not been judged. What comes out orders
@@ -37,10 +38,14 @@ const BY_SHARE: f64 = 35.0;
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same where the maps share the area of one room.
+const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
 /// The same for a place that tags tell.
 const AGREEMENT_OF_HALVES_BY_TAGS: f64 = 0.75;
 /// Per unit of that share.
 const BY_AGREEMENT: f64 = 140.0;
+/// So large is a room at the most, and so large is the area that the maps share if it is surely more than a room, square metres.
+const ROOM: (f64, f64) = (40.0, 60.0);
 
 /// What makes places stand out from all others, before the maps are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +85,8 @@ pub struct Grounds {
     pub evidence: f64,
     /// The share of the walls that agree, 0 to 1.
     pub wall_agreement: f64,
+    /// The area that both maps know, square metres.
+    pub overlap: f64,
     /// The most evidence at another place, as a share of that here.
     pub evidence_elsewhere: f64,
 }
@@ -98,12 +105,15 @@ pub struct Odds {
 impl Odds {
     /// Of an alignment.
     pub fn new(grounds: &Grounds) -> Self {
-        let Grounds { origin, found_too, evidence, wall_agreement, evidence_elsewhere } = *grounds;
+        let Grounds { origin, found_too, evidence, wall_agreement, overlap, evidence_elsewhere } = *grounds;
         // Tags, and another source, tell a place from those that are like it.
         let is_told = origin == Origin::Tags || found_too;
         let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
         let halves = match origin {
-            Origin::Search { .. } => AGREEMENT_OF_HALVES,
+            Origin::Search { .. } => {
+                let share_of_room = ((ROOM.1 - overlap) / (ROOM.1 - ROOM.0)).clamp(0.0, 1.0);
+                AGREEMENT_OF_HALVES + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - AGREEMENT_OF_HALVES)
+            }
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
         };
         Self {
@@ -123,8 +133,18 @@ impl Odds {
 mod tests {
     use super::*;
 
+    /// Of maps that fit well in many rooms.
+    const GROUNDS: Grounds = Grounds {
+        origin: Origin::Tags,
+        found_too: false,
+        evidence: 300.0,
+        wall_agreement: 0.9,
+        overlap: 200.0,
+        evidence_elsewhere: 0.0,
+    };
+
     fn probability(evidence: f64, evidence_elsewhere: f64, origin: Origin) -> f64 {
-        let grounds = Grounds { origin, found_too: false, evidence, wall_agreement: 0.9, evidence_elsewhere };
+        let grounds = Grounds { origin, evidence, evidence_elsewhere, ..GROUNDS };
         Odds::new(&grounds).probability()
     }
 
@@ -147,19 +167,35 @@ mod tests {
         assert!(probability(60.0, 1.0, Origin::FewTags) < 0.01);
         assert!(probability(-20.0, 0.0, Origin::Tags) < 0.9);
         let origin = Origin::Search { lead: 4.0 };
-        let grounds = Grounds { origin, found_too: true, evidence: 40.0, wall_agreement: 0.8, evidence_elsewhere: 1.0 };
+        let grounds = Grounds {
+            origin,
+            found_too: true,
+            evidence: 40.0,
+            wall_agreement: 0.8,
+            evidence_elsewhere: 1.0,
+            ..GROUNDS
+        };
         assert!(Odds::new(&grounds).probability() > 0.999);
     }
 
     #[test]
     fn maps_that_contradict_each_other_as_much_as_they_agree_are_not_of_one_place() {
         let with = |wall_agreement: f64, origin: Origin| {
-            let evidence_elsewhere = 0.0;
-            Odds::new(&Grounds { origin, found_too: false, evidence: 300.0, wall_agreement, evidence_elsewhere })
-                .probability()
+            Odds::new(&Grounds { origin, wall_agreement, ..GROUNDS }).probability()
         };
         let searched = Origin::Search { lead: 20.0 };
         assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
+    }
+
+    #[test]
+    fn maps_that_share_one_room_must_agree_in_nearly_all_of_it() {
+        let with = |overlap: f64, wall_agreement: f64| {
+            let origin = Origin::Search { lead: 20.0 };
+            Odds::new(&Grounds { origin, wall_agreement, overlap, ..GROUNDS }).probability()
+        };
+        assert!(with(34.0, 0.89) < 0.5 && with(34.0, 1.0) > 0.999);
+        assert!(with(60.0, 0.89) > 0.999);
+        assert!(with(45.0, 0.7) < with(55.0, 0.7));
     }
 }

@@ -47,10 +47,13 @@ impl RunFolder {
     /// # Errors
     /// The folder of this user cannot be made or is not to be trusted, or there is no room.
     pub fn create() -> Result<Self, RunFolderError> {
-        let parent = user_folder::path();
-        user_folder::make(&parent).map_err(failed("use the folder", &parent))?;
+        Self::create_in(&user_folder::path())
+    }
+
+    fn create_in(parent: &Path) -> Result<Self, RunFolderError> {
+        user_folder::make(parent).map_err(failed("use the folder", parent))?;
         loop {
-            let prefix = new_prefix().map_err(failed("name a run in", &parent))?;
+            let prefix = new_prefix().map_err(failed("name a run in", parent))?;
             let path = parent.join(&prefix);
             DirBuilder::new().mode(OWN_FOLDER).create(&path).map_err(failed("make the folder", &path))?;
             if let Some(lock) = lock_for_run(&path).map_err(failed("lock a file in the folder", &path))? {
@@ -172,7 +175,7 @@ pub fn running_runs() -> Result<Vec<RunningRun>, RunFolderError> {
         let run = RunningRun { prefix, folder };
         (run.pipeline().exists() && run.is_running()).then_some(run)
     };
-    Ok(run_folders()?.into_iter().filter_map(run).collect())
+    Ok(run_folders(&user_folder::path())?.into_iter().filter_map(run).collect())
 }
 
 /// What is left of one run of which no process lives.
@@ -191,8 +194,12 @@ pub struct LeftOver {
 /// # Errors
 /// The folder of this user is not to be trusted, or something cannot be removed.
 pub fn clean() -> Result<Vec<LeftOver>, RunFolderError> {
+    clean_in(&user_folder::path())
+}
+
+fn clean_in(parent: &Path) -> Result<Vec<LeftOver>, RunFolderError> {
     let mut cleaned = Vec::new();
-    for (folder, prefix) in run_folders()? {
+    for (folder, prefix) in run_folders(parent)? {
         let locked = lock_for_removal(&folder).map_err(failed("lock a file in the folder", &folder))?;
         let Removal::Dead(_lock) = locked else { continue };
         let files = shared_memory(&prefix);
@@ -203,14 +210,13 @@ pub fn clean() -> Result<Vec<LeftOver>, RunFolderError> {
     Ok(cleaned)
 }
 
-/// The folders of runs of this user and their prefixes, by name. What is called otherwise than a run is passed over.
-fn run_folders() -> Result<Vec<(PathBuf, String)>, RunFolderError> {
-    let parent = user_folder::path();
-    match user_folder::check(&parent) {
+/// The folders of runs in that of a user and their prefixes, by name. What is called otherwise than a run is passed over.
+fn run_folders(parent: &Path) -> Result<Vec<(PathBuf, String)>, RunFolderError> {
+    match user_folder::check(parent) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-        checked => checked.map_err(failed("use the folder", &parent))?,
+        checked => checked.map_err(failed("use the folder", parent))?,
     }
-    let entries = fs::read_dir(&parent).map_err(failed("look into the folder", &parent))?;
+    let entries = fs::read_dir(parent).map_err(failed("look into the folder", parent))?;
     let folders = entries.flatten().filter_map(|entry| {
         let prefix = entry.file_name().into_string().ok().filter(|name| is_prefix(name))?;
         let metadata = fs::symlink_metadata(entry.path()).ok()?;
@@ -223,14 +229,16 @@ fn run_folders() -> Result<Vec<(PathBuf, String)>, RunFolderError> {
 
 fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
     for file in shared_memory(prefix) {
-        ignore_missing(fs::remove_file(file))?;
+        unless_done_by_another(fs::remove_file(file))?;
     }
-    ignore_missing(fs::remove_dir_all(folder))
+    unless_done_by_another(fs::remove_dir_all(folder))
 }
 
-fn ignore_missing(result: io::Result<()>) -> io::Result<()> {
+/// Two programs may remove the same at once: what is gone is gone, and a folder that is not empty got the lock of the other,
+/// which removes it.
+fn unless_done_by_another(result: io::Result<()>) -> io::Result<()> {
     match result {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+        Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => Err(error),
         _ => Ok(()),
     }
 }
@@ -243,47 +251,62 @@ fn allocated(file: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    // Runs of other tests, and what cleans up after them, have other folders.
+    fn user_folder() -> tempfile::TempDir {
+        tempfile::Builder::new().permissions(fs::Permissions::from_mode(OWN_FOLDER)).tempdir().unwrap()
+    }
 
     #[test]
     fn a_living_run_is_not_touched_and_a_dead_one_is_removed() {
-        let alive = RunFolder::create().unwrap();
-        let dead = RunFolder::create().unwrap();
-        let (dead_path, dead_prefix) = (dead.path.clone(), dead.prefix.clone());
-        let file = board_path(&dead_prefix);
+        let user = user_folder();
+        let alive = RunFolder::create_in(user.path()).unwrap();
+        let dead = RunFolder::create_in(user.path()).unwrap();
+        let (dead_path, file) = (dead.path.clone(), board_path(&dead.prefix));
         fs::write(&file, [1; 5000]).unwrap();
         drop(dead);
         let joined = RunFolder::join(&alive.path).unwrap();
         drop(alive);
-        // Other tests clean at the same time; whoever is first removes it.
-        let cleaned = clean().unwrap();
-        assert!(cleaned.iter().all(|left| left.folder != joined.path));
+        let bytes = allocated(&file).unwrap();
+        assert_eq!(clean_in(user.path()).unwrap(), [LeftOver { folder: dead_path.clone(), files: 1, bytes }]);
         assert!(joined.path.exists() && !dead_path.exists() && !file.exists());
         joined.remove().unwrap();
     }
 
     #[test]
     fn what_is_not_named_as_a_run_is_never_touched() {
-        let parent = user_folder::path();
-        user_folder::make(&parent).unwrap();
-        let strange = parent.join(format!("o{}", std::process::id()));
-        fs::create_dir(&strange).unwrap();
-        clean().unwrap();
-        assert!(strange.exists());
-        fs::remove_dir(strange).unwrap();
+        let user = user_folder();
+        fs::create_dir(user.path().join("o")).unwrap();
+        assert_eq!(clean_in(user.path()).unwrap(), []);
+        assert!(user.path().join("o").exists());
     }
 
     #[test]
     fn a_folder_that_was_never_locked_is_removed_and_a_run_that_comes_too_late_sees_it() {
-        let parent = user_folder::path();
-        user_folder::make(&parent).unwrap();
-        let folder = parent.join(new_prefix().unwrap());
+        let user = user_folder();
+        let folder = user.path().join(new_prefix().unwrap());
         fs::create_dir(&folder).unwrap();
         let Removal::Dead(lock) = lock_for_removal(&folder).unwrap() else { panic!("it is dead") };
         assert!(lock_for_run(&folder).unwrap().is_none());
         drop(lock);
-        clean().unwrap();
+        assert_eq!(clean_in(user.path()).unwrap().len(), 1);
         assert!(!folder.exists());
         assert!(lock_for_run(&folder).unwrap().is_none());
+    }
+
+    #[test]
+    fn many_that_clean_at_once_remove_all_and_none_fails() {
+        let user = user_folder();
+        for _ in 0..100 {
+            drop(RunFolder::create_in(user.path()).unwrap());
+        }
+        std::thread::scope(|scope| {
+            let cleaners: Vec<_> = (0..4).map(|_| scope.spawn(|| clean_in(user.path()).unwrap())).collect();
+            cleaners.into_iter().for_each(|cleaner| drop(cleaner.join().unwrap()));
+        });
+        clean_in(user.path()).unwrap();
+        assert_eq!(fs::read_dir(user.path()).unwrap().count(), 0);
     }
 
     #[test]
