@@ -13,6 +13,7 @@ pub mod line_extractor;
 pub mod map_aligner;
 pub mod map_cleaner;
 pub mod merge_verifier;
+pub mod place_window;
 pub mod quadrant_classifier;
 pub mod robot_maps;
 pub mod robot_pair;

@@ -16,6 +16,7 @@ mod commands;
 pub mod evaluate;
 mod interrupt;
 mod job;
+mod merge_text;
 pub mod shipped;
 mod status;
 pub mod summary;

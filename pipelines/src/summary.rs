@@ -1,9 +1,11 @@
 //! What a run has found, as JSON and as text.
 
+use crate::merge_text::{write_explanation, write_merge};
 use crate::table::Table;
 use anyhow::{Result, bail};
-use gridweave_logs::summary::{Areas, Frame, Summary};
+use gridweave_logs::summary::{Areas, Summary};
 use gridweave_runtime::engine::{RunReport, StageReport};
+use gridweave_runtime::pipeline::suggest;
 use serde::ser::{SerializeMap, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -105,12 +107,28 @@ impl RunSummary {
         Ok(())
     }
 
-    /// The summary for people.
-    pub fn to_text(&self) -> String {
+    /// The summary for people, with the whole of what is known of some robots.
+    pub fn to_text(&self, explained: &[String]) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = self.write_text(&mut text);
+        for (robot, merge) in explained.iter().flat_map(|robot| self.merge.as_ref().map(|merge| (robot, merge))) {
+            let _ = write_explanation(&mut text, merge, robot);
+        }
         text
+    }
+
+    /// An error if there is no robot of one of these names.
+    pub(crate) fn check_robots(&self, names: &[String]) -> Result<()> {
+        let Some(merge) = &self.merge else { return Ok(()) };
+        let known: Vec<&str> = merge.frames.keys().chain(merge.unmerged.keys()).map(String::as_str).collect();
+        match names.iter().find(|name| !known.contains(&name.as_str())) {
+            Some(name) => bail!(
+                "there is no robot `{name}` to explain: {}",
+                suggest(name, &known, "the robots").unwrap_or_default()
+            ),
+            None => Ok(()),
+        }
     }
 
     fn write_text(&self, out: &mut String) -> std::fmt::Result {
@@ -148,36 +166,6 @@ impl RunSummary {
     }
 }
 
-fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result {
-    if let Some(reference) = &merge.reference {
-        let merged = merge.frames.len();
-        match (merged, merged + merge.unmerged.len()) {
-            (_, 1) => writeln!(out, "only {reference} has a map: there is nothing to merge it with")?,
-            (1, all) => writeln!(out, "none of the other {} robots could be merged with {reference}", all - 1)?,
-            (_, all) => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
-        }
-        write!(out, "{}", frames_table(&merge.frames))?;
-    }
-    for (robot, reason) in &merge.unmerged {
-        writeln!(out, "not merged: {robot}: {reason}")?;
-    }
-    for group in &merge.groups {
-        let (count, reference) = (group.frames.len(), &group.reference);
-        writeln!(out, "{count} of these are tied to each other; map frames in the frame of {reference}:")?;
-        write!(out, "{}", frames_table(&group.frames))?;
-    }
-    if merge.alignments.is_empty() {
-        return Ok(());
-    }
-    let mut table = Table::new(["pair", "accepted", "score", "method", "reason"]);
-    for pair in &merge.alignments {
-        let accepted = if pair.accepted { "yes" } else { "no" };
-        let names = format!("{} {}", pair.a, pair.b);
-        table.row([names, accepted.into(), format!("{:.3}", pair.score), pair.method.clone(), pair.reason.clone()]);
-    }
-    write!(out, "\n{table}")
-}
-
 /// How much of a fused map is known, and how much of it is in conflict.
 fn write_areas(out: &mut String, stage: &str, area: &Areas) -> std::fmt::Result {
     let Areas { known_to_one_m2, known_to_several_m2, in_conflict_m2, conflict_share } = *area;
@@ -187,40 +175,4 @@ fn write_areas(out: &mut String, stage: &str, area: &Areas) -> std::fmt::Result 
         write!(out, ", which contradict each other on {in_conflict_m2:.1} m2 of it ({percent:.1} %)")?;
     }
     writeln!(out)
-}
-
-/// Poses of map frames with their standard deviations.
-fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
-    let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
-    for (robot, Frame { x, y, yaw, covariance }) in frames {
-        let variance = |place: usize| covariance[place].max(0.0);
-        let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
-        let numbers = [*x, *y, yaw.to_degrees(), std_position, std_yaw];
-        table.row(std::iter::once(robot.clone()).chain(numbers.map(|number| format!("{number:.3}"))));
-    }
-    table
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn robots_tied_to_each_other_only_are_shown_in_their_own_frame() {
-        let frame = |x: f64| json!({"x": x, "y": 0.0, "yaw": 0.5, "covariance": vec![0.01; 9]});
-        let merge = json!({
-            "reference": "robot1",
-            "frames": {"robot1": frame(0.0)},
-            "unmerged": {"robot2": "it is tied to robot3 only", "robot3": "it is tied to robot2 only"},
-            "groups": [{"reference": "robot2", "frames": {"robot2": frame(0.0), "robot3": frame(4.25)}}],
-        });
-        let merge = serde_json::from_value(merge).unwrap();
-        let text = RunSummary::new(Some(merge), &RunReport::default()).to_text();
-        let lines: Vec<&str> = text.lines().collect();
-        let start = lines.iter().position(|line| line.starts_with("2 of these")).unwrap();
-        assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
-        assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
-        assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
-    }
 }

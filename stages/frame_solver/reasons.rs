@@ -106,7 +106,9 @@ impl<'a> UnusedAlignments<'a> {
             .map(|refusal| refusal.other.to_owned())
             .collect();
         let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
-        Some(format!("no alignment with {}: {reason}", list(&same)))
+        // A reason of several lines begins on a line of its own.
+        let gap = if reason.contains('\n') { "\n" } else { " " };
+        Some(format!("no alignment with {}:{gap}{reason}", list(&same)))
     }
 }
 

@@ -190,7 +190,11 @@ impl Refined {
             covariance: row_by_row(&registration.covariance),
             method: format!("{}+icp", first_guess.method),
             accepted: refusal.is_none(),
-            reason: format!("{}; {}", first_guess.reason, self.refinement.reason()),
+            reason: match refusal {
+                None => format!("{}; {}", first_guess.reason, self.refinement.reason()),
+                // What is in the way comes first, and behind an empty line what it was about.
+                Some(_) => format!("{}\n\n{}", self.refinement.reason(), first_guess.reason),
+            },
             ..first_guess.clone()
         };
         alignment.set_transform_a_b(&registration.transform_a_b);

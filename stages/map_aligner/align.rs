@@ -4,6 +4,7 @@ use super::lead::{OTHERS, lead};
 use super::peaks::{JUDGED, change, is_near, overlay};
 use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, SearchRefusal, covariance, refine_peak};
 use crate::geometry::{Grid, Pose2};
+use crate::place_window::PlaceWindow;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
@@ -78,19 +79,21 @@ pub fn align_maps(
     let cell = least.max(0.5 * parameters.cell);
     let prepare = |map: &NamedMap<'_>| PreparedMap::new(map.robot, &map.grid, cell, parameters.max_extent);
     let (a, b) = rayon::join(|| prepare(a), || prepare(b));
-    align_prepared(&a?, &b?, parameters)
+    align_prepared(&a?, &b?, None, parameters)
 }
 
-/// Finds how map b may lie on map a, of two maps in cells of the same size.
+/// Finds how map b may lie on map a, of two maps in cells of the same size, anywhere or in a window.
 pub fn align_prepared(
     a: &PreparedMap,
     b: &PreparedMap,
+    window: Option<&PlaceWindow>,
     parameters: &MapAlignerParameters,
 ) -> Result<MapAlignments, SearchRefusal> {
-    let peaks = Peaks::find(a, b, parameters);
-    let best = peaks.all().first().ok_or(SearchRefusal::NoFit)?;
+    let peaks = Peaks::find(a, b, window, parameters);
+    let no_fit = || if window.is_some() { SearchRefusal::NoFitInWindow } else { SearchRefusal::NoFit };
+    let best = peaks.all().first().ok_or_else(no_fit)?;
     let hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
-    let best_found = hypotheses.first().ok_or(SearchRefusal::NoFit)?;
+    let best_found = hypotheses.first().ok_or_else(no_fit)?;
     let (length, least) = (best_found.alignment.wall_in_common, parameters.min_wall_length);
     if length < least {
         return Err(SearchRefusal::TooLittleInCommon { length, least });

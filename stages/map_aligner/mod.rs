@@ -62,8 +62,8 @@ pub fn kind() -> StageKind {
         "Finds how the maps of each pair of robots may lie to each other from the maps alone: every rotation and every \
          translation is tried, and the places are taken at which walls lie on walls and not on free space of the other \
          map. It sends the best few, ranked and marked as provisional: icp_refiner makes them exact, and merge_verifier \
-         decides between them.",
-        |parameters: MapAlignerParameters, _| Ok(MapAligner::new(parameters)),
+         decides between them. Where initial poses are given, only places near them are tried.",
+        |parameters: MapAlignerParameters, context| Ok(MapAligner::new(parameters, context.initial_poses.clone())),
     )
     .input("map", "The robots' maps.", MapAligner::receive_map)
     .finish(MapAligner::finish)

@@ -5,6 +5,7 @@ use super::overlay::Overlay;
 use super::search::{Place, search};
 use super::{MapAlignerParameters, PreparedMap};
 use crate::geometry::{Point2, Pose2, turn_difference};
+use crate::place_window::PlaceWindow;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -28,15 +29,20 @@ pub struct Peaks {
 }
 
 impl Peaks {
-    /// Searches for all places of map b on map a.
-    pub fn find(a: &PreparedMap, b: &PreparedMap, parameters: &MapAlignerParameters) -> Self {
+    /// Searches for all places of map b on map a, or all in a window.
+    pub fn find(
+        a: &PreparedMap,
+        b: &PreparedMap,
+        window: Option<&PlaceWindow>,
+        parameters: &MapAlignerParameters,
+    ) -> Self {
         // The search itself takes cells twice as wide as those of its level.
         let level = a.level_of_size(2 * MOST_CELLS).max(b.level_of_size(2 * MOST_CELLS)).max(JUDGED);
         let penalty = parameters.free_space_penalty;
         let step = 2.0 * parameters.rotation_step;
         let half_turns = (PI / step - 1e-9).ceil() as usize;
         let (coarse_a, coarse_b) = (a.level(level), b.level(level));
-        let places = search(coarse_a, coarse_b, half_turns, penalty, parameters.apart, PLACES);
+        let places = search(coarse_a, coarse_b, window, half_turns, penalty, parameters.apart, PLACES);
         let candidates = apart_from_better(&overlay(a, b, level, penalty), &places, parameters.apart, 2.0 * step);
         let ways = candidates.par_iter().map(|(start, centre)| {
             let mut place = *start;
@@ -52,9 +58,11 @@ impl Peaks {
             (judged(*start), judged(place))
         });
         let (starts, mut peaks): (Vec<Place>, Vec<Place>) = ways.collect::<Vec<_>>().into_iter().unzip();
-        peaks.retain(|place| place.score > 0.0);
+        let is_possible = |place: &Place| window.is_none_or(|window| window.contains(&place.transform_a_b, 0.0, 0.0));
+        peaks.retain(|place| place.score > 0.0 && is_possible(place));
         peaks.sort_by(Place::best_first);
         let mut visited = [starts, peaks.clone()].concat();
+        visited.retain(is_possible);
         visited.sort_by(Place::best_first);
         Self { visited, peaks }
     }

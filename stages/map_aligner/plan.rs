@@ -7,7 +7,9 @@ use super::{
     align_prepared,
 };
 use crate::geometry::{Grid, Pose2};
+use crate::place_window::PlaceWindow;
 use crate::robot_pair::RobotPair;
+use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// As many groups, the largest first, are tried for a robot when its map comes; the others at the end.
@@ -23,6 +25,8 @@ const KEPT_SCORE: f64 = 0.9;
 /// search, however many robots there are.
 pub struct MergePlan {
     parameters: MapAlignerParameters,
+    /// Where the user knows maps to lie.
+    initial_poses: InitialPoses,
     /// The side of the narrowest cells, metres.
     cell: f64,
     robots: BTreeMap<String, Robot>,
@@ -62,8 +66,9 @@ impl Group {
 
 impl MergePlan {
     /// Without any robots.
-    pub fn new(parameters: MapAlignerParameters) -> Self {
+    pub fn new(parameters: MapAlignerParameters, initial_poses: InitialPoses) -> Self {
         Self {
+            initial_poses,
             cell: 0.5 * parameters.cell,
             parameters,
             robots: BTreeMap::new(),
@@ -151,7 +156,8 @@ impl MergePlan {
         let (first, second) =
             if is_before(&self.groups[one], &self.groups[other]) { (one, other) } else { (other, one) };
         let (group_a, group_b) = (&self.groups[first], &self.groups[second]);
-        let found = align_prepared(self.map_of(group_a)?, self.map_of(group_b)?, &self.parameters);
+        let window = self.window(group_a, group_b);
+        let found = align_prepared(self.map_of(group_a)?, self.map_of(group_b)?, window.as_ref(), &self.parameters);
         let pair = RobotPair::by_name(group_a.name(), group_b.name());
         let (count_a, count_b) = (group_a.members.len(), group_b.members.len());
         self.searches += 1;
@@ -193,6 +199,17 @@ impl MergePlan {
         None
     }
 
+    /// Where one group can lie on another, by the first robots of both of which it is known.
+    fn window(&self, group_a: &Group, group_b: &Group) -> Option<PlaceWindow> {
+        let known = |group: &Group| {
+            let mut poses =
+                group.members.iter().filter_map(|(robot, place)| Some((*self.initial_poses.get(robot)?, *place)));
+            poses.next()
+        };
+        let ((a, place_a), (b, place_b)) = (known(group_a)?, known(group_b)?);
+        Some(PlaceWindow::between(&a, &b).of_wholes(place_a, place_b))
+    }
+
     /// Whether about as large a share of the walls agrees at another guess: then the place is not clear, however much
     /// more wall there is at the best. What there is depends on what the robots happen to have seen.
     fn has_alike(&self, found: &MapAlignments) -> bool {
@@ -214,7 +231,8 @@ impl MergePlan {
 
     /// The guesses for a pair of robots by a search of their own.
     fn searched(&mut self, PairInCommon { pair, .. }: &PairInCommon) -> Option<Statement> {
-        let found = align_prepared(self.map(&pair.a)?, self.map(&pair.b)?, &self.parameters);
+        let window = PlaceWindow::of(pair, &self.initial_poses);
+        let found = align_prepared(self.map(&pair.a)?, self.map(&pair.b)?, window.as_ref(), &self.parameters);
         self.searches += 1;
         let found = found.map(|found| with_reasons(&found)).map_err(|refusal| refusal.to_string());
         Some(Statement::of(pair.clone(), found))

@@ -16,7 +16,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let plan = MergePlan::new(MapAlignerParameters::default());
+        let plan = MergePlan::new(MapAlignerParameters::default(), InitialPoses::new());
         Self { plan, told: Vec::new(), maps: BTreeMap::new() }
     }
 

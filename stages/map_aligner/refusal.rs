@@ -18,12 +18,21 @@ pub enum SearchRefusal {
         most: f64,
     },
     /// No place speaks for itself.
-    #[error("the maps fit nowhere: wherever walls lie on walls, as many lie on free space of the other map")]
+    #[error(
+        "the maps fit nowhere\ntry: drive one robot on where the other was, or one tag seen by both\n\nwherever walls lie on walls, \
+         as many lie on free space of the other map"
+    )]
     NoFit,
+    /// No place speaks for itself of those that are possible.
+    #[error(
+        "the maps fit nowhere near the initial poses\ntry: are the poses right? --initial ROBOT=X,Y,YAW,STDDEV widens them\n\n\
+         wherever walls lie on walls there, as many lie on free space of the other map"
+    )]
+    NoFitInWindow,
     /// Too little in common.
     #[error(
-        "the maps have too little in common: at the best place they agree on {length:.0} m of wall, and at least \
-         {least:.0} m are needed"
+        "the maps have too little in common: {length:.0} m of wall agree at the best place\nmissing: {least:.0} m of wall \
+         (min_wall_length)\ntry: drive one robot on where the other was, or one tag seen by both"
     )]
     TooLittleInCommon {
         /// Metres of wall on which the maps agree.

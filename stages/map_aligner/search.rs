@@ -3,6 +3,7 @@
 use super::correlation::{Correlator, ScoredShift, Workspace};
 use super::raster::Raster;
 use crate::geometry::{Pose2, pose};
+use crate::place_window::PlaceWindow;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -29,20 +30,35 @@ impl Place {
 
 /// Tries every place of map `b` on map `a`, to a cell of twice the width of those of the rasters, at twice `half_turns`
 /// rotations that are evenly spread over a full turn. Gives the best `most` of the places that are the best at
-/// their rotation within some square of `spacing` metres, the best first.
-pub fn search(a: &Raster, b: &Raster, half_turns: usize, penalty: f64, spacing: f64, most: usize) -> Vec<Place> {
-    let angles: Vec<f64> = (0..half_turns).map(|number| PI * number as f64 / half_turns as f64).collect();
+/// their rotation within some square of `spacing` metres, the best first. Where there is a `window`, every place in it is
+/// taken, and none outside.
+pub fn search(
+    a: &Raster,
+    b: &Raster,
+    window: Option<&PlaceWindow>,
+    half_turns: usize,
+    penalty: f64,
+    spacing: f64,
+    most: usize,
+) -> Vec<Place> {
+    let step = PI / half_turns as f64;
+    let may_turn = |angle: f64| window.is_none_or(|window| window.contains_yaw(angle, step));
+    let angles = (0..half_turns).map(|number| step * number as f64);
+    let angles: Vec<f64> = angles.filter(|angle| may_turn(*angle) || may_turn(angle + PI)).collect();
+    let (spacing, most_at_one) = if window.is_some() { (0.0, usize::MAX) } else { (spacing, MOST_AT_ONE) };
+    let margin = 2.0 * a.cell;
+    let may_lie = |place: &Place| window.is_none_or(|window| window.contains(&place.transform_a_b, margin, step));
     let size_b = angles.iter().fold(Vector2::zeros(), |most, angle| b.box_turned(*angle).1.sup(&most));
     let correlator = Correlator::new(a, size_b, penalty);
     let places_at = |workspace: &mut Workspace, angle: &f64| {
         correlator.correlate(b, *angle, workspace);
         let both = [(false, *angle), (true, angle + PI)].map(|(opposite, angle)| {
-            let shifts = correlator.best_of_blocks(workspace, opposite, spacing, MOST_AT_ONE).into_iter();
+            let shifts = correlator.best_of_blocks(workspace, opposite, spacing, most_at_one).into_iter();
             let place = |ScoredShift { translation, score }: ScoredShift| Place {
                 transform_a_b: pose(translation.x, translation.y, angle),
                 score,
             };
-            shifts.map(place).collect::<Vec<_>>()
+            shifts.map(place).filter(may_lie).collect::<Vec<_>>()
         });
         both.concat()
     };

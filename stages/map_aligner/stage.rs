@@ -4,7 +4,7 @@ use super::{MapAlignerParameters, MergePlan, Statement};
 use crate::geometry::row_by_row;
 use crate::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
-use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
+use gridweave_runtime::stage::{InitialPoses, Out, Output, OutputPorts, Outputs, Received, StageError};
 
 /// What the stage sends.
 pub(super) struct Guesses {
@@ -28,8 +28,9 @@ pub(super) struct MapAligner {
 }
 
 impl MapAligner {
-    pub(super) fn new(parameters: MapAlignerParameters) -> Self {
-        Self { provisional: parameters.provisional, maps: RobotMaps::default(), plan: MergePlan::new(parameters) }
+    pub(super) fn new(parameters: MapAlignerParameters, initial_poses: InitialPoses) -> Self {
+        let provisional = parameters.provisional;
+        Self { provisional, maps: RobotMaps::default(), plan: MergePlan::new(parameters, initial_poses) }
     }
 
     pub(super) fn receive_map(

@@ -1,9 +1,11 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::refusal::{Hypotheses, Hypothesis};
+use super::verdict::{Candidate, Verdict};
 use super::{
     Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
 };
+use crate::place_window::PlaceWindow;
 use gridweave_runtime::ros::Alignment;
 
 /// Evidence that a rival's is a share of is at least this: below, either is as good as none.
@@ -11,80 +13,61 @@ const LEAST_EVIDENCE: f64 = 1.0;
 /// Another place is like one if the share of the walls that agree is less by this at the most.
 const LIKENESS_MARGIN: f64 = 0.15;
 
-/// A hypothesis, and what the maps say of each other there.
-#[derive(Clone, Copy, Debug)]
-pub struct Candidate<'a> {
-    /// The hypothesis.
-    pub alignment: &'a Alignment,
-    /// What the maps say.
-    pub agreement: Agreement,
-}
-
-/// The judgement on all hypotheses for a pair.
-#[derive(Clone, Debug)]
-pub struct Verdict<'a> {
-    /// The hypothesis that is right, or came nearest to it.
-    pub candidate: Candidate<'a>,
-    /// Why it is not accepted; none if it is.
-    pub refusal: Option<Refusal>,
-    /// The best place elsewhere, if there is one.
-    pub rival: Option<Rival>,
-    /// The most evidence for another place, as a share of that for this one.
-    pub evidence_elsewhere: f64,
-    /// The probability that it is right, 0 to 1, see [`Odds`].
-    pub score: f64,
-    /// Another source that has found the same place.
-    pub found_too_by: Option<&'a str>,
-}
-
-impl Verdict<'_> {
-    /// What speaks for it, or against it, in plain words.
-    pub fn reason(&self) -> String {
-        let Agreement { wall_on_wall, wall_on_free, overlap, .. } = self.candidate.agreement;
-        let found = &self.candidate.alignment.reason;
-        if let Some(refusal) = &self.refusal {
-            return match refusal {
-                Refusal::Before(reason) => reason.clone(),
-                refusal => format!("{found}; the maps do not confirm it: {refusal}"),
-            };
-        }
-        let too = self.found_too_by.map_or_else(String::new, |source| format!(", found by the {source}, too"));
-        let elsewhere = self.rival.map_or_else(String::new, |Rival { agreement, .. }| {
-            let share = 100.0 * agreement.wall_agreement();
-            format!("; at the best of other places {share:.0} % of {:.0} m agree", agreement.wall_seen())
-        });
-        format!(
-            "{found}{too}; the maps confirm it: {wall_on_wall:.0} m of wall agree and {wall_on_free:.0} m lie on free space, in \
-             {overlap:.0} m2 that both maps know{elsewhere}"
-        )
-    }
+/// What the user knows of a pair of robots.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UserKnowledge {
+    /// Where the maps can lie to each other; none if it is not known.
+    pub window: Option<PlaceWindow>,
+    /// The number of the hypothesis that is right, from 1, as they are listed in the reason of a refusal.
+    pub hypothesis: Option<usize>,
 }
 
 /// Judges the hypotheses of all sources for one pair. `None` if none of them has a place.
 ///
 /// The first whose probability is as high as is asked for is accepted: those that rest on enough tags come first, and then
-/// the others, by their evidence. If there is none, the most probable is the answer, refused.
+/// the others, by their evidence. If there is none, the most probable is the answer, refused. Where the user knows where the
+/// maps can lie to each other, only what lies there takes part; and where he has chosen a hypothesis, it is accepted.
 pub fn judge<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
     hypotheses: &[&'a Alignment],
+    known: &UserKnowledge,
     parameters: &MergeVerifierParameters,
 ) -> Option<Verdict<'a>> {
-    let mut candidates: Vec<Candidate<'a>> = hypotheses
+    let mut all: Vec<Candidate<'a>> = hypotheses
         .iter()
         .filter(|alignment| has_place(alignment))
         .map(|alignment| Candidate { alignment, agreement: compare(a, b, &alignment.transform_a_b(), parameters) })
         .collect();
     // The sort is stable, so that equals stay in the order of their sources and ranks.
     let is_provisional = |candidate: &Candidate<'_>| candidate.alignment.provisional;
-    candidates.sort_by(|one, other| {
+    all.sort_by(|one, other| {
         is_provisional(one)
             .cmp(&is_provisional(other))
             .then(other.agreement.evidence.total_cmp(&one.agreement.evidence))
     });
+    if let Some(window) = &known.window {
+        let is_possible = |candidate: &Candidate<'_>| window.contains(&candidate.alignment.transform_a_b(), 0.0, 0.0);
+        if !all.iter().any(is_possible) {
+            return all.first().map(|candidate| unexpected(candidate, window));
+        }
+        all.retain(is_possible);
+    }
+    let judge_one = |candidate: &Candidate<'a>| judge_one(a, b, candidate, &all, known.window.is_some(), parameters);
+    if let Some(asked) = known.hypothesis {
+        let count = all.len();
+        let chosen = asked.checked_sub(1).and_then(|index| all.get(index));
+        return match chosen {
+            Some(chosen) => Some(Verdict { refusal: None, chosen: Some((asked, count)), ..judge_one(chosen) }),
+            None => {
+                let refusal = Some(Refusal::NoSuchHypothesis { asked, count });
+                all.first().map(|first| Verdict { refusal, ..judge_one(first) })
+            }
+        };
+    }
     let mut best: Option<Verdict<'a>> = None;
-    for candidate in &candidates {
-        let verdict = judge_one(a, b, candidate, &candidates, parameters);
+    for candidate in &all {
+        let verdict = judge_one(candidate);
         if verdict.refusal.is_none() {
             return Some(verdict);
         }
@@ -93,6 +76,25 @@ pub fn judge<'a>(
         }
     }
     best
+}
+
+/// The judgement on a place at which the maps cannot lie by what the user knows.
+fn unexpected<'a>(candidate: &Candidate<'a>, window: &PlaceWindow) -> Verdict<'a> {
+    let (shift, turn) = window.change(&candidate.alignment.transform_a_b());
+    let refusal = match candidate.alignment.accepted {
+        true => Refusal::Unexpected { shift, turn: turn.to_degrees() },
+        false => Refusal::Before(candidate.alignment.reason.clone()),
+    };
+    Verdict {
+        candidate: *candidate,
+        refusal: Some(refusal),
+        rival: None,
+        evidence_elsewhere: 0.0,
+        score: 0.0,
+        found_too_by: None,
+        chosen: None,
+        hypotheses: Hypotheses::default(),
+    }
 }
 
 /// Whether an alignment says where map b lies, in numbers.
@@ -105,6 +107,7 @@ fn judge_one<'a>(
     b: &MapView<'_>,
     candidate: &Candidate<'a>,
     all: &[Candidate<'a>],
+    is_expected: bool,
     parameters: &MergeVerifierParameters,
 ) -> Verdict<'a> {
     let Candidate { alignment, agreement } = candidate;
@@ -120,7 +123,7 @@ fn judge_one<'a>(
     let by_evidence = |one: &Rival, other: &Rival| one.agreement.evidence.total_cmp(&other.agreement.evidence);
     let another = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
     let another = another.max_by(|(_, one), (_, other)| by_evidence(one, other));
-    let is_told = !alignment.provisional || found_too_by.is_some();
+    let is_told = !alignment.provisional || found_too_by.is_some() || is_expected;
     let mut rival = another.map(|(_, rival)| rival);
     // A stage that has looked for others has sent the best of them.
     if alignment.accepted && !is_told && alignment.hypotheses == 0 {
@@ -136,6 +139,7 @@ fn judge_one<'a>(
     let odds = Odds::new(&Grounds {
         origin,
         found_too: found_too_by.is_some(),
+        is_expected,
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
         overlap: agreement.overlap,
@@ -145,7 +149,13 @@ fn judge_one<'a>(
     let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {
         _ if !alignment.accepted => Some(Refusal::Before(alignment.reason.clone())),
         _ if score >= parameters.accept => None,
-        Some(rival) => Some(likeness(candidate, &rival, another.filter(|_| is_told), evidence_elsewhere, all)),
+        Some(rival) => Some(likeness(
+            candidate,
+            &rival,
+            another.filter(|_| !alignment.provisional || found_too_by.is_some()),
+            evidence_elsewhere,
+            all,
+        )),
         None if odds.part < odds.chance => Some(Refusal::Contradiction {
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,
@@ -158,7 +168,8 @@ fn judge_one<'a>(
             accept: parameters.accept,
         }),
     };
-    Verdict { candidate: *candidate, refusal, rival, evidence_elsewhere, score, found_too_by }
+    let hypotheses = listed(all);
+    Verdict { candidate: *candidate, refusal, rival, evidence_elsewhere, score, found_too_by, chosen: None, hypotheses }
 }
 
 /// What makes an alignment stand out before the maps are compared. A stage that has looked for all other places says by its
@@ -188,11 +199,15 @@ fn likeness(
             rival: other.agreement.wall_on_wall,
             here: candidate.agreement.wall_on_wall,
         },
-        None => Refusal::Ambiguous { shift, turn, share, hypotheses: Hypotheses(all.iter().map(hypothesis).collect()) },
+        None => Refusal::Ambiguous { shift, turn, share, hypotheses: listed(all) },
     }
 }
 
-fn hypothesis(candidate: &Candidate<'_>) -> Hypothesis {
-    let Alignment { x, y, yaw, .. } = *candidate.alignment;
-    Hypothesis { x, y, yaw: yaw.to_degrees(), wall_on_wall: candidate.agreement.wall_on_wall }
+fn listed(all: &[Candidate<'_>]) -> Hypotheses {
+    let hypothesis = |candidate: &Candidate<'_>| {
+        let Alignment { x, y, yaw, .. } = *candidate.alignment;
+        let Agreement { wall_on_wall, wall_on_free, .. } = candidate.agreement;
+        Hypothesis { x, y, yaw: yaw.to_degrees(), wall_on_wall, wall_on_free }
+    };
+    Hypotheses(all.iter().map(hypothesis).collect())
 }

@@ -10,12 +10,14 @@
 
 mod agreement;
 mod judge;
+mod knowledge;
 mod parameters;
 mod refusal;
 mod regions;
 mod rivals;
 mod score;
 mod stage;
+mod verdict;
 
 #[cfg(test)]
 mod stage_tests;
@@ -23,11 +25,12 @@ mod stage_tests;
 mod tests;
 
 pub use agreement::{Agreement, MapView, compare, compare_sampled};
-pub use judge::{Candidate, Verdict, judge};
+pub use judge::{UserKnowledge, judge};
 pub use parameters::MergeVerifierParameters;
 pub use refusal::{Hypotheses, Hypothesis, Refusal};
 pub use rivals::{Rival, best_rival_nearby};
 pub use score::{Grounds, Odds, Origin};
+pub use verdict::{Candidate, Verdict};
 
 use gridweave_runtime::stage::StageKind;
 use stage::MergeVerifier;
@@ -39,7 +42,7 @@ pub fn kind() -> StageKind {
         "Judges all alignments that were proposed for each pair of robots, from tags and from maps, against each other and \
          by the maps: how probable is it that walls lie on walls, and not on free space, for another reason than that it \
          is the place? It accepts one or none, from a probability on, and says why.",
-        |parameters: MergeVerifierParameters, _| Ok(MergeVerifier::new(parameters)),
+        |parameters: MergeVerifierParameters, context| Ok(MergeVerifier::new(parameters, context)),
     )
     .input("map", "The robots' maps.", MergeVerifier::receive_map)
     .inputs(

@@ -3,6 +3,7 @@
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// Parameters of the merge verifier. What takes them expects values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -20,11 +21,21 @@ pub struct MergeVerifierParameters {
     /// Where a provisional alignment comes from a stage that has not looked for others itself, map b is also laid
     /// elsewhere: turned by quarter turns, and moved by up to this many metres. 0 only turns it.
     pub rival_reach: f64,
+    /// Which of the hypotheses that a refusal has listed is right, by somebody who has looked: by robot, which means its
+    /// pair with the reference or with the only other robot, or by pair as ROBOT/ROBOT. From 1; 0 is the initial pose itself.
+    pub hypotheses: BTreeMap<String, usize>,
 }
 
 impl Default for MergeVerifierParameters {
     fn default() -> Self {
-        Self { accept: 0.999, wall_tolerance: 0.1, region: 3.0, slide_deviation: 0.12, rival_reach: 4.0 }
+        Self {
+            accept: 0.999,
+            wall_tolerance: 0.1,
+            region: 3.0,
+            slide_deviation: 0.12,
+            rival_reach: 4.0,
+            hypotheses: BTreeMap::new(),
+        }
     }
 }
 

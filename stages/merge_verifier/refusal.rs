@@ -2,7 +2,11 @@
 
 use std::fmt;
 
-/// Why an alignment may not be used. The texts are for the people who run the robots.
+/// Maps that agree on less wall, metres, have nothing in common that could be contradicted.
+const LITTLE_WALL: f64 = 4.0;
+
+/// Why an alignment may not be used. The texts are for the people who run the robots: [`headline`](Self::headline) and
+/// [`advice`](Self::advice) for those who look at many, and the whole for those who ask.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// The stage that sent it has refused it.
@@ -40,7 +44,7 @@ pub enum Refusal {
     /// Another hypothesis fits nearly as well.
     #[error(
         "the maps fit at several places, and it cannot be told which is right: with map b moved by {shift:.1} m and turned \
-         by {turn:.0} degrees from the best of them {:.0} % as much speaks for it; the hypotheses are {hypotheses}",
+         by {turn:.0} degrees from the best of them {:.0} % as much speaks for it",
         share * 100.0
     )]
     Ambiguous {
@@ -52,6 +56,22 @@ pub enum Refusal {
         share: f64,
         /// All places.
         hypotheses: Hypotheses,
+    },
+    /// It lies where the user knows the maps not to lie.
+    #[error("it is {shift:.1} m and {turn:.0} degrees away from the initial poses, which is more than they allow")]
+    Unexpected {
+        /// How far it is from what is known, metres.
+        shift: f64,
+        /// How much map b is turned from what is known, degrees.
+        turn: f64,
+    },
+    /// The user has chosen a hypothesis that is not there.
+    #[error("hypothesis {asked} was asked for, and there are {count}")]
+    NoSuchHypothesis {
+        /// The number that was asked for.
+        asked: usize,
+        /// How many there are.
+        count: usize,
     },
     /// Another source has found a place at which the maps fit far better.
     #[error(
@@ -72,7 +92,64 @@ pub enum Refusal {
     },
 }
 
-/// Places of map b in frame a, as people read them.
+impl Refusal {
+    /// What was found, in a line; the whole where a stage before has refused it.
+    pub fn headline(&self) -> String {
+        match self {
+            Self::Before(reason) => reason.clone(),
+            Self::Chance { agree, against, .. } => {
+                format!("{agree:.0} m of wall agree and {against:.0} m contradict, which may be chance")
+            }
+            Self::Contradiction { agree, .. } if *agree < LITTLE_WALL => {
+                "there is no place at which the maps agree on more than a piece of wall".to_owned()
+            }
+            Self::Contradiction { agree, against, .. } => {
+                format!("the maps contradict each other: {agree:.0} m of wall agree, {against:.0} m do not")
+            }
+            Self::Ambiguous { hypotheses: Hypotheses(all), .. } if all.len() > 1 => {
+                format!("the maps fit at {} places, and it cannot be told which is right", all.len())
+            }
+            Self::Ambiguous { shift, turn, .. } => {
+                format!("the maps fit nearly as well {shift:.1} m and {turn:.0} degrees from there")
+            }
+            Self::Unexpected { shift, turn } => {
+                format!("the maps fit {shift:.1} m and {turn:.0} degrees from the initial poses only")
+            }
+            Self::Elsewhere { source_of_rival, shift, .. } => {
+                format!("the {source_of_rival} say {shift:.1} m away, where the maps fit far better")
+            }
+            Self::NoSuchHypothesis { asked, count } => {
+                format!("hypothesis {asked} was asked for, and there are {count}")
+            }
+        }
+    }
+
+    /// What would help with robot b.
+    pub fn advice(&self, b: &str) -> Option<String> {
+        Some(match self {
+            Self::Before(_) => return None,
+            Self::Contradiction { agree, .. } if *agree < LITTLE_WALL => {
+                "drive one robot on where the other was, or one tag seen by both".to_owned()
+            }
+            Self::Chance { .. } => {
+                format!("drive on where the other was, one tag seen by both, or --initial {b}=X,Y,YAW")
+            }
+            Self::Contradiction { .. } => {
+                format!("is it one floor, and nothing moved? Then --initial {b}=X,Y,YAW, or tags")
+            }
+            Self::Ambiguous { hypotheses: Hypotheses(all), .. } if all.len() > 1 => {
+                format!("--accept {b}=N for a place listed, --initial {b}=X,Y,YAW, or one tag")
+            }
+            Self::Ambiguous { .. } | Self::Elsewhere { .. } => {
+                format!("more tags that both have seen, or --initial {b}=X,Y,YAW")
+            }
+            Self::Unexpected { .. } => format!("are the poses right? --initial {b}=X,Y,YAW,STDDEV widens them"),
+            Self::NoSuchHypothesis { .. } => "leave --accept out to see which there are".to_owned(),
+        })
+    }
+}
+
+/// Places of map b in frame a, as people read them: a line each, numbered from 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hypotheses(pub Vec<Hypothesis>);
 
@@ -87,13 +164,15 @@ pub struct Hypothesis {
     pub yaw: f64,
     /// Metres of wall that agree.
     pub wall_on_wall: f64,
+    /// Metres of wall that lie on free space.
+    pub wall_on_free: f64,
 }
 
 impl fmt::Display for Hypotheses {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (number, Hypothesis { x, y, yaw, wall_on_wall }) in self.0.iter().enumerate() {
-            let comma = if number == 0 { "" } else { ", " };
-            write!(text, "{comma}({x:.1} m, {y:.1} m, {yaw:.0} degrees: {wall_on_wall:.0} m of wall)")?;
+        for (number, Hypothesis { x, y, yaw, wall_on_wall, wall_on_free }) in (1..).zip(&self.0) {
+            let place = format!("  {number}: x {x:.1} m, y {y:.1} m, yaw {yaw:.0} degrees");
+            writeln!(text, "{place}: {wall_on_wall:.0} m of wall agree, {wall_on_free:.0} m do not")?;
         }
         Ok(())
     }

@@ -38,6 +38,8 @@ const BY_SHARE: f64 = 35.0;
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same where the user knows the place: it is one building, and what contradicts is a bend, or was moved.
+const AGREEMENT_OF_HALVES_WHERE_EXPECTED: f64 = 0.4;
 /// The same where the maps share the area of one room.
 const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
 /// The same for a place that tags tell.
@@ -62,14 +64,14 @@ pub enum Origin {
 }
 
 impl Origin {
-    /// The lead that it stands for, with another source that has found the same or without.
-    fn lead(self, found_too: bool) -> f64 {
+    /// The lead that it stands for, if another source tells the same or not.
+    fn lead(self, is_told_too: bool) -> f64 {
         let own = match self {
             Self::Search { lead } => lead,
             Self::Tags => LEAD_OF_TAGS,
             Self::FewTags => LEAD_OF_FEW_TAGS,
         };
-        let more = if found_too { LEAD_OF_FEW_TAGS } else { 0.0 };
+        let more = if is_told_too { LEAD_OF_FEW_TAGS } else { 0.0 };
         (own + more).clamp(0.0, MOST_LEAD)
     }
 }
@@ -81,6 +83,8 @@ pub struct Grounds {
     pub origin: Origin,
     /// Whether another source has found the same.
     pub found_too: bool,
+    /// Whether the user knows about where the maps lie, and it is there.
+    pub is_expected: bool,
     /// The evidence of walls, see [`Agreement`](super::Agreement).
     pub evidence: f64,
     /// The share of the walls that agree, 0 to 1.
@@ -105,11 +109,13 @@ pub struct Odds {
 impl Odds {
     /// Of an alignment.
     pub fn new(grounds: &Grounds) -> Self {
-        let Grounds { origin, found_too, evidence, wall_agreement, overlap, evidence_elsewhere } = *grounds;
+        let Grounds { origin, found_too, is_expected, evidence, wall_agreement, overlap, evidence_elsewhere } =
+            *grounds;
         // Tags, and another source, tell a place from those that are like it.
         let is_told = origin == Origin::Tags || found_too;
         let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
         let halves = match origin {
+            Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
             Origin::Search { .. } => {
                 let share_of_room = ((ROOM.1 - overlap) / (ROOM.1 - ROOM.0)).clamp(0.0, 1.0);
                 AGREEMENT_OF_HALVES + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - AGREEMENT_OF_HALVES)
@@ -117,7 +123,7 @@ impl Odds {
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
         };
         Self {
-            chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * origin.lead(found_too),
+            chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * origin.lead(found_too || is_expected),
             likeness: BY_SHARE * (like - evidence_elsewhere),
             part: BY_AGREEMENT * (wall_agreement - halves),
         }
@@ -137,6 +143,7 @@ mod tests {
     const GROUNDS: Grounds = Grounds {
         origin: Origin::Tags,
         found_too: false,
+        is_expected: false,
         evidence: 300.0,
         wall_agreement: 0.9,
         overlap: 200.0,
@@ -197,5 +204,20 @@ mod tests {
         assert!(with(34.0, 0.89) < 0.5 && with(34.0, 1.0) > 0.999);
         assert!(with(60.0, 0.89) > 0.999);
         assert!(with(45.0, 0.7) < with(55.0, 0.7));
+    }
+
+    #[test]
+    fn where_the_user_knows_the_place_a_small_map_is_enough() {
+        let small = Grounds {
+            origin: Origin::Search { lead: 3.0 },
+            evidence: 20.0,
+            wall_agreement: 0.8,
+            overlap: 15.0,
+            ..GROUNDS
+        };
+        let expected = Grounds { is_expected: true, ..small };
+        assert!(Odds::new(&small).probability() < 0.9 && Odds::new(&expected).probability() > 0.999);
+        let ambiguous = Grounds { evidence_elsewhere: 0.9, ..expected };
+        assert!(Odds::new(&ambiguous).probability() < 0.01, "it is not known to the metre");
     }
 }

@@ -1,12 +1,13 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
+use super::knowledge::{Knowledge, by_initial_poses};
 use super::{Agreement, MapView, MergeVerifierParameters, Verdict, judge};
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::robot_maps::{RobotMap, RobotMaps};
 use crate::robot_pair::RobotPair;
 use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
 use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
-use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage sends.
@@ -32,7 +33,10 @@ impl Outputs for Judgements {
 
 /// Judges the alignments of pairs of robots.
 pub(super) struct MergeVerifier {
+    /// The stage's name, as the user may set its parameters.
+    name: String,
     parameters: MergeVerifierParameters,
+    knowledge: Knowledge,
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
@@ -42,8 +46,10 @@ pub(super) struct MergeVerifier {
 }
 
 impl MergeVerifier {
-    pub(super) fn new(parameters: MergeVerifierParameters) -> Self {
+    pub(super) fn new(parameters: MergeVerifierParameters, context: &Context) -> Self {
         Self {
+            name: context.stage.clone(),
+            knowledge: Knowledge::new(&parameters, context),
             parameters,
             maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
@@ -97,6 +103,7 @@ impl MergeVerifier {
             let alignment = Alignment { reason, ..refused(&proposed) };
             self.send(&pair, alignment, output)?;
         }
+        self.knowledge.unused().for_each(|unused| output.warn(unused));
         Ok(())
     }
 
@@ -113,14 +120,21 @@ impl MergeVerifier {
 
     /// Judges a pair, and sends the outcome and what it went by if they are not what was sent last.
     fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
+        let known = self.knowledge.of(pair, self.maps.iter().count());
         let proposed = self.proposed(pair);
         let maps = self.maps.pair(pair);
+        if let Some(alignment) = maps.and_then(|(a, _)| by_initial_poses(pair, &known, &a.frame_id)) {
+            return self.send(pair, alignment, output);
+        }
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let verdict = maps.and_then(|(a, b)| judge(&view(a), &view(b), &proposed, &self.parameters));
+        let verdict = maps.and_then(|(a, b)| judge(&view(a), &view(b), &proposed, &known, &self.parameters));
         let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
-        let (evidence, alignment) = (evidence(verdict, pair, proposed.len()), judged(verdict, &proposed));
+        let (evidence, alignment) = (
+            evidence(verdict, pair, proposed.len()),
+            judged(verdict, &proposed, verdict.reason(self.parameters.accept, &self.name)),
+        );
         if self.evidence.get(pair) != Some(&evidence) {
             let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
             output.evidence.send("", &Evidence { header, ..evidence.clone() })?;
@@ -168,9 +182,8 @@ fn evidence(verdict: &Verdict<'_>, pair: &RobotPair, hypotheses: usize) -> Evide
 }
 
 /// The outcome for a pair of which a place was proposed.
-fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment]) -> Alignment {
+fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Alignment {
     let accepted = verdict.refusal.is_none();
-    let reason = verdict.reason();
     Alignment {
         accepted,
         provisional: false,
@@ -196,5 +209,16 @@ fn refused(proposed: &[&Alignment]) -> Alignment {
 /// A refusal, with what the other sources have against the pair: whoever reads it wants to know why nothing helped.
 fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> String {
     let others = proposed.iter().filter(|alignment| alignment.source != source && alignment.rank == 0);
-    others.fold(reason, |reason, other| format!("{reason}; by the {}: {}", other.source, other.reason))
+    let others: Vec<String> =
+        others.map(|other| format!("by the {}: {}", other.source, one_line(&other.reason))).collect();
+    if others.is_empty() {
+        return reason;
+    }
+    // Behind the empty line stands what only those read who ask for it.
+    let gap = if reason.contains("\n\n") { "\n" } else { "\n\n" };
+    format!("{reason}{gap}{}", others.join("\n"))
+}
+
+fn one_line(reason: &str) -> String {
+    reason.split('\n').filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
 }

@@ -54,7 +54,7 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
         registry,
     };
     let summary = job.run()?;
-    print(summary.to_text())?;
+    print(summary.to_text(&[]))?;
 
     let evaluation = evaluate(&folder.join("summary.json"), &truth)?;
     print_line(format_args!("\nerrors against the truth:\n{}", evaluation.to_text()))?;

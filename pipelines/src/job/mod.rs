@@ -27,6 +27,8 @@ use std::path::{Path, PathBuf};
 
 /// The kind of stage that writes logs.
 const LOG_SINK: &str = "mcap_sink";
+/// The kind of stage that decides between hypotheses.
+const VERIFIER: &str = "merge_verifier";
 
 /// What a run writes beside what its options ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,9 +64,11 @@ impl Job<'_> {
     /// Runs the pipeline, writes all that was asked for, and prints the summary.
     pub(crate) fn run_and_print(&self) -> Result<Status> {
         let summary = self.run()?;
+        let explained: Vec<String> = self.options.explain.iter().map(|typed| self.robot(typed)).collect();
+        summary.check_robots(&explained)?;
         match self.options.json {
             true => print_line(summary.to_json()),
-            false => print(summary.to_text()),
+            false => print(summary.to_text(&explained)),
         }?;
         Ok(match summary.has_unmerged() {
             true => Status::NotAllMerged,
@@ -102,18 +106,45 @@ impl Job<'_> {
         Ok(summary)
     }
 
-    /// The reference robot: its name, or its map file as it was typed among the inputs.
-    fn reference(&self) -> Option<String> {
-        let typed = self.options.reference.clone()?;
-        let file = self.inputs.iter().position(|input| input.as_os_str() == typed.as_str());
-        let names = file.and_then(|file| robot_names(self.inputs).ok()?.into_iter().nth(file));
-        Some(names.unwrap_or(typed))
+    /// A robot: its name, or its map file as it was typed among the inputs.
+    fn robot(&self, typed: &str) -> String {
+        let file = self.inputs.iter().position(|input| input.as_os_str() == typed);
+        let name = file.and_then(|file| robot_names(self.inputs).ok()?.into_iter().nth(file));
+        name.unwrap_or_else(|| typed.to_owned())
+    }
+
+    /// `ROBOT=...` with the robot's name.
+    fn robot_first(&self, typed: &str) -> String {
+        match typed.rsplit_once('=') {
+            Some((robot, value)) => format!("{}={value}", self.robot(robot)),
+            None => typed.to_owned(),
+        }
+    }
+
+    /// The hypotheses that the user accepts, as the verifier takes them.
+    fn accepted(&self) -> Result<toml::Table, BadUse> {
+        let read = |typed: &String| {
+            let (robot, number) = typed.rsplit_once('=')?;
+            let number = if number == "initial" { 0 } else { number.parse().ok().filter(|number| *number > 0)? };
+            Some((self.robot(robot), toml::Value::Integer(number)))
+        };
+        let wrong = |typed: &String| {
+            BadUse(format!(
+                "`--accept {typed}` accepts nothing: write ROBOT=N for a place that a refusal has listed, from 1, or \
+                 ROBOT=initial for its initial pose as it is"
+            ))
+        };
+        self.options.accept.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
     }
 
     fn overrides(&self) -> Result<Overrides> {
         let mut overrides = Overrides::default();
-        overrides.reference = self.reference();
+        overrides.reference = self.options.reference.as_deref().map(|typed| self.robot(typed));
         overrides.seed = self.options.seed;
+        overrides.initial_poses = self.options.initial.iter().map(|typed| self.robot_first(typed)).collect();
+        if !self.options.accept.is_empty() {
+            overrides.set_for_kind(VERIFIER, "hypotheses", self.accepted()?);
+        }
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
             overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);

@@ -26,6 +26,17 @@ pub(crate) struct RunOptions {
     /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
     #[arg(long, value_name = "ROBOT")]
     pub(crate) reference: Option<String>,
+    /// Where the map frame of a robot lies, about: metres and radians, in the frame of the reference or in one in which the
+    /// pose of another robot is given, too. The standard deviations are 1 m and 0.2 radians unless given.
+    #[arg(long, value_name = "ROBOT=X,Y,YAW[,STDDEV[,YAW_STDDEV]]", allow_hyphen_values = true)]
+    pub(crate) initial: Vec<String>,
+    /// Accept the place with this number that a refusal has listed for a robot and the reference; `initial` lays it by its
+    /// initial pose without a look at the maps. ROBOT/ROBOT is the pair of these two.
+    #[arg(long, value_name = "ROBOT=N")]
+    pub(crate) accept: Vec<String>,
+    /// Print all that speaks for and against the places of a robot.
+    #[arg(long, value_name = "ROBOT")]
+    pub(crate) explain: Vec<String>,
     /// Read map files by their thresholds to the letter, also where these make unknown cells free or leave no walls.
     #[arg(long)]
     pub(crate) literal_thresholds: bool,

@@ -142,6 +142,7 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
     }
     stages.sort_by_key(|(place, _)| *place);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, .. } = settings;
-    Pipeline { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, stages }
+    let Settings { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, initial_poses, .. } =
+        settings;
+    Pipeline { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, initial_poses, stages }
 }

@@ -15,6 +15,9 @@
 //! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
 //! map = "/{robot}/map"
 //!
+//! [robots.robot2]                 # what is known of one robot
+//! initial = { x = 5.0, y = 3.0, yaw = 1.57, stddev = 1.0, yaw_stddev = 0.2 }  # where its map frame lies, about
+//!
 //! [stages.log]
 //! kind = "mcap_source"
 //! files = ["a.mcap"]              # any key that this page does not name is a parameter
@@ -53,6 +56,7 @@ mod binding;
 mod diagnostic;
 mod document;
 mod drawing;
+mod initial_poses;
 mod kinds;
 mod live;
 mod load;
@@ -84,7 +88,7 @@ pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
 pub use single_stage::SingleStage;
 
-use crate::stage::{Context, InputWire, RobotTopics, StageKind};
+use crate::stage::{Context, InitialPoses, InputWire, RobotTopics, StageKind};
 use std::time::Duration;
 
 /// A pipeline that has passed every check: each stage's kind exists, each wire's ends exist and agree in type, and
@@ -109,6 +113,8 @@ pub struct Pipeline {
     pub memory_limit: Option<u64>,
     /// How topics are told apart.
     pub robots: RobotTopics,
+    /// Where the user knows the maps of robots to lie; where there are any, that of the reference among them.
+    pub initial_poses: InitialPoses,
     /// The stages, each behind those that feed it; among those that could be next, by name.
     pub stages: Vec<StageSpec>,
 }
@@ -175,6 +181,7 @@ impl Pipeline {
             seed: stage_seed(self.seed, &spec.name),
             reference: self.reference.clone(),
             robots: self.robots.clone(),
+            initial_poses: self.initial_poses.clone(),
             inputs: spec.inputs.iter().map(|wire| self.input_wire(spec, wire)).collect(),
         }
     }

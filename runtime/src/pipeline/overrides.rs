@@ -11,6 +11,8 @@ pub struct Overrides {
     pub reference: Option<String>,
     /// Seeds all randomness.
     pub seed: Option<u64>,
+    /// Where the map frame of a robot lies, as `ROBOT=X,Y,YAW[,STDDEV[,YAW_STDDEV]]`.
+    pub initial_poses: Vec<String>,
     settings: Vec<Setting>,
 }
 

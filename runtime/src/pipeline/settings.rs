@@ -1,12 +1,13 @@
 //! The sections `[pipeline]` and `[robots]`.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
-use super::document::{Entry, Item};
+use super::document::{Entry, Item, Value};
+use super::initial_poses::{complete, read_robot, read_typed};
 use super::live::{Mode, read_word};
 use super::overrides::Overrides;
 use super::values::{entries, text, unknown_key, wrong_type};
 use crate::message::{FixedText, LONGEST_ROBOT_NAME};
-use crate::stage::{RobotTopics, TfFrames};
+use crate::stage::{InitialPoses, RobotTopics, TfFrames};
 use std::time::Duration;
 
 /// How many samples an input may hold where the pipeline does not say.
@@ -30,6 +31,7 @@ pub(super) struct Settings {
     pub(super) stall_timeout: Option<Duration>,
     pub(super) memory_limit: Option<u64>,
     pub(super) robots: RobotTopics,
+    pub(super) initial_poses: InitialPoses,
 }
 
 impl Settings {
@@ -47,6 +49,7 @@ impl Settings {
             stall_timeout,
             memory_limit: None,
             robots,
+            initial_poses: InitialPoses::new(),
         }
     }
 
@@ -103,7 +106,10 @@ impl Settings {
                     continue;
                 }
                 _ => {
-                    problems.push(unknown_key(key, key_at, "[robots]", &KEYS));
+                    match &item.value {
+                        Value::Table(known) => read_robot(key, known, &mut self.initial_poses, problems),
+                        _ => problems.push(unknown_key(key, key_at, "[robots]", &KEYS)),
+                    }
                     continue;
                 }
             };
@@ -127,6 +133,10 @@ impl Settings {
             self.reference = Some(robot.clone());
         }
         self.seed = overrides.seed.unwrap_or(self.seed);
+        for typed in &overrides.initial_poses {
+            read_typed(typed, &mut self.initial_poses, problems);
+        }
+        complete(&mut self.initial_poses, self.reference.as_deref(), problems);
     }
 }
 

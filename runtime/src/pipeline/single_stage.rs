@@ -6,7 +6,7 @@ use super::nearest::did_you_mean;
 use super::overrides::Overrides;
 use super::settings::Settings;
 use super::stage_section::read_stage;
-use crate::stage::{Registry, RobotTopics, StageKind};
+use crate::stage::{InitialPoses, Registry, RobotTopics, StageKind};
 
 /// A stage, and what a pipeline would tell it. All of it has been checked as that of a pipeline is.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub struct SingleStage {
     pub batch: bool,
     /// How topics are told apart.
     pub robots: RobotTopics,
+    /// Where the user knows the maps of robots to lie.
+    pub initial_poses: InitialPoses,
 }
 
 impl SingleStage {
@@ -86,6 +88,7 @@ impl SingleStage {
                 seed: settings.seed,
                 batch: settings.batch,
                 robots: settings.robots,
+                initial_poses: settings.initial_poses,
             }),
             _ => Err(problems.into_errors()),
         }

@@ -2,7 +2,7 @@
 
 use super::live::Word;
 use super::{Mode, Pipeline};
-use crate::stage::RobotTopics;
+use crate::stage::{InitialPose, InitialPoses, RobotTopics};
 use toml::{Table, Value};
 
 impl Pipeline {
@@ -27,7 +27,7 @@ impl Pipeline {
             (0..self.stages.len()).map(|index| (self.stages[index].name.clone(), self.stage_table(index).into()));
         let file: [(String, Value); 3] = [
             ("pipeline".into(), pipeline.into()),
-            ("robots".into(), robots_table(&self.robots).into()),
+            ("robots".into(), robots_table(&self.robots, &self.initial_poses).into()),
             ("stages".into(), Table::from_iter(stages).into()),
         ];
         Table::from_iter(file).to_string()
@@ -66,7 +66,7 @@ impl Pipeline {
     }
 }
 
-fn robots_table(robots: &RobotTopics) -> Table {
+fn robots_table(robots: &RobotTopics, initial_poses: &InitialPoses) -> Table {
     let RobotTopics { map, pose, tags, tf } = robots;
     let topics = [("map", map), ("pose", pose), ("tags", tags)];
     let mut table = Table::from_iter(topics.map(|(key, topic)| (key.to_owned(), topic.as_str().into())));
@@ -74,6 +74,11 @@ fn robots_table(robots: &RobotTopics) -> Table {
         let frames = [("map_frame", &tf.map_frame), ("base_frame", &tf.base_frame)];
         let frames = Table::from_iter(frames.map(|(key, frame)| (key.to_owned(), frame.as_str().into())));
         table.insert("tf".into(), frames.into());
+    }
+    for (robot, initial) in initial_poses.iter().filter(|(_, initial)| **initial != InitialPose::ORIGIN) {
+        let values = InitialPose::FIELDS.into_iter().zip(initial.values());
+        let initial = Table::from_iter(values.map(|(key, value)| (key.to_owned(), value.into())));
+        table.insert(robot.clone(), Table::from_iter([("initial".to_owned(), initial.into())]).into());
     }
     table
 }

@@ -1,5 +1,6 @@
 //! What a stage is told when it is made.
 
+use super::InitialPoses;
 use serde::{Deserialize, Serialize};
 
 /// What a stage is told of its pipeline when it is made.
@@ -13,6 +14,8 @@ pub struct Context {
     pub reference: Option<String>,
     /// How topics are told apart.
     pub robots: RobotTopics,
+    /// Where the user knows the maps of robots to lie; where there are any, that of the reference among them.
+    pub initial_poses: InitialPoses,
     /// What is wired to the stage, in the order of its wires: see [`Message::wire`](crate::message::Message::wire).
     pub inputs: Vec<InputWire>,
 }

@@ -45,6 +45,7 @@
 mod builder;
 mod context;
 mod error;
+mod initial_poses;
 mod kind;
 mod lone_stage;
 mod node;
@@ -57,6 +58,7 @@ mod registry;
 pub use builder::StageBuilder;
 pub use context::{Context, InputWire, RobotTopics, TfFrames, match_robot};
 pub use error::StageError;
+pub use initial_poses::{InitialPose, InitialPoses};
 pub use kind::{Source, StageKind};
 pub use lone_stage::LoneStage;
 pub use node::Node;

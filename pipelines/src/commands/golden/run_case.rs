@@ -98,6 +98,7 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         stall_timeout: None,
         memory_limit: None,
         robots: case.stage.robots.clone(),
+        initial_poses: case.stage.initial_poses.clone(),
         stages,
     };
     let report = engine::run(&pipeline, EngineKind::Threads, observer)?;

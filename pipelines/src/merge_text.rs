@@ -1,0 +1,137 @@
+//! What a merge has found, for people.
+
+use crate::table::Table;
+use gridweave_logs::summary::{Frame, Summary};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Where the maps lie, which are not merged and why, and what became of each pair.
+pub(crate) fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result {
+    if let Some(reference) = &merge.reference {
+        let merged = merge.frames.len();
+        match (merged, merged + merge.unmerged.len()) {
+            (_, 1) => writeln!(out, "only {reference} has a map: there is nothing to merge it with")?,
+            (1, 2) => writeln!(out, "the other robot could not be merged with {reference}")?,
+            (1, all) => writeln!(out, "none of the other {} robots could be merged with {reference}", all - 1)?,
+            (_, all) => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
+        }
+        write!(out, "{}", frames_table(&merge.frames))?;
+    }
+    for (robot, reason) in &merge.unmerged {
+        match short(reason) {
+            line if !line.contains('\n') => writeln!(out, "not merged: {robot}: {line}")?,
+            lines => {
+                writeln!(out, "not merged: {robot}:")?;
+                lines.lines().try_for_each(|line| writeln!(out, "  {line}"))?;
+            }
+        }
+    }
+    for group in &merge.groups {
+        let (count, reference) = (group.frames.len(), &group.reference);
+        writeln!(out, "{count} of these are tied to each other; map frames in the frame of {reference}:")?;
+        write!(out, "{}", frames_table(&group.frames))?;
+    }
+    if merge.alignments.is_empty() {
+        return Ok(());
+    }
+    let mut table = Table::new(["pair", "accepted", "score", "method"]);
+    for pair in &merge.alignments {
+        let accepted = if pair.accepted { "yes" } else { "no" };
+        let names = format!("{} {}", pair.a, pair.b);
+        table.row([names, accepted.into(), format!("{:.3}", pair.score), pair.method.clone()]);
+    }
+    let table = table.to_string();
+    let mut rows = table.lines();
+    writeln!(out, "\n{}", rows.next().unwrap_or_default())?;
+    for (row, pair) in rows.zip(&merge.alignments) {
+        writeln!(out, "{row}")?;
+        if let Some(headline) = pair.reason.lines().next() {
+            writeln!(out, "    {headline}")?;
+        }
+    }
+    Ok(())
+}
+
+/// All that is known of a robot and each other: the whole of every reason.
+pub(crate) fn write_explanation(out: &mut String, merge: &Summary, robot: &str) -> std::fmt::Result {
+    let pairs: Vec<_> = merge.alignments.iter().filter(|pair| pair.a == robot || pair.b == robot).collect();
+    if let Some(reason) = merge.unmerged.get(robot).filter(|_| pairs.is_empty()) {
+        writeln!(out, "\n{robot} is not merged: {reason}")?;
+    }
+    for pair in pairs {
+        let outcome = if pair.accepted { "accepted" } else { "refused" };
+        writeln!(out, "\n{} and {}, {outcome} with {:.3} by {}:", pair.a, pair.b, pair.score, pair.method)?;
+        pair.reason.lines().try_for_each(|line| writeln!(out, "  {line}"))?;
+    }
+    Ok(())
+}
+
+/// The first paragraph of a reason: what everybody is shown.
+fn short(reason: &str) -> &str {
+    reason.split("\n\n").next().unwrap_or(reason).trim_end()
+}
+
+/// Poses of map frames with their standard deviations.
+fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
+    let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
+    for (robot, Frame { x, y, yaw, covariance }) in frames {
+        let variance = |place: usize| covariance[place].max(0.0);
+        let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
+        let numbers = [*x, *y, yaw.to_degrees(), std_position, std_yaw];
+        table.row(std::iter::once(robot.clone()).chain(numbers.map(|number| format!("{number:.3}"))));
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn text(merge: serde_json::Value) -> String {
+        let mut text = String::new();
+        write_merge(&mut text, &serde_json::from_value(merge).unwrap()).unwrap();
+        text
+    }
+
+    #[test]
+    fn robots_tied_to_each_other_only_are_shown_in_their_own_frame() {
+        let frame = |x: f64| json!({"x": x, "y": 0.0, "yaw": 0.5, "covariance": vec![0.01; 9]});
+        let merge = json!({
+            "reference": "robot1",
+            "frames": {"robot1": frame(0.0)},
+            "unmerged": {"robot2": "it is tied to robot3 only", "robot3": "it is tied to robot2 only"},
+            "groups": [{"reference": "robot2", "frames": {"robot2": frame(0.0), "robot3": frame(4.25)}}],
+        });
+        let text = text(merge);
+        let lines: Vec<&str> = text.lines().collect();
+        let start = lines.iter().position(|line| line.starts_with("2 of these")).unwrap();
+        assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
+        assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
+        assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
+    }
+
+    #[test]
+    fn a_reason_is_shown_up_to_the_empty_line_and_explained_to_its_end() {
+        let reason = "the maps fit at 2 places\ntry: one tag\n\nthe whole of it";
+        let merge = json!({
+            "reference": "robot1",
+            "frames": {"robot1": {"x": 0.0, "y": 0.0, "yaw": 0.0}},
+            "unmerged": {"robot2": format!("no alignment with robot1:\n{reason}")},
+            "alignments": [{
+                "a": "robot1", "b": "robot2", "method": "maps", "x": 0.0, "y": 0.0, "yaw": 0.0,
+                "score": 0.25, "accepted": false, "checked": false, "reason": reason,
+            }],
+        });
+        let shown = text(merge.clone());
+        assert!(shown.contains(
+            "not merged: robot2:\n  no alignment with robot1:\n  the maps fit at 2 places\n  try: one tag\n"
+        ));
+        assert!(shown.contains("  robot1 robot2  no        0.250  maps\n    the maps fit at 2 places\n"), "{shown}");
+        assert!(!shown.contains("the whole"), "{shown}");
+        let mut explained = String::new();
+        write_explanation(&mut explained, &serde_json::from_value(merge).unwrap(), "robot2").unwrap();
+        assert!(explained.contains("robot1 and robot2, refused with 0.250 by maps:\n  the maps fit"), "{explained}");
+        assert_eq!(explained.matches("the whole of it").count(), 1);
+    }
+}

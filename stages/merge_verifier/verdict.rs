@@ -1,0 +1,94 @@
+//! The judgement on all hypotheses for a pair of robots, and what is said of it.
+
+use super::refusal::Hypotheses;
+use super::{Agreement, Refusal, Rival};
+use gridweave_runtime::ros::Alignment;
+use std::fmt::Write;
+
+/// A hypothesis, and what the maps say of each other there.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<'a> {
+    /// The hypothesis.
+    pub alignment: &'a Alignment,
+    /// What the maps say.
+    pub agreement: Agreement,
+}
+
+/// The judgement on all hypotheses for a pair.
+#[derive(Clone, Debug)]
+pub struct Verdict<'a> {
+    /// The hypothesis that is right, or came nearest to it.
+    pub candidate: Candidate<'a>,
+    /// Why it is not accepted; none if it is.
+    pub refusal: Option<Refusal>,
+    /// The best place elsewhere, if there is one.
+    pub rival: Option<Rival>,
+    /// The most evidence for another place, as a share of that for this one.
+    pub evidence_elsewhere: f64,
+    /// The probability that it is right, 0 to 1, see [`Odds`](super::Odds).
+    pub score: f64,
+    /// Another source that has found the same place.
+    pub found_too_by: Option<&'a str>,
+    /// If the user has chosen it: its number, and of how many.
+    pub chosen: Option<(usize, usize)>,
+    /// All hypotheses that took part, in the order in which the user can choose one.
+    pub hypotheses: Hypotheses,
+}
+
+impl Verdict<'_> {
+    /// What speaks for it, or against it, in plain words: a paragraph of short lines for all, and behind an empty line the
+    /// whole for those who ask. `accept` is the probability that is asked for, and `stage` the name of this stage.
+    pub fn reason(&self, accept: f64, stage: &str) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = match &self.refusal {
+            None => self.write_acceptance(&mut text),
+            Some(Refusal::Before(reason)) => write!(text, "{reason}"),
+            Some(refusal) => self.write_refusal(refusal, accept, stage, &mut text),
+        };
+        text
+    }
+
+    fn write_acceptance(&self, text: &mut String) -> std::fmt::Result {
+        let Agreement { wall_on_wall, wall_on_free, overlap, .. } = self.candidate.agreement;
+        let agree = format!("{wall_on_wall:.0} m of wall agree and {wall_on_free:.0} m contradict, in {overlap:.0} m2");
+        match self.chosen {
+            Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, which was asked for: {agree}")?,
+            None => writeln!(text, "{agree} that both know")?,
+        }
+        write!(text, "\n{}", self.candidate.alignment.reason)?;
+        if let Some(source) = self.found_too_by {
+            write!(text, ", found by the {source}, too")?;
+        }
+        if self.chosen.is_none() {
+            write!(text, "; the maps confirm it")?;
+        }
+        if let Some(Rival { agreement, .. }) = &self.rival {
+            let share = 100.0 * agreement.wall_agreement();
+            write!(text, "; at the best of other places {share:.0} % of {:.0} m agree", agreement.wall_seen())?;
+        }
+        Ok(())
+    }
+
+    fn write_refusal(&self, refusal: &Refusal, accept: f64, stage: &str, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "{}", refusal.headline())?;
+        if !matches!(refusal, Refusal::Unexpected { .. } | Refusal::NoSuchHypothesis { .. }) {
+            // Rounded down, so that what is too little is not shown as enough.
+            let probability = (1000.0 * self.score).floor() / 1000.0;
+            writeln!(text, "missing: a probability of {accept} (--set {stage}.accept); this is {probability:.3}")?;
+        }
+        if let Some(advice) = refusal.advice(&self.candidate.alignment.b) {
+            writeln!(text, "try: {advice}")?;
+        }
+        let hypotheses = self.hypotheses.to_string();
+        if matches!(refusal, Refusal::Ambiguous { .. }) && self.hypotheses.0.len() > 1 {
+            write!(text, "{hypotheses}")?;
+        }
+        write!(text, "\n{}; the maps do not confirm it: {refusal}", self.candidate.alignment.reason)?;
+        if !hypotheses.is_empty() {
+            let Alignment { a, b, .. } = self.candidate.alignment;
+            write!(text, "\nplaces of the map of {b} on that of {a}:\n{}", hypotheses.trim_end())?;
+        }
+        Ok(())
+    }
+}
