@@ -10,10 +10,11 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 }
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 10] = [
     ("auto_merge", include_str!("../auto_merge.toml")),
     ("cut", include_str!("../cut.toml")),
     ("live", include_str!("../live.toml")),
+    ("live_merge", include_str!("../live_merge.toml")),
     ("map_file_merge", include_str!("../map_file_merge.toml")),
     ("map_merge", include_str!("../map_merge.toml")),
     ("simulate", include_str!("../simulate.toml")),

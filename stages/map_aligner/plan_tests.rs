@@ -5,6 +5,7 @@ use super::{MapAlignerParameters, MergePlan, Statement};
 use crate::geometry::Grid;
 use crate::robot_pair::RobotPair;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
+use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A plan that is given maps one by one.

@@ -207,7 +207,7 @@ fn listed(all: &[Candidate<'_>]) -> Hypotheses {
     let hypothesis = |candidate: &Candidate<'_>| {
         let Alignment { x, y, yaw, .. } = *candidate.alignment;
         let Agreement { wall_on_wall, wall_on_free, .. } = candidate.agreement;
-        Hypothesis { x, y, yaw: yaw.to_degrees(), wall_on_wall, wall_on_free }
+        Hypothesis { x, y, yaw, wall_on_wall, wall_on_free }
     };
     Hypotheses(all.iter().map(hypothesis).collect())
 }

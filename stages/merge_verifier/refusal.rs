@@ -138,7 +138,7 @@ impl Refusal {
                 format!("is it one floor, and nothing moved? Then --initial {b}=X,Y,YAW, or tags")
             }
             Self::Ambiguous { hypotheses: Hypotheses(all), .. } if all.len() > 1 => {
-                format!("--accept {b}=N for a place listed, --initial {b}=X,Y,YAW, or one tag")
+                format!("--accept {b}=N of these, --initial {b}=X,Y,YAW, or one common tag")
             }
             Self::Ambiguous { .. } | Self::Elsewhere { .. } => {
                 format!("more tags that both have seen, or --initial {b}=X,Y,YAW")
@@ -160,7 +160,7 @@ pub struct Hypothesis {
     pub x: f64,
     /// Translation of `T_a_b`, metres.
     pub y: f64,
-    /// Rotation of `T_a_b`, degrees.
+    /// Rotation of `T_a_b`, radians.
     pub yaw: f64,
     /// Metres of wall that agree.
     pub wall_on_wall: f64,
@@ -171,7 +171,7 @@ pub struct Hypothesis {
 impl fmt::Display for Hypotheses {
     fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, Hypothesis { x, y, yaw, wall_on_wall, wall_on_free }) in (1..).zip(&self.0) {
-            let place = format!("  {number}: x {x:.1} m, y {y:.1} m, yaw {yaw:.0} degrees");
+            let place = format!("  {number}: x {x:.1}, y {y:.1}, yaw {yaw:.2} ({:.0} deg)", yaw.to_degrees());
             writeln!(text, "{place}: {wall_on_wall:.0} m of wall agree, {wall_on_free:.0} m do not")?;
         }
         Ok(())

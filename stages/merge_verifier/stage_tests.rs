@@ -5,6 +5,7 @@ use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Evidence, Header};
+use gridweave_runtime::stage::{Context, InitialPose, InitialPoses};
 
 /// West and east.
 fn maps() -> (DrawnMap, DrawnMap) {
@@ -102,7 +103,7 @@ fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
     };
     assert_eq!(bench.give(&nothing("maps", "no walls"))[0].reason, "no walls");
     let sent = bench.give(&nothing("tags", "no tags"));
-    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls; by the tags: no tags"));
+    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls\n\nby the tags: no tags"));
     assert_eq!(bench.give(&nothing("tags", "no tags")), []);
     assert_eq!(bench.finish(), []);
 }
@@ -122,4 +123,49 @@ fn a_hypothesis_out_of_order_is_warned_of() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give(&Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
     assert_eq!(bench.stage.warnings().len(), 1, "{:?}", bench.stage.warnings());
+}
+
+/// Two robots of which it is known where they are.
+fn knowing(parameters: &str) -> StageBench {
+    let robot2 = InitialPose { x: 5.0, y: 1.0, yaw: 0.5, ..InitialPose::default() };
+    let initial_poses = InitialPoses::from([("robot1".into(), InitialPose::ORIGIN), ("robot2".into(), robot2)]);
+    StageBench::with_context(&super::kind(), parameters, &Context { initial_poses, ..Context::default() })
+}
+
+#[test]
+fn an_initial_pose_is_taken_as_it_is_when_that_is_asked_for() {
+    let (a, b) = maps();
+    let mut bench = knowing("hypotheses = { robot2 = 0 }");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let nothing = Alignment { accepted: false, has_transform: false, ..proposed("maps", &Pose2::identity()) };
+    let sent = bench.give(&nothing);
+    let [laid] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(laid.accepted && laid.source == "initial poses", "{laid:?}");
+    assert_eq!((laid.x, laid.y, laid.yaw), (5.0, 1.0, 0.5));
+    assert!((laid.covariance[0] - 1.0).abs() < 1e-9 && (laid.covariance[8] - 0.04).abs() < 1e-9, "{laid:?}");
+    assert_eq!(laid.header.frame_id, "robot1/map");
+
+    let mut bench = StageBench::new(&super::kind(), "hypotheses = { robot2 = 0 }");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&nothing);
+    assert!(!sent[0].accepted && sent[0].reason.contains("--initial robot2=X,Y,YAW"), "{sent:?}");
+}
+
+#[test]
+fn a_choice_that_concerns_no_pair_is_warned_of() {
+    let (a, b) = maps();
+    let warnings = |parameters: &str| {
+        let mut bench = knowing(parameters);
+        bench.give_map("robot1", &a);
+        bench.give_map("robot2", &b);
+        bench.give(&proposed("maps", &a.transform_to(&b)));
+        bench.finish();
+        bench.stage.warnings().len()
+    };
+    assert_eq!(warnings("hypotheses = { robot2 = 1 }"), 0);
+    assert_eq!(warnings("hypotheses = { \"robot2/robot1\" = 1 }"), 0);
+    assert_eq!(warnings("hypotheses = { robot3 = 1 }"), 1);
+    assert_eq!(warnings("hypotheses = { \"robot2/robot2\" = 1 }"), 1);
 }

@@ -1,10 +1,11 @@
 //! Comparison and judgement on drawn floor plans.
 
-use super::{MergeVerifierParameters, Refusal, Verdict, compare, compare_sampled, judge};
+use super::{MergeVerifierParameters, Refusal, UserKnowledge, Verdict, compare, compare_sampled, judge};
 use crate::geometry::{Pose2, pose, row_by_row};
+use crate::place_window::PlaceWindow;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use gridweave_runtime::ros::Alignment;
-use gridweave_runtime::stage::Parameters;
+use gridweave_runtime::stage::{InitialPose, Parameters};
 use nalgebra::Matrix3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -47,8 +48,16 @@ fn by_maps(places: &[Pose2]) -> Vec<Alignment> {
 }
 
 fn judged<'a>(a: &DrawnMap, b: &DrawnMap, hypotheses: &'a [Alignment]) -> Verdict<'a> {
+    judged_knowing(a, b, hypotheses, &UserKnowledge::default())
+}
+
+fn judged_knowing<'a>(a: &DrawnMap, b: &DrawnMap, hypotheses: &'a [Alignment], known: &UserKnowledge) -> Verdict<'a> {
     let hypotheses: Vec<&Alignment> = hypotheses.iter().collect();
-    judge(&a.view(), &b.view(), &hypotheses, &MergeVerifierParameters::default()).unwrap()
+    judge(&a.view(), &b.view(), &hypotheses, known, &MergeVerifierParameters::default()).unwrap()
+}
+
+fn reason(verdict: &Verdict<'_>) -> String {
+    verdict.reason(0.999, "verifier")
 }
 
 /// A building whose two halves are the same but for one short wall.
@@ -76,11 +85,11 @@ fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
     let verdict = judged(&a, &b, &tags);
     assert_eq!(verdict.refusal, None);
     assert!(verdict.candidate.agreement.wall_agreement() > 0.95);
-    assert!(verdict.reason().starts_with("four tags; the maps confirm it: "), "{}", verdict.reason());
+    assert!(reason(&verdict).contains("\n\nfour tags; the maps confirm it"), "{}", reason(&verdict));
     let elsewhere = pose(1.5, 0.0, 0.0) * truth;
     let maps = by_maps(&[elsewhere, truth]);
     let verdict = judged(&a, &b, &maps);
-    assert_eq!((verdict.refusal.clone(), verdict.candidate.alignment.rank), (None, 1), "{}", verdict.reason());
+    assert_eq!((verdict.refusal.clone(), verdict.candidate.alignment.rank), (None, 1), "{}", reason(&verdict));
     assert!(verdict.rival.is_some_and(|rival| (rival.shift - 1.5).abs() < 0.05));
     assert!(verdict.score > 0.999);
 }
@@ -96,11 +105,11 @@ fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
     let verdict = judged(&a, &b, &maps);
     let Some(Refusal::Ambiguous { turn, share, hypotheses, .. }) = &verdict.refusal else { panic!("{verdict:?}") };
     assert!((turn.abs() - 180.0).abs() < 0.1 && *share > 0.6 && hypotheses.0.len() == 2);
-    assert!(verdict.reason().contains("it cannot be told which is right"), "{}", verdict.reason());
+    assert!(reason(&verdict).contains("it cannot be told which is right"), "{}", reason(&verdict));
 
     let both: Vec<Alignment> = [vec![by_tags(&truth)], by_maps(&[turned, truth])].concat();
     let verdict = judged(&a, &b, &both);
-    assert_eq!(verdict.refusal, None, "{}", verdict.reason());
+    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
     assert!(verdict.candidate.alignment.transform_a_b() == by_tags(&truth).transform_a_b());
     assert!(verdict.found_too_by.is_some());
 }
@@ -124,9 +133,12 @@ fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
     maps[0].accepted = false;
     maps[0].reason = "ICP has not settled".into();
     let verdict = judged(&a, &b, &maps);
-    assert_eq!(verdict.reason(), "ICP has not settled");
+    assert_eq!(reason(&verdict), "ICP has not settled");
     let nowhere = Alignment { has_transform: false, accepted: false, ..maps[0].clone() };
-    assert!(judge(&a.view(), &b.view(), &[&nowhere], &MergeVerifierParameters::default()).is_none());
+    assert!(
+        judge(&a.view(), &b.view(), &[&nowhere], &UserKnowledge::default(), &MergeVerifierParameters::default())
+            .is_none()
+    );
 }
 
 #[test]
@@ -150,7 +162,7 @@ fn a_mirrored_map_and_another_building_are_refused() {
         let b = other.draw(part, drawing(12.0, 6.0, -2.1));
         let hypotheses = [by_tags(&a.transform_to(&b))];
         let verdict = judged(&a, &b, &hypotheses);
-        assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", verdict.reason());
+        assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
     }
 }
 
@@ -161,7 +173,7 @@ fn maps_that_hardly_overlap_are_refused() {
     let b = office.draw(seen(7.7, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
     let hypotheses = [by_tags(&a.transform_to(&b))];
     let verdict = judged(&a, &b, &hypotheses);
-    assert!(matches!(verdict.refusal, Some(Refusal::Chance { .. })), "{}", verdict.reason());
+    assert!(matches!(verdict.refusal, Some(Refusal::Chance { .. })), "{}", reason(&verdict));
 }
 
 #[test]
@@ -214,8 +226,8 @@ fn what_is_accepted_follows_from_the_probability_that_is_asked_for() {
     let hypotheses: Vec<&Alignment> = hypotheses.iter().collect();
     for (accept, is_accepted) in [(0.0, true), (0.999, true), (1.0, false)] {
         let parameters = MergeVerifierParameters { accept, ..Default::default() };
-        let verdict = judge(&a.view(), &b.view(), &hypotheses, &parameters).unwrap();
-        assert_eq!(verdict.refusal.is_none(), is_accepted, "{accept}: {}", verdict.reason());
+        let verdict = judge(&a.view(), &b.view(), &hypotheses, &UserKnowledge::default(), &parameters).unwrap();
+        assert_eq!(verdict.refusal.is_none(), is_accepted, "{accept}: {}", reason(&verdict));
     }
 }
 
@@ -227,7 +239,7 @@ fn the_wrong_quarter_is_refused() {
     for turn in [FRAC_PI_2, PI, -FRAC_PI_2] {
         let hypotheses = [by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)))];
         let verdict = judged(&a, &b, &hypotheses);
-        assert!(verdict.refusal.is_some(), "{turn}: {}", verdict.reason());
+        assert!(verdict.refusal.is_some(), "{turn}: {}", reason(&verdict));
     }
 }
 
@@ -240,6 +252,80 @@ fn the_defaults_are_in_range_and_nonsense_is_not() {
         region: f64::NAN,
         slide_deviation: -1.0,
         rival_reach: 1e9,
+        ..MergeVerifierParameters::default()
     };
     assert_eq!(nonsense.check().len(), 5);
+}
+
+/// The nearly symmetric building, twice, and a place in each of its halves.
+fn ambiguous() -> (DrawnMap, DrawnMap, [Pose2; 2]) {
+    let building = nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (building.draw(part, drawing(3.0, 2.0, 0.4)), building.draw(part, drawing(12.0, 6.0, -2.1)));
+    let truth = a.transform_to(&b);
+    let world_a = a.transform_world_map;
+    let half_turn = world_a.inverse() * pose(20.0, 12.0, PI) * world_a * truth;
+    (a, b, [truth, half_turn])
+}
+
+/// An initial pose of map b that is known to half a metre, with map a at the origin.
+fn window_at(place: &Pose2) -> UserKnowledge {
+    let known = InitialPose {
+        x: place.translation.x + 0.4,
+        y: place.translation.y - 0.3,
+        yaw: place.rotation.angle() + 0.1,
+        stddev: 0.5,
+        yaw_stddev: 0.1,
+    };
+    UserKnowledge { window: Some(PlaceWindow::between(&InitialPose::ORIGIN, &known)), hypothesis: None }
+}
+
+#[test]
+fn an_initial_pose_decides_between_places_that_are_alike() {
+    let (a, b, places) = ambiguous();
+    let hypotheses = by_maps(&places);
+    assert!(matches!(judged(&a, &b, &hypotheses).refusal, Some(Refusal::Ambiguous { .. })));
+    for (rank, place) in (0..).zip(&places) {
+        let verdict = judged_knowing(&a, &b, &hypotheses, &window_at(place));
+        assert_eq!((verdict.refusal.clone(), verdict.candidate.alignment.rank), (None, rank), "{}", reason(&verdict));
+    }
+    let elsewhere = window_at(&(pose(5.0, 0.0, 0.0) * places[0]));
+    let verdict = judged_knowing(&a, &b, &hypotheses, &elsewhere);
+    assert!(matches!(verdict.refusal, Some(Refusal::Unexpected { shift, .. }) if (shift - 5.0).abs() < 1.0));
+    assert!(reason(&verdict).contains("from the initial poses only\ntry: "), "{}", reason(&verdict));
+}
+
+#[test]
+fn a_hypothesis_that_was_listed_can_be_chosen() {
+    let (a, b, places) = ambiguous();
+    let hypotheses = by_maps(&places);
+    let refused = judged(&a, &b, &hypotheses);
+    let listed = &refused.hypotheses.0;
+    assert_eq!(listed.len(), 2);
+    for (number, place) in (1..).zip(listed) {
+        let known = UserKnowledge { hypothesis: Some(number), ..UserKnowledge::default() };
+        let verdict = judged_knowing(&a, &b, &hypotheses, &known);
+        assert_eq!(verdict.refusal, None);
+        assert_eq!((place.x, place.y), (verdict.candidate.alignment.x, verdict.candidate.alignment.y));
+        assert!(verdict.score < 0.999, "what the maps say of it stays as it is");
+        assert!(reason(&verdict).starts_with(&format!("hypothesis {number} of 2, which was asked for")));
+    }
+    let known = UserKnowledge { hypothesis: Some(3), ..UserKnowledge::default() };
+    let refusal = judged_knowing(&a, &b, &hypotheses, &known).refusal;
+    assert_eq!(refusal, Some(Refusal::NoSuchHypothesis { asked: 3, count: 2 }));
+}
+
+#[test]
+fn what_everybody_is_shown_of_a_refusal_fits_in_eighty_columns() {
+    let (a, b, places) = ambiguous();
+    let hypotheses: Vec<Alignment> =
+        by_maps(&places).into_iter().map(|one| Alignment { b: "robot2".into(), ..one }).collect();
+    let reason = reason(&judged(&a, &b, &hypotheses));
+    let (shown, whole) = reason.split_once("\n\n").unwrap();
+    let lines: Vec<&str> = shown.lines().collect();
+    assert!(lines.iter().all(|line| line.len() <= 78), "{shown}");
+    assert_eq!(lines[0], "the maps fit at 2 places, and it cannot be told which is right");
+    assert!(lines[1].starts_with("missing: a probability of 0.999 (--set verifier.accept); this is 0.0"), "{shown}");
+    assert!(lines[2].starts_with("try: --accept robot2=N") && lines[4].starts_with("  2: x "), "{shown}");
+    assert!(whole.starts_with("the maps alone; the maps do not confirm it"), "{whole}");
 }

@@ -23,6 +23,18 @@ fn an_interrupt_ends_a_live_run_when_all_that_was_sent_is_handled() {
 }
 
 #[test]
+fn maps_without_tags_are_merged_live() {
+    let run = Run::start("live_merge", &[]);
+    let args = ["--robots", "2", "--seed", "1001", "--set", "tags=0"];
+    let (_, truth) = simulate(run.folder.path(), LOG, &args);
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["into live_merge"]);
+    let done = run.interrupt();
+    done.assert_done();
+    done.ended.assert(0, &["merged 2 of 2 robots"]);
+    done.assert_right(&truth);
+}
+
+#[test]
 fn players_that_are_killed_leave_room_for_others_and_the_run_goes_on() {
     let run = Run::start(RECEIVE, &[]);
     let (log, _) = run.simulate();

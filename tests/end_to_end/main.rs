@@ -26,3 +26,4 @@ mod processes;
 mod real_logs;
 mod support;
 mod two_tags;
+mod user_knowledge;

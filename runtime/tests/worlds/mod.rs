@@ -331,6 +331,7 @@ impl PipelineBuilder {
             stall_timeout: None,
             memory_limit: None,
             robots: Default::default(),
+            initial_poses: Default::default(),
             stages,
         }
     }

@@ -278,6 +278,25 @@ fn the_reference_is_the_name_of_a_robot() {
 }
 
 #[test]
+fn an_initial_pose_has_a_place_and_a_direction() {
+    let with = |initial: &str| format!("[robots.robot2]\ninitial = {initial}\n\n[stages.log]");
+    let errors = |initial: &str, place: &str, underlined: &str, says: &[&str]| {
+        assert_error(("[stages.log]", &with(initial)), place, underlined, says);
+    };
+    errors("{ x = 1.0, y = 2 }", "11:11", "{ x = 1.0, y = 2 }", &["`initial` has no `yaw`", "in metres and radians"]);
+    errors("{ x = 1.0, y = 2, yaw = 0, std = 1 }", "11:38", "std", &["unknown key `std`", "did you mean"]);
+    errors("{ x = 1.0, y = 2, yaw = \"east\" }", "11:35", "\"east\"", &["a finite number of radians"]);
+    errors("{ x = 1.0, y = nan, yaw = 0 }", "11:26", "nan", &["a finite number of metres"]);
+    errors("{ x = 1.0, y = 2, yaw = 0, stddev = 0.0 }", "11:47", "0.0", &["metres from 0.01"]);
+    let robot = "[robots.robot2]\ninital = { }\n\n[stages.log]";
+    assert_error(("[stages.log]", robot), "11:1", "inital", &["`[robots.robot2]`", "did you mean `initial`?"]);
+    let alone = with("{ x = 1.0, y = 2, yaw = 0 }");
+    let text = VALID.replacen("[stages.log]", &alone, 1).replacen("reference = \"robot1\"\n", "", 1);
+    let error = only_error(&text);
+    assert!(error.title.contains("the initial pose of `robot2` alone"), "{}", error.text);
+}
+
+#[test]
 fn a_pattern_tells_robots_apart() {
     let topic = "\"/{robot}/map\"\n";
     assert_error((topic, "\"/map\"\n"), "8:7", "\"/map\"", &["expected `{robot}` once, found it nowhere"]);

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::pipeline::SettingError;
+use crate::stage::InitialPose;
 
 fn load(overrides: &Overrides) -> Result<Pipeline, PipelineErrors> {
     Pipeline::parse("walls.toml", VALID, &registry(), overrides)
@@ -27,6 +28,33 @@ fn settings_go_before_the_file_and_the_last_one_counts() {
     assert_eq!(parameter(&pipeline, "lines", "mean"), Some("groups".into()));
     assert_eq!(pipeline.stages.iter().find(|stage| stage.name == "fuse").map(|stage| stage.depth), Some(9));
     assert_eq!((pipeline.seed, pipeline.reference.as_deref()), (u64::MAX, Some("robot2")));
+}
+
+#[test]
+fn an_initial_pose_is_typed_in_numbers_and_the_reference_lies_at_the_origin() {
+    let typed = |texts: &[&str]| {
+        let mut overrides = Overrides::default();
+        overrides.initial_poses = texts.iter().map(|text| (*text).to_owned()).collect();
+        load(&overrides)
+    };
+    let pipeline = typed(&["robot2=1,-2.5, 0.5", "robot3=1,2,3,0.5,0.1"]).unwrap();
+    let robot2 = InitialPose { x: 1.0, y: -2.5, yaw: 0.5, ..InitialPose::default() };
+    let robot3 = InitialPose { x: 1.0, y: 2.0, yaw: 3.0, stddev: 0.5, yaw_stddev: 0.1 };
+    let expected = [("robot1", InitialPose::ORIGIN), ("robot2", robot2), ("robot3", robot3)];
+    assert_eq!(pipeline.initial_poses, expected.map(|(robot, pose)| (robot.to_owned(), pose)).into());
+    for (text, underlined, says) in [
+        ("robot2", "robot2", "expected ROBOT=X,Y,YAW"),
+        ("=1,2,3", "=1,2,3", "expected ROBOT=X,Y,YAW"),
+        ("robot2=1,2", "1,2", "expected 3 to 5 numbers, found 2"),
+        ("robot2=1,2,3,4,5,6", "1,2,3,4,5,6", "found 6"),
+        ("robot2=1,north,3", "north", "y: expected a finite number of metres"),
+        ("robot2=1,2,3,-1", "-1", "stddev: expected metres"),
+    ] {
+        let errors = typed(&[text]).unwrap_err();
+        let found = shown(&errors);
+        assert_eq!((found.len(), found[0].underlined.as_str()), (1, underlined), "{errors}");
+        assert!(errors.to_string().contains(says), "{errors}");
+    }
 }
 
 #[test]

@@ -87,6 +87,7 @@ fn a_pipeline_written_out_is_the_same_when_read_again() {
     let mut overrides = Overrides::default();
     overrides.seed = Some(u64::MAX);
     overrides.set("lines.starts=[0.5, 1]").unwrap();
+    overrides.initial_poses.push("robot2=1,-2.5,0.5".into());
     let frames = "[robots]\ntf = { map_frame = \"{robot}/map\", base_frame = \"{robot}/base_link\" }";
     let text = changed("[robots]", frames);
     let first = Pipeline::parse("walls.toml", &text, &registry(), &overrides).unwrap();
