@@ -35,7 +35,7 @@ enum Command {
     Graph(graph::GraphArgs),
     /// List the stage kinds with their ports and parameters.
     Kinds(kinds::KindsArgs),
-    /// Show what is in logs: topics, types, counts, times, robots.
+    /// Show what is in logs (topics, types, counts, times, robots) or in map files.
     Info(info::InfoArgs),
     /// Compare a summary with the truth.
     Evaluate(evaluate::EvaluateArgs),

@@ -209,6 +209,22 @@ fn unrelated_maps_are_not_merged_and_the_reference_stands_alone() {
 }
 
 #[test]
+fn what_is_in_map_files_is_shown_as_a_merge_reads_it() {
+    let folder = two_rooms();
+    let info = |more: &[&str]| gridweave(folder.path(), &[&["info", "a.yaml", "b.yaml"], more].concat());
+    info(&[]).assert(0, &["occupied m2", "  a  ", "  b  "]);
+    let shown: Value = serde_json::from_str(&info(&["--json"]).stdout).unwrap();
+    let map = map_file::load(&folder.path().join("a.yaml")).unwrap();
+    assert_eq!((&shown[0]["robot"], &shown[1]["robot"]), (&Value::from("a"), &Value::from("b")));
+    assert_eq!((&shown[0]["width"], &shown[0]["height"]), (&map.info.width.into(), &map.info.height.into()));
+    let occupied =
+        map.cells.iter().filter(|cell| **cell == 100).count() as f64 * f64::from(map.info.resolution).powi(2);
+    assert!((shown[0]["occupied_m2"].as_f64().unwrap() - occupied).abs() < 1e-6, "{shown}");
+    gridweave(folder.path(), &["info", "a.yaml", "a.mcap"]).assert(2, &["a.yaml is a map file and a.mcap is a log"]);
+    gridweave(folder.path(), &["info", "missing.yaml"]).assert(1, &["missing.yaml"]);
+}
+
+#[test]
 fn one_map_has_nothing_to_be_merged_with() {
     let folder = two_rooms();
     merge(folder.path(), &["a.yaml", "-o", "merged.yaml"]).assert(0, &["only a", "nothing to merge"]);

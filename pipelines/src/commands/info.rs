@@ -1,5 +1,7 @@
-//! `gridweave info`: what is in logs.
+//! `gridweave info`: what is in logs, or in map files.
 
+use super::map_file_info;
+use crate::job::Inputs;
 use crate::shipped;
 use crate::status::Status;
 use crate::table::Table;
@@ -16,9 +18,9 @@ use std::path::PathBuf;
 /// What `gridweave info` is told.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// Logs (MCAP files or rosbag2 folders).
-    #[arg(required = true, value_name = "LOG")]
-    pub(crate) logs: Vec<PathBuf>,
+    /// Logs (MCAP files or rosbag2 folders), or map files (map_server YAML).
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
     /// Take the topic patterns of this pipeline to tell robots apart.
     #[arg(long)]
     pub(crate) pipeline: Option<PathBuf>,
@@ -27,13 +29,21 @@ pub(crate) struct InfoArgs {
     pub(crate) json: bool,
 }
 
-/// Shows what is in logs.
+/// Shows what is in logs, or in map files.
 pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
+    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+        let maps = map_file_info::inspect(&args.inputs)?;
+        match args.json {
+            true => print_line(serde_json::to_string_pretty(&maps)?),
+            false => print(map_file_info::to_text(&maps)),
+        }?;
+        return Ok(Status::Done);
+    }
     let robots = match &args.pipeline {
         None => RobotTopics::default(),
         Some(path) => shipped::load(path, &Overrides::default(), registry)?.robots,
     };
-    let found = info::inspect(&args.logs, &robots)?;
+    let found = info::inspect(&args.inputs, &robots)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&found)?),
         false => print(to_text(&found)),

@@ -8,6 +8,7 @@ pub(crate) mod graph;
 pub(crate) mod info;
 pub(crate) mod kinds;
 pub(crate) mod live;
+mod map_file_info;
 pub(crate) mod merge;
 pub(crate) mod processes;
 pub(crate) mod run;
