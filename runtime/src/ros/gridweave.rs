@@ -178,7 +178,7 @@ pub struct Alignment {
     /// How many hypotheses its stage has for the pair. All are sent one after the other, by rank, and take the place of
     /// those sent before. 0 if its stage does not look for others, 1 if it has looked and there is no other.
     pub hypotheses: u32,
-    /// Why it is refused, or what speaks for it.
+    /// Why it is refused, or what speaks for it: short lines that everybody is shown and, behind an empty line, the whole.
     pub reason: String,
 }
 
