@@ -8,6 +8,7 @@
 mod bad_input;
 mod closed_output;
 mod engines_agree;
+mod far_from_the_origin;
 mod full_shared_memory;
 mod golden;
 mod golden_mistakes;
