@@ -26,4 +26,5 @@ mod output_files;
 mod processes;
 mod real_logs;
 mod support;
+mod torture;
 mod two_tags;
