@@ -40,6 +40,10 @@ enum Args {
         /// For so long.
         #[arg(long, default_value_t = 60.0)]
         minutes: f64,
+        /// How much faster than it was recorded: no faster than the machine can follow, as the run is to have nothing left to do
+        /// half a minute after the last message.
+        #[arg(long, default_value_t = 2.0)]
+        rate: f64,
         /// What is killed, and when, is drawn from this.
         #[arg(long, default_value_t = 1)]
         seed: u64,
@@ -66,7 +70,7 @@ fn torture(args: Args) -> Result<ExitCode> {
     let program = |given: Option<PathBuf>| given.map_or_else(beside, Ok);
     match args {
         Args::Rounds { rounds, seed, kills, program: given } => rounds::torture(&program(given)?, rounds, seed, kills)?,
-        Args::Soak { minutes, seed, program: given } => soak::soak(&program(given)?, minutes, seed)?,
+        Args::Soak { minutes, rate, seed, program: given } => soak::soak(&program(given)?, minutes, rate, seed)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -17,8 +17,6 @@ use std::time::{Duration, Instant};
 /// Stages of the pipeline that are started again when they fail.
 const MORTAL: [&str; 9] =
     ["robots", "common_tags", "lines", "quadrants", "cleaner", "icp", "verifier", "frames", "fuser"];
-/// Messages are played so much faster than they were recorded.
-const RATE: &str = "10";
 /// Seconds between two kills, at least and at most.
 const PAUSE: (f64, f64) = (3.0, 9.0);
 /// Of two means of what is used, the later may be greater by this share, and by so much.
@@ -37,7 +35,7 @@ struct Usage {
 }
 
 /// Plays and kills for so many minutes.
-pub(crate) fn soak(program: &Path, minutes: f64, seed: u64) -> Result<()> {
+pub(crate) fn soak(program: &Path, minutes: f64, rate: f64, seed: u64) -> Result<()> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut world = World::new(program)?;
     ensure!(
@@ -47,7 +45,8 @@ pub(crate) fn soak(program: &Path, minutes: f64, seed: u64) -> Result<()> {
     world.run(&["simulate", "-o", "in.mcap", "--robots", "2"])?;
     let run = world.start(&["run", "live", "-o", "out.mcap", "--summary", "summary.json"], false)?;
     let name = run_name(run.id());
-    let player = world.start(&["play", "in.mcap", "--loop", "--rate", RATE, "--run", &name, "--wait", "60"], false)?;
+    let player = world
+        .start(&["play", "in.mcap", "--loop", "--rate", &rate.to_string(), "--run", &name, "--wait", "60"], false)?;
     ensure!(wait_for(START, || of_stages(&world).len() > MORTAL.len()), "the run does not start");
 
     let (start, mut kills, mut usages) = (Instant::now(), BTreeMap::<&str, u64>::new(), Vec::new());
