@@ -47,6 +47,8 @@ inputs = ["join"]
 
 const OUTPUT: &str = "out.mcap";
 const ENGINES: [&str; 4] = ["processes", "processes", "threads-ipc", "threads"];
+/// So many rounds are told of together.
+const PROGRESS: u32 = 50;
 /// Processes that lose the one that leads them end within this.
 const END: Duration = Duration::from_secs(30);
 
@@ -83,6 +85,13 @@ pub(crate) fn torture(program: &Path, rounds: u32, seed: u64, kills: bool) -> Re
             }
         }
         *done.entry(round.trouble).or_default() += 1;
+        if (number + 1) % PROGRESS == 0 {
+            tell(&format!(
+                "{} rounds in {:.0} s, every promise held so far",
+                number + 1,
+                start.elapsed().as_secs_f64()
+            ));
+        }
     }
     let seconds = start.elapsed().as_secs_f64();
     let rounds: u32 = done.values().sum();
