@@ -61,6 +61,13 @@ impl GridGeometry {
     }
 }
 
+/// The most cells of a grid that is laid over several, of which `known` cells are known in all: memory goes with what is
+/// known, and not with how far apart a message says that it lies. The first are 200 x 200 m in cells of 0.05 m; beyond, maps
+/// that hang together know more than a sixty-fourth of the rectangle round them.
+pub fn most_cells_over(known: f64) -> f64 {
+    (16 << 20) as f64 + 64.0 * known
+}
+
 /// Why a message cannot be used as a grid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {

@@ -7,7 +7,7 @@ mod point_index;
 mod pose;
 mod rigid_fit;
 
-pub use grid::{Cell, Grid, GridError, GridGeometry};
+pub use grid::{Cell, Grid, GridError, GridGeometry, most_cells_over};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 pub use point_index::{Buckets, Neighbour, PointIndex};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};

@@ -86,6 +86,11 @@ impl KnownArea {
         }
     }
 
+    /// The number of cells between the first and the last known one of every row.
+    pub(super) fn cell_count(&self) -> usize {
+        self.rows.iter().map(|row| row.behind - row.first).sum()
+    }
+
     /// The corners of the known parts of all rows, in cells.
     pub(super) fn corners(&self) -> impl Iterator<Item = Point2> + '_ {
         self.rows.iter().flat_map(|&KnownRow { row, first, behind }| {

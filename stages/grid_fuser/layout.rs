@@ -1,7 +1,7 @@
 //! How large the fused grid is, and where its cells lie.
 
 use super::{KnownArea, PlacedGrid};
-use crate::geometry::{GridGeometry, Point2, pose};
+use crate::geometry::{GridGeometry, Point2, most_cells_over, pose};
 
 /// A rectangle along the world's axes, in cells of the fused grid, counted from the anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,42 +29,57 @@ pub struct Lattice {
 pub struct Layout {
     /// The fused grid in the world: along its axes, cropped to what is known. `None` if nothing is.
     pub geometry: Option<GridGeometry>,
-    /// For every map, whether it is part of it. A map is not if its pose is no finite number, or if it would make the
-    /// grid larger than the limits allow.
-    pub takes_part: Vec<bool>,
+    /// For every map, whether it is part of it.
+    pub takes_part: Vec<Result<(), LeftOut>>,
 }
+
+/// Why a map is no part of the fused grid.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LeftOut {
+    /// Its pose is no finite number.
+    #[error("where it lies is no finite number")]
+    NotFinite,
+    /// The grid would be longer than a side may be.
+    #[error("it lies so far away that the fused map would be longer than `max_extent`, {0} m; {DOUBT}")]
+    TooLong(f64),
+    /// The grid would have more cells than it may have.
+    #[error("the fused map would have more cells than `max_cells`, {0}; {DOUBT}")]
+    TooManyCells(u64),
+    /// The grid would be all but unknown.
+    #[error("it lies so far away that next to nothing of the fused map would be known; {DOUBT}")]
+    Unknown,
+}
+
+/// What puts a map far away, other than a wrong merge.
+const DOUBT: &str = "does the origin of each map fit the poses of its robot?";
 
 /// Lays out the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left out.
 pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
-    let mut whole: Option<Extent> = None;
-    let mut takes_part = Vec::with_capacity(maps.len());
+    let mut layout = Layout { geometry: None, takes_part: Vec::with_capacity(maps.len()) };
+    let (mut whole, mut known): (Option<Extent>, f64) = (None, 0.0);
     for (map, area) in maps {
-        let extent = extent(map, area, lattice);
-        let joined = match (whole, extent) {
-            (Some(one), Ok(Some(next))) => Some(one.joined(&next)),
-            (one, Ok(next)) => one.or(next),
-            (_, Err(NotFinite)) => None,
-        };
-        let fits = extent.is_ok() && joined.is_none_or(|joined| lattice.geometry(&joined).is_some());
-        if fits {
-            whole = joined;
-        }
-        takes_part.push(fits);
+        let fits = extent(map, area, lattice).and_then(|extent| {
+            let Some(extent) = extent else { return Ok(()) };
+            let cells = area.cell_count() as f64 * (map.grid.geometry.resolution / lattice.resolution).powi(2);
+            let joined = whole.map_or(extent, |whole| whole.joined(&extent));
+            layout.geometry = Some(lattice.geometry(&joined, known + cells)?);
+            (whole, known) = (Some(joined), known + cells);
+            Ok(())
+        });
+        layout.takes_part.push(fits);
     }
-    Layout { geometry: whole.and_then(|extent| lattice.geometry(&extent)), takes_part }
+    layout
 }
 
-#[derive(Clone, Copy)]
-struct NotFinite;
-
-fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, NotFinite> {
+/// The rectangle that holds what is known of a map, if anything is.
+fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, LeftOut> {
     let transform_world_grid = map.transform_world_grid();
     let mut extent: Option<Extent> = None;
     for corner in area.corners() {
         let in_world = transform_world_grid * (corner * map.grid.geometry.resolution);
         let in_cells = Point2::from((in_world - lattice.anchor) / lattice.resolution);
         if !in_cells.coords.iter().all(|value| value.is_finite()) {
-            return Err(NotFinite);
+            return Err(LeftOut::NotFinite);
         }
         let corner = Extent { low: in_cells, high: in_cells };
         extent = Some(extent.map_or(corner, |extent| extent.joined(&corner)));
@@ -79,25 +94,32 @@ impl Extent {
 }
 
 impl Lattice {
-    /// The grid of the cells whose centres lie within the extent. `None` if it is beyond the limits.
-    fn geometry(&self, extent: &Extent) -> Option<GridGeometry> {
+    /// The grid of the cells whose centres lie within the extent, about `known` of which are known.
+    fn geometry(&self, extent: &Extent, known: f64) -> Result<GridGeometry, LeftOut> {
         let (left, width) = self.cells(extent.low.x, extent.high.x)?;
         let (bottom, height) = self.cells(extent.low.y, extent.high.y)?;
-        let is_small = (width as u64).checked_mul(height as u64).is_some_and(|cells| cells <= self.max_cells);
+        let cells = width as f64 * height as f64;
+        if cells > self.max_cells as f64 {
+            return Err(LeftOut::TooManyCells(self.max_cells));
+        }
+        if cells > most_cells_over(known) {
+            return Err(LeftOut::Unknown);
+        }
         let corner = self.anchor + nalgebra::Vector2::new(left, bottom) * self.resolution;
         let origin = pose(corner.x, corner.y, 0.0);
-        is_small.then_some(GridGeometry { width, height, resolution: self.resolution, origin })
+        Ok(GridGeometry { width, height, resolution: self.resolution, origin })
     }
 
     /// The first cell and the number of cells on one axis.
-    fn cells(&self, low: f64, high: f64) -> Option<(f64, usize)> {
+    fn cells(&self, low: f64, high: f64) -> Result<(f64, usize), LeftOut> {
         // The extent's ends lie on the borders of cells, mostly; centres are half a cell away from rounding errors.
         let (mut first, mut behind) = ((low - 0.5).ceil(), (high - 0.5).floor() + 1.0);
         if behind <= first {
             (first, behind) = (low.floor(), low.floor() + 1.0);
         }
         let count = behind - first;
-        (count * self.resolution <= self.max_extent && count < f64::from(u32::MAX)).then_some((first, count as usize))
+        let fits = count * self.resolution <= self.max_extent && count < f64::from(u32::MAX);
+        if fits { Ok((first, count as usize)) } else { Err(LeftOut::TooLong(self.max_extent)) }
     }
 }
 
@@ -155,11 +177,23 @@ mod tests {
             [pose(f64::NAN, 0.0, 0.0), pose(f64::INFINITY, 0.0, 0.0), pose(3e3, 0.0, 0.0), pose(1e300, 0.0, 0.0)];
         for bad in absurd {
             let layout = lay_out_at(grid(&CELLS), &[Pose2::identity(), bad, pose(1.0, 0.0, 0.3)]);
-            assert_eq!(layout.takes_part, [true, false, true], "{bad:?}");
+            assert_eq!(layout.takes_part.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true], "{bad:?}");
             assert!(layout.geometry.unwrap().width < 40);
         }
         let many_cells = lay_out_at(grid(&CELLS), &[Pose2::identity(), pose(60.0, 60.0, 0.0)]);
-        assert_eq!(many_cells.takes_part, [true, false], "1200 x 1200 cells are more than a million");
+        let too_many = Err(LeftOut::TooManyCells(1_000_000));
+        assert_eq!(many_cells.takes_part, [Ok(()), too_many], "1200 x 1200 cells are more than a million");
+    }
+
+    #[test]
+    fn the_grid_goes_with_what_is_known_and_not_with_how_far_apart_it_lies() {
+        let lattice = Lattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
+        let known = vec![0; 6 * 4];
+        let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
+        let at = |x: f64, y: f64| (PlacedGrid { grid, transform_world_map: pose(x, y, 0.0) }, &area);
+        let layout = lay_out(&[at(0.0, 0.0), at(300.0, 300.0), at(150.0, 150.0)], &lattice);
+        assert_eq!(layout.takes_part, [Ok(()), Err(LeftOut::Unknown), Ok(())]);
+        assert!(layout.geometry.unwrap().cell_count() < 10_000_000);
     }
 
     proptest! {

@@ -39,7 +39,8 @@ pub struct GridFuserParameters {
     /// Metres. The longest side that the fused map may have; a robot whose map would make it longer is left out with a
     /// warning.
     pub max_extent: f64,
-    /// The most cells that the fused map may have; a robot whose map would make it larger is left out with a warning.
+    /// The most cells that the fused map may have; a robot whose map would make it larger is left out with a warning, and so
+    /// is one that lies so far away that next to nothing of the fused map would be known.
     pub max_cells: u64,
 }
 

@@ -138,15 +138,13 @@ impl GridFuser {
             max_cells: self.parameters.max_cells,
         };
         let layout = lay_out(&maps, &lattice);
-        for (frame, _) in placed.iter().zip(&layout.takes_part).filter(|(_, takes_part)| !**takes_part) {
-            output.warn(format!(
-                "the map of {} is not in the fused one: where it lies is no finite number, or the fused map would be \
-                 larger than `max_extent` or `max_cells` allow",
-                frame.robot
-            ));
+        for (frame, takes_part) in placed.iter().zip(&layout.takes_part) {
+            if let Err(reason) = takes_part {
+                output.warn(format!("the map of {} is not in the fused one: {reason}", frame.robot));
+            }
         }
         let mut takes_part = layout.takes_part.iter();
-        maps.retain(|_| takes_part.next().is_some_and(|takes_part| *takes_part));
+        maps.retain(|_| takes_part.next().is_some_and(Result::is_ok));
         let Some(geometry) = layout.geometry else { return Ok(()) };
         let header = Header::new(output.log_time(), RobotFrames::WORLD);
         let prefix = prefix(&geometry, header.clone());

@@ -1,5 +1,5 @@
 //! When there is no room left in shared memory, a run of processes ends with the stage's name and the cause.
-use crate::support::{Ended, gridweave_program, outcome, processes, run_folder, start_program};
+use crate::support::{Ended, Running, gridweave_program, outcome, processes, run_folder, start_program};
 use std::fs;
 use tempfile::TempDir;
 
@@ -33,15 +33,28 @@ const SMALL: &str = "mount -t tmpfs -o size=4m tmpfs /dev/shm && exec \"$0\" \"$
 const FULL: &str =
     "mount -t tmpfs -o size=64k tmpfs /dev/shm && { cat /dev/zero >/dev/shm/zeros 2>&-; exec \"$0\" \"$@\"; }";
 
-/// A run with such a /dev/shm, in a folder of its own: how it ended, and its number.
-fn run_with(shared_memory: &str, engine: &str) -> (TempDir, Ended, u32) {
+/// One with room, which another program fills once there is a file `fill`. Then the source may send its second message.
+const FILLED: &str = "mount -t tmpfs -o size=64m tmpfs /dev/shm && {
+    (while [ ! -e fill ]; do [ -e /proc/$$ ] || exit; sleep 0.01; done; cat /dev/zero >/dev/shm/zeros 2>&-; touch gate_2) &
+    exec \"$0\" \"$@\"
+}";
+
+/// Starts a run with such a /dev/shm, in a folder of its own.
+fn start_with(shared_memory: &str, engine: &str, settings: &[&str]) -> (TempDir, Running) {
     let own = ["--user", "--map-root-user", "--mount"];
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("large.toml"), LARGE).unwrap();
     let program = gridweave_program();
     let run = ["run", "large.toml", "-o", "out.mcap", "--engine", engine];
     let args = [&own, &["sh", "-c", shared_memory, program.to_str().unwrap()][..], &run].concat();
-    let run = start_program("unshare".as_ref(), folder.path(), &args, &[]);
+    let settings: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    let run = start_program("unshare".as_ref(), folder.path(), &[args, settings].concat(), &[]);
+    (folder, run)
+}
+
+/// A run with such a /dev/shm: how it ended, and its number.
+fn run_with(shared_memory: &str, engine: &str) -> (TempDir, Ended, u32) {
+    let (folder, run) = start_with(shared_memory, engine, &[]);
     let id = run.id();
     let ended = run.wait();
     assert_eq!(processes(id), []);
@@ -65,4 +78,17 @@ fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
     ended.assert(1, &["cannot make the board of the run", &format!("/dev/shm/gw{id}_"), "No space left"]);
     let (_, ended, _) = run_with(FULL, "threads-ipc");
     ended.assert(1, &["there is no room left in /dev/shm"]);
+}
+
+#[test]
+#[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
+fn a_run_whose_room_in_shared_memory_another_program_takes_says_so() {
+    let settings = ["source.gates=[2]", "source.pause=0", "hangs.what=print", "hangs.at=1"];
+    let (folder, run) = start_with(FILLED, "threads-ipc", &settings);
+    // The first message has come, so there is room for more by what is known then.
+    run.wait_for_lines(1);
+    fs::write(folder.path().join("fill"), b"").unwrap();
+    run.wait().assert(1, &["stage `source`", "no room left in /dev/shm"]);
+    let (reason, messages) = outcome(&folder.path().join("out.mcap"));
+    assert!(reason.contains("/dev/shm") && messages > 0, "{messages} {reason}");
 }

@@ -8,6 +8,7 @@
 mod bad_input;
 mod closed_output;
 mod engines_agree;
+mod far_from_the_origin;
 mod full_shared_memory;
 mod golden;
 mod golden_mistakes;
@@ -25,5 +26,6 @@ mod output_files;
 mod processes;
 mod real_logs;
 mod support;
+mod torture;
 mod two_tags;
 mod user_knowledge;

@@ -1,6 +1,6 @@
 //! Outputs: a run owns the files that it writes, touches no others, and what was there stays until there is something better.
 
-use crate::support::{DIAMOND, Running, gridweave, outcome, part, processes, signal, start, wait_until};
+use crate::support::{DIAMOND, Run, Running, TROUBLED, gridweave, outcome, part, processes, signal, start, wait_until};
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::path::Path;
@@ -38,6 +38,23 @@ fn of_two_runs_with_one_output_the_second_is_refused_and_the_first_keeps_its_log
         assert_eq!((reason.as_str(), messages > 3000), ("", true), "{messages}");
         assert!(!part(&output).exists());
     }
+}
+
+#[test]
+fn of_two_live_runs_with_one_output_the_second_is_refused_and_the_first_keeps_its_log() {
+    let first = Run::start(TROUBLED, &[]);
+    wait_until("messages", || first.number("output", "messages_in") > 50);
+    let args = ["run", "pipeline.toml", "-o", OUTPUT, "--summary", "second.json"];
+    for _ in 0..3 {
+        gridweave(first.folder.path(), &args).assert(1, &["out.mcap is being written by process"]);
+    }
+    let before = first.number("output", "messages_in");
+    wait_until("more messages", || first.number("output", "messages_in") > before + 50);
+    let done = first.interrupt();
+    done.assert_done();
+    let written: usize = done.output().values().map(Vec::len).sum();
+    assert_eq!(done.numbers("output", ["messages_in", "dropped"]), [written as u64, 0]);
+    assert!(!part(&done.path(OUTPUT)).exists() && !done.path("second.json").exists());
 }
 
 #[test]

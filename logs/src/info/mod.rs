@@ -129,7 +129,7 @@ fn file_info(file: &LogFile) -> FileInfo {
     let name = |compression: &String| if compression.is_empty() { "none".to_owned() } else { compression.clone() };
     FileInfo {
         path: file.path().to_owned(),
-        size: file.bytes().len() as u64,
+        size: file.size(),
         chunks: file.chunks(),
         compression: file.compressions().iter().map(name).collect(),
         ..Default::default()

@@ -1,13 +1,12 @@
 //! Blocks: the pieces in which a file is read. A block is a chunk, or a run of records that lie in the file by
 //! themselves.
 
-use super::chunk::Chunk;
+use super::bytes::FileBytes;
+use super::chunk::{Chunk, LARGEST};
 use super::damage::ChunkFault;
 use super::definitions::Definitions;
-use super::file::LogFile;
 use super::record::{MessageRecord, record_at};
 use mcap::records::op;
-use std::borrow::Cow;
 use std::ops::Range;
 
 /// A piece of a file, and the time that its messages span.
@@ -42,9 +41,12 @@ impl Block {
     }
 
     /// The block's records, uncompressed.
-    pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
+    pub(crate) fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
         match &self.records {
-            Records::Bare(range) => file.get(range.clone()).map(Cow::Borrowed).ok_or(ChunkFault::Records),
+            Records::Bare(range) if range.len() as u64 > LARGEST => {
+                Err(ChunkFault::TooMuch { size: range.len() as u64 })
+            }
+            Records::Bare(range) => file.read(range.clone()).ok_or(ChunkFault::Records),
             Records::Chunk(chunk) => chunk.contents(file),
         }
     }
@@ -55,21 +57,14 @@ impl Block {
     }
 
     /// Makes the block's messages ready to be given out.
-    pub(crate) fn load(&self, file: &[u8]) -> Result<LoadedBlock, ChunkFault> {
-        let contents = self.contents(file)?;
-        let messages = index_messages(&contents, self.may_be_cut())?;
-        let records = match contents {
-            Cow::Owned(bytes) => LoadedRecords::Memory(bytes),
-            Cow::Borrowed(_) => LoadedRecords::File(match &self.records {
-                Records::Bare(range) => range.clone(),
-                Records::Chunk(chunk) => chunk.data.clone(),
-            }),
-        };
+    pub(crate) fn load(&self, file: &FileBytes) -> Result<LoadedBlock, ChunkFault> {
+        let records = self.contents(file)?;
+        let messages = index_messages(&records, self.may_be_cut())?;
         Ok(LoadedBlock { records, messages })
     }
 
     /// Reads the block through for what its header does not say, or does not say reliably.
-    pub(crate) fn survey(&self, file: &[u8]) -> Result<Survey, ChunkFault> {
+    pub(crate) fn survey(&self, file: &FileBytes) -> Result<Survey, ChunkFault> {
         let contents = self.contents(file)?;
         let mut survey = Survey { times: None, definitions: Definitions::default() };
         let mut position = 0;
@@ -101,16 +96,9 @@ pub(crate) struct Survey {
 
 /// A block whose messages can be given out.
 pub(crate) struct LoadedBlock {
-    records: LoadedRecords,
+    records: Vec<u8>,
     /// By log time, and at equal times by position.
     messages: Vec<MessagePlace>,
-}
-
-enum LoadedRecords {
-    /// Borrowed from the file.
-    File(Range<usize>),
-    /// Decompressed.
-    Memory(Vec<u8>),
 }
 
 /// Where a message lies in its block.
@@ -147,11 +135,7 @@ impl LoadedBlock {
     }
 
     /// The message with the given index.
-    pub(crate) fn message<'a>(&'a self, file: &'a LogFile, index: usize) -> Option<MessageRecord<'a>> {
-        let records = match &self.records {
-            LoadedRecords::File(range) => file.bytes().get(range.clone())?,
-            LoadedRecords::Memory(bytes) => bytes,
-        };
-        MessageRecord::parse(record_at(records, self.messages.get(index)?.position)?.body)
+    pub(crate) fn message(&self, index: usize) -> Option<MessageRecord<'_>> {
+        MessageRecord::parse(record_at(&self.records, self.messages.get(index)?.position)?.body)
     }
 }

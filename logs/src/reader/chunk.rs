@@ -1,12 +1,13 @@
 //! Chunks: many records, compressed together.
 
+use super::bytes::{FileBytes, Window};
 use super::damage::ChunkFault;
-use super::record::{Fields, HEAD, Record};
-use std::borrow::Cow;
+use super::record::{Fields, HEAD, Record, wanted};
+use mcap::records::op;
 use std::io::Read;
 use std::ops::Range;
 
-/// The most bytes that the contents of a compressed chunk may have: no more than a log of ours can hold in one, and less than
+/// The most bytes that the contents of a chunk may have: no more than a log of ours can hold in one, and less than
 /// would harm a machine. A few bytes of a file can claim, and even hold, any number.
 pub(crate) const LARGEST: u64 = 1 << 30;
 /// The same for a chunk that is cut and does not say its size, as one does whose recorder was killed. Recorders close a chunk
@@ -37,11 +38,12 @@ impl Chunk {
         (chunk.data.end == record.end()).then_some(chunk)
     }
 
-    /// Reads a chunk at `position` that the end of `file` cuts.
-    pub(crate) fn parse_cut(file: &[u8], position: usize) -> Option<Self> {
-        let start = position.checked_add(HEAD)?;
-        let (mut chunk, _) = Self::parse_header(file.get(start..)?, start)?;
-        chunk.data.end = file.len();
+    /// Reads a chunk at `position` that the end of the file cuts.
+    pub(crate) fn parse_cut(file: &mut Window<'_>, position: usize) -> Option<Self> {
+        let (start, end) = (position.checked_add(HEAD)?, file.file_length());
+        let header = end.checked_sub(start)?.min(wanted(op::CHUNK));
+        let (mut chunk, _) = Self::parse_header(file.bytes(start, header)?, start)?;
+        chunk.data.end = end;
         chunk.cut = true;
         Some(chunk)
     }
@@ -57,31 +59,38 @@ impl Chunk {
     }
 
     /// The chunk's records, uncompressed and checked. Those of a chunk that is cut: as far as they go, unchecked.
-    pub(crate) fn contents<'a>(&self, file: &'a [u8]) -> Result<Cow<'a, [u8]>, ChunkFault> {
-        let data = file.get(self.data.clone()).ok_or(ChunkFault::Records)?;
+    pub(crate) fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
         let most = match self.size {
             // What recorders write before a chunk is whole.
             0 | u64::MAX if self.cut => LARGEST_UNTOLD,
             size => size,
         };
-        if !self.compression.is_empty() && most > LARGEST {
-            return Err(ChunkFault::TooMuch { size: most });
+        // Neither what is read nor what becomes of it; one that is cut is read bit by bit.
+        let most_read = if self.cut { most } else { most.max(self.data.len() as u64) };
+        if most_read > LARGEST {
+            return Err(ChunkFault::TooMuch { size: most_read });
         }
-        let contents = match (self.compression.as_str(), self.cut) {
-            ("", _) => Cow::Borrowed(data),
-            ("zstd", false) => Cow::Owned(decompress_zstd(data, self.size)?),
-            ("zstd", true) => Cow::Owned(decompress_cut(zstd::stream::read::Decoder::new(data), most)),
-            ("lz4", false) => Cow::Owned(decompress_lz4(data, self.size)?),
-            ("lz4", true) => Cow::Owned(decompress_cut(lz4::Decoder::new(data), most)),
-            (other, _) => return Err(ChunkFault::UnknownCompression(other.to_owned())),
+        if self.cut {
+            let data = file.part(self.data.clone());
+            return match self.compression.as_str() {
+                "" => Ok(read_cut(Ok(data), LARGEST)),
+                "zstd" => Ok(read_cut(zstd::stream::read::Decoder::new(data), most)),
+                "lz4" => Ok(read_cut(lz4::Decoder::new(data), most)),
+                other => Err(ChunkFault::UnknownCompression(other.to_owned())),
+            };
+        }
+        let data = || file.read(self.data.clone()).ok_or(ChunkFault::Records);
+        let contents = match self.compression.as_str() {
+            "" => data()?,
+            "zstd" => decompress_zstd(&data()?, self.size)?,
+            "lz4" => decompress_lz4(&data()?, self.size)?,
+            other => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };
-        if !self.cut {
-            if contents.len() as u64 != self.size {
-                return Err(ChunkFault::Decompression);
-            }
-            if self.checksum != 0 && crc32fast::hash(&contents) != self.checksum {
-                return Err(ChunkFault::Checksum);
-            }
+        if contents.len() as u64 != self.size {
+            return Err(ChunkFault::Decompression);
+        }
+        if self.checksum != 0 && crc32fast::hash(&contents) != self.checksum {
+            return Err(ChunkFault::Checksum);
         }
         Ok(contents)
     }
@@ -125,8 +134,8 @@ fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     Ok(buffer)
 }
 
-/// What a decoder gives until it fails, its input ends, or it has given `most` bytes.
-fn decompress_cut(decoder: std::io::Result<impl Read>, most: u64) -> Vec<u8> {
+/// What a reader gives until it fails, its input ends, or it has given `most` bytes.
+fn read_cut(decoder: std::io::Result<impl Read>, most: u64) -> Vec<u8> {
     let mut buffer = Vec::new();
     if let Ok(decoder) = decoder {
         let mut decoder = decoder.take(most);
@@ -148,7 +157,11 @@ mod tests {
             let compression = "zstd".to_owned();
             Chunk { first_time: 0, last_time: 0, compression, size, checksum: 0, data: 0..data.len(), cut }
         };
-        let length = |chunk: &Chunk| chunk.contents(&data).map(|contents| contents.len() as u64);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("chunk");
+        std::fs::write(&path, &data).unwrap();
+        let file = FileBytes::open(&path).unwrap();
+        let length = |chunk: &Chunk| chunk.contents(&file).map(|contents| contents.len() as u64);
         assert_eq!(length(&chunk(1 << 20, true)), Ok(1 << 20));
         for untold in [0, u64::MAX] {
             assert_eq!(length(&chunk(untold, true)), Ok(LARGEST_UNTOLD));

@@ -1,11 +1,12 @@
 //! The layout of a file: its blocks, found by walking over its records without reading what is in them.
 
 use super::block::{Block, Records};
+use super::bytes::{FileBytes, Window};
 use super::chunk::Chunk;
 use super::damage::{ChunkFault, Damage};
 use super::definitions::Definitions;
 use super::outcome;
-use super::record::{Fields, MessageRecord, Record, record_at};
+use super::record::{Fields, MessageRecord, Record};
 use super::summary::SummarySection;
 use mcap::MAGIC;
 use mcap::records::op;
@@ -32,10 +33,10 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// Finds the blocks of `file`, which begins with the magic bytes.
-    pub(crate) fn of(file: &[u8]) -> Self {
+    pub(crate) fn of(file: &FileBytes) -> Self {
         let summary = SummarySection::read(file);
         let mut walk = Walk { layout: Self::default(), unsure: Vec::new(), run: None };
-        walk.data_section(file, &summary);
+        walk.data_section(&mut Window::new(file), &summary);
         let Walk { mut layout, mut unsure, .. } = walk;
         if summary.bad_checksum {
             layout.damage.push(Damage::BadIndex);
@@ -51,7 +52,7 @@ impl Layout {
     }
 
     /// Reads the unsure blocks through, for the time they span and the channels they describe.
-    fn survey(&mut self, file: &[u8], unsure: &[bool]) {
+    fn survey(&mut self, file: &FileBytes, unsure: &[bool]) {
         let blocks = std::mem::take(&mut self.blocks);
         let surveys: Vec<_> =
             blocks.par_iter().zip(unsure).map(|(block, &unsure)| unsure.then(|| block.survey(file))).collect();
@@ -81,18 +82,19 @@ struct Walk {
 }
 
 impl Walk {
-    fn data_section(&mut self, file: &[u8], summary: &SummarySection) {
+    fn data_section(&mut self, file: &mut Window<'_>, summary: &SummarySection) {
         let mut index = ChunkTimes::default();
         let mut position = MAGIC.len();
         loop {
-            let record = record_at(file, position);
-            match record.filter(|record| self.take(file, record, &mut index)) {
-                Some(record) if matches!(record.opcode, op::DATA_END | op::FOOTER) => break,
-                Some(record) => position = record.end(),
+            let record =
+                file.record(position).map(|record| (record.opcode, record.end(), self.take(&record, &mut index)));
+            match record.filter(|(_, end, taken)| taken.unwrap_or_else(|| is_record(file, *end))) {
+                Some((op::DATA_END | op::FOOTER, ..)) => break,
+                Some((_, end, _)) => position = end,
                 None => {
                     // The next chunk that the summary knows of is where reading can go on.
                     let next = summary.chunk_starts.partition_point(|&start| start <= position);
-                    let Some(&next) = summary.chunk_starts.get(next).filter(|&&next| next < file.len()) else {
+                    let Some(&next) = summary.chunk_starts.get(next).filter(|&&next| next < file.file_length()) else {
                         self.cut_chunk(file, position);
                         self.layout.damage.push(Damage::NoEnd { position });
                         break;
@@ -110,13 +112,13 @@ impl Walk {
         }
     }
 
-    /// Takes up one record; `false` if it cannot be one.
-    fn take(&mut self, file: &[u8], record: &Record<'_>, index: &mut ChunkTimes) -> bool {
+    /// Takes up one record; `false` if it cannot be one, and nothing if it is one where another follows.
+    fn take(&mut self, record: &Record<'_>, index: &mut ChunkTimes) -> Option<bool> {
         match record.opcode {
-            0 => return false,
+            0 => return Some(false),
             op::MESSAGE => match MessageRecord::parse(record.body) {
                 Some(message) => self.extend_run(record, message.log_time),
-                None => return false,
+                None => return Some(false),
             },
             op::SCHEMA | op::CHANNEL => self.layout.definitions.read(record),
             op::CHUNK => {
@@ -127,7 +129,7 @@ impl Walk {
                     None => {
                         self.layout.damage.push(Damage::BadChunk { fault: ChunkFault::Records });
                         // Of the lengths that contradict each other, the record's is right if another record follows.
-                        return record_at(file, record.end()).is_some_and(|next| next.opcode != 0);
+                        return None;
                     }
                 }
             }
@@ -140,7 +142,7 @@ impl Walk {
             }
             _ => {}
         }
-        true
+        Some(true)
     }
 
     fn extend_run(&mut self, record: &Record<'_>, time: u64) {
@@ -174,8 +176,8 @@ impl Walk {
     }
 
     /// The chunk that the end of the file cuts: a recorder that was killed leaves one.
-    fn cut_chunk(&mut self, file: &[u8], position: usize) {
-        if file.get(position) == Some(&op::CHUNK)
+    fn cut_chunk(&mut self, file: &mut Window<'_>, position: usize) {
+        if file.bytes(position, 1) == Some(&[op::CHUNK])
             && let Some(chunk) = Chunk::parse_cut(file, position)
         {
             self.end_run();
@@ -192,6 +194,11 @@ impl Walk {
             *unsure = times != Some((block.first_time, block.last_time));
         }
     }
+}
+
+/// Whether there may be a record at `position`.
+fn is_record(file: &mut Window<'_>, position: usize) -> bool {
+    file.record(position).is_some_and(|record| record.opcode != 0)
 }
 
 /// The least and the greatest log time that the index records behind a chunk list.

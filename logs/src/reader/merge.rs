@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
 use std::sync::Arc;
 
-/// One message of a log, borrowed from the file or from the chunk that it came in.
+/// One message of a log, borrowed from the block that it came in.
 #[derive(Clone, Copy, Debug)]
 pub struct LogMessage<'a> {
     /// The file, as an index among the reader's files.
@@ -108,11 +108,7 @@ impl LogReader {
         let Reverse(due) = self.active.peek()?;
         self.given = true;
         let file = due.id.file;
-        let Some(message) = due.block.message(self.files.get(file)?, due.index) else {
-            // The message was there when its block was loaded.
-            self.damage.push((file, Damage::Changed));
-            return None;
-        };
+        let message = due.block.message(due.index)?;
         if message.log_time < self.last_time {
             self.damage.push((file, Damage::LateMessage));
         }
@@ -156,8 +152,10 @@ impl LogReader {
                         self.active.push(Reverse(Active { time, id, index: 0, block }));
                     }
                 }
-                Err(_) if self.files.get(id.file).is_some_and(LogFile::is_cut) => {
-                    self.damage.push((id.file, Damage::Changed));
+                Err(_) if self.files.get(id.file).is_some_and(|file| file.bytes.is_cut()) => {
+                    if !self.damage.contains(&(id.file, Damage::Changed)) {
+                        self.damage.push((id.file, Damage::Changed));
+                    }
                 }
                 Err(fault) => self.damage.push((id.file, Damage::BadChunk { fault })),
             }

@@ -1,7 +1,7 @@
 //! Reads MCAP files in the order of log time.
 //!
-//! A file is mapped into memory and walked over once, from record to record, which finds its **blocks**: its chunks,
-//! and runs of records without a chunk. A block's time span is taken from its header where the index behind it says
+//! A file is walked over once, from record to record, which finds its **blocks**: its chunks, and runs of records without a
+//! chunk. A block's time span is taken from its header where the index behind it says
 //! the same, and is looked up in the block itself otherwise. Blocks are then loaded (decompressed and checked) a few
 //! ahead of their use, in the order of their first message, and merged: by log time, then by file, then by position in
 //! the file. A message is borrowed from its block; nothing is copied.
@@ -21,6 +21,7 @@
 
 mod ahead;
 mod block;
+mod bytes;
 mod chunk;
 mod damage;
 mod definitions;

@@ -1,5 +1,7 @@
 //! Records, the parts of an MCAP file: an opcode, the body's length, and the body, borrowed where it lies.
 
+use mcap::records::op;
+
 /// The bytes before a record's body: the opcode and the body's length.
 pub(crate) const HEAD: usize = 9;
 
@@ -9,13 +11,16 @@ pub(crate) struct Record<'a> {
     pub(crate) opcode: u8,
     /// Where the record begins.
     pub(crate) position: usize,
+    /// How long its body is.
+    pub(crate) length: usize,
+    /// Its body; only the beginning of it where no more was asked for.
     pub(crate) body: &'a [u8],
 }
 
 impl Record<'_> {
     /// Where the next record begins.
     pub(crate) fn end(&self) -> usize {
-        self.position + HEAD + self.body.len()
+        self.position + HEAD + self.length
     }
 }
 
@@ -24,7 +29,18 @@ pub(crate) fn record_at(bytes: &[u8], position: usize) -> Option<Record<'_>> {
     let mut fields = Fields(bytes.get(position..)?);
     let opcode = fields.u8()?;
     let length = usize::try_from(fields.u64()?).ok()?;
-    Some(Record { opcode, position, body: fields.bytes(length)? })
+    Some(Record { opcode, position, length, body: fields.bytes(length)? })
+}
+
+/// How much of a record's body is looked at, at most, where the records of a file are walked over.
+pub(crate) fn wanted(opcode: u8) -> usize {
+    match opcode {
+        op::MESSAGE => MessageRecord::FIELDS,
+        // Its header. No compression has a name that is longer.
+        op::CHUNK => 1 << 10,
+        op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::METADATA => 64 << 20,
+        _ => 0,
+    }
 }
 
 /// A message, as it stands in a record.
@@ -38,6 +54,9 @@ pub(crate) struct MessageRecord<'a> {
 }
 
 impl<'a> MessageRecord<'a> {
+    /// The bytes before the data.
+    const FIELDS: usize = 22;
+
     /// Reads the body of a message record; `None` if it is too short.
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut fields = Fields(body);

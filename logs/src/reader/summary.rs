@@ -1,5 +1,6 @@
 //! The summary at the end of a file that was closed: its channels again, and where its chunks begin.
 
+use super::bytes::FileBytes;
 use super::definitions::Definitions;
 use super::record::{Fields, HEAD, record_at};
 use mcap::MAGIC;
@@ -7,6 +8,8 @@ use mcap::records::op;
 
 /// The footer's body: two offsets and a checksum.
 const FOOTER: usize = 20;
+/// A longer summary is not used: it would index millions of chunks.
+const LARGEST: usize = 256 << 20;
 
 /// What stands behind the messages of a file.
 #[derive(Debug, Default)]
@@ -25,32 +28,37 @@ pub(crate) struct SummarySection {
 
 impl SummarySection {
     /// Reads the summary of a whole file; of a file without one, nothing.
-    pub(crate) fn read(file: &[u8]) -> Self {
+    pub(crate) fn read(file: &FileBytes) -> Self {
         let mut summary = Self::default();
-        let Some(content) = file.strip_suffix(MAGIC) else { return summary };
-        let Some(footer_start) = content.len().checked_sub(HEAD + FOOTER) else { return summary };
-        let Some(footer) = record_at(content, footer_start).filter(|record| record.opcode == op::FOOTER) else {
+        let Some(footer_start) = file.len().checked_sub(HEAD + FOOTER + MAGIC.len()) else { return summary };
+        let Some(end) = file.read(footer_start..file.len()) else { return summary };
+        let Some(footer) = end.strip_suffix(MAGIC).and_then(|end| record_at(end, 0)) else { return summary };
+        if footer.opcode != op::FOOTER || footer.length != FOOTER {
             return summary;
-        };
+        }
         summary.closed = true;
         let mut fields = Fields(footer.body);
         let (Some(start), Some(_), Some(checksum)) = (fields.u64(), fields.u64(), fields.u32()) else { return summary };
         let Ok(start) = usize::try_from(start) else { return summary };
-        if start < MAGIC.len() || start > footer_start {
+        if start < MAGIC.len() || start > footer_start || footer_start - start > LARGEST {
             return summary;
         }
+        let Some(records) = file.read(start..footer_start) else { return summary };
         // The checksum covers the summary and the footer up to the checksum itself.
-        if checksum != 0 && crc32fast::hash(&content[start..content.len() - 4]) != checksum {
+        let mut hash = crc32fast::Hasher::new();
+        hash.update(&records);
+        hash.update(&end[..HEAD + FOOTER - 4]);
+        if checksum != 0 && hash.finalize() != checksum {
             summary.bad_checksum = true;
             return summary;
         }
-        summary.read_records(&content[..footer_start], start);
+        summary.read_records(&records);
         summary
     }
 
-    fn read_records(&mut self, bytes: &[u8], start: usize) {
+    fn read_records(&mut self, bytes: &[u8]) {
         let mut channel_count = None;
-        let mut position = start;
+        let mut position = 0;
         while let Some(record) = record_at(bytes, position) {
             position = record.end();
             match record.opcode {

@@ -58,7 +58,7 @@ impl RunNames {
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
         if self.is_shared() {
-            Room::default().take(0, || format!("open shared memory for the run {}", self.prefix))?;
+            Room::default().ask(0, || format!("open shared memory for the run {}", self.prefix))?;
         }
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;

@@ -314,10 +314,17 @@ impl<S: Service + 'static> LinkSender<S> {
     }
 
     fn loan(&self, length: usize) -> Result<SampleMutUninit<S, [MaybeUninit<u8>], SampleHeader>, LinkError> {
+        let doing = || format!("send {length} bytes on {}", self.name);
         if let Some(room) = &self.room {
-            room.take(length, || format!("send {length} bytes on {}", self.name))?;
+            room.ask(length, doing)?;
         }
-        self.publisher.loan_slice_uninit(length).map_err(|e| self.failed(&e))
+        let sample = self.publisher.loan_slice_uninit(length).map_err(|e| self.failed(&e))?;
+        if let Some(room) = &self.room {
+            // The headers lie before it, and were written already: where it was free a moment ago, if not taken.
+            let start = std::ptr::from_ref(sample.user_header()).addr();
+            room.take(start..sample.payload().as_ptr_range().end.addr(), doing)?;
+        }
+        Ok(sample)
     }
 
     /// Sends a sample, and wakes those who wait for it.

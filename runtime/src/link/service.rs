@@ -83,7 +83,7 @@ impl LinkShape<'_> {
     ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {}", self.name()))(cause);
         if names.is_shared() {
-            Room::default().take(0, || format!("open the link {}", self.name()))?;
+            Room::default().ask(0, || format!("open the link {}", self.name()))?;
         }
         // Nobody sees a link from outside that does not leave the process.
         let (observers, mut buffer) = match names.is_shared() {

@@ -3,12 +3,13 @@
 pub(crate) mod golden_cases;
 mod live_run;
 mod readings;
-mod run_files;
 
+pub(crate) use gridweave_tests::run_files::{
+    DIAMOND, left_over, outcome, part, processes, run_folder, run_name, signal, wait_until,
+};
 pub(crate) use gridweave_tests::{LogBuilder, TestMap};
 pub(crate) use live_run::{LOG, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, read};
-pub(crate) use readings::{change_readings, moved_reading, place_in_map_2};
-pub(crate) use run_files::{DIAMOND, left_over, outcome, part, processes, run_folder, run_name, signal, wait_until};
+pub(crate) use readings::{change_log, change_readings, moved_reading, place_in_map_2};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};

@@ -1,10 +1,27 @@
-//! Logs of which the tag readings are changed.
+//! Logs of which messages are changed.
 
 use super::LogBuilder;
 use gridweave_runtime::ros::{PoseStamped, RosMessage, TagRange, decode, encode};
 use nalgebra::{Isometry2, Point2, Vector2};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Writes a log again with its messages changed: `change` is given the topic, the type and the bytes of each, and gives none
+/// for one that is to be left out.
+pub(crate) fn change_log(log: &Path, to: &Path, mut change: impl FnMut(&str, &str, &[u8]) -> Option<Vec<u8>>) {
+    let bytes = std::fs::read(log).unwrap();
+    let mut changed = LogBuilder::new(to);
+    let mut start = None;
+    for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+        let seconds = (message.log_time - *start.get_or_insert(message.log_time)) as f64 * 1e-9;
+        let topic = message.channel.topic.as_str();
+        let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+        if let Some(data) = change(topic, name, &message.data) {
+            changed.raw(seconds, topic, name, &data);
+        }
+    }
+    changed.finish();
+}
 
 /// Writes a log again with its tag readings changed: `change` is given the robot, the reading, and the place of the robot in
 /// its map, and gives none for a reading that is to be left out. Topics are as the simulator has them.
@@ -13,27 +30,18 @@ pub(crate) fn change_readings(
     to: &Path,
     mut change: impl FnMut(&str, TagRange, Point2<f64>) -> Option<TagRange>,
 ) {
-    let bytes = std::fs::read(log).unwrap();
-    let mut changed = LogBuilder::new(to);
     let mut places: BTreeMap<String, Point2<f64>> = BTreeMap::new();
-    let mut start = None;
-    for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
-        let seconds = (message.log_time - *start.get_or_insert(message.log_time)) as f64 * 1e-9;
-        let topic = message.channel.topic.as_str();
-        let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+    change_log(log, to, |topic, name, data| {
         let robot = topic.split('/').nth(1).unwrap_or_default();
-        let mut data = message.data.into_owned();
         if name == PoseStamped::NAME {
-            let pose: PoseStamped = decode(&data).unwrap();
+            let pose: PoseStamped = decode(data).unwrap();
             places.insert(robot.to_owned(), Point2::from(pose.pose.planar().translation.vector));
         } else if name == TagRange::NAME {
             let place = places.get(robot).copied().unwrap_or_default();
-            let Some(reading) = change(robot, decode(&data).unwrap(), place) else { continue };
-            data = encode(&reading).unwrap();
+            return Some(encode(&change(robot, decode(data).unwrap(), place)?).unwrap());
         }
-        changed.raw(seconds, topic, name, &data);
-    }
-    changed.finish();
+        Some(data.to_vec())
+    });
 }
 
 /// The place of a tag in the map of robot2, by the truth of a log of which robot1 is the reference.

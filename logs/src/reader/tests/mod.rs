@@ -1,5 +1,6 @@
 //! Tests of the reader as a whole.
 
+mod conformance;
 mod damaged;
 mod errors;
 mod order;

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// A source, a diamond of two stages, one that joins them with the source itself, and a log. It does not end by itself.
-pub(crate) const DIAMOND: &str = r#"
+pub const DIAMOND: &str = r#"
 [pipeline]
 name = "diamond"
 depth = 4
@@ -37,7 +37,7 @@ inputs = ["join"]
 "#;
 
 /// What the name of the run of the supervisor with this process number begins with.
-pub(crate) fn run_name(run: u32) -> String {
+pub fn run_name(run: u32) -> String {
     format!("gw{run}_")
 }
 
@@ -51,21 +51,21 @@ fn user_folder() -> PathBuf {
 }
 
 /// The folder of a run's files, if it is there.
-pub(crate) fn run_folder(run: u32) -> Option<PathBuf> {
+pub fn run_folder(run: u32) -> Option<PathBuf> {
     let entries = fs::read_dir(user_folder()).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
     let name = format!("/{}", run_name(run));
     entries.into_iter().find(|path| path.to_string_lossy().contains(&name))
 }
 
 /// What a run has left in shared memory and in its folder.
-pub(crate) fn left_over(run: u32) -> Vec<PathBuf> {
+pub fn left_over(run: u32) -> Vec<PathBuf> {
     let is_of_run = |path: &PathBuf| path.to_string_lossy().contains(&format!("/gw{run}_"));
     let shared = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path()).filter(is_of_run);
     shared.chain(run_folder(run)).collect()
 }
 
 /// The processes of a run, by name.
-pub(crate) fn processes(run: u32) -> Vec<(u32, String)> {
+pub fn processes(run: u32) -> Vec<(u32, String)> {
     let name = format!("/{}", run_name(run));
     let of_process = |id: u32| {
         let line = fs::read(format!("/proc/{id}/cmdline")).ok()?;
@@ -79,13 +79,13 @@ pub(crate) fn processes(run: u32) -> Vec<(u32, String)> {
 }
 
 /// Sends a signal to a process.
-pub(crate) fn signal(process: u32, signal: &str) {
+pub fn signal(process: u32, signal: &str) {
     assert!(Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).status().unwrap().success());
 }
 
 /// Waits until something is so that nothing tells of: files grow, and runs go on, without a word to others.
 #[track_caller]
-pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
+pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
     while !condition() {
         assert!(start.elapsed() < Duration::from_secs(60), "no {what}");
@@ -94,14 +94,14 @@ pub(crate) fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
 }
 
 /// Where a file lies while it is written.
-pub(crate) fn part(file: &Path) -> PathBuf {
+pub fn part(file: &Path) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
     name.push(".part");
     name.into()
 }
 
 /// What the log says of its end, and how many messages it holds.
-pub(crate) fn outcome(log: &Path) -> (String, usize) {
+pub fn outcome(log: &Path) -> (String, usize) {
     let bytes = fs::read(log).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();

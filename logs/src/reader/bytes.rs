@@ -1,0 +1,182 @@
+//! The bytes of a file, read where they lie. They are not mapped into memory: where another program cuts a file that is mapped,
+//! whoever reads it ends by SIGBUS, and here there are just fewer bytes.
+
+use super::record::{HEAD, Record, wanted};
+use gridweave_runtime::input_file;
+use rustix::buffer::spare_capacity;
+use rustix::io::{Errno, pread};
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Range;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+/// So much is read at least where records are walked over.
+const WINDOW: usize = 64 << 10;
+
+/// A file that is read from several places at once.
+#[derive(Debug)]
+pub(crate) struct FileBytes {
+    file: File,
+    /// How long it was when it was opened.
+    length: usize,
+}
+
+impl FileBytes {
+    /// Opens a regular file.
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
+        let file = input_file::open(path)?;
+        let length = usize::try_from(file.metadata()?.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
+        // A folder is opened as well, and cannot be read.
+        file.read_at(&mut [0], 0)?;
+        Ok(Self { file, length })
+    }
+
+    /// How long it was when it was opened.
+    pub(crate) fn len(&self) -> usize {
+        self.length
+    }
+
+    /// Whether another program has cut it since.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.file.metadata().is_ok_and(|file| file.len() < self.length as u64)
+    }
+
+    /// The bytes of a part of it. None if it does not have them, or has them no more, or if there is no memory for them.
+    pub(crate) fn read(&self, part: Range<usize>) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.read_into(part, &mut bytes).then_some(bytes)
+    }
+
+    /// Puts the bytes of a part of it in place of what `bytes` holds; `false` as [`read`](Self::read) gives none.
+    fn read_into(&self, part: Range<usize>, bytes: &mut Vec<u8>) -> bool {
+        bytes.clear();
+        if part.start > part.end || part.end > self.length || bytes.try_reserve_exact(part.len()).is_err() {
+            return false;
+        }
+        while bytes.len() < part.len() {
+            let position = (part.start + bytes.len()) as u64;
+            match pread(&self.file, spare_capacity(bytes), position) {
+                Ok(0) => return false,
+                Ok(_) | Err(Errno::INTR) => {}
+                Err(_) => return false,
+            }
+        }
+        bytes.truncate(part.len());
+        true
+    }
+
+    /// A reader of a part of it.
+    pub(crate) fn part(&self, part: Range<usize>) -> impl Read {
+        Part { file: self, part }
+    }
+}
+
+/// What is left of a part of a file.
+struct Part<'a> {
+    file: &'a FileBytes,
+    part: Range<usize>,
+}
+
+impl Read for Part<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let most = buffer.len().min(self.part.len());
+        let count = self.file.file.read_at(&mut buffer[..most], self.part.start as u64)?;
+        self.part.start += count;
+        Ok(count)
+    }
+}
+
+/// The part of a file that a walk over its records is at.
+pub(crate) struct Window<'a> {
+    file: &'a FileBytes,
+    start: usize,
+    bytes: Vec<u8>,
+}
+
+impl<'a> Window<'a> {
+    /// At the beginning of the file.
+    pub(crate) fn new(file: &'a FileBytes) -> Self {
+        Self { file, start: 0, bytes: Vec::new() }
+    }
+
+    /// The length of the file.
+    pub(crate) fn file_length(&self) -> usize {
+        self.file.len()
+    }
+
+    /// So many bytes at `position`. None if the file ends before.
+    pub(crate) fn bytes(&mut self, position: usize, length: usize) -> Option<&[u8]> {
+        let end = position.checked_add(length)?;
+        if position < self.start || end > self.start + self.bytes.len() {
+            let most = length.max(WINDOW).min(self.file.len().checked_sub(position)?);
+            self.start = position;
+            if most < length || !self.file.read_into(position..position + most, &mut self.bytes) {
+                self.bytes.clear();
+                return None;
+            }
+        }
+        self.bytes.get(position - self.start..end - self.start)
+    }
+
+    /// The record at `position`, with as much of its body as a walk needs. None if the file ends before it does.
+    pub(crate) fn record(&mut self, position: usize) -> Option<Record<'_>> {
+        let head = self.bytes(position, HEAD)?;
+        let opcode = *head.first()?;
+        let length = usize::try_from(u64::from_le_bytes(head.get(1..HEAD)?.try_into().ok()?)).ok()?;
+        let end = position.checked_add(HEAD)?.checked_add(length)?;
+        if end > self.file.len() {
+            return None;
+        }
+        let taken = length.min(wanted(opcode));
+        let body = &self.bytes(position, HEAD + taken)?[HEAD..];
+        Some(Record { opcode, position, length, body })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mcap::records::op;
+
+    fn file(bytes: &[u8]) -> (tempfile::TempDir, FileBytes) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        std::fs::write(&path, bytes).unwrap();
+        let file = FileBytes::open(&path).unwrap();
+        (folder, file)
+    }
+
+    #[test]
+    fn a_part_that_a_file_does_not_have_is_none_and_so_is_one_that_it_has_no_more() {
+        let (folder, file) = file(b"0123456789");
+        assert_eq!(file.read(2..5).unwrap(), b"234");
+        assert_eq!(file.read(0..10).unwrap().len(), 10);
+        assert!(file.read(5..11).is_none() && file.read(11..11).is_none() && !file.is_cut());
+        File::options().write(true).open(folder.path().join("file")).unwrap().set_len(4).unwrap();
+        assert!(file.read(2..5).is_none() && file.is_cut());
+        assert_eq!(file.read(2..4).unwrap(), b"23");
+        assert!(Window::new(&file).bytes(0, 10).is_none());
+        assert!(FileBytes::open(folder.path()).is_err());
+    }
+
+    #[test]
+    fn records_are_walked_over_whatever_their_length() {
+        let mut bytes = Vec::new();
+        let lengths = [0, 5, WINDOW - 30, 3 * WINDOW, 40, 2 * WINDOW];
+        for (opcode, length) in [op::SCHEMA, op::ATTACHMENT, op::MESSAGE].into_iter().cycle().zip(lengths) {
+            bytes.push(opcode);
+            bytes.extend((length as u64).to_le_bytes());
+            bytes.extend(vec![opcode; length]);
+        }
+        let (_folder, file) = file(&bytes);
+        let (mut window, mut position) = (Window::new(&file), 0);
+        for length in lengths {
+            let record = window.record(position).unwrap();
+            assert_eq!((record.length, record.body.len()), (length, length.min(wanted(record.opcode))));
+            assert!(record.body.iter().all(|byte| *byte == record.opcode));
+            position = record.end();
+        }
+        assert!(position == bytes.len() && window.record(position).is_none());
+    }
+}
