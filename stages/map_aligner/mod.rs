@@ -17,6 +17,7 @@ mod climb;
 mod correlation;
 mod fine_search;
 mod fourier;
+mod group;
 mod lead;
 mod overlay;
 mod parameters;
