@@ -15,7 +15,11 @@ pub(super) struct Group {
 }
 
 impl Group {
-    pub(super) fn new(number: u64, members: BTreeMap<String, Pose2>) -> Self {
+    pub(super) fn new(number: u64, mut members: BTreeMap<String, Pose2>) -> Self {
+        // The frame of a robot alone is that of its map.
+        if members.len() == 1 {
+            members.values_mut().for_each(|place| *place = Pose2::identity());
+        }
         Self { number, members, joint: OnceCell::new() }
     }
 
@@ -34,5 +38,21 @@ impl Group {
             Raster::union(&maps).map(PreparedMap::of_raster)
         });
         joint.as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+
+    #[test]
+    fn a_robot_that_is_left_alone_lies_in_its_own_frame() {
+        let members = |robots: &[&str]| {
+            let places = robots.iter().map(|robot| ((*robot).to_owned(), pose(1.0, 2.0, 0.5)));
+            Group::new(7, places.collect()).members
+        };
+        assert_eq!(members(&["a"])["a"], Pose2::identity());
+        assert_eq!(members(&["a", "b"])["b"], pose(1.0, 2.0, 0.5));
     }
 }

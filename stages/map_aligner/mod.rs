@@ -30,6 +30,7 @@ mod refusal;
 mod search;
 mod stage;
 mod statement;
+mod walk;
 
 #[cfg(test)]
 mod plan_tests;

@@ -6,37 +6,38 @@ use std::ops::Range;
 /// Two grids share their cells if no corner lies farther from one of the other's than this, in cells.
 const TOLERANCE: f64 = 0.01;
 
-/// The number of cells that are unknown, occupied, or neither in one map and not in the other, as a share of the cells known
-/// in `before`. What a grid does not reach is unknown. Infinite if the cells of the maps do not coincide, or nothing was
-/// known before and something is.
-pub fn changed_share(before: &Grid<'_>, after: &Grid<'_>) -> f64 {
-    let Some((column, row)) = offset(before, after) else { return f64::INFINITY };
-    let (width, height) = (before.geometry.width, before.geometry.height);
+/// The number of cells that are unknown, occupied, or neither in one map and not in the other. What a grid does not reach is
+/// unknown. None if the cells of the maps do not coincide.
+pub fn changed_cells(before: &Grid<'_>, after: &Grid<'_>) -> Option<usize> {
+    let (column, row) = offset(before, after)?;
     // The rows and columns of `before` that `after` has too.
-    let rows = common(height, after.geometry.height, row);
-    let columns = common(width, after.geometry.width, column);
-    let mut in_common = (0, 0, 0);
-    if !columns.is_empty() {
+    let rows = common(before.geometry.height, after.geometry.height, row);
+    let columns = common(before.geometry.width, after.geometry.width, column);
+    let mut changed = 0;
+    if !rows.is_empty() && !columns.is_empty() {
         let first = columns.start.wrapping_add_signed(-column);
-        for number in rows {
-            let start = number.wrapping_add_signed(-row) * after.geometry.width + first;
-            let one = &before.cells[number * width..][columns.clone()];
-            let other = &after.cells[start..start + columns.len()];
+        for number in rows.clone() {
+            let one = &before.cells[number * before.geometry.width..][columns.clone()];
+            let other = number.wrapping_add_signed(-row) * after.geometry.width + first;
+            let other = &after.cells[other..other + columns.len()];
+            // Most rows are as they were.
             if one != other {
-                let changed = one.iter().zip(other).filter(|(one, other)| kind_of(**one) != kind_of(**other));
-                in_common.0 += changed.count();
+                changed += one.iter().zip(other).filter(|(one, other)| kind_of(**one) != kind_of(**other)).count();
             }
-            in_common.1 += known(one);
-            in_common.2 += known(other);
         }
     }
-    let (known_before, known_after) = (known(before.cells), known(after.cells));
-    let changed = in_common.0 + (known_before - in_common.1) + (known_after - in_common.2);
-    match (changed, known_before) {
-        (0, _) => 0.0,
-        (_, 0) => f64::INFINITY,
-        (changed, known_before) => changed as f64 / known_before as f64,
-    }
+    let rows_after = moved(&rows, -row);
+    let columns_after = moved(&columns, -column);
+    Some(changed + known_outside(before, &rows, &columns) + known_outside(after, &rows_after, &columns_after))
+}
+
+/// The number of known cells that do not lie in some rows and columns.
+fn known_outside(grid: &Grid<'_>, rows: &Range<usize>, columns: &Range<usize>) -> usize {
+    let of_row = |(row, cells): (usize, &[i8])| match rows.contains(&row) {
+        true => known_cells(&cells[..columns.start]) + known_cells(&cells[columns.end..]),
+        false => known_cells(cells),
+    };
+    grid.cells.chunks_exact(grid.geometry.width.max(1)).enumerate().map(of_row).sum()
 }
 
 /// The cell of `before` that cell (0, 0) of `after` is, if the cells coincide.
@@ -60,10 +61,20 @@ fn common(count: usize, other: usize, offset: isize) -> Range<usize> {
     start.min(end)..end
 }
 
-fn kind_of(value: i8) -> (bool, bool) {
-    (is_known(value), is_occupied(value))
+/// A range moved by `by`; none if it is empty.
+fn moved(range: &Range<usize>, by: isize) -> Range<usize> {
+    match range.is_empty() {
+        true => 0..0,
+        false => range.start.wrapping_add_signed(by)..range.end.wrapping_add_signed(by),
+    }
 }
 
-fn known(cells: &[i8]) -> usize {
-    cells.iter().filter(|value| is_known(**value)).count()
+fn kind_of(value: i8) -> u8 {
+    u8::from(is_known(value)) + u8::from(is_occupied(value))
+}
+
+/// How many cells are known.
+pub fn known_cells(cells: &[i8]) -> usize {
+    // So few are counted together that a byte holds their number, and many bytes are added at once.
+    cells.chunks(128).map(|cells| usize::from(cells.iter().map(|value| u8::from(is_known(*value))).sum::<u8>())).sum()
 }

@@ -6,7 +6,7 @@
 //! has changed in it. As maps grow, each that is picked knows more than the one before by that share, so that their number
 //! goes with the logarithm of what is known.
 //!
-//! - [`changed_share`]: how much of a map is another than in the one before.
+//! - [`changed_cells`]: how much of a map is another than in the one before.
 
 mod change;
 mod parameters;
@@ -15,7 +15,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub use change::changed_share;
+pub use change::{changed_cells, known_cells};
 pub use parameters::MapSelectorParameters;
 
 use gridweave_runtime::stage::StageKind;

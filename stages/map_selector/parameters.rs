@@ -9,13 +9,13 @@ use serde::Deserialize;
 #[serde(default, deny_unknown_fields)]
 pub struct MapSelectorParameters {
     /// A map is passed on if at least so many cells have become free, occupied or unknown since the map of the robot that was
-    /// passed on before, as a share of the cells known then. 0 passes on all maps.
+    /// passed on before, as a share of the cells known then: with 1 about when what is known has doubled. 0 passes on all maps.
     pub min_change: f64,
 }
 
 impl Default for MapSelectorParameters {
     fn default() -> Self {
-        Self { min_change: 0.5 }
+        Self { min_change: 1.0 }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The stage: keeps of each robot the map that came last and the one that was passed on last.
 
-use super::{MapSelectorParameters, changed_share};
-use crate::robot_maps::RobotMaps;
+use super::{MapSelectorParameters, changed_cells, known_cells};
+use crate::geometry::Grid;
+use crate::robot_maps::{RobotMap, RobotMaps};
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeSet;
@@ -21,7 +22,8 @@ impl Outputs for SelectedMaps {
 pub(super) struct MapSelector {
     parameters: MapSelectorParameters,
     last: RobotMaps<()>,
-    passed_on: RobotMaps<()>,
+    /// Each with the number of its known cells.
+    passed_on: RobotMaps<usize>,
     /// The robots whose last map was not passed on.
     waiting: BTreeSet<String>,
 }
@@ -41,15 +43,23 @@ impl MapSelector {
             return Ok(());
         }
         let before = self.passed_on.get(robot).zip(self.last.get(robot));
-        let has_changed = before
-            .is_none_or(|(before, last)| changed_share(&before.grid(), &last.grid()) >= self.parameters.min_change);
+        let has_changed = before.is_none_or(|(before, last)| self.has_changed(before, &last.grid()));
         if !has_changed {
             self.waiting.insert(robot.to_owned());
             return Ok(());
         }
         self.waiting.remove(robot);
-        self.passed_on.keep(&map, output, |_| ());
+        self.passed_on.keep(&map, output, |grid| known_cells(grid.cells));
         output.map.send_bytes(robot, map.message().bytes())
+    }
+
+    /// Whether a map has changed so much that it is passed on.
+    fn has_changed(&self, before: &RobotMap<usize>, map: &Grid<'_>) -> bool {
+        let changed = changed_cells(&before.grid(), map);
+        changed.is_none_or(|changed| {
+            changed as f64 >= self.parameters.min_change * before.own as f64
+                && (changed > 0 || self.parameters.min_change == 0.0)
+        })
     }
 
     /// The last maps are those that a merge is judged by.

@@ -1,6 +1,6 @@
 //! Which maps are passed on.
 
-use super::{MapSelectorParameters, changed_share, kind};
+use super::{MapSelectorParameters, changed_cells, kind, known_cells};
 use crate::geometry::{Grid, GridGeometry, UNKNOWN, pose};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, decode};
@@ -14,8 +14,11 @@ fn map(column: i32, width: usize, known: usize) -> (GridGeometry, Vec<i8>) {
     (GridGeometry { width, height: 10, resolution: 0.05, origin }, (0..width * 10).map(value).collect())
 }
 
+/// The changed cells as a share of those known before; infinite if the cells do not coincide.
 fn share(before: &(GridGeometry, Vec<i8>), after: &(GridGeometry, Vec<i8>)) -> f64 {
-    changed_share(&Grid::new(before.0, &before.1).unwrap(), &Grid::new(after.0, &after.1).unwrap())
+    let changed = changed_cells(&Grid::new(before.0, &before.1).unwrap(), &Grid::new(after.0, &after.1).unwrap());
+    let share = |changed| if changed == 0 { 0.0 } else { changed as f64 / known_cells(&before.1) as f64 };
+    changed.map_or(f64::INFINITY, share)
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod line_extractor;
 mod logs;
 mod map_aligner;
 mod map_cleaner;
+mod map_selector;
 mod merge_verifier;
 mod quadrant_classifier;
 mod result_sinks;
@@ -53,6 +54,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         logs::cases(),
         map_aligner::cases(),
         map_cleaner::cases(),
+        map_selector::cases(),
         merge_verifier::cases(),
         quadrant_classifier::cases(),
         result_sinks::cases(),
