@@ -10,7 +10,6 @@ mod line_extractor;
 mod logs;
 mod map_aligner;
 mod map_cleaner;
-mod map_selector;
 mod merge_verifier;
 mod quadrant_classifier;
 mod result_sinks;
@@ -54,7 +53,6 @@ pub(crate) fn made_up() -> Vec<Case> {
         logs::cases(),
         map_aligner::cases(),
         map_cleaner::cases(),
-        map_selector::cases(),
         merge_verifier::cases(),
         quadrant_classifier::cases(),
         result_sinks::cases(),
