@@ -12,6 +12,7 @@ pub mod icp_refiner;
 pub mod line_extractor;
 pub mod map_aligner;
 pub mod map_cleaner;
+pub mod map_selector;
 pub mod merge_verifier;
 pub mod place_window;
 pub mod quadrant_classifier;
@@ -35,6 +36,7 @@ pub fn kinds() -> Vec<StageKind> {
         line_extractor::kind(),
         map_aligner::kind(),
         map_cleaner::kind(),
+        map_selector::kind(),
         merge_verifier::kind(),
         quadrant_classifier::kind(),
         simulator::kind(),

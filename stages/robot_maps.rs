@@ -94,6 +94,11 @@ impl<T> RobotMap<T> {
         Grid { geometry: self.geometry, cells: OccupancyGrid { data, ..Default::default() }.cells() }
     }
 
+    /// The message that it came in, encoded.
+    pub fn bytes(&self) -> &[u8] {
+        self.message.bytes()
+    }
+
     /// Whether the cells of another map are the same and lie at the same place.
     pub fn is_same(&self, other: &OccupancyGrid<'_>) -> bool {
         self.geometry == GridGeometry::from(&other.info) && self.grid().cells == other.cells()

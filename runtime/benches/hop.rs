@@ -139,6 +139,7 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
         stall_timeout: None,
         memory_limit: None,
         robots: Default::default(),
+        initial_poses: Default::default(),
         stages,
     };
     run(&pipeline, engine, &()).unwrap();

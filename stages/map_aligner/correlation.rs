@@ -2,6 +2,7 @@
 
 use super::fourier::{Buffers, Fourier};
 use super::raster::{Content, Raster};
+use super::walk::Walk;
 use nalgebra::{UnitComplex, Vector2};
 use rustfft::num_complex::Complex32;
 
@@ -21,9 +22,10 @@ pub struct Correlator {
     cell: f64,
     /// The lower corner of map a.
     corner: Vector2<f64>,
-    /// Spectrum of a's walls less `penalty` times a's free space: what a wall of b meets.
+    /// Spectrum of a's walls less `penalty` times a's free space: what a wall of b meets. Its first half, as the other is the
+    /// complex conjugate.
     for_walls: Vec<Complex32>,
-    /// Spectrum of a's walls times `-penalty`: what free space of b meets.
+    /// Spectrum of a's walls times `-penalty`: what free space of b meets. Its first half.
     for_free: Vec<Complex32>,
 }
 
@@ -57,12 +59,13 @@ impl Correlator {
         fourier.forward(&mut workspace.buffers, workspace.size.1);
         let scale = 1.0 / (fourier.width * fourier.height) as f32;
         let penalty = penalty as f32;
-        let spectrum = &workspace.buffers.spectrum;
-        let (mut for_walls, mut for_free) = (spectrum.clone(), spectrum.clone());
-        for_each_pair(&fourier, spectrum, |place, at, opposite| {
-            let (walls, free) = split(at, opposite);
-            for_walls[place] = (walls - free * penalty) * scale;
-            for_free[place] = walls * (-penalty * scale);
+        let (mut for_walls, mut for_free) = (Vec::new(), Vec::new());
+        for_each_opposite(&fourier, &mut workspace.buffers.spectrum, |_, column, opposite| {
+            for (at, opposite) in column.iter().zip(opposite) {
+                let (walls, free) = split(at, opposite);
+                for_walls.push((walls - free * penalty) * scale);
+                for_free.push(walls * (-penalty * scale));
+            }
         });
         Self { cell, corner: workspace.corner, for_walls, for_free, fourier }
     }
@@ -76,39 +79,41 @@ impl Correlator {
     pub fn correlate(&self, b: &Raster, angle: f64, workspace: &mut Workspace) {
         workspace.draw(&self.fourier, b, angle, self.cell);
         self.fourier.forward(&mut workspace.buffers, workspace.size.1);
-        let Buffers { plane, spectrum, .. } = &mut workspace.buffers;
-        for_each_pair(&self.fourier, spectrum, |place, at, opposite| {
-            let (walls, free) = split(at, opposite);
-            let (for_walls, for_free) = (self.for_walls[place], self.for_free[place]);
-            let forth = for_walls * walls.conj() + for_free * free.conj();
-            let back = for_walls * walls + for_free * free;
-            plane[place] = Complex32::new(forth.re - back.im, forth.im + back.re);
+        for_each_opposite(&self.fourier, &mut workspace.buffers.spectrum, |start, column, opposite| {
+            let of_a = self.for_walls[start..].iter().zip(&self.for_free[start..]);
+            for ((at, opposite), (for_walls, for_free)) in column.iter_mut().zip(opposite).zip(of_a) {
+                let (walls, free) = split(at, opposite);
+                let forth = for_walls * walls.conj() + for_free * free.conj();
+                let back = for_walls * walls + for_free * free;
+                *at = Complex32::new(forth.re - back.im, forth.im + back.re);
+                *opposite = Complex32::new(forth.re + back.im, back.re - forth.im);
+            }
         });
-        std::mem::swap(plane, spectrum);
         self.fourier.inverse(&mut workspace.buffers);
     }
 
-    /// The best translation in each block of `side` metres, of those just scored at `angle`, or half a turn more if
-    /// `opposite`, as far as its score is above zero; of these the best `most`, the best first.
-    pub fn best_of_blocks(&self, workspace: &Workspace, opposite: bool, side: f64, most: usize) -> Vec<ScoredShift> {
+    /// The best translation in each block of `side` metres, of those just scored at `angle`, and of those half a turn on, as
+    /// far as its score is above zero; of these the best `most`, the best first.
+    pub fn best_of_blocks(&self, workspace: &Workspace, side: f64, most: usize) -> [Vec<ScoredShift>; 2] {
         let side = ((side / self.cell).round() as usize).max(1);
-        match opposite {
-            true => self.best_shifts(workspace, true, side, most, |score| score.im),
-            false => self.best_shifts(workspace, false, side, most, |score| score.re),
-        }
+        let [forth, opposite] = self.blocks(&workspace.buffers.plane, side);
+        [
+            self.best_shifts(workspace, false, side, most, forth, |score| score.re),
+            self.best_shifts(workspace, true, side, most, opposite, |score| score.im),
+        ]
     }
 
-    /// The same, for blocks of `side` cells, with what gives the score of a number in the plane.
+    /// The best translations of the best `most` blocks of `side` cells, with what gives the score of a number in the plane.
     fn best_shifts(
         &self,
         workspace: &Workspace,
         opposite: bool,
         side: usize,
         most: usize,
+        mut best: Vec<Block>,
         score: impl Fn(&Complex32) -> f32,
     ) -> Vec<ScoredShift> {
         let plane = &workspace.buffers.plane;
-        let mut best = self.blocks(plane, side, &score);
         // Of equals the first comes first, so that the order is the same however it is sorted.
         let order =
             |one: &Block, other: &Block| (other.score, one.row, one.column).cmp(&(one.score, other.row, other.column));
@@ -130,25 +135,26 @@ impl Correlator {
         best.into_iter().filter_map(shift).collect()
     }
 
-    /// The blocks whose best score is above zero.
-    fn blocks(&self, plane: &[Complex32], side: usize, score: &impl Fn(&Complex32) -> f32) -> Vec<Block> {
+    /// The blocks whose best score is above zero: of the real, and of the imaginary part of a plane.
+    fn blocks(&self, plane: &[Complex32], side: usize) -> [Vec<Block>; 2] {
         let width = self.fourier.width;
-        let (mut blocks, mut best_of_columns) = (Vec::new(), vec![0.0; width]);
+        let zero = Complex32::new(0.0, 0.0);
+        let (mut forth, mut opposite, mut best_of_columns) = (Vec::new(), Vec::new(), vec![zero; width]);
         for (number, rows) in plane.chunks(side * width).enumerate() {
-            best_of_columns.fill(0.0);
+            best_of_columns.fill(zero);
             for row in rows.chunks_exact(width) {
-                for (best, value) in best_of_columns.iter_mut().zip(row) {
-                    *best = f32::max(*best, score(value));
-                }
+                best_of_columns.iter_mut().zip(row).for_each(|(best, scores)| *best = greater(best, scores));
             }
             for (place, columns) in best_of_columns.chunks(side).enumerate() {
-                let score = rounded(columns.iter().fold(0.0, |most, score| f32::max(most, *score)));
-                if score > 0 {
-                    blocks.push(Block { score, row: number * side, column: place * side });
+                let best = columns.iter().fold(zero, |most, scores| greater(&most, scores));
+                for (blocks, score) in [(&mut forth, rounded(best.re)), (&mut opposite, rounded(best.im))] {
+                    if score > 0 {
+                        blocks.push(Block { score, row: number * side, column: place * side });
+                    }
                 }
             }
         }
-        blocks
+        [forth, opposite]
     }
 
     /// The translation that a place in the plane of scores stands for.
@@ -196,17 +202,36 @@ fn cells_of(length: f64, cell: f64) -> usize {
     (length / cell) as usize + 2
 }
 
-/// Goes through the numbers of a spectrum: with the place of each, it, and the number of the opposite frequency.
-fn for_each_pair(fourier: &Fourier, spectrum: &[Complex32], mut visit: impl FnMut(usize, &Complex32, &Complex32)) {
+/// The greater real part of two numbers, and the greater imaginary part.
+fn greater(one: &Complex32, other: &Complex32) -> Complex32 {
+    let greater = |one: f32, other: f32| if other > one { other } else { one };
+    Complex32::new(greater(one.re, other.re), greater(one.im, other.im))
+}
+
+/// Goes through the first half of the columns of a spectrum: with the place of the first number of each, it, and the numbers of
+/// the opposite frequencies. Both may be changed; of the column that is its own opposite, the first counts.
+fn for_each_opposite(
+    fourier: &Fourier,
+    spectrum: &mut [Complex32],
+    mut visit: impl FnMut(usize, &mut [Complex32], &mut [Complex32]),
+) {
     let (width, height) = (fourier.width, fourier.height);
-    for (number, column) in spectrum.chunks_exact(height).enumerate() {
+    let mut mirrored = vec![Complex32::new(0.0, 0.0); height];
+    for number in 0..=width / 2 {
         let opposite = (width - number) % width * height;
-        let (start, opposite) = (number * height, &spectrum[opposite..opposite + height]);
-        visit(start, &column[0], &opposite[0]);
-        for (row, (at, opposite)) in column[1..].iter().zip(opposite[1..].iter().rev()).enumerate() {
-            visit(start + row + 1, at, opposite);
+        mirror(&spectrum[opposite..opposite + height], &mut mirrored);
+        let start = number * height;
+        visit(start, &mut spectrum[start..start + height], &mut mirrored);
+        if opposite != start {
+            mirror(&mirrored, &mut spectrum[opposite..opposite + height]);
         }
     }
+}
+
+/// Copies a column with its frequencies turned round.
+fn mirror(from: &[Complex32], to: &mut [Complex32]) {
+    to[0] = from[0];
+    to[1..].iter_mut().zip(from[1..].iter().rev()).for_each(|(to, from)| *to = *from);
 }
 
 /// The spectra of the real and of the imaginary part of a plane.
@@ -229,19 +254,18 @@ impl Workspace {
         let plane = &mut self.buffers.plane;
         plane[..self.size.1 * fourier.width].fill(Complex32::new(0.0, 0.0));
         let share = ((raster.cell * raster.cell) / (cell * cell)) as f32;
+        let (free, wall) = (Complex32::new(0.0, share), Complex32::new(share, 0.0));
+        let mut values = [Complex32::new(0.0, 0.0); 4];
+        values[Content::Free as usize] = free;
+        values[Content::BesideWall as usize] = wall;
+        values[Content::Wall as usize] = wall;
         let turn = UnitComplex::new(angle);
         let step = turn * Vector2::new(raster.cell, 0.0) / cell;
         for (row, contents) in raster.cells.chunks(raster.width.max(1)).enumerate() {
             let start = ((turn * raster.centre(0, row)).coords - self.corner) / cell;
-            for (column, content) in contents.iter().enumerate() {
-                let value = match content {
-                    Content::Unknown => continue,
-                    Content::Free => Complex32::new(0.0, share),
-                    Content::BesideWall | Content::Wall => Complex32::new(share, 0.0),
-                };
-                let place = start + step * column as f64;
-                if let Some(cell) = plane.get_mut(place.y as usize * fourier.width + place.x as usize) {
-                    *cell += value;
+            for (place, content) in Walk::new(&start, &step, fourier.width).zip(contents) {
+                if let (true, Some(cell)) = (*content != Content::Unknown, plane.get_mut(place)) {
+                    *cell += values[*content as usize];
                 }
             }
         }
@@ -328,7 +352,8 @@ mod tests {
             let mut workspace = correlator.workspace();
             correlator.correlate(&b, 0.0, &mut workspace);
             for opposite in [false, true] {
-                let best = correlator.best_of_blocks(&workspace, opposite, 2.0, 3);
+                let [forth, back] = correlator.best_of_blocks(&workspace, 2.0, 3);
+                let best = if opposite { back } else { forth };
                 let score = best.first().map_or(0.0, |best| best.score);
                 let translation = best.first().map_or(Vector2::zeros(), |best| best.translation);
                 let (most, there) = counted(&a, &b, opposite, 0.6, &translation);

@@ -17,6 +17,7 @@ mod climb;
 mod correlation;
 mod fine_search;
 mod fourier;
+mod group;
 mod lead;
 mod overlay;
 mod parameters;
@@ -29,6 +30,7 @@ mod refusal;
 mod search;
 mod stage;
 mod statement;
+mod walk;
 
 #[cfg(test)]
 mod plan_tests;

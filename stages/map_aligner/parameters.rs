@@ -47,8 +47,8 @@ pub struct MapAlignerParameters {
     /// A robot that is laid on several maps that lie together is aligned with at most so many more of them, besides
     /// the one with which it has the most wall in common.
     pub predictions: usize,
-    /// A map whose known area has grown by at most this share keeps its guesses, if they still fit, and is not searched
-    /// again.
+    /// A map whose known area has grown by at most this share since it was searched keeps its guesses, if they still fit, and is
+    /// not searched again before the end.
     pub little_growth: f64,
     /// Whether the guess is marked as provisional: then `merge_verifier` must confirm it by more than it asks of a guess
     /// that rests on tags.

@@ -1,9 +1,10 @@
 //! Which maps of many robots are searched, so that not every pair of them must be.
 
+use super::group::Group;
 use super::peaks::{JUDGED, is_near, overlay};
 use super::statement::{Statement, with_reasons};
 use super::{
-    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, Raster, SearchRefusal, align_near,
+    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,
     align_prepared,
 };
 use crate::geometry::{Grid, Pose2};
@@ -47,21 +48,8 @@ struct Robot {
     map: Result<PreparedMap, SearchRefusal>,
     /// Known cells when it was searched last.
     searched_cells: usize,
-}
-
-/// Robots whose maps are laid together.
-struct Group {
-    number: u64,
-    /// `T_group_robot`.
-    members: BTreeMap<String, Pose2>,
-    /// Their maps as one, if there are several.
-    joint: Option<PreparedMap>,
-}
-
-impl Group {
-    fn name(&self) -> &str {
-        self.members.keys().next().map_or("", String::as_str)
-    }
+    /// Whether it is this map that was searched last.
+    is_searched: bool,
 }
 
 impl MergePlan {
@@ -97,33 +85,48 @@ impl MergePlan {
         let map = PreparedMap::new(robot, grid, self.cell, self.parameters.max_extent);
         let cells = map.as_ref().map_or(0, |map| map.level(0).known_cells());
         let searched_cells = self.robots.get(robot).map_or(0, |known| known.searched_cells);
-        self.robots.insert(robot.to_owned(), Robot { map, searched_cells });
-        let has_grown_little = (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
-        let group = self.group_of(robot).filter(|group| self.groups[*group].members.len() > 1);
-        if let (true, Some(group)) = (has_grown_little, group)
-            && let Some(kept) = self.kept(robot)
-        {
-            // The map of the group holds the one before.
-            let members = self.groups.remove(group).members;
-            self.add(members);
-            return self.tell(kept);
+        let has_grown_little =
+            map.is_ok() && (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
+        self.robots.insert(robot.to_owned(), Robot { map, searched_cells, is_searched: false });
+        if let (true, Some(group)) = (has_grown_little, self.group_of(robot)) {
+            if self.groups[group].members.len() == 1 {
+                return Vec::new();
+            }
+            if let Some(kept) = self.kept(robot) {
+                // The map of the group holds the one before.
+                let members = self.groups.remove(group).members;
+                self.add(members);
+                return self.tell(kept);
+            }
         }
-        self.leave(robot);
-        if let Some(known) = self.robots.get_mut(robot) {
-            known.searched_cells = cells;
-        }
+        self.leave(&[robot]);
+        let number = self.add_alone(robot);
         let mut statements = self.refusals(robot);
-        if self.robots.get(robot).is_some_and(|known| known.map.is_ok()) {
-            let number = self.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())]));
+        if let Some(number) = number {
             self.tie_with_others(number, GROUPS_TRIED, &mut statements);
         }
         statements.extend(self.retractions(robot, &statements));
         self.tell(statements)
     }
 
-    /// No more maps come: what has not found its place is tried once more.
+    /// No more maps come: the last maps that were not searched are searched, so that what is told rests on them, and what
+    /// has not found its place is tried once more.
     pub fn finish(&mut self) -> Vec<Statement> {
         let mut statements = Vec::new();
+        let not_searched = self.robots.iter().filter(|(_, known)| known.map.is_ok() && !known.is_searched);
+        let robots: Vec<String> = not_searched.map(|(robot, _)| robot.clone()).collect();
+        self.leave(&robots.iter().map(String::as_str).collect::<Vec<_>>());
+        for robot in &robots {
+            self.add_alone(robot);
+        }
+        for robot in &robots {
+            if let Some(group) = self.group_of(robot) {
+                self.tie_with_others(self.groups[group].number, usize::MAX, &mut statements);
+            }
+        }
+        for robot in &robots {
+            statements.extend(self.retractions(robot, &statements));
+        }
         for _ in 0..LAST_ROUNDS {
             let count = self.groups.len();
             let Some(largest) = self.by_size().first().copied() else { break };
@@ -172,7 +175,7 @@ impl MergePlan {
         let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
             statements.push(Statement::of(pair, Ok(with_reasons(&found))));
-            return if is_clear { self.unite(first, second, &best) } else { None };
+            return is_clear.then(|| self.unite(first, second, &best));
         }
         let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
         if is_clear {
@@ -183,7 +186,7 @@ impl MergePlan {
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
             statements.extend(told);
-            return if fits { self.unite(first, second, &best) } else { None };
+            return fits.then(|| self.unite(first, second, &best));
         }
         if self.has_alike(&found) {
             let reason = format!(
@@ -338,45 +341,47 @@ impl MergePlan {
         news
     }
 
-    /// Takes a robot out of its group.
-    fn leave(&mut self, robot: &str) {
-        let Some(index) = self.group_of(robot) else { return };
-        let mut members = self.groups.remove(index).members;
-        members.remove(robot);
-        if !members.is_empty() {
-            self.add(members);
+    /// Makes a robot that is in no group, and is about to be searched, a group of its own. Its number, if its map can be
+    /// searched.
+    fn add_alone(&mut self, robot: &str) -> Option<u64> {
+        let known = self.robots.get_mut(robot)?;
+        known.is_searched = true;
+        known.searched_cells = known.map.as_ref().map_or(0, |map| map.level(0).known_cells());
+        known.map.is_ok().then(|| self.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())])))
+    }
+
+    /// Takes robots out of their groups.
+    fn leave(&mut self, robots: &[&str]) {
+        let left = |group: &mut Group| robots.iter().any(|robot| group.members.contains_key(*robot));
+        let groups: Vec<Group> = self.groups.extract_if(.., left).collect();
+        for mut members in groups.into_iter().map(|group| group.members) {
+            members.retain(|robot, _| !robots.contains(&robot.as_str()));
+            if !members.is_empty() {
+                self.add(members);
+            }
         }
     }
 
     /// Lays two groups together. The number of the group of both.
-    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> Option<u64> {
+    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> u64 {
         let (kept, moved) = (&self.groups[first], &self.groups[second]);
-        let maps = [(Pose2::identity(), self.map_of(kept)?), (*transform_groups, self.map_of(moved)?)];
-        let joint = PreparedMap::of_raster(Raster::union(&maps.map(|(place, map)| (place, map.level(0))))?);
         let mut members = kept.members.clone();
         members.extend(moved.members.iter().map(|(robot, place)| (robot.clone(), transform_groups * place)));
         let numbers = [kept.number, moved.number];
         self.groups.retain(|group| !numbers.contains(&group.number));
-        Some(self.add_joint(members, Some(joint)))
+        self.add(members)
     }
 
     /// Adds a group of robots with their places. Its number.
     fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
-        let maps = members.iter().filter_map(|(robot, place)| Some((*place, self.map(robot)?.level(0))));
-        let maps: Vec<(Pose2, &Raster)> = maps.collect();
-        let joint = if maps.len() > 1 { Raster::union(&maps).map(PreparedMap::of_raster) } else { None };
-        self.add_joint(members, joint)
-    }
-
-    fn add_joint(&mut self, members: BTreeMap<String, Pose2>, joint: Option<PreparedMap>) -> u64 {
         let number = self.next;
         self.next += 1;
-        self.groups.push(Group { number, members, joint });
+        self.groups.push(Group::new(number, members));
         number
     }
 
     fn map_of<'a>(&'a self, group: &'a Group) -> Option<&'a PreparedMap> {
-        group.joint.as_ref().or_else(|| self.map(group.name()))
+        group.map(|robot| self.map(robot))
     }
 
     fn map(&self, robot: &str) -> Option<&PreparedMap> {

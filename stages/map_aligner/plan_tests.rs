@@ -132,6 +132,40 @@ fn a_map_that_has_grown_a_little_is_not_searched_again() {
 }
 
 #[test]
+fn the_last_maps_are_searched_at_the_end_whatever_has_grown() {
+    let office = angular_office();
+    let draw = |east: f64| office.draw(seen(4.0, -0.2, east, 12.2), drawing(12.0, 6.0, 0.4));
+    let told = |maps: &[f64]| {
+        let mut bench = Bench::new();
+        bench.give("robot0", part(0));
+        maps.iter().for_each(|east| bench.give("robot1", draw(*east)));
+        let before = bench.plan.searches;
+        let bench = bench.finish();
+        bench.assert_right();
+        (bench.plan.searches - before, bench.last().values().map(|told| (*told).clone()).collect::<Vec<_>>())
+    };
+    let (searches, at_once) = told(&[17.8]);
+    assert_eq!(searches, 0, "it was searched when it came");
+    let (searches, little_by_little) = told(&[17.0, 17.2, 17.4, 17.6, 17.8]);
+    assert_eq!((searches, little_by_little), (1, at_once));
+}
+
+#[test]
+fn a_robot_that_lies_on_none_is_searched_again_when_its_map_has_grown_and_at_the_end() {
+    let stranger = |east: f64| FloorPlan::another_office().draw(seen(-0.2, -0.2, east, 12.2), drawing(1.0, 1.0, 1.0));
+    let mut bench = Bench::new();
+    bench.give("robot0", part(0));
+    let mut searches = vec![];
+    for east in [12.0, 12.5, 13.0, 20.2] {
+        bench.give("robot1", stranger(east));
+        searches.push(bench.plan.searches);
+    }
+    assert_eq!(searches, [1, 1, 1, 2]);
+    bench.give("robot1", stranger(20.4));
+    assert_eq!(bench.finish().plan.searches, 3);
+}
+
+#[test]
 fn what_does_not_hold_any_more_is_taken_back() {
     let mut bench = Bench::new();
     bench.give("robot0", part(0));

@@ -1,5 +1,6 @@
 //! A map in wider cells, cropped to what is known.
 
+use super::walk::Walk;
 use crate::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
@@ -65,17 +66,18 @@ impl Raster {
         }
         let mut raster = Self::unknown(&bounds, cell, geometry.resolution);
         let step = geometry.origin.rotation * Vector2::new(geometry.resolution, 0.0) / cell;
+        let contents: [Content; 256] = std::array::from_fn(|byte| match byte as u8 as i8 {
+            value if is_occupied(value) => Content::Wall,
+            value if is_free(value) => Content::Free,
+            _ => Content::Unknown,
+        });
         for (row, (first, last), cells) in rows() {
             let start = (geometry.centre(Cell { column: first, row }).coords - raster.corner) / cell;
-            for (number, value) in cells[first..=last].iter().enumerate() {
-                let content = match *value {
-                    value if is_occupied(value) => Content::Wall,
-                    value if is_free(value) => Content::Free,
-                    _ => continue,
-                };
-                // Never below zero, as there is a rim.
-                let place = start + step * number as f64;
-                if let Some(cell) = raster.cells.get_mut(place.y as usize * raster.width + place.x as usize) {
+            // Never below zero, as there is a rim.
+            let places = Walk::new(&start, &step, raster.width);
+            for (place, value) in places.zip(&cells[first..=last]) {
+                let content = contents[*value as u8 as usize];
+                if let (true, Some(cell)) = (content != Content::Unknown, raster.cells.get_mut(place)) {
                     *cell = content.max(*cell);
                 }
             }

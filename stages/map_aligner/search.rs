@@ -52,15 +52,14 @@ pub fn search(
     let correlator = Correlator::new(a, size_b, penalty);
     let places_at = |workspace: &mut Workspace, angle: &f64| {
         correlator.correlate(b, *angle, workspace);
-        let both = [(false, *angle), (true, angle + PI)].map(|(opposite, angle)| {
-            let shifts = correlator.best_of_blocks(workspace, opposite, spacing, most_at_one).into_iter();
-            let place = |ScoredShift { translation, score }: ScoredShift| Place {
+        let shifts = correlator.best_of_blocks(workspace, spacing, most_at_one);
+        let both = [*angle, angle + PI].into_iter().zip(shifts).flat_map(|(angle, shifts)| {
+            shifts.into_iter().map(move |ScoredShift { translation, score }| Place {
                 transform_a_b: pose(translation.x, translation.y, angle),
                 score,
-            };
-            shifts.map(place).filter(may_lie).collect::<Vec<_>>()
+            })
         });
-        both.concat()
+        both.filter(may_lie).collect::<Vec<_>>()
     };
     let places: Vec<Vec<Place>> = angles.par_iter().map_init(|| correlator.workspace(), places_at).collect();
     let mut places = places.concat();

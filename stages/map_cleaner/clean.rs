@@ -2,7 +2,7 @@
 
 use super::MapCleanerParameters;
 use super::objects::loose_cells;
-use super::passages::wide_known_space;
+use super::passages::{KnownBox, wide_known_space};
 use crate::geometry::{Grid, UNKNOWN, is_occupied};
 
 /// Clears what is no wall out of `cells`, which hold the same as `grid`: what becomes unknown says nothing for or against a
@@ -12,11 +12,15 @@ use crate::geometry::{Grid, UNKNOWN, is_occupied};
 /// - Known space that is narrower than a robot, such as rays through glass and open doors. Walls stay.
 pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8]) {
     let radius = (0.5 * parameters.min_passage / grid.geometry.resolution).min(1e6) as usize;
-    if radius > 0 {
-        let wide = wide_known_space(grid, radius);
-        for ((value, is_wide), was) in cells.iter_mut().zip(wide).zip(grid.cells) {
-            if !is_wide && !is_occupied(*was) {
-                *value = UNKNOWN;
+    if let (true, Some(known_box)) = (radius > 0, KnownBox::of(grid)) {
+        let wide = wide_known_space(grid, &known_box, radius);
+        for (row, wide) in known_box.rows.clone().zip(wide.chunks_exact(known_box.columns.len())) {
+            let start = row * grid.geometry.width;
+            let places = start + known_box.columns.start..start + known_box.columns.end;
+            for ((value, is_wide), was) in cells[places.clone()].iter_mut().zip(wide).zip(&grid.cells[places]) {
+                if !is_wide && !is_occupied(*was) {
+                    *value = UNKNOWN;
+                }
             }
         }
     }

@@ -1,56 +1,88 @@
 //! Known space that is too narrow for a robot to have seen it well.
 
 use crate::geometry::{Grid, is_known};
+use std::ops::Range;
 
-/// Whether each cell is known and lies in a square of `2 * radius + 1` known cells: the morphological opening of the known
-/// space by that square (Serra 1982). Beyond the border of the grid all is known, so that a map that is cut off there
-/// loses nothing.
-pub(super) fn wide_known_space(grid: &Grid<'_>, radius: usize) -> Vec<bool> {
-    let (width, height) = (grid.geometry.width, grid.geometry.height);
-    let known: Vec<bool> = grid.cells.iter().map(|value| is_known(*value)).collect();
-    let eroded = spread_unknown(known, width, height, radius, false);
-    spread_unknown(eroded, width, height, radius, true)
+/// The part of a grid that holds all of its known cells.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct KnownBox {
+    pub(super) rows: Range<usize>,
+    pub(super) columns: Range<usize>,
 }
 
-/// Spreads what is `spread` by `radius` cells along rows, and then along columns.
-fn spread_unknown(mut cells: Vec<bool>, width: usize, height: usize, radius: usize, spread: bool) -> Vec<bool> {
-    if width == 0 || height == 0 {
-        return cells;
+impl KnownBox {
+    /// With one unknown cell to each side where the grid goes on. None if nothing is known.
+    pub(super) fn of(grid: &Grid<'_>) -> Option<Self> {
+        let (width, height) = (grid.geometry.width, grid.geometry.height);
+        let mut known: Option<Self> = None;
+        for (row, cells) in grid.cells.chunks_exact(width.max(1)).enumerate() {
+            let is_known = |value: &i8| is_known(*value);
+            let Some(first) = cells.iter().position(is_known) else { continue };
+            let last = cells.iter().rposition(is_known).unwrap_or(first);
+            let columns = known.as_ref().map_or(first..last, |known| known.columns.clone());
+            let rows = known.map_or(row, |known| known.rows.start)..row;
+            known = Some(Self { rows, columns: columns.start.min(first)..columns.end.max(last) });
+        }
+        let with_rim = |range: Range<usize>, count: usize| range.start.saturating_sub(1)..(range.end + 2).min(count);
+        known.map(|known| Self { rows: with_rim(known.rows, height), columns: with_rim(known.columns, width) })
     }
+}
+
+/// Whether each cell of the box, row by row, is known and lies in a square of `2 * radius + 1` known cells: the morphological
+/// opening of the known space by that square (Serra 1982). Beyond the border of the grid all is known, so that a map that is
+/// cut off there loses nothing.
+pub(super) fn wide_known_space(grid: &Grid<'_>, known_box: &KnownBox, radius: usize) -> Vec<bool> {
+    let (width, height) = (known_box.columns.len(), known_box.rows.len());
+    let mut known = Vec::with_capacity(width * height);
+    for row in known_box.rows.clone() {
+        let cells = &grid.cells[row * grid.geometry.width..][known_box.columns.clone()];
+        known.extend(cells.iter().map(|value| is_known(*value)));
+    }
+    // What is unknown beyond the box is no nearer to a known cell than the rim of the box.
+    spread(&mut known, width, radius, false);
+    spread(&mut known, width, radius, true);
+    known
+}
+
+/// Spreads what is `value` by `radius` cells along rows, and then along columns.
+fn spread(cells: &mut [bool], width: usize, radius: usize, value: bool) {
+    if width == 0 {
+        return;
+    }
+    let radius = radius.min(usize::from(u16::MAX - 1)) as u16;
     let mut line = Vec::with_capacity(width);
-    for row in cells.chunks_mut(width) {
-        if row.contains(&spread) {
+    for row in cells.chunks_exact_mut(width) {
+        if row.contains(&value) {
             line.clear();
             line.extend_from_slice(row);
-            spread_line(&line, radius, spread, |place| row[place] = spread);
+            spread_line(&line, usize::from(radius), value, |places| row[places].fill(value));
         }
     }
     // Row by row, as memory lies: how far the last cell to spread lies above, and then below, each column.
-    let mut since = vec![usize::MAX; width];
-    let source = cells.clone();
-    let rows: [Box<dyn Iterator<Item = usize>>; 2] = [Box::new(0..height), Box::new((0..height).rev())];
-    for rows in rows {
-        since.fill(usize::MAX);
-        for row in rows {
-            let start = row * width;
-            for ((since, from), cell) in since.iter_mut().zip(&source[start..]).zip(&mut cells[start..]) {
-                *since = if *from == spread { 0 } else { since.saturating_add(1) };
-                if *since <= radius {
-                    *cell = spread;
-                }
-            }
-        }
+    let source = cells.to_vec();
+    let mut since = vec![u16::MAX; width];
+    for (row, from) in cells.chunks_exact_mut(width).zip(source.chunks_exact(width)) {
+        spread_row(row, from, &mut since, radius, value);
     }
-    cells
+    since.fill(u16::MAX);
+    for (row, from) in cells.chunks_exact_mut(width).zip(source.chunks_exact(width)).rev() {
+        spread_row(row, from, &mut since, radius, value);
+    }
 }
 
-fn spread_line(line: &[bool], radius: usize, spread: bool, mut set: impl FnMut(usize)) {
+fn spread_line(line: &[bool], radius: usize, value: bool, mut fill: impl FnMut(Range<usize>)) {
     let mut until = 0;
-    for (place, _) in line.iter().enumerate().filter(|(_, value)| **value == spread) {
-        let last = (place + radius).min(line.len() - 1);
-        for place in until.max(place.saturating_sub(radius))..=last {
-            set(place);
-        }
-        until = last + 1;
+    for (place, _) in line.iter().enumerate().filter(|(_, cell)| **cell == value) {
+        let behind = (place + radius + 1).min(line.len());
+        fill(until.max(place.saturating_sub(radius))..behind);
+        until = behind;
+    }
+}
+
+/// Goes on by a row, where `since` says for each column how many rows ago a cell was to spread.
+fn spread_row(row: &mut [bool], from: &[bool], since: &mut [u16], radius: u16, value: bool) {
+    for ((cell, from), since) in row.iter_mut().zip(from).zip(since) {
+        *since = if *from == value { 0 } else { since.saturating_add(1) };
+        *cell = if *since <= radius { value } else { *cell };
     }
 }

@@ -1,5 +1,6 @@
 //! Cleaning of small maps that are drawn by hand.
 
+use super::passages::{KnownBox, wide_known_space};
 use super::{MapCleanerParameters, clean};
 use crate::geometry::{Grid, GridGeometry, UNKNOWN, pose};
 use gridweave_runtime::stage::Parameters;
@@ -72,6 +73,38 @@ proptest! {
         let (_, again) = cleaned(|column, row| after[row * WIDTH + column]);
         let walls = |cells: &[i8]| cells.iter().filter(|cell| **cell == 100).count();
         prop_assert_eq!(walls(&again), walls(&after));
+    }
+}
+
+proptest! {
+    #[test]
+    fn space_is_wide_where_a_square_of_known_cells_lies(
+        width in 1usize..14, height in 1usize..14, radius in 1usize..4,
+        values in prop::collection::vec(prop::sample::select(vec![-1_i8, 0, 0, 0, 0, 100]), 14 * 14),
+        inner in 0usize..6,
+    ) {
+        // Nothing is known near the left and the lower border if the inner part begins later.
+        let value = |index: usize| {
+            if index % width < inner || index / width < inner { UNKNOWN } else { values[index] }
+        };
+        let cells: Vec<i8> = (0..width * height).map(value).collect();
+        let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
+        let grid = Grid::new(geometry, &cells).unwrap();
+        let is_on_grid = |column: i32, row: i32| (0..width as i32).contains(&column) && (0..height as i32).contains(&row);
+        let reach = radius as i32;
+        let around = |column: i32, row: i32| (row - reach..=row + reach).flat_map(move |row| (column - reach..=column + reach).map(move |column| (column, row)));
+        let is_eroded = |column: i32, row: i32| !around(column, row)
+            .any(|(column, row)| is_on_grid(column, row) && cells[row as usize * width + column as usize] == UNKNOWN);
+        let Some(known_box) = KnownBox::of(&grid) else { return Ok(()) };
+        let wide = wide_known_space(&grid, &known_box, radius);
+        for (index, is_wide) in wide.into_iter().enumerate() {
+            let column = (known_box.columns.start + index % known_box.columns.len()) as i32;
+            let row = (known_box.rows.start + index / known_box.columns.len()) as i32;
+            let expected = around(column, row).any(|(column, row)| is_on_grid(column, row) && is_eroded(column, row));
+            prop_assert_eq!(is_wide, expected, "{} {}", column, row);
+        }
+        let is_in_box = |index: usize| known_box.rows.contains(&(index / width)) && known_box.columns.contains(&(index % width));
+        prop_assert!(cells.iter().enumerate().all(|(index, value)| *value == UNKNOWN || is_in_box(index)));
     }
 }
 

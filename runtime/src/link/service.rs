@@ -9,7 +9,11 @@ use iceoryx2::node::Node;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
 use iceoryx2::service::Service;
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeOpenError as E, PublishSubscribeOpenOrCreateError as OpenError,
+};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::time::Duration;
 
 /// How many programs may look on at a link.
 pub(crate) const MAX_OBSERVERS: usize = 4;
@@ -23,6 +27,10 @@ pub(super) const KEEPER_HELD: usize = 22;
 pub(super) const FIRST_PLACE: usize = 4 * 1024;
 /// What a reader of a live link has room for beyond its depth: for what is repeated.
 const REPEAT_ROOM: usize = 48;
+/// Ends that open a link at once may each find it neither there nor theirs to make, where the machine is busy. They try
+/// again, so often at the most.
+const ATTEMPTS: usize = 100;
+const BETWEEN_ATTEMPTS: Duration = Duration::from_millis(10);
 /// Of what may be held, so much is not counted on: for the sample that is being received.
 const SPARE: usize = 2;
 
@@ -96,20 +104,31 @@ impl LinkShape<'_> {
         };
         buffer = buffer.max(keepers * KEEPER_BUFFER);
         let subscribers = self.readers.max(1) + observers + keepers;
+        let name = names.link(self.stage, self.port)?;
         // The payload begins where the user header ends, and so is aligned as that is. To ask iceoryx2 for it would set
         // aside eight bytes for each.
-        node.service_builder(&names.link(self.stage, self.port)?)
-            .publish_subscribe::<[u8]>()
-            .user_header::<SampleHeader>()
-            .enable_safe_overflow(self.overflow == Overflow::DropOldest)
-            .history_size(0)
-            .subscriber_max_buffer_size(buffer)
-            .subscriber_max_borrowed_samples(self.held(self.depth) + SPARE)
-            .max_publishers(senders)
-            .max_subscribers(subscribers)
-            .max_nodes(subscribers + senders + 1)
-            .open_or_create()
-            .map_err(|e| failed(&e))
+        let open = || {
+            node.service_builder(&name)
+                .publish_subscribe::<[u8]>()
+                .user_header::<SampleHeader>()
+                .enable_safe_overflow(self.overflow == Overflow::DropOldest)
+                .history_size(0)
+                .subscriber_max_buffer_size(buffer)
+                .subscriber_max_borrowed_samples(self.held(self.depth) + SPARE)
+                .max_publishers(senders)
+                .max_subscribers(subscribers)
+                .max_nodes(subscribers + senders + 1)
+                .open_or_create()
+        };
+        for _ in 1..ATTEMPTS {
+            match open() {
+                Err(OpenError::SystemInFlux | OpenError::PublishSubscribeOpenError(E::DoesNotExist)) => {
+                    std::thread::sleep(BETWEEN_ATTEMPTS);
+                }
+                done => return done.map_err(|e| failed(&e)),
+            }
+        }
+        open().map_err(|e| failed(&e))
     }
 
     /// A publisher of the link. It sets memory aside for each sample that can be in use at a time: as much as the largest
