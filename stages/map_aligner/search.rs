@@ -43,7 +43,7 @@ pub fn search(
 ) -> Vec<Place> {
     let step = PI / half_turns as f64;
     let may_turn = |angle: f64| window.is_none_or(|window| window.contains_yaw(angle, step));
-    let angles = (0..half_turns).map(|number| step * number as f64);
+    let angles = (0..half_turns).map(|number| PI * number as f64 / half_turns as f64);
     let angles: Vec<f64> = angles.filter(|angle| may_turn(*angle) || may_turn(angle + PI)).collect();
     let (spacing, most_at_one) = if window.is_some() { (0.0, usize::MAX) } else { (spacing, MOST_AT_ONE) };
     let margin = 2.0 * a.cell;
