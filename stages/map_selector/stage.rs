@@ -40,7 +40,8 @@ impl MapSelector {
     ) -> Result<(), StageError> {
         let robot = map.robot();
         if !self.last.keep(&map, output, |_| ()) {
-            return Ok(());
+            // That the robot is there must be known, to say that it is not merged.
+            return output.map.send_bytes(robot, map.message().bytes());
         }
         let before = self.passed_on.get(robot).zip(self.last.get(robot));
         let has_changed = before.is_none_or(|(before, last)| self.has_changed(before, &last.grid()));

@@ -88,6 +88,17 @@ fn the_first_map_each_that_has_changed_and_the_last_are_passed_on() {
     assert_eq!(passed_on(&[10, 20], 0.5), (vec![0, 1], vec![]), "none is passed on twice");
 }
 
+#[test]
+fn what_is_no_map_is_passed_on_so_that_its_robot_is_known() {
+    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let info = MapMetaData { resolution: 0.05, width: 40, height: 10, ..Default::default() };
+    let too_short = OccupancyGrid { info, data: &[0; 7], ..Default::default() };
+    stage.give::<OccupancyGrid<'_>>("map", "a", LogTime(0), &too_short).unwrap();
+    assert_eq!((stage.take_messages("map").len(), stage.warnings().len()), (1, 1));
+    stage.finish(LogTime(1)).unwrap();
+    assert_eq!(stage.take_messages("map").len(), 0);
+}
+
 proptest! {
     #[test]
     fn what_waits_is_less_than_what_is_asked_for_and_the_last_is_never_lost(
