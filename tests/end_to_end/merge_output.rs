@@ -41,11 +41,12 @@ fn results_stand_beside_the_input_as_it_was() {
     let frames: RobotFrames = decode(after["/robot_frames"].last().unwrap()).unwrap();
     assert_eq!((frames.reference.as_str(), frames.frames.len(), frames.unmerged.len()), ("robot1", 2, 0));
 
-    // Each new map has its walls found once, and no other map's are found again for it.
+    // Each map that is picked has its walls found once, and no other map's are found again for it.
     for robot in ["robot1", "robot2"] {
         let maps = before[&format!("/{robot}/map")].len();
-        assert_eq!(after[&format!("/{robot}/lines/segments")].len(), maps);
-        assert_eq!(after[&format!("/{robot}/quadrants/direction")].len(), maps);
+        let picked = after[&format!("/{robot}/lines/segments")].len();
+        assert!((1..=maps).contains(&picked), "{picked} of {maps}");
+        assert_eq!(after[&format!("/{robot}/quadrants/direction")].len(), picked);
     }
 }
 
