@@ -52,12 +52,7 @@ fn what_is_refused_says_why() {
 
 #[test]
 fn hypotheses_are_ranked_and_counted_and_their_scores_fall() {
-    let hall = FloorPlan::new(&[
-        [0.0, 0.0, 20.0, 0.0],
-        [20.0, 0.0, 20.0, 12.0],
-        [20.0, 12.0, 0.0, 12.0],
-        [0.0, 12.0, 0.0, 0.0],
-    ]);
+    let hall = FloorPlan::hall();
     let all = seen(-0.2, -0.2, 20.2, 12.2);
     let mut bench = StageBench::new(&super::kind(), "max_hypotheses = 3\nleast_share = 0.0");
     bench.give_map("robot1", &hall.draw(all, drawing(3.0, 2.0, 0.4)));
@@ -109,12 +104,7 @@ fn parameters_that_cannot_be_are_refused() {
 
 #[test]
 fn where_initial_poses_are_known_only_places_near_them_are_found() {
-    let hall = FloorPlan::new(&[
-        [0.0, 0.0, 20.0, 0.0],
-        [20.0, 0.0, 20.0, 12.0],
-        [20.0, 12.0, 0.0, 12.0],
-        [0.0, 12.0, 0.0, 0.0],
-    ]);
+    let hall = FloorPlan::hall();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (hall.draw(part, drawing(3.0, 2.0, 0.4)), hall.draw(part, drawing(12.0, 6.0, -2.1)));
     let found = |initial_poses: InitialPoses| {

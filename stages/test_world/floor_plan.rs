@@ -90,6 +90,11 @@ impl FloorPlan {
         ])
     }
 
+    /// A hall of 20 x 12 m that looks the same after half a turn.
+    pub(crate) fn hall() -> Self {
+        Self::new(&[[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]])
+    }
+
     /// A straight corridor without an end, 2 m wide.
     pub(crate) fn corridor() -> Self {
         Self::new(&[[-100.0, -1.0, 100.0, -1.0], [-100.0, 1.0, 100.0, 1.0]])
