@@ -58,6 +58,17 @@ pub enum Failure {
     /// The user asked for a stop.
     #[error("was interrupted")]
     Interrupted,
+    /// The user asked a live run for its end, and it does not come to it.
+    #[error(
+        "was to end, but nothing has moved in it for {seconds} s, and these stages have not ended: {}",
+        stages.join(", ")
+    )]
+    Stuck {
+        /// For how long nothing has moved.
+        seconds: f64,
+        /// The stages that have not ended, with how many messages wait in them.
+        stages: Vec<String>,
+    },
     /// Its process could not be started or watched.
     #[error("cannot run in processes: {0}")]
     Process(String),

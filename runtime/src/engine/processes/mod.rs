@@ -15,11 +15,13 @@
 //!
 //! A live run goes on without a process that has failed if its stages say `restart = "on_failure"`: the supervisor removes
 //! what the process has left in shared memory and starts it again after a while. A live run ends when the observer asks
-//! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end.
+//! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end, however long
+//! that takes; only when nothing moves any more does the run fail.
 
 mod awake;
 mod backoff;
 mod child;
+mod drain;
 mod event;
 mod process;
 mod supervisor;

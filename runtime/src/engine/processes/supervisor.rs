@@ -3,6 +3,7 @@
 use super::Launch;
 use super::awake::Awake;
 use super::backoff::Backoff;
+use super::drain::{Drain, STUCK_AFTER};
 use super::event::{Event, listen};
 use super::process::Process;
 use super::system::describe;
@@ -10,7 +11,7 @@ use super::words::{Said, Told};
 use crate::engine::run_folder::RunFolder;
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{LinkError, RunNames};
-use crate::link::{StageBoard, StageNumber, StageState};
+use crate::link::{StageBoard, StageNumber, StageState, WireNumber};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
@@ -28,9 +29,6 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(10);
 /// A process that dies takes the links of others with it, and their complaints may come before the news of its death.
 /// So long the supervisor waits for a better reason.
 const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
-
-/// So long may a live run take to handle what is on its way when it is to end.
-const DRAIN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// A run that has failed.
 struct Stopping {
@@ -71,6 +69,7 @@ fn run_in(
         processes: Vec::new(),
         draining: None,
         awake: Awake::new(Instant::now()),
+        awake_for: Duration::ZERO,
         reports: BTreeMap::new(),
         stopping: None,
         readers: Vec::new(),
@@ -88,9 +87,11 @@ struct Supervisor<'a> {
     boards: Vec<StageBoard>,
     events: Sender<Event>,
     processes: Vec<Process>,
-    /// Since when a live run comes to its end.
-    draining: Option<Instant>,
+    /// Of a live run that comes to its end.
+    draining: Option<Drain>,
     awake: Awake,
+    /// For how long this process had been awake when it last looked.
+    awake_for: Duration,
     reports: BTreeMap<String, StageReport>,
     stopping: Option<Stopping>,
     readers: Vec<thread::JoinHandle<()>>,
@@ -153,6 +154,7 @@ impl Supervisor<'_> {
                 Ok(event) => self.note(event),
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
             }
+            self.awake_for = self.awake.look(Instant::now());
             if self.stopping.is_none() && self.observer.should_stop() {
                 match self.pipeline.mode {
                     Mode::Replay => self.fail(RunError::of_run(Failure::Interrupted)),
@@ -263,17 +265,31 @@ impl Supervisor<'_> {
 
     /// Brings a live run to its end.
     fn drain(&mut self) {
-        match self.draining {
+        match &mut self.draining {
             None => {
-                self.draining = Some(Instant::now());
+                self.draining = Some(Drain::new(Instant::now()));
                 self.processes
                     .iter_mut()
                     .filter(|process| !process.ended)
                     .for_each(|process| process.tell(&Told::Drain));
             }
-            Some(since) if since.elapsed() > DRAIN_TIMEOUT => self.fail(RunError::of_run(Failure::Interrupted)),
-            Some(_) => {}
+            Some(drain) => {
+                if drain.is_stuck(&self.boards, self.awake_for, Instant::now()) {
+                    let stages = self.not_ended();
+                    self.fail(RunError::of_run(Failure::Stuck { seconds: STUCK_AFTER.as_secs_f64(), stages }));
+                }
+            }
         }
+    }
+
+    /// The stages that have not ended, each with how many messages wait in it.
+    fn not_ended(&self) -> Vec<String> {
+        let stages = self.pipeline.stages.iter().zip(&self.boards);
+        let running = stages.filter(|(_, board)| board.state() != StageState::Ended);
+        let waiting = |board: &StageBoard| -> u64 {
+            (0..board.wires()).map(|wire| board.get_wire(wire, WireNumber::Waiting)).sum()
+        };
+        running.map(|(stage, board)| format!("`{}` ({} messages wait)", stage.name, waiting(board))).collect()
     }
 
     fn note_words(&mut self, process: usize, words: Said) {
@@ -298,7 +314,7 @@ impl Supervisor<'_> {
     /// Kills a process that does not say that it is alive, as one does that was stopped as a whole, or that has taken
     /// more memory than it may.
     fn look_at_processes(&mut self) {
-        let awake_for = self.awake.look(Instant::now());
+        let awake_for = self.awake_for;
         if self.stopping.is_some() {
             return;
         }
