@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// The most topics of which the last message is kept. What is beyond is not repeated.
-const MAX_TOPICS: usize = 40;
+pub(super) const MAX_TOPICS: usize = 40;
 /// Messages up to this size are copied, larger ones held where they are.
 const LARGEST_COPIED: usize = 16 * 1024;
 

@@ -41,8 +41,10 @@
 //! 7. **Late readers.** The owner of a live link keeps the last message of each topic. A reader that comes, or a program that
 //!    looks on, counts itself among the greetings of the owner, which then sends what it keeps again: marked as
 //!    repeated, with the number and the origin that it had. A reader leaves out what it had already.
-//! 8. **The end.** The owner's last message says that the stream has ended. A reader takes what is left, and is noted on the
-//!    board as ended when its stage is done and holds nothing any more; the owner keeps its publisher until then.
+//! 8. **The end.** The owner's last message says that the stream has ended, and how many greetings it had answered. A live
+//!    reader whose own is not among them, as one that was just started again, waits: the owner answers it, and says it
+//!    again. A reader takes what is left, and is noted on the board as ended when its stage is done and holds nothing any
+//!    more; the owner keeps its publisher until then.
 
 mod board;
 pub mod direct;

@@ -57,20 +57,25 @@ impl<S: Service + 'static> Outputs<S> {
     pub(crate) fn answer_greetings(&mut self) -> Result<(), LinkError> {
         if self.is_greeted() {
             self.greeted = self.sleeper.board().get(StageNumber::Greetings);
-            self.links.iter_mut().try_for_each(LinkSender::repeat)?;
+            let greeted = self.greeted;
+            self.links.iter_mut().try_for_each(|link| link.repeat(greeted))?;
         }
         Ok(())
     }
 
     /// Sends all that was gathered and the end of the stream on every link, and waits until every reader has
-    /// acknowledged it. The stage had come to the log time `time`.
+    /// acknowledged it. The stage had come to the log time `time`. A reader that comes meanwhile, as one does that was
+    /// started again, is sent what it has missed, and the end.
     pub(crate) fn end(&mut self, time: LogTime) -> Result<(), LinkError> {
         for link in 0..self.links.len() {
             self.make_way(link, time)?;
-            self.links[link].end(time)?;
+            self.links[link].end(time, self.greeted)?;
         }
-        let links = &self.links;
-        self.sleeper.wait(|| Ok(links.iter().all(LinkSender::is_acknowledged)))
+        let sleeper = Rc::clone(&self.sleeper);
+        sleeper.wait(|| {
+            self.answer_greetings()?;
+            Ok(self.links.iter().all(LinkSender::is_acknowledged))
+        })
     }
 
     /// Makes a link ready for a sample by itself: sends what was gathered before it, and waits for room.
@@ -141,5 +146,134 @@ impl<S: Service + 'static> OutputSink for Sink<S> {
         outputs.links[self.link].send_in_place(header, write)?;
         outputs.links[self.link].count(&header);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::{
+        Board, Control, InputQueue, LinkReceiver, LinkShape, Order, PortBoard, ReaderEnd, RunNames, SenderRole,
+        StageState,
+    };
+    use crate::message::MessageFlags;
+    use crate::pipeline::Overflow;
+    use iceoryx2::node::Node;
+    use iceoryx2::service::local::Service as Local;
+    use std::sync::{Arc, mpsc};
+    use std::time::{Duration, Instant};
+
+    const DEPTH: usize = 4;
+    const TIME: LogTime = LogTime(7);
+    /// So long the test waits before it stops the stage and fails.
+    const DEADLINE: Duration = Duration::from_secs(20);
+
+    /// A live link of stage 0, which the stages 1 and 2 read.
+    struct World {
+        names: RunNames,
+        board: Arc<Board>,
+        control: Arc<Control>,
+    }
+
+    impl World {
+        fn new() -> Self {
+            let board = Board::new(&[(0, 1), (1, 0), (1, 0)]);
+            (1..=2).for_each(|stage| board.stage(stage).set_state(StageState::Starting));
+            Self { names: RunNames::unique(), board, control: Arc::default() }
+        }
+
+        fn shape(&self) -> LinkShape<'static> {
+            let (order, overflow) = (Order::Arrival, Overflow::Wait);
+            LinkShape { stage: "a", port: "b", readers: 2, depth: DEPTH, order, overflow }
+        }
+
+        fn port(&self) -> PortBoard {
+            PortBoard { board: self.board.stage(0), port: 0 }
+        }
+
+        fn end_of(&self, stage: usize) -> ReaderEnd {
+            ReaderEnd { board: self.board.stage(stage), wire: 0, depth: DEPTH }
+        }
+
+        /// Sends one message, waits for the word, and ends.
+        fn send(&self, go_on: mpsc::Receiver<()>) -> Result<(), LinkError> {
+            let node = self.names.node::<Local>()?;
+            let ends = vec![self.end_of(1), self.end_of(2)];
+            let sender =
+                LinkSender::new(&node, &self.names, &self.shape(), ends, self.port(), SenderRole::Owner, false)?;
+            let sleeper = Rc::new(Sleeper::new(self.board.stage(0), Arc::clone(&self.control)));
+            let outputs = Outputs::new(vec![sender], Rc::clone(&sleeper));
+            sleeper.wait(|| Ok(outputs.borrow().links.iter().all(LinkSender::is_connected)))?;
+            outputs.borrow_mut().answer_greetings()?;
+            let header = MessageHeader { log_time: TIME, length: 3, flags: MessageFlags::DATA, ..Default::default() };
+            Outputs::sink(&outputs, 0).send(header, b"map").expect("it has room");
+            go_on.recv().expect("the test goes on");
+            outputs.borrow_mut().end(TIME)
+        }
+
+        /// A reader with what comes in on it.
+        fn reader(&self, node: &Node<Local>, stage: usize) -> (LinkReceiver<Local>, InputQueue) {
+            let receiver = LinkReceiver::new(node, &self.names, &self.shape(), self.end_of(stage), self.port());
+            self.board.stage(stage).set_state(StageState::Running);
+            (receiver.expect("it has a place"), InputQueue::default())
+        }
+
+        /// Takes what comes until there are so many messages, or the stream has ended. Gives how many there were.
+        fn take(&self, (receiver, queue): &mut (LinkReceiver<Local>, InputQueue), most: usize) -> usize {
+            let (start, mut count) = (Instant::now(), 0);
+            while count < most && !queue.has_ended() && start.elapsed() < DEADLINE {
+                receiver.receive(queue).expect("the link is there");
+                while queue.pop().is_some() {
+                    receiver.taken();
+                    count += 1;
+                }
+                std::thread::yield_now();
+            }
+            count
+        }
+    }
+
+    #[test]
+    fn a_reader_that_is_started_again_while_the_stream_ends_is_sent_what_it_missed_and_the_end() {
+        let world = World::new();
+        let (word, words) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let sender = scope.spawn({
+                let world = &world;
+                move || world.send(words)
+            });
+            let node = world.names.node::<Local>().unwrap();
+            let mut lasting = world.reader(&node, 1);
+            let mut dying = world.reader(&node, 2);
+            // Both must be connected for the message to be sent.
+            while !(dying.0.has_news(&dying.1).unwrap() || sender.is_finished()) {
+                std::thread::yield_now();
+            }
+            dying.0.receive(&mut dying.1).unwrap();
+            let lasting_had = world.take(&mut lasting, 1);
+            let dying_had = world.take(&mut dying, 1);
+
+            drop(dying);
+            let board = world.board.stage(2);
+            board.clear();
+            board.add(StageNumber::Restarts, 1);
+            board.set_state(StageState::Starting);
+            word.send(()).unwrap();
+            world.take(&mut lasting, usize::MAX);
+            let lasting_ended = lasting.1.has_ended();
+            world.board.stage(1).set_state(StageState::Ended);
+
+            let mut restarted = world.reader(&node, 2);
+            let restarted_had = world.take(&mut restarted, usize::MAX);
+            let restarted_ended = restarted.1.has_ended();
+            board.set_state(StageState::Ended);
+            if !restarted_ended {
+                world.control.stop(&world.board);
+            }
+            assert_eq!((lasting_had, dying_had, restarted_had), (1, 1, 1));
+            assert!(lasting_ended && restarted_ended);
+            assert_eq!(restarted.1.bound(), TIME, "it knows how far the stream had come");
+            assert_eq!(sender.join().unwrap(), Ok(()));
+        });
     }
 }

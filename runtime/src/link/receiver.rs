@@ -58,7 +58,10 @@ pub struct LinkReceiver<S: Service> {
     owner: PortBoard,
     /// How many senders had come when it was last looked for them.
     senders: u64,
-    greeted: bool,
+    /// The number of its greeting, once it has greeted the owner.
+    greeting: Option<u64>,
+    /// Whether it has counted what was sent before it came.
+    has_counted: bool,
     /// For each slot of the board the sender that it is given to, 0 for none.
     slots: [u64; MAX_SENDERS],
     known: BTreeMap<u64, Known>,
@@ -99,7 +102,8 @@ impl<S: Service + 'static> LinkReceiver<S> {
             end,
             owner,
             senders: 0,
-            greeted: false,
+            greeting: None,
+            has_counted: false,
             slots: [0; MAX_SENDERS],
             known: BTreeMap::new(),
             waiting: VecDeque::new(),
@@ -198,10 +202,9 @@ impl<S: Service + 'static> LinkReceiver<S> {
                 self.end.board.window(self.end.wire, slot).give(sender, limit);
             }
         }
-        if !self.greeted && !present.is_empty() {
-            self.greeted = true;
+        if self.greeting.is_none() && !present.is_empty() {
             self.count_lost();
-            self.owner.board.greet();
+            self.greeting = Some(self.owner.board.greet());
         }
         self.owner.board.ring();
         Ok(())
@@ -230,7 +233,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
         let mut messages = 0;
         if flags.contains(MessageFlags::END) {
             // What others have sent may come after the owner's last word.
-            self.ended = Some(header.message.log_time);
+            self.note_end_mark(&header);
         } else if is_new {
             messages = self.unpack(&header, sample, queue)?;
         }
@@ -280,10 +283,15 @@ impl<S: Service + 'static> LinkReceiver<S> {
     fn note_end(&mut self, queue: &mut InputQueue) {
         if self.is_at_end() && !queue.has_ended() {
             queue.end(self.ended.unwrap_or_default());
-            if !self.greeted {
-                self.greeted = true;
-                self.count_lost();
-            }
+            self.count_lost();
+        }
+    }
+
+    /// The owner has said that it sends no more. Where it has yet to answer this reader, it will say so again.
+    fn note_end_mark(&mut self, header: &SampleHeader) {
+        let is_answered = self.greeting.is_some_and(|greeting| greeting <= header.message.sequence);
+        if self.order == Order::LogTime || is_answered {
+            self.ended = Some(header.message.log_time);
         }
     }
 
@@ -292,10 +300,10 @@ impl<S: Service + 'static> LinkReceiver<S> {
         self.ended.is_some() || self.order == Order::Arrival && self.owner.board.state() == StageState::Ended
     }
 
-    /// Counts as dropped what was sent while a stage was away that was started again.
-    fn count_lost(&self) {
+    /// Counts as dropped, once, what was sent while a stage was away that was started again.
+    fn count_lost(&mut self) {
         let (board, wire) = (&self.end.board, self.end.wire);
-        if board.get(StageNumber::Restarts) > 0 {
+        if !std::mem::replace(&mut self.has_counted, true) && board.get(StageNumber::Restarts) > 0 {
             let had = board.get_wire(wire, WireNumber::Taken) + board.get_wire(wire, WireNumber::Dropped);
             let lost = self.owner.board.sent(self.owner.port).saturating_sub(had);
             board.add_wire(wire, WireNumber::Dropped, lost);

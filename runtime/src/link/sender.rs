@@ -83,6 +83,8 @@ pub struct LinkSender<S: Service> {
     origin: u64,
     /// The number of the next sample.
     number: u64,
+    /// The log time to which the stream had come at its end.
+    ended: Option<LogTime>,
     sequence: Sequence,
     batch: Batch,
     gather: bool,
@@ -129,6 +131,7 @@ impl<S: Service + 'static> LinkSender<S> {
             kept,
             origin,
             number: 0,
+            ended: None,
             sequence: Sequence::new(shape.order),
             batch: Batch::default(),
             gather: gather && shape.order == Order::LogTime,
@@ -247,7 +250,10 @@ impl<S: Service + 'static> LinkSender<S> {
     /// Tells the readers that nothing before `watermark` will follow, if they do not know it. Needs room.
     pub(crate) fn raise(&mut self, watermark: LogTime) -> Result<(), LinkError> {
         match self.sequence.raise(watermark) {
-            true => self.send_mark(MessageFlags::WATERMARK, watermark),
+            true => {
+                let flags = MessageFlags::WATERMARK;
+                self.send_bytes(MessageHeader { flags, log_time: watermark, ..Default::default() }, &[])
+            }
             false => Ok(()),
         }
     }
@@ -257,23 +263,40 @@ impl<S: Service + 'static> LinkSender<S> {
         self.order == Order::LogTime && watermark > self.reached()
     }
 
-    /// Says that the stream has ended, and that it has come to the given log time. Needs room.
-    pub(crate) fn end(&mut self, time: LogTime) -> Result<(), LinkError> {
-        self.send_mark(MessageFlags::END, time)
+    /// Says that the stream has ended, and that it has come to the given log time, when the owner had answered so many
+    /// greetings. Needs room.
+    pub(crate) fn end(&mut self, time: LogTime, greeted: u64) -> Result<(), LinkError> {
+        self.ended = Some(time);
+        self.send_bytes(end_mark(time, greeted), &[])
     }
 
-    /// Sends the last message of each topic again, if this is the owner of a live link.
-    pub(crate) fn repeat(&mut self) -> Result<(), LinkError> {
+    /// Sends the last message of each topic again, if this is the owner of a live link, and that the stream has ended, if it
+    /// has. With this so many greetings are answered.
+    pub(crate) fn repeat(&mut self, greeted: u64) -> Result<(), LinkError> {
         self.look()?;
-        for (header, bytes) in self.kept.iter().flat_map(Kept::messages) {
-            let mut header = *header;
-            header.message.flags.0 |= MessageFlags::REPEATED.0;
-            header.sent_at = monotonic_nanoseconds();
-            let mut sample = self.loan(bytes.len())?.write_from_slice(bytes);
-            *sample.user_header_mut() = header;
-            sample.send().map_err(|e| self.failed(&e))?;
+        let Some(kept) = &self.kept else { return Ok(()) };
+        for (header, bytes) in kept.messages() {
+            self.send_again(*header, bytes)?;
+        }
+        if let Some(time) = self.ended {
+            let header = SampleHeader::single(end_mark(time, greeted));
+            // The number of the mark itself, which was the last sample.
+            self.send_again(
+                SampleHeader { origin: self.origin, number: self.number.saturating_sub(1), ..header },
+                &[],
+            )?;
         }
         self.ring();
+        Ok(())
+    }
+
+    /// Sends a sample that was sent before, with the number and the origin that it had.
+    fn send_again(&self, mut header: SampleHeader, bytes: &[u8]) -> Result<(), LinkError> {
+        header.message.flags.0 |= MessageFlags::REPEATED.0;
+        header.sent_at = monotonic_nanoseconds();
+        let mut sample = self.loan(bytes.len())?.write_from_slice(bytes);
+        *sample.user_header_mut() = header;
+        sample.send().map_err(|e| self.failed(&e))?;
         Ok(())
     }
 
@@ -290,10 +313,6 @@ impl<S: Service + 'static> LinkSender<S> {
     /// Whether there is something for the owner to take in.
     pub(crate) fn has_news(&self) -> Result<bool, LinkError> {
         self.kept.as_ref().map_or(Ok(false), Kept::has_news)
-    }
-
-    fn send_mark(&mut self, flags: MessageFlags, log_time: LogTime) -> Result<(), LinkError> {
-        self.send_bytes(MessageHeader { flags, log_time, ..Default::default() }, &[])
     }
 
     /// Where a payload of this size travels; none if that is in its sample.
@@ -361,4 +380,9 @@ impl<S: Service + 'static> LinkSender<S> {
     fn failed(&self, cause: &dyn std::fmt::Debug) -> LinkError {
         LinkError::shared(format!("send on {}", self.name))(cause)
     }
+}
+
+/// The mark of the end of a stream. A live reader whose own greeting is not among the answered ones waits for the next.
+fn end_mark(log_time: LogTime, greeted: u64) -> MessageHeader {
+    MessageHeader { flags: MessageFlags::END, log_time, sequence: greeted, ..Default::default() }
 }

@@ -1,6 +1,7 @@
 //! The service of a link, as all of its ends open it.
 
 use super::board::MAX_SENDERS;
+use super::kept::MAX_TOPICS;
 use super::room::Room;
 use super::stage_board::StageBoard;
 use super::{LinkError, Order, RunNames, SampleHeader};
@@ -25,8 +26,9 @@ pub(super) const KEEPER_BUFFER: usize = 128;
 pub(super) const KEEPER_HELD: usize = 22;
 /// For how large a payload, in bytes, room is set aside for each sample before the first is sent.
 pub(super) const FIRST_PLACE: usize = 4 * 1024;
-/// What a reader of a live link has room for beyond its depth: for what is repeated.
-const REPEAT_ROOM: usize = 48;
+/// What a reader of a live link has room for beyond its depth: for what is repeated, with the end, for itself and for
+/// another who came at the same time.
+const REPEAT_ROOM: usize = 2 * (MAX_TOPICS + 1);
 /// Ends that open a link at once may each find it neither there nor theirs to make, where the machine is busy. They try
 /// again, so often at the most.
 const ATTEMPTS: usize = 100;

@@ -153,10 +153,12 @@ impl StageBoard {
         self.board.word(self.place.senders(port)).fetch_add(1, Ordering::AcqRel);
     }
 
-    /// A reader of the stage's links has come, or a program that looks on: it is to be sent what it has missed.
-    pub(crate) fn greet(&self) {
-        self.stage_word(StageNumber::Greetings as usize).fetch_add(1, Ordering::AcqRel);
+    /// A reader of the stage's links has come, or a program that looks on: it is to be sent what it has missed. Gives the
+    /// number of the greeting, from 1 on.
+    pub(crate) fn greet(&self) -> u64 {
+        let before = self.stage_word(StageNumber::Greetings as usize).fetch_add(1, Ordering::AcqRel);
         self.ring();
+        before + 1
     }
 
     /// Where the stage sleeps, and the programs that send as this stage.
