@@ -1,9 +1,11 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
 //! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `hypotheses`, `robot_maps` and `robot_pair`.
+//! in `geometry`, `walls`, `deformation`, `hypotheses`, `robot_maps` and `robot_pair`.
 
 #![forbid(unsafe_code)]
 
+pub mod deformation;
+pub mod elastic_refiner;
 pub mod frame_solver;
 pub mod geometry;
 pub mod grid_fuser;
@@ -30,6 +32,7 @@ use gridweave_runtime::stage::StageKind;
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
     vec![
+        elastic_refiner::kind(),
         frame_solver::kind(),
         grid_fuser::kind(),
         icp_refiner::kind(),

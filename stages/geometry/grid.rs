@@ -131,6 +131,11 @@ impl<'a> Grid<'a> {
         }
     }
 
+    /// The value of the cell that a point falls in; unknown outside of the grid.
+    pub fn value_at(&self, point: &Point2) -> i8 {
+        self.geometry.cell(point).map_or(UNKNOWN, |cell| self.value(cell))
+    }
+
     /// The cells that hold an obstacle, row by row.
     pub fn occupied(&self) -> impl Iterator<Item = Cell> + 'a {
         // Most of a map is free or unknown. Whole blocks of it are passed over by their greatest value.

@@ -30,7 +30,10 @@ pub fn carry(map: &PlacedGrid<'_>, geometry: &GridGeometry) -> Vec<i8> {
     let width = map.grid.geometry.width.max(1);
     for (index, &value) in map.grid.cells.iter().enumerate().filter(|(_, value)| is_known(**value)) {
         let cell = Cell { column: index % width, row: index / width };
-        let centre = map.transform_world_map * map.grid.geometry.centre(cell);
+        let centre = match map.bend {
+            None => map.transform_world_map * map.grid.geometry.centre(cell),
+            Some(bend) => map.transform_world_map * bend.apply(&map.grid.geometry.centre(cell)),
+        };
         let Some(place) = geometry.cell(&centre).and_then(|cell| carried.get_mut(geometry.index(cell))) else {
             continue;
         };
@@ -106,7 +109,7 @@ mod tests {
     #[test]
     fn equation_15_leaves_23_cells_with_two_holes_and_the_mean_closes_both() {
         let (cells, area, transform_world_map, output) = golden_area(0);
-        let map = PlacedGrid { grid: Grid::new(area, &cells).unwrap(), transform_world_map };
+        let map = PlacedGrid::rigid(Grid::new(area, &cells).unwrap(), transform_world_map);
         let carried = carry(&map, &output);
         assert_eq!(known(&carried), 23);
         let closed = close_gaps(&carried, &output);

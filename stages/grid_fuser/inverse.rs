@@ -3,6 +3,7 @@
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
 use super::{Fused, KnownArea, PlacedGrid};
+use crate::deformation::Deformation;
 use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN, is_known};
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -42,10 +43,12 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
     });
 }
 
-/// How output cells are found in one map: its column and row are linear in the output's.
+/// How output cells are found in one map: its column and row are linear in the output's. Those of a map that is bent are so
+/// over the length of a stretch, over which a bend changes next to nothing.
 struct Lookup<'a> {
     grid: Grid<'a>,
     area: &'a KnownArea,
+    bend: Option<&'a Deformation>,
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
     /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
@@ -64,6 +67,7 @@ impl<'a> Lookup<'a> {
         Self {
             grid: map.grid,
             area,
+            bend: map.bend,
             start: (transform_grid_output * Point2::new(half, half)) * scale,
             step: transform_grid_output.rotation * Vector2::new(output.resolution, 0.0) * scale,
             columns: (area.columns.0 as f64, area.columns.1 as f64),
@@ -75,9 +79,19 @@ impl<'a> Lookup<'a> {
     fn row(&self, row: usize, count: usize) -> LookupRow<'_> {
         let row = row as f64;
         let start = Point2::new(self.start.x - row * self.step.y, self.start.y + row * self.step.x);
-        let by_column = range_within(start.x, self.step.x, self.columns, count);
-        let by_row = range_within(start.y, self.step.y, self.rows, count);
+        let resolution = self.grid.geometry.resolution;
+        let bent = self.bend.map_or(0.0, |bend| (bend.largest_move() / resolution).ceil());
+        let widened = |(low, high): (f64, f64)| (low - bent, high + bent);
+        let by_column = range_within(start.x, self.step.x, widened(self.columns), count);
+        let by_row = range_within(start.y, self.step.y, widened(self.rows), count);
         LookupRow { lookup: self, start, from: by_column.0.max(by_row.0), to: by_column.1.min(by_row.1) }
+    }
+
+    /// The place of the map, in cells, that its bend lays at a place where the map would lie without it.
+    fn unbent(&self, place: &Point2, bend: &Deformation) -> Point2 {
+        let GridGeometry { resolution, origin, .. } = self.grid.geometry;
+        let point = bend.inverse(&(origin * (place * resolution)));
+        origin.inverse_transform_point(&point) / resolution
     }
 
     fn value(&self, place: &Point2) -> i8 {
@@ -108,30 +122,38 @@ impl LookupRow<'_> {
         if from >= to {
             return None;
         }
-        let step = self.lookup.step;
-        let middle = self.start + step * ((from + to) as f64 / 2.0);
+        let (mut start, mut step) = (self.start, self.lookup.step);
+        if let Some(bend) = self.lookup.bend {
+            let [one, other] = [from, to].map(|index| self.lookup.unbent(&(start + step * index as f64), bend));
+            step = (other - one) / (to - from) as f64;
+            start = one - step * from as f64;
+        }
+        let middle = start + step * ((from + to) as f64 / 2.0);
         // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
         let may_be_known = step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
-        may_be_known.then_some(Stretch { row: self, first, from, to })
+        may_be_known.then_some(Stretch { lookup: self.lookup, first, from, to, start, step })
     }
 }
 
 /// A few cells of one output row on one map.
 struct Stretch<'a> {
-    row: &'a LookupRow<'a>,
+    lookup: &'a Lookup<'a>,
     /// The first cell of the stretch.
     first: usize,
     /// Its cells that may fall on the known part of the map: the first, and the one behind the last.
     from: usize,
     to: usize,
+    /// Where the centre of the row's first cell would fall, if the whole row went as this stretch does, and how that changes
+    /// by one cell.
+    start: Point2,
+    step: Vector2<f64>,
 }
 
 impl Stretch<'_> {
     /// Hands out what the map says of every cell of the stretch that may fall on its known part.
     fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
-        let LookupRow { lookup, start, .. } = self.row;
         for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
-            take(cell, lookup.value(&(start + lookup.step * index as f64)));
+            take(cell, self.lookup.value(&(self.start + self.step * index as f64)));
         }
     }
 }
@@ -188,7 +210,7 @@ mod tests {
         fn the_reference_map_comes_out_as_it_went_in(cells in cells(13, 9), x in -99.0..99.0, y in -99.0..99.0) {
             let source = geometry(13, 9, 0.05, pose(x, y, 0.0));
             let grid = Grid::new(source, &cells).unwrap();
-            let (laid, fused) = fuse_all(&[PlacedGrid { grid, transform_world_map: Pose2::identity() }]);
+            let (laid, fused) = fuse_all(&[PlacedGrid::rigid(grid, Pose2::identity())]);
             prop_assert_eq!(laid, source);
             prop_assert_eq!(fused, cells);
         }
@@ -196,7 +218,7 @@ mod tests {
         #[test]
         fn a_map_fused_with_itself_keeps_free_and_occupied(cells in cells(13, 9), x in -9.0..9.0) {
             let grid = Grid::new(geometry(13, 9, 0.05, pose(x, 1.0, 0.0)), &cells).unwrap();
-            let map = PlacedGrid { grid, transform_world_map: Pose2::identity() };
+            let map = PlacedGrid::rigid(grid, Pose2::identity());
             let (_, fused) = fuse_all(&[map, map]);
             for (one, two) in cells.iter().zip(fused) {
                 prop_assert_eq!(*one == UNKNOWN, two == UNKNOWN);
@@ -209,9 +231,8 @@ mod tests {
         fn the_order_of_the_maps_does_not_matter(
             first in cells(13, 9), second in cells(7, 8), third in cells(5, 4), x in -0.5..0.5, yaw in -4.0..4.0,
         ) {
-            let map = |cells, geometry, transform_world_map| PlacedGrid {
-                grid: Grid::new(geometry, cells).unwrap(), transform_world_map,
-            };
+            let map = |cells, geometry, transform_world_map| 
+                PlacedGrid::rigid(Grid::new(geometry, cells).unwrap(), transform_world_map);
             let first = map(&first, geometry(13, 9, 0.05, Pose2::identity()), Pose2::identity());
             let second = map(&second, geometry(7, 8, 0.07, pose(0.1, 0.2, 0.4)), pose(x, 0.1, yaw));
             let third = map(&third, geometry(5, 4, 0.1, Pose2::identity()), pose(0.1, x, 2.0 * yaw));
@@ -223,7 +244,7 @@ mod tests {
         fn a_turned_area_has_no_gaps(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
             let cells = vec![0; 20 * 20];
             let grid = Grid::new(geometry(20, 20, 0.05, pose(0.3, -0.2, 0.7)), &cells).unwrap();
-            let map = PlacedGrid { grid, transform_world_map: pose(x, y, yaw) };
+            let map = PlacedGrid::rigid(grid, pose(x, y, yaw));
             let (laid, fused) = fuse_all(&[map]);
             for row in fused.chunks(laid.width) {
                 let first = row.iter().position(|value| *value == 0).unwrap_or(0);
@@ -240,7 +261,7 @@ mod tests {
         let (coarse, fine) = ([0, 100, -1, 50], [0; 4]);
         let coarse = Grid::new(geometry(2, 2, 0.1, Pose2::identity()), &coarse).unwrap();
         let fine = Grid::new(geometry(2, 2, 0.05, pose(-0.1, 0.0, 0.0)), &fine).unwrap();
-        let maps = [fine, coarse].map(|grid| PlacedGrid { grid, transform_world_map: Pose2::identity() });
+        let maps = [fine, coarse].map(|grid| PlacedGrid::rigid(grid, Pose2::identity()));
         let (laid, fused) = fuse_all(&maps);
         assert_eq!((laid.width, laid.height, laid.resolution), (6, 4, 0.05));
         #[rustfmt::skip]
@@ -256,7 +277,7 @@ mod tests {
     fn a_map_whose_origin_is_turned_lies_where_its_origin_says() {
         let cells = [100, 0, 0, 0, 0, 0];
         let turned = Grid::new(geometry(3, 2, 1.0, pose(0.0, 0.0, std::f64::consts::FRAC_PI_2)), &cells).unwrap();
-        let (laid, fused) = fuse_all(&[PlacedGrid { grid: turned, transform_world_map: Pose2::identity() }]);
+        let (laid, fused) = fuse_all(&[PlacedGrid::rigid(turned, Pose2::identity())]);
         assert_eq!((laid.width, laid.height), (2, 3));
         assert!((laid.origin.translation.x + 2.0).abs() < 1e-12);
         assert_eq!(fused, [0, 100, 0, 0, 0, 0]);

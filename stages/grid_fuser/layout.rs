@@ -73,11 +73,9 @@ pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layo
 
 /// The rectangle that holds what is known of a map, if anything is.
 fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, LeftOut> {
-    let transform_world_grid = map.transform_world_grid();
     let mut extent: Option<Extent> = None;
     for corner in area.corners() {
-        let in_world = transform_world_grid * (corner * map.grid.geometry.resolution);
-        let in_cells = Point2::from((in_world - lattice.anchor) / lattice.resolution);
+        let in_cells = Point2::from((map.in_world(&corner) - lattice.anchor) / lattice.resolution);
         if !in_cells.coords.iter().all(|value| value.is_finite()) {
             return Err(LeftOut::NotFinite);
         }
@@ -143,7 +141,7 @@ mod tests {
     fn lay_out_at(grid: Grid<'_>, poses: &[Pose2]) -> Layout {
         let area = KnownArea::of(&grid);
         let maps: Vec<_> =
-            poses.iter().map(|&transform_world_map| (PlacedGrid { grid, transform_world_map }, &area)).collect();
+            poses.iter().map(|&transform_world_map| (PlacedGrid::rigid(grid, transform_world_map), &area)).collect();
         lay_out(&maps, &LATTICE)
     }
 
@@ -190,7 +188,7 @@ mod tests {
         let lattice = Lattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
         let known = vec![0; 6 * 4];
         let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
-        let at = |x: f64, y: f64| (PlacedGrid { grid, transform_world_map: pose(x, y, 0.0) }, &area);
+        let at = |x: f64, y: f64| (PlacedGrid::rigid(grid, pose(x, y, 0.0)), &area);
         let layout = lay_out(&[at(0.0, 0.0), at(300.0, 300.0), at(150.0, 150.0)], &lattice);
         assert_eq!(layout.takes_part, [Ok(()), Err(LeftOut::Unknown), Ok(())]);
         assert!(layout.geometry.unwrap().cell_count() < 10_000_000);

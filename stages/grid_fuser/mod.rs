@@ -1,8 +1,8 @@
 //! Grid fuser: the maps of all placed robots in, one map out (Tsardoulias et al., section 4.4), and where they
 //! contradict each other.
 //!
-//! Every robot's map is carried into the world, which is the reference robot's map frame, and the maps are added in
-//! log-odds. Coverage fields, which are grids too, can be fused by a second stage of this kind.
+//! Every robot's map is carried into the world, which is the reference robot's map frame, through its bend if one is known,
+//! and the maps are added in log-odds. Coverage fields, which are grids too, can be fused by a second stage of this kind.
 //!
 //! - [`known`]: where the known cells of a map lie, so that nothing else is walked.
 //! - [`layout`]: how large the fused grid is, and where its cells lie.
@@ -26,7 +26,8 @@ pub use known::KnownArea;
 pub use parameters::{GridFuserParameters, Warp};
 pub use stage::kind;
 
-use crate::geometry::{Grid, Pose2};
+use crate::deformation::Deformation;
+use crate::geometry::{Grid, Point2, Pose2};
 
 /// A map and where it lies.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +36,8 @@ pub struct PlacedGrid<'a> {
     pub grid: Grid<'a>,
     /// `T_world_map`: the pose of the map frame in the world.
     pub transform_world_map: Pose2,
+    /// How the map is bent; none if it is rigid.
+    pub bend: Option<&'a Deformation>,
 }
 
 /// What is made of the maps: two grids of the same size.
@@ -46,7 +49,21 @@ pub struct Fused<'a> {
     pub conflicts: &'a mut [i8],
 }
 
-impl PlacedGrid<'_> {
+impl<'a> PlacedGrid<'a> {
+    /// A map that is not bent.
+    pub fn rigid(grid: Grid<'a>, transform_world_map: Pose2) -> Self {
+        Self { grid, transform_world_map, bend: None }
+    }
+
+    /// Where a point of the map lies in the world, given in cells along the grid's sides from its corner.
+    pub fn in_world(&self, cells: &Point2) -> Point2 {
+        let in_grid = cells * self.grid.geometry.resolution;
+        match self.bend {
+            None => self.transform_world_grid() * in_grid,
+            Some(bend) => self.transform_world_map * bend.apply(&(self.grid.geometry.origin * in_grid)),
+        }
+    }
+
     /// `T_world_grid`: the pose of the grid's corner in the world.
     pub fn transform_world_grid(&self) -> Pose2 {
         self.transform_world_map * self.grid.geometry.origin

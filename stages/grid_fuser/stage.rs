@@ -4,21 +4,26 @@ use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
+use crate::deformation::Deformation;
 use crate::geometry::{GridGeometry, Point2};
 use crate::robot_maps::RobotMaps;
-use gridweave_runtime::ros::{GridPrefix, Header, MapAgreement, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames};
+use gridweave_runtime::ros::{
+    GridPrefix, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames,
+};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use std::collections::BTreeMap;
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {
     StageKind::stage(
         "grid_fuser",
         "Fuses the maps of all placed robots in log-odds: unknown says nothing, evidence adds. The map is sent when the \
-         frames change by more than `min_move` or `min_turn`, when a robot that is placed has another map, and at the \
+         frames change by more than `min_move` or `min_turn` or maps are bent otherwise, when a robot that is placed has another map, and at the \
          end if anything has changed since. Where maps contradict each other, and the area of that, is sent beside it.",
         |parameters, _: &Context| Ok(GridFuser::new(parameters)),
     )
     .input("map", "the robots' maps, or their coverage fields", GridFuser::receive_map)
+    .optional_input("deformation", "how the maps are bent", GridFuser::receive_deformation)
     .input("frames", "where the maps lie", GridFuser::receive_frames)
     .finish(GridFuser::finish)
     .build()
@@ -56,6 +61,10 @@ struct GridFuser {
     table: EvidenceTable,
     parameters: GridFuserParameters,
     maps: RobotMaps<KnownArea>,
+    /// How the maps are bent, by robot.
+    bends: BTreeMap<String, Deformation>,
+    /// Whether a bend has come that is in no fused map.
+    has_new_bends: bool,
     frames: RobotFrames,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
@@ -64,7 +73,15 @@ struct GridFuser {
 impl GridFuser {
     fn new(parameters: GridFuserParameters) -> Self {
         let table = EvidenceTable::new(parameters.min_probability, parameters.max_probability);
-        Self { table, parameters, maps: RobotMaps::default(), frames: RobotFrames::default(), fused: None }
+        Self {
+            table,
+            parameters,
+            maps: RobotMaps::default(),
+            bends: BTreeMap::new(),
+            has_new_bends: false,
+            frames: RobotFrames::default(),
+            fused: None,
+        }
     }
 
     /// A map of a robot that is not placed waits for its frame, which mostly follows at the same log time.
@@ -80,6 +97,22 @@ impl GridFuser {
         if is_placed { self.fuse(output) } else { Ok(()) }
     }
 
+    /// A bend waits for the frames that belong to it, which follow at the same log time, or for the end. Those of one map
+    /// belong to those of the others: all change together.
+    fn receive_deformation(
+        &mut self,
+        deformation: Received<'_, MapDeformation>,
+        output: &Output<FusedMap>,
+    ) -> Result<(), StageError> {
+        let robot = &deformation.robot;
+        let Some(bend) = Deformation::from_message(&deformation) else {
+            output.warn(format!("how the map of {robot} is bent was left out: its nodes do not lie on a lattice"));
+            return Ok(());
+        };
+        self.has_new_bends |= self.bends.insert(robot.clone(), bend.clone()).is_none_or(|before| before != bend);
+        Ok(())
+    }
+
     /// Frames that differ from those of the fused map by no more than the parameters allow wait for the end.
     fn receive_frames(
         &mut self,
@@ -88,14 +121,14 @@ impl GridFuser {
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
         let is_near = self.fused.as_ref().is_some_and(|fused| self.is_near(fused));
-        if is_near { Ok(()) } else { self.fuse(output) }
+        if is_near && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
     }
 
     fn finish(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         let is_sent = self.fused.as_ref().is_some_and(|fused| {
             (&fused.reference, self.placed(fused)) == (&self.frames.reference, self.placed(&self.frames))
         });
-        if is_sent { Ok(()) } else { self.fuse(output) }
+        if is_sent && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
     }
 
     /// Whether the robots are where the frames that were `fused` have them, as far as the parameters ask.
@@ -118,6 +151,7 @@ impl GridFuser {
 
     fn fuse(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         self.fused = Some(self.frames.clone());
+        self.has_new_bends = false;
         if !output.map.is_read() && !output.conflicts.is_read() && !output.agreement.is_read() {
             return Ok(());
         }
@@ -125,7 +159,8 @@ impl GridFuser {
         let mut maps = Vec::with_capacity(placed.len());
         for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let placed = PlacedGrid { grid: map.grid(), transform_world_map: frame.transform_reference_robot() };
+            let bend = self.bends.get(&frame.robot);
+            let placed = PlacedGrid { bend, ..PlacedGrid::rigid(map.grid(), frame.transform_reference_robot()) };
             maps.push((placed, &map.own));
         }
 

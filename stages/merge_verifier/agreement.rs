@@ -2,7 +2,7 @@
 
 use super::MergeVerifierParameters;
 use super::regions::RegionComparison;
-use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, is_known};
+use crate::geometry::{Grid, Point2, Pose2, is_known};
 use crate::walls::{WallMap, stride};
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
@@ -111,10 +111,6 @@ fn chance(map: &MapView<'_>, tolerance: f64) -> f64 {
 fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, most_points: usize) -> f64 {
     let stride = stride(b.walls.samples.len(), most_points);
     let samples = b.walls.samples.iter().step_by(stride);
-    let known = samples.filter(|sample| is_known(value_at(&a.grid, &(transform_a_b * sample.point)))).count();
+    let known = samples.filter(|sample| is_known(a.grid.value_at(&(transform_a_b * sample.point)))).count();
     known as f64 * stride as f64 * b.walls.sample_area
-}
-
-pub(super) fn value_at(grid: &Grid<'_>, point: &Point2) -> i8 {
-    grid.geometry.cell(point).map_or(UNKNOWN, |cell| grid.value(cell))
 }

@@ -5,26 +5,15 @@
 //! centimetres counts little.
 
 use super::MapView;
-use super::agreement::value_at;
 use crate::geometry::{Point2, Pose2, is_free, is_known};
-use crate::walls::{WallMap, stride};
+use crate::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT, WallMap, before_wall, stride};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
-/// Walls that cross by more than this are not the same wall: the cosine of 30 degrees.
-const LEAST_NORMAL_AGREEMENT: f64 = 0.866;
-/// Two maps show the same face of a wall if both know free space so far before it, metres, or so many cells of the coarser
-/// one. Wherever the ends of two buildings are laid back to back, wall lies on wall, too.
-const BEFORE_WALL: f64 = 0.2;
-const CELLS_BEFORE_WALL: f64 = 3.0;
 /// Points by which a region is registered at the most.
 const POINTS: usize = 120;
 /// Rounds of the registration of a region, and how far partners lie apart at the most in each, metres.
 const ROUNDS: [f64; 4] = [0.4, 0.3, 0.2, 0.2];
-/// The length of wall that counts as one measurement of where a region lies, metres.
-const CORRELATION_LENGTH: f64 = 0.5;
-/// Standard deviation of such a measurement, metres.
-const DEVIATION: f64 = 0.05;
 
 /// What two maps say of each other in one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,14 +46,14 @@ impl RegionComparison {
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
         for index in self.sample(b.walls) {
             let point = transform_a_b * b.walls.walls.points()[index];
-            if is_known(value_at(&a.grid, &point)) {
+            if is_known(a.grid.value_at(&point)) {
                 parts.entry(key(&point)).or_default().of_b.push(index);
             }
         }
         let transform_b_a = transform_a_b.inverse();
         for index in self.sample(a.walls) {
             let point = a.walls.walls.points()[index];
-            if is_known(value_at(&b.grid, &(transform_b_a * point))) {
+            if is_known(b.grid.value_at(&(transform_b_a * point))) {
                 parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
@@ -135,8 +124,7 @@ impl RegionComparison {
         // Both ways are added up.
         let count = other.walls.walls.points().len();
         let length = 0.5 * other.walls.spacing * stride(count, self.most_points) as f64;
-        let coarser = map.grid.geometry.resolution.max(other.grid.geometry.resolution);
-        let ahead = BEFORE_WALL.max(CELLS_BEFORE_WALL * coarser);
+        let ahead = before_wall(map.grid.geometry.resolution.max(other.grid.geometry.resolution));
         for &index in points {
             let own = other.walls.walls.points()[index];
             let point = transform * own;
@@ -148,14 +136,14 @@ impl RegionComparison {
                     continue;
                 }
                 let is_seen_from = |side: f64| {
-                    is_free(value_at(&other.grid, &(own + normal * (side * ahead))))
-                        && is_free(value_at(&map.grid, &(point + turned * (side * ahead))))
+                    is_free(other.grid.value_at(&(own + normal * (side * ahead))))
+                        && is_free(map.grid.value_at(&(point + turned * (side * ahead))))
                 };
                 if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.wall_on_wall += length;
                     on_wall(&point);
                 }
-            } else if is_free(value_at(&map.grid, &point)) {
+            } else if is_free(map.grid.value_at(&point)) {
                 region.wall_on_free += length;
             }
         }

@@ -11,6 +11,22 @@ use std::cell::OnceCell;
 /// The radius in which a wall's direction is measured, metres: what stages take that are not told another.
 pub const NORMAL_RADIUS: f64 = 0.2;
 
+/// Walls that cross by more than this are not the same wall: the cosine of 30 degrees.
+pub const LEAST_NORMAL_AGREEMENT: f64 = 0.866;
+
+/// The length of wall that counts as one measurement of where it lies, metres: neighbouring points of a wall say the same.
+pub const CORRELATION_LENGTH: f64 = 0.5;
+
+/// Standard deviation of such a measurement, metres.
+pub const DEVIATION: f64 = 0.05;
+
+/// So far before a wall, metres, space is known to be free where the wall was seen from there, on a map of the given metres
+/// a cell. Two maps show the same face of a wall if both know free space before it: where the ends of two buildings are
+/// laid back to back, wall lies on wall, too.
+pub fn before_wall(resolution: f64) -> f64 {
+    f64::max(0.2, 3.0 * resolution)
+}
+
 /// Walls that are made when they are first asked for.
 pub type WallsOnDemand = OnceCell<WallMap>;
 

@@ -5,7 +5,7 @@ mod stage;
 
 pub use stage::kind;
 
-use gridweave_runtime::ros::{MapAgreement, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts};
+use gridweave_runtime::ros::{DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -25,6 +25,9 @@ pub struct Summary {
     /// What became of each pair of robots.
     #[serde(default)]
     pub alignments: Vec<Pair>,
+    /// How the maps are bent, by robot.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bends: BTreeMap<String, Bend>,
     /// How far the maps agree that were fused, by the stage that fused them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub areas: BTreeMap<String, Areas>,
@@ -42,6 +45,38 @@ pub struct Frame {
     /// Of (x, y, yaw), 3 x 3 row by row.
     #[serde(default)]
     pub covariance: [f64; 9],
+}
+
+/// How a map is bent: where its places belong before the map is placed as a whole.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bend {
+    /// The largest displacement of a node, metres.
+    pub largest_m: f64,
+    /// The largest turn of a node, degrees.
+    pub largest_deg: f64,
+    /// The longer side of the rectangle that the nodes fill, metres.
+    pub over_m: f64,
+    /// The length of its walls that were laid on walls of others, metres.
+    pub wall_matched_m: f64,
+    /// From node to node along x and along y, metres.
+    pub spacing: f64,
+    /// The nodes: x, y, and by how much they are displaced along x and y, metres, and turned, radians.
+    pub nodes: Vec<[f64; 5]>,
+}
+
+impl From<&MapDeformation> for Bend {
+    fn from(message: &MapDeformation) -> Self {
+        let most = |part: &dyn Fn(&DeformationNode) -> f64| message.nodes.iter().map(part).fold(f64::MIN, f64::max);
+        let side = |part: &dyn Fn(&DeformationNode) -> f64| most(part) + most(&|node| -part(node));
+        Self {
+            largest_m: most(&|node| node.dx.hypot(node.dy)),
+            largest_deg: most(&|node| node.dyaw.abs()).to_degrees(),
+            over_m: side(&|node| node.x).max(side(&|node| node.y)),
+            wall_matched_m: message.wall_matched,
+            spacing: message.spacing,
+            nodes: message.nodes.iter().map(|node| [node.x, node.y, node.dx, node.dy, node.dyaw]).collect(),
+        }
+    }
 }
 
 /// Robots that are merged with each other, but not with the reference.

@@ -1,8 +1,8 @@
 //! The stage `summary_sink`.
 
-use super::{Areas, Summary};
+use super::{Areas, Bend, Summary};
 use crate::file::replace;
-use gridweave_runtime::ros::{MapAgreement, RobotFrames, Verdicts};
+use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -28,6 +28,7 @@ pub fn kind() -> StageKind {
     .inputs("frames", "where the robots' maps lie", SummarySink::frames)
     .optional_inputs("verdicts", "what became of each pair of robots", SummarySink::verdicts)
     .optional_inputs("agreement", "how far the maps agree that were fused", SummarySink::agreement)
+    .optional_inputs("deformation", "how the maps are bent", SummarySink::deformation)
     .finish(SummarySink::write)
     .build()
 }
@@ -63,6 +64,14 @@ impl SummarySink {
     fn agreement(&mut self, agreement: Received<'_, MapAgreement>, _: &Output<()>) -> Result<(), StageError> {
         let stage = self.from.get(agreement.wire()).cloned().unwrap_or_default();
         self.summary.areas.insert(stage, Areas::from(&*agreement));
+        Ok(())
+    }
+
+    fn deformation(&mut self, deformation: Received<'_, MapDeformation>, _: &Output<()>) -> Result<(), StageError> {
+        // Of a map that knows nothing there is nothing to say.
+        if !deformation.nodes.is_empty() {
+            self.summary.bends.insert(deformation.robot.clone(), Bend::from(&*deformation));
+        }
         Ok(())
     }
 

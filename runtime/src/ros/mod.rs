@@ -16,8 +16,8 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RobotFrame, RobotFrames, RobotGroup,
-    Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag, UnmergedRobot,
+    Alignment, CommonTag, CommonTags, DeformationNode, Evidence, MapAgreement, MapDeformation, MapDirection, RobotFrame,
+    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag, UnmergedRobot,
     Verdict, Verdicts,
 };
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};

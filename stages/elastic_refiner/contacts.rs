@@ -1,0 +1,148 @@
+//! Where walls of two maps lie near each other, as equations for the nodes around.
+
+use super::body::Body;
+use super::equations::Equations;
+use crate::deformation::{Corners, Deformation, node_jacobian};
+use crate::geometry::Point2;
+use crate::walls::{CORRELATION_LENGTH, DEVIATION, stride};
+use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector2};
+use std::collections::BTreeMap;
+
+/// Points of the walls of a map that are looked up in another, at most.
+const MOST_POINTS: usize = 12_000;
+/// Metres of wall between two points that are looked up, at the least.
+const LEAST_SPACING: f64 = 0.15;
+
+/// The nodes of one contact: four of each map.
+const NODES: usize = 8;
+const UNKNOWNS: usize = 3 * NODES;
+
+/// Contacts that concern the same nodes, summed up.
+struct Sum {
+    nodes: [usize; NODES],
+    information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+    vector: SVector<f64, UNKNOWNS>,
+}
+
+/// What the walls of map b say where they lie within `reach` of walls of map a.
+pub(super) struct Contacts {
+    sums: Vec<Sum>,
+    /// The length of wall of map b that lies on walls of map a, metres, each contact by its weight.
+    pub(super) length: f64,
+}
+
+/// A map, how it is bent so far, and the number of its first node among those of all maps.
+#[derive(Clone, Copy)]
+pub(super) struct Bent<'a> {
+    pub(super) body: &'a Body,
+    pub(super) bend: &'a Deformation,
+    pub(super) first: usize,
+}
+
+impl Bent<'_> {
+    fn in_world(&self, point: &Point2) -> Point2 {
+        self.body.transform_world_map * self.bend.apply(point)
+    }
+}
+
+/// Looks the walls of map b up in map a. What lies `reach` metres apart counts a quarter of what lies on each other, and
+/// nothing beyond.
+pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
+    let points = b.body.walls.walls.points();
+    let every = stride(points.len(), MOST_POINTS).max((LEAST_SPACING / b.body.walls.spacing).round() as usize);
+    let length = every as f64 * b.body.walls.spacing;
+    // Both maps are looked up in each other, and say the same.
+    let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
+    let mut sums: BTreeMap<[usize; NODES], Sum> = BTreeMap::new();
+    let mut matched = 0.0;
+    for index in (0..points.len()).step_by(every) {
+        let point = points[index];
+        let Some(contact) = find(a, b, index, &point, reach) else { continue };
+        let kernel = (1.0 / (1.0 + (contact.residual / reach).powi(2))).powi(2);
+        matched += kernel * length;
+        let nodes = contact.nodes(a.first, b.first);
+        let row = contact.row(a, b, &point);
+        let sum = sums.entry(nodes).or_insert_with(|| Sum {
+            nodes,
+            information: SMatrix::zeros(),
+            vector: SVector::zeros(),
+        });
+        sum.information.ger(weight * kernel, &row, &row, 1.0);
+        sum.vector.axpy(weight * kernel * contact.target, &row, 1.0);
+    }
+    Contacts { sums: sums.into_values().collect(), length: matched }
+}
+
+impl Contacts {
+    /// Adds what they say to the equations.
+    pub(super) fn add_to(&self, equations: &mut Equations) {
+        for Sum { nodes, information, vector } in &self.sums {
+            for (i, &row) in nodes.iter().enumerate() {
+                equations.add_vector(row, &vector.fixed_rows::<3>(3 * i).into_owned());
+                for (j, &column) in nodes.iter().enumerate() {
+                    let block: Matrix3<f64> = information.fixed_view::<3, 3>(3 * i, 3 * j).into_owned();
+                    equations.add(row, column, &block);
+                }
+            }
+        }
+    }
+}
+
+/// A point of map b on a wall of map a.
+struct Contact {
+    of_a: Corners,
+    of_b: Corners,
+    /// The point of the wall of map a, map frame, and its normal, world.
+    partner: Point2,
+    normal: Vector2<f64>,
+    /// How far the point lies from the wall, as the maps are bent so far, metres.
+    residual: f64,
+    /// The same as the maps came, and so what the moves of the nodes must make up for.
+    target: f64,
+}
+
+fn find(a: Bent<'_>, b: Bent<'_>, index: usize, point: &Point2, reach: f64) -> Option<Contact> {
+    let (of_a_world, of_b_world) = (&a.body.transform_world_map, &b.body.transform_world_map);
+    let in_world = b.in_world(point);
+    let in_a = a.bend.inverse(&of_a_world.inverse_transform_point(&in_world));
+    let partner = a.body.walls.walls.nearest(&in_a, reach)?.index;
+    let normal = of_a_world * a.body.walls.normals[partner];
+    let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
+    if !a.body.seen[partner].fit(b.body.seen[index], cosine) {
+        return None;
+    }
+    let place = a.body.walls.walls.points()[partner];
+    Some(Contact {
+        of_a: a.body.lattice.corners(&place)?,
+        of_b: b.body.lattice.corners(point)?,
+        partner: place,
+        normal,
+        residual: normal.dot(&(in_world - a.in_world(&place))),
+        target: normal.dot(&(of_a_world * place - of_b_world * point)),
+    })
+}
+
+impl Contact {
+    /// The numbers of its nodes among those of all maps.
+    fn nodes(&self, first_a: usize, first_b: usize) -> [usize; NODES] {
+        std::array::from_fn(|place| match place < 4 {
+            true => first_a + self.of_a[place].0,
+            false => first_b + self.of_b[place - 4].0,
+        })
+    }
+
+    /// How far the point moves away from the wall with the moves of the nodes.
+    fn row(&self, a: Bent<'_>, b: Bent<'_>, point: &Point2) -> SVector<f64, UNKNOWNS> {
+        let mut row = SVector::<f64, UNKNOWNS>::zeros();
+        let ends = [(a, &self.of_a, &self.partner, -1.0), (b, &self.of_b, point, 1.0)];
+        for (end, (bent, corners, point, sign)) in ends.into_iter().enumerate() {
+            let normal = bent.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
+            for (place, &(node, weight)) in corners.iter().enumerate() {
+                let arm = point - bent.body.lattice.position(node);
+                let by_node: RowVector3<f64> = normal * node_jacobian(&arm);
+                row.fixed_rows_mut::<3>(12 * end + 3 * place).copy_from(&(sign * weight * by_node).transpose());
+            }
+        }
+        row
+    }
+}

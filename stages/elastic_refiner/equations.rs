@@ -1,0 +1,117 @@
+//! The normal equations of all nodes of all maps, and their solution.
+
+use super::ElasticRefinerParameters;
+use super::body::Body;
+use crate::geometry::Point2;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra_sparse::factorization::CscCholesky;
+use nalgebra_sparse::{CooMatrix, CscMatrix};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
+/// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
+const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
+
+/// Normal equations, node by node.
+#[derive(Clone, Debug)]
+pub(super) struct Equations {
+    blocks: BTreeMap<(usize, usize), Matrix3<f64>>,
+    vector: Vec<Vector3<f64>>,
+}
+
+impl Equations {
+    /// What is known of the nodes of the bodies without looking at walls. The nodes of all bodies are numbered one after
+    /// the other.
+    pub(super) fn of_bends(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Self {
+        let nodes: usize = bodies.iter().map(|body| body.lattice.len()).sum();
+        let mut equations = Self { blocks: BTreeMap::new(), vector: vec![Vector3::zeros(); nodes] };
+        let (shift, turn) = FRAME_DEVIATION;
+        let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
+        for node in 0..nodes {
+            equations.add(node, node, &Matrix3::from_diagonal(&of_frame));
+        }
+        let mut first = 0;
+        for body in bodies {
+            for (i, j) in body.lattice.edges() {
+                let (at_i, at_j) = (body.lattice.position(i), body.lattice.position(j));
+                equations.add_edge((first + i, at_i), (first + j, at_j), parameters);
+            }
+            first += body.lattice.len();
+        }
+        equations
+    }
+
+    /// Two nodes side by side: the displacement between them is that of a rigid piece which is turned as they are in the
+    /// mean, and both are turned alike.
+    fn add_edge(
+        &mut self,
+        (i, at_i): (usize, Point2),
+        (j, at_j): (usize, Point2),
+        parameters: &ElasticRefinerParameters,
+    ) {
+        let arm = at_j - at_i;
+        let distance = arm.norm();
+        let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * distance.sqrt();
+        let information = Matrix3::from_diagonal(&deviation.map(|deviation| deviation.powi(-2)));
+        // (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i)
+        let half = 0.5 * arm;
+        let by_i = -Matrix3::new(1.0, 0.0, -half.y, 0.0, 1.0, half.x, 0.0, 0.0, 1.0);
+        let by_j = Matrix3::new(1.0, 0.0, half.y, 0.0, 1.0, -half.x, 0.0, 0.0, 1.0);
+        for (row, by_row) in [(i, by_i), (j, by_j)] {
+            for (column, by_column) in [(i, by_i), (j, by_j)] {
+                self.add(row, column, &(by_row.transpose() * information * by_column));
+            }
+        }
+    }
+
+    pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
+        *self.blocks.entry((row, column)).or_insert_with(Matrix3::zeros) += block;
+    }
+
+    pub(super) fn add_vector(&mut self, node: usize, part: &Vector3<f64>) {
+        self.vector[node] += part;
+    }
+
+    /// Solves them with the nodes taken in the given order. Along that order, nodes that have to do with each other must
+    /// lie near each other: the factor is as wide as they are far apart. `None` if they have no solution.
+    pub(super) fn solve(&self, order: &[usize]) -> Option<Solution> {
+        let mut place = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(to, &node)| place[node] = to);
+        let size = 3 * order.len();
+        let mut matrix = CooMatrix::zeros(size, size);
+        for (&(row, column), block) in &self.blocks {
+            matrix.push_matrix(3 * place[row], 3 * place[column], block);
+        }
+        let factor = CscCholesky::factor(&CscMatrix::from(&matrix)).ok()?;
+        let mut right = DVector::zeros(size);
+        for (node, part) in self.vector.iter().enumerate() {
+            right.fixed_rows_mut::<3>(3 * place[node]).copy_from(part);
+        }
+        let solved = factor.solve(&right);
+        let moves = place.iter().map(|&place| solved.fixed_view::<3, 1>(3 * place, 0).into_owned()).collect();
+        Some(Solution { moves, place, factor })
+    }
+}
+
+/// What the nodes do.
+pub(super) struct Solution {
+    /// Displacement and turn of each node.
+    pub(super) moves: Vec<Vector3<f64>>,
+    place: Vec<usize>,
+    factor: CscCholesky<f64>,
+}
+
+impl Solution {
+    /// The covariance of each node.
+    pub(super) fn covariances(&self) -> Vec<Matrix3<f64>> {
+        let size = 3 * self.place.len();
+        let of_node = |&place: &usize| {
+            let mut unit = DMatrix::zeros(size, 3);
+            unit.fixed_view_mut::<3, 3>(3 * place, 0).fill_with_identity();
+            self.factor.solve_mut(&mut unit);
+            unit.fixed_view::<3, 3>(3 * place, 0).into_owned()
+        };
+        self.place.par_iter().map(of_node).collect()
+    }
+}

@@ -1,0 +1,48 @@
+//! Bends the maps of robots that are placed in one world, so that walls that several have seen lie on each other (the maps
+//! of a SLAM are right in every room and bent as a whole).
+//!
+//! Each map gets a lattice of nodes ([`Deformation`](crate::deformation::Deformation)). All nodes of all maps are found
+//! together, as the least squares of
+//!
+//! - walls: a point of a wall of one map lies on the same face of a wall of another, measured across that wall, with a
+//!   Geman-McClure kernel that narrows from round to round (graduated non-convexity, Yang et al. 2020) ([`contacts`]);
+//! - bends: neighbouring nodes of a map are displaced and turned alike, as far as the drift of a SLAM allows, a random walk:
+//!   the variance grows with the distance ([`equations`]). Where only one map knows the place, this carries the bend on, and
+//!   the map is rigid in itself;
+//! - frames: the maps lie about where the rigid frames have them.
+//!
+//! Nodes that are rigid pieces tied by what drift allows are the submaps of Atlas (Bosse et al. 2004) and Cartographer (Hess
+//! et al. 2016), on a lattice as in Kimera-Multi's deformation graphs (Tian et al. 2022) and in the embedded deformation
+//! (Sumner et al. 2007). That walls are drawn onto walls of the other map everywhere at once, and not region by region, is
+//! the optimisation of Shahbandi, Magnusson and Iagnemma (2018), with points and lines in place of a distance map's gradient.
+
+mod body;
+mod contacts;
+mod equations;
+mod parameters;
+mod refine;
+mod stage;
+#[cfg(test)]
+mod tests;
+
+pub use body::Body;
+pub use parameters::ElasticRefinerParameters;
+pub use refine::{Bend, refine};
+
+use gridweave_runtime::stage::StageKind;
+use stage::ElasticRefiner;
+
+/// The stage kind `elastic_refiner`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "elastic_refiner",
+        "Bends the maps of all placed robots, so that walls that several have seen lie on each other. What is sent for each \
+         robot is a lattice of small displacements and turns with their covariances; the rigid frames stay as they are. The \
+         bends are estimated when the frames or the maps of placed robots have changed, at the latest at the end.",
+        |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
+    )
+    .input("map", "The robots' maps.", ElasticRefiner::receive_map)
+    .input("frames", "Where the maps lie.", ElasticRefiner::receive_frames)
+    .finish(ElasticRefiner::finish)
+    .build()
+}

@@ -1,0 +1,46 @@
+//! The parameters of the stage.
+
+use gridweave_runtime::stage::{ParameterError, Parameters};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// Parameters of the elastic refiner. What takes them expects values that have passed [`check`](Parameters::check).
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ElasticRefinerParameters {
+    /// Whether maps are bent. If not, frames go through and nothing else is sent: the maps are rigid.
+    pub enabled: bool,
+    /// Metres from node to node: within such a distance a map counts as rigid.
+    pub spacing: f64,
+    /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of
+    /// each metre between them.
+    pub bend: f64,
+    /// How maps turn: standard deviation of the turn of two places of a map against each other, radians for the root of each
+    /// metre between them.
+    pub turn: f64,
+    /// Metres. Walls that lie farther apart, as the rigid frames have them, are not laid on each other.
+    pub reach: f64,
+}
+
+impl Default for ElasticRefinerParameters {
+    fn default() -> Self {
+        Self { enabled: true, spacing: 3.0, bend: 0.02, turn: 0.005, reach: 1.0 }
+    }
+}
+
+impl Parameters for ElasticRefinerParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let ranges = [
+            ("spacing", self.spacing, 0.5, 100.0),
+            ("bend", self.bend, 1e-6, 10.0),
+            ("turn", self.turn, 1e-6, 1.0),
+            ("reach", self.reach, 0.01, 10.0),
+        ];
+        let wrong = ranges.into_iter().filter(|(_, value, least, most)| !(*least..=*most).contains(value));
+        wrong
+            .map(|(field, value, least, most)| {
+                ParameterError::new(field, format!("must lie between {least} and {most}, not {value}"))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,82 @@
+//! The estimate of all bends together.
+
+use super::ElasticRefinerParameters;
+use super::body::Body;
+use super::contacts::{Bent, Contacts, contacts};
+use super::equations::{Equations, Solution};
+use crate::deformation::Deformation;
+use crate::geometry::Point2;
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+
+/// How far walls may lie apart from round to round, as shares of the reach: wide at first, when the maps lie where the rigid
+/// frames have them, and at the end about as far as a wall is drawn wrong.
+const ROUNDS: [f64; 12] = [1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.45, 0.35, 0.25, 0.2, 0.2, 0.2];
+
+/// How one map is bent.
+#[derive(Clone, Debug)]
+pub struct Bend {
+    /// Where its places belong.
+    pub deformation: Deformation,
+    /// The covariance of each node: (x, y, turn).
+    pub covariances: Vec<Matrix3<f64>>,
+    /// The length of its walls that lie on walls of others, metres.
+    pub wall_matched: f64,
+}
+
+/// Bends placed maps, so that walls that several show lie on each other: for each body how it is bent. `None` if numbers
+/// are so large that the equations have no solution.
+pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<Vec<Bend>> {
+    let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
+    let of_bends = Equations::of_bends(bodies, parameters);
+    let order = order(bodies);
+    let pairs: Vec<(usize, usize)> =
+        (0..bodies.len()).flat_map(|a| (0..bodies.len()).filter(move |b| *b != a).map(move |b| (a, b))).collect();
+    let firsts: Vec<usize> = bodies
+        .iter()
+        .scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len())))
+        .collect();
+    let mut last: Option<(Solution, Vec<f64>)> = None;
+    for share in ROUNDS {
+        let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };
+        let found: Vec<Contacts> =
+            pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect();
+        let mut equations = of_bends.clone();
+        found.iter().for_each(|contacts| contacts.add_to(&mut equations));
+        let solution = equations.solve(&order)?;
+        let mut matched = vec![0.0; bodies.len()];
+        pairs.iter().zip(&found).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
+        for (bend, &first) in bends.iter_mut().zip(&firsts) {
+            let count = bend.moves.len();
+            bend.moves.copy_from_slice(&solution.moves[first..first + count]);
+        }
+        last = Some((solution, matched));
+    }
+    let (solution, matched) = last?;
+    let mut covariances = solution.covariances().into_iter();
+    let bend = |(deformation, wall_matched): (Deformation, f64)| Bend {
+        covariances: covariances.by_ref().take(deformation.moves.len()).collect(),
+        deformation,
+        wall_matched,
+    };
+    let is_finite = bends.iter().all(|bend| bend.largest_move().is_finite());
+    is_finite.then(|| bends.into_iter().zip(matched).map(bend).collect())
+}
+
+/// The nodes of all bodies, by where they lie along the longer side of the world: those that have to do with each other
+/// lie near each other in this order.
+fn order(bodies: &[Body]) -> Vec<usize> {
+    let in_world = |body: &Body, node: usize| body.transform_world_map * body.lattice.position(node);
+    let places: Vec<Point2> =
+        bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
+    let Some(first) = places.first() else { return Vec::new() };
+    let (low, high) = places.iter().fold((*first, *first), |(low, high), place| (low.inf(place), high.sup(place)));
+    let is_wide = high.x - low.x > high.y - low.y;
+    let along = |node: usize| if is_wide { (places[node].x, places[node].y) } else { (places[node].y, places[node].x) };
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by(|&one, &other| {
+        let (one_at, other_at) = (along(one), along(other));
+        one_at.0.total_cmp(&other_at.0).then(one_at.1.total_cmp(&other_at.1)).then(one.cmp(&other))
+    });
+    order
+}

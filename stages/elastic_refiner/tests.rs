@@ -1,0 +1,1 @@
+//! What bends do to made-up maps.
