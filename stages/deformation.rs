@@ -16,6 +16,11 @@ pub type Vertex = (i32, i32);
 /// The corners of a lattice square that have nodes, by their numbers, each with its weight; the weights add up to 1.
 pub type Corners = [(usize, f64); 4];
 
+/// No node lies farther from the origin along x or y, in vertices.
+const MOST_VERTICES: f64 = 1e6;
+/// A lattice of a message may take so many vertices.
+const MOST_TABLE: i64 = 1 << 22;
+
 /// After so many rounds a place is carried back to within a thousandth of the displacement.
 const INVERSE_ROUNDS: usize = 3;
 
@@ -42,7 +47,7 @@ impl Lattice {
         let mut last = None;
         for (index, _) in grid.cells.iter().enumerate().filter(|(_, cell)| is_known(**cell)) {
             let cell = Cell { column: index % width, row: index / width };
-            let square = vertex_below(&geometry.centre(cell), spacing);
+            let Some(square) = vertex_below(&geometry.centre(cell), spacing) else { continue };
             if last.replace(square) != Some(square) {
                 let (column, row) = square;
                 for corner in [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)] {
@@ -96,7 +101,7 @@ impl Lattice {
 
     /// The nodes around a point. Where the map knows nothing around it there may be none.
     pub fn corners(&self, point: &Point2) -> Option<Corners> {
-        let (column, row) = vertex_below(point, self.spacing);
+        let (column, row) = vertex_below(point, self.spacing)?;
         let x = (point.x / self.spacing - f64::from(column)).clamp(0.0, 1.0);
         let y = (point.y / self.spacing - f64::from(row)).clamp(0.0, 1.0);
         let corners = [
@@ -124,9 +129,11 @@ impl Lattice {
     }
 }
 
-/// The vertex at the lower left of the square that a point lies in.
-fn vertex_below(point: &Point2, spacing: f64) -> Vertex {
-    ((point.x / spacing).floor() as i32, (point.y / spacing).floor() as i32)
+/// The vertex at the lower left of the square that a point lies in; none if it lies beyond all lattices.
+fn vertex_below(point: &Point2, spacing: f64) -> Option<Vertex> {
+    let (column, row) = ((point.x / spacing).floor(), (point.y / spacing).floor());
+    let fits = column.abs() < MOST_VERTICES && row.abs() < MOST_VERTICES;
+    fits.then_some((column as i32, row as i32))
 }
 
 /// How a map is bent: where each of its points belongs, in its own frame.
@@ -186,11 +193,6 @@ impl Deformation {
     }
 }
 
-/// Farther from the origin no node of a message may lie, in vertices.
-const MOST_VERTICES: f64 = 1e6;
-/// A lattice of a message may take so many vertices.
-const MOST_TABLE: i64 = 1 << 22;
-
 fn table_size(vertices: &[Vertex]) -> i64 {
     let extent = |part: fn(&Vertex) -> i32| {
         let (low, high) = (vertices.iter().map(part).min(), vertices.iter().map(part).max());
@@ -225,7 +227,10 @@ mod tests {
         let lattice = deformation(|_| Vector3::zeros()).lattice;
         // Columns -2 to 4 and rows -2 to 2; nothing is known where x > 8.5 and y > 3.
         assert_eq!(lattice.len(), 7 * 5 - 1);
-        assert!(lattice.corners(&Point2::new(9.0, 5.0)).is_some_and(|corners| corners[3].1 == 0.0), "the last has none");
+        assert!(
+            lattice.corners(&Point2::new(13.0, 5.0)).is_some_and(|corners| corners[3].1 == 0.0),
+            "the last has none"
+        );
         assert!(lattice.corners(&Point2::new(99.0, 0.0)).is_none());
         let edges = lattice.edges().count();
         assert_eq!(edges, 6 * 5 + 7 * 4 - 2);
@@ -247,8 +252,7 @@ mod tests {
     #[test]
     fn a_message_that_is_no_lattice_is_none() {
         let node = |x: f64, y: f64| DeformationNode { x, y, ..Default::default() };
-        let message =
-            |spacing, nodes| MapDeformation { spacing, nodes, robot: "robot1".into(), ..Default::default() };
+        let message = |spacing, nodes| MapDeformation { spacing, nodes, robot: "robot1".into(), ..Default::default() };
         assert!(Deformation::from_message(&message(4.0, vec![node(0.0, 4.0), node(-4.0, 8.0)])).is_some());
         for bad in [
             message(4.0, vec![]),

@@ -62,11 +62,8 @@ pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
         matched += kernel * length;
         let nodes = contact.nodes(a.first, b.first);
         let row = contact.row(a, b, &point);
-        let sum = sums.entry(nodes).or_insert_with(|| Sum {
-            nodes,
-            information: SMatrix::zeros(),
-            vector: SVector::zeros(),
-        });
+        let sum =
+            sums.entry(nodes).or_insert_with(|| Sum { nodes, information: SMatrix::zeros(), vector: SVector::zeros() });
         sum.information.ger(weight * kernel, &row, &row, 1.0);
         sum.vector.axpy(weight * kernel * contact.target, &row, 1.0);
     }

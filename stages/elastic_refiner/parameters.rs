@@ -24,7 +24,7 @@ pub struct ElasticRefinerParameters {
 
 impl Default for ElasticRefinerParameters {
     fn default() -> Self {
-        Self { enabled: true, spacing: 3.0, bend: 0.02, turn: 0.005, reach: 1.0 }
+        Self { enabled: true, spacing: 3.0, bend: 0.05, turn: 0.01, reach: 2.0 }
     }
 }
 

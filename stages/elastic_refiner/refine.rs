@@ -32,10 +32,8 @@ pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<
     let order = order(bodies);
     let pairs: Vec<(usize, usize)> =
         (0..bodies.len()).flat_map(|a| (0..bodies.len()).filter(move |b| *b != a).map(move |b| (a, b))).collect();
-    let firsts: Vec<usize> = bodies
-        .iter()
-        .scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len())))
-        .collect();
+    let firsts: Vec<usize> =
+        bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
     let mut last: Option<(Solution, Vec<f64>)> = None;
     for share in ROUNDS {
         let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };

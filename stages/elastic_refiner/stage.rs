@@ -92,7 +92,9 @@ impl ElasticRefiner {
                 Some(bends) => {
                     for ((frame, map), bend) in placed.iter().zip(&bends) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
-                        output.deformation.send(&frame.robot, &message(header, &frame.robot, self.parameters.spacing, bend))?;
+                        output
+                            .deformation
+                            .send(&frame.robot, &message(header, &frame.robot, self.parameters.spacing, bend))?;
                     }
                 }
                 None => output.warn("the maps cannot be bent onto each other: a frame lies too far away for numbers"),

@@ -231,7 +231,7 @@ mod tests {
         fn the_order_of_the_maps_does_not_matter(
             first in cells(13, 9), second in cells(7, 8), third in cells(5, 4), x in -0.5..0.5, yaw in -4.0..4.0,
         ) {
-            let map = |cells, geometry, transform_world_map| 
+            let map = |cells, geometry, transform_world_map|
                 PlacedGrid::rigid(Grid::new(geometry, cells).unwrap(), transform_world_map);
             let first = map(&first, geometry(13, 9, 0.05, Pose2::identity()), Pose2::identity());
             let second = map(&second, geometry(7, 8, 0.07, pose(0.1, 0.2, 0.4)), pose(x, 0.1, yaw));

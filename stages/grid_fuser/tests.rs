@@ -188,7 +188,7 @@ fn an_output_is_the_same_if_nothing_else_is_read() {
         });
         let mut node = kind().make(toml::Table::new(), &Context::default(), ends.collect()).unwrap();
         let bytes = encode(&frames(&[("", 0.0)])).unwrap();
-        for (port, bytes) in [(0, map(0.0, &[0, 100])), (1, bytes)] {
+        for (port, bytes) in [(0, map(0.0, &[0, 100])), (2, bytes)] {
             node.receive(port, &Message::from_vec(MessageHeader::default(), bytes)).unwrap();
         }
         lists.map(|list| list.0.take())

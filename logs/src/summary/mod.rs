@@ -5,7 +5,9 @@ mod stage;
 
 pub use stage::kind;
 
-use gridweave_runtime::ros::{DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts};
+use gridweave_runtime::ros::{
+    DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts,
+};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -16,9 +16,9 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonTag, CommonTags, DeformationNode, Evidence, MapAgreement, MapDeformation, MapDirection, RobotFrame,
-    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag, UnmergedRobot,
-    Verdict, Verdicts,
+    Alignment, CommonTag, CommonTags, DeformationNode, Evidence, MapAgreement, MapDeformation, MapDirection,
+    RobotFrame, RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange,
+    TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};
 pub use std_msgs::{Header, Time};
