@@ -4,12 +4,16 @@
 //! of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. In a log of robots
 //! that have nothing to do with each other (the truth has no frames) to refuse is right, and every merged
 //! robot is wrong. The reference robot is not counted.
+//!
+//! Where the truth knows places that two robots have both seen (`common`), it is measured how far apart the merge has them,
+//! as the rigid frames lay them and as the maps are bent.
 
+use crate::common_places::{self, CommonPlace, CommonPlaces, pose};
 use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::input_file;
-use nalgebra::{Isometry2, Point2, Vector2};
+use nalgebra::{Isometry2, Point2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -71,6 +75,9 @@ pub struct Evaluation {
     pub wrong: usize,
     /// How many are not merged, rightly or not.
     pub refused: usize,
+    /// How far apart the same places lie, if the truth knows such and the robots are merged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub common: Option<CommonPlaces>,
 }
 
 #[derive(Deserialize)]
@@ -80,10 +87,9 @@ struct Truth {
     /// The middle of each robot's last map, in its map frame.
     #[serde(default)]
     centres: BTreeMap<String, [f64; 2]>,
-}
-
-fn pose(frame: &Frame) -> Isometry2<f64> {
-    Isometry2::new(Vector2::new(frame.x, frame.y), frame.yaw)
+    /// Places that the first two robots by name both have seen.
+    #[serde(default)]
+    common: Vec<CommonPlace>,
 }
 
 /// Measures the summary that `gridweave run --summary` wrote against a truth file. Where the truth has no frames, the
@@ -160,7 +166,10 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
     let robots: Vec<RobotResult> =
         names.iter().filter(|robot| Some(**robot) != run.reference.as_ref()).map(one).collect();
     let count = |outcomes: &[RobotOutcome]| robots.iter().filter(|robot| outcomes.contains(&robot.outcome)).count();
+    let mut known = truth.frames.keys();
+    let pair = known.next().zip(known.next());
     Ok(Evaluation {
+        common: pair.and_then(|(first, second)| common_places::measure(run, [first, second], &truth.common)),
         reference: run.reference.clone(),
         related,
         right: count(&[RobotOutcome::Right]),
@@ -200,7 +209,8 @@ impl Evaluation {
         let unrelated = if self.related { "" } else { "; the truth has no frames: the robots are taken as unrelated" };
         let reference = self.reference.as_deref().unwrap_or("none");
         let Self { right, wrong, refused, .. } = self;
-        format!("{table}right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})\n")
+        let common = self.common.as_ref().map(|common| format!("{common}\n")).unwrap_or_default();
+        format!("{table}right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})\n{common}")
     }
 }
 

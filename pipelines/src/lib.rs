@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 mod cli;
 mod commands;
+pub mod common_places;
 pub mod evaluate;
 mod interrupt;
 mod job;

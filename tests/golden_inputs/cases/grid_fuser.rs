@@ -91,7 +91,7 @@ fn grid(width: u32, cells: &[i8]) -> TestMap {
 }
 
 /// Where robots lie in the map of robot1.
-fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]) {
+pub(super) fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]) {
     let frame = |(robot, transform): &(&str, Pose2)| RobotFrame {
         robot: (*robot).into(),
         frame_id: format!("{robot}/map"),

@@ -3,6 +3,7 @@
 //! Topics are those of the pipeline `tag_merge`, so that a case is fed by the same patterns as a cut of a log.
 
 mod drawing;
+mod elastic_refiner;
 mod frame_solver;
 mod grid_fuser;
 mod icp_refiner;
@@ -46,6 +47,7 @@ impl Case {
 /// All cases whose inputs are made up.
 pub(crate) fn made_up() -> Vec<Case> {
     [
+        elastic_refiner::cases(),
         frame_solver::cases(),
         grid_fuser::cases(),
         icp_refiner::cases(),
