@@ -79,6 +79,11 @@ impl Lattice {
         self.vertices.len()
     }
 
+    /// Metres from node to node along x and along y.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.vertices.is_empty()

@@ -16,6 +16,8 @@ pub struct Body {
     pub(super) lattice: Lattice,
     /// `T_world_map`.
     pub(super) transform_world_map: Pose2,
+    /// Whether it stays as it is.
+    pub(super) is_kept: bool,
 }
 
 /// From which sides a wall is seen: from that of its normal, and from the other.
@@ -37,7 +39,13 @@ impl Body {
         let seen = points
             .map(|(point, normal)| Sides { ahead: is_seen(point, normal, 1.0), behind: is_seen(point, normal, -1.0) })
             .collect();
-        Self { walls, seen, lattice: Lattice::over(grid, spacing), transform_world_map }
+        Self { walls, seen, lattice: Lattice::over(grid, spacing), transform_world_map, is_kept: false }
+    }
+
+    /// The same map, which is not bent, while others are bent onto it.
+    #[must_use]
+    pub fn kept(self) -> Self {
+        Self { is_kept: true, ..self }
     }
 }
 

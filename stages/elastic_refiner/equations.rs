@@ -2,16 +2,18 @@
 
 use super::ElasticRefinerParameters;
 use super::body::Body;
+use super::selected_inverse::SelectedInverse;
 use crate::geometry::Point2;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DVector, Matrix3, Vector3};
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
 /// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
 const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
+/// The same of a map that is not to be bent: as good as nothing.
+const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 
 /// Normal equations, node by node.
 #[derive(Clone, Debug)]
@@ -26,13 +28,13 @@ impl Equations {
     pub(super) fn of_bends(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Self {
         let nodes: usize = bodies.iter().map(|body| body.lattice.len()).sum();
         let mut equations = Self { blocks: BTreeMap::new(), vector: vec![Vector3::zeros(); nodes] };
-        let (shift, turn) = FRAME_DEVIATION;
-        let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
-        for node in 0..nodes {
-            equations.add(node, node, &Matrix3::from_diagonal(&of_frame));
-        }
         let mut first = 0;
         for body in bodies {
+            let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
+            let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
+            for node in first..first + body.lattice.len() {
+                equations.add(node, node, &Matrix3::from_diagonal(&of_frame));
+            }
             for (i, j) in body.lattice.edges() {
                 let (at_i, at_j) = (body.lattice.position(i), body.lattice.position(j));
                 equations.add_edge((first + i, at_i), (first + j, at_j), parameters);
@@ -105,13 +107,8 @@ pub(super) struct Solution {
 impl Solution {
     /// The covariance of each node.
     pub(super) fn covariances(&self) -> Vec<Matrix3<f64>> {
-        let size = 3 * self.place.len();
-        let of_node = |&place: &usize| {
-            let mut unit = DMatrix::zeros(size, 3);
-            unit.fixed_view_mut::<3, 3>(3 * place, 0).fill_with_identity();
-            self.factor.solve_mut(&mut unit);
-            unit.fixed_view::<3, 3>(3 * place, 0).into_owned()
-        };
-        self.place.par_iter().map(of_node).collect()
+        let inverse = SelectedInverse::of(self.factor.l());
+        let of_node = |&place: &usize| Matrix3::from_fn(|row, column| inverse.at(3 * place + row, 3 * place + column));
+        self.place.iter().map(of_node).collect()
     }
 }

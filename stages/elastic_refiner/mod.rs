@@ -21,6 +21,7 @@ mod contacts;
 mod equations;
 mod parameters;
 mod refine;
+mod selected_inverse;
 mod stage;
 #[cfg(test)]
 mod tests;
@@ -38,7 +39,8 @@ pub fn kind() -> StageKind {
         "elastic_refiner",
         "Bends the maps of all placed robots, so that walls that several have seen lie on each other. What is sent for each \
          robot is a lattice of small displacements and turns with their covariances; the rigid frames stay as they are. The \
-         bends are estimated when the frames or the maps of placed robots have changed, at the latest at the end.",
+         bends are estimated when other robots are placed, when a frame has changed by more than `min_move` or `min_turn`, \
+         and at the end if anything has changed since.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)

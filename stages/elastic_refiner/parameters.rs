@@ -10,6 +10,8 @@ use serde::Deserialize;
 pub struct ElasticRefinerParameters {
     /// Whether maps are bent. If not, frames go through and nothing else is sent: the maps are rigid.
     pub enabled: bool,
+    /// Whether the map of the reference robot stays as it is, and only the others are bent onto it.
+    pub keep_reference: bool,
     /// Metres from node to node: within such a distance a map counts as rigid.
     pub spacing: f64,
     /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of
@@ -20,11 +22,25 @@ pub struct ElasticRefinerParameters {
     pub turn: f64,
     /// Metres. Walls that lie farther apart, as the rigid frames have them, are not laid on each other.
     pub reach: f64,
+    /// Metres. While the robots explore, the bends are estimated again when a frame has moved by more than this; at the end
+    /// they are in any case.
+    pub min_move: f64,
+    /// Radians. The same when a frame has turned by more than this.
+    pub min_turn: f64,
 }
 
 impl Default for ElasticRefinerParameters {
     fn default() -> Self {
-        Self { enabled: true, spacing: 3.0, bend: 0.05, turn: 0.01, reach: 2.0 }
+        Self {
+            enabled: true,
+            keep_reference: false,
+            spacing: 3.0,
+            bend: 0.05,
+            turn: 0.01,
+            reach: 2.0,
+            min_move: 0.1,
+            min_turn: 0.01,
+        }
     }
 }
 
@@ -35,6 +51,8 @@ impl Parameters for ElasticRefinerParameters {
             ("bend", self.bend, 1e-6, 10.0),
             ("turn", self.turn, 1e-6, 1.0),
             ("reach", self.reach, 0.01, 10.0),
+            ("min_move", self.min_move, 0.0, f64::MAX),
+            ("min_turn", self.min_turn, 0.0, f64::MAX),
         ];
         let wrong = ranges.into_iter().filter(|(_, value, least, most)| !(*least..=*most).contains(value));
         wrong

@@ -30,8 +30,13 @@ pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<
     let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
     let of_bends = Equations::of_bends(bodies, parameters);
     let order = order(bodies);
+    let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
+    let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
+    let meet = |a: usize, b: usize| {
+        a != b && boxes[a].zip(boxes[b]).is_some_and(|(a, b)| is_below(&a[0], &b[1]) && is_below(&b[0], &a[1]))
+    };
     let pairs: Vec<(usize, usize)> =
-        (0..bodies.len()).flat_map(|a| (0..bodies.len()).filter(move |b| *b != a).map(move |b| (a, b))).collect();
+        (0..bodies.len()).flat_map(|a| (0..bodies.len()).map(move |b| (a, b))).filter(|&(a, b)| meet(a, b)).collect();
     let firsts: Vec<usize> =
         bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
     let mut last: Option<(Solution, Vec<f64>)> = None;
@@ -59,6 +64,15 @@ pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<
     };
     let is_finite = bends.iter().all(|bend| bend.largest_move().is_finite());
     is_finite.then(|| bends.into_iter().zip(matched).map(bend).collect())
+}
+
+/// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.
+fn known_box(body: &Body, reach: f64) -> Option<[Point2; 2]> {
+    let mut points = body.walls.walls.points().iter().map(|point| body.transform_world_map * point);
+    let first = points.next()?;
+    let (low, high) = points.fold((first, first), |(low, high), point| (low.inf(&point), high.sup(&point)));
+    let margin = nalgebra::Vector2::repeat(reach);
+    Some([low - margin, high + margin])
 }
 
 /// The nodes of all bodies, by where they lie along the longer side of the world: those that have to do with each other

@@ -30,8 +30,8 @@ pub(super) struct ElasticRefiner {
     parameters: ElasticRefinerParameters,
     maps: RobotMaps<()>,
     frames: RobotFrames,
-    /// The numbers of the maps that were bent last.
-    bent: BTreeMap<String, u64>,
+    /// The frames in which the maps were bent last, and the numbers of these maps.
+    bent: (RobotFrames, BTreeMap<String, u64>),
     /// Whether any bend was sent.
     has_sent: bool,
 }
@@ -42,7 +42,7 @@ impl ElasticRefiner {
             parameters,
             maps: RobotMaps::default(),
             frames: RobotFrames::default(),
-            bent: BTreeMap::new(),
+            bent: Default::default(),
             has_sent: false,
         }
     }
@@ -63,11 +63,25 @@ impl ElasticRefiner {
         output: &Output<Bends>,
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
-        self.bend(output)
+        // What changes little waits for the end: bends are told in the map's own frame, and hold in a frame that lies beside.
+        if self.is_near() { output.frames.send("", &self.frames) } else { self.bend(output) }
     }
 
     pub(super) fn finish(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
-        if self.numbers() == self.bent { Ok(()) } else { self.bend(output) }
+        let is_bent = (&self.frames.frames, &self.numbers()) == (&self.bent.0.frames, &self.bent.1);
+        if is_bent { Ok(()) } else { self.bend(output) }
+    }
+
+    /// Whether the robots are about where they were when their maps were bent.
+    fn is_near(&self) -> bool {
+        let (before, after) = (&self.bent.0, &self.frames);
+        let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
+        let mut pairs = before.frames.iter().zip(&after.frames);
+        let robots = self.numbers();
+        before.reference == after.reference
+            && before.frames.len() == after.frames.len()
+            && robots.keys().eq(self.bent.1.keys())
+            && pairs.all(|(one, next)| one.is_near(next, min_move, min_turn))
     }
 
     /// The maps of the placed robots, by their numbers.
@@ -77,7 +91,7 @@ impl ElasticRefiner {
     }
 
     fn bend(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
-        self.bent = self.numbers();
+        self.bent = (self.frames.clone(), self.numbers());
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
         // What is alone is not bent, which is news if it was.
@@ -86,7 +100,11 @@ impl ElasticRefiner {
             self.has_sent = true;
             let bodies: Vec<Body> = placed
                 .iter()
-                .map(|(frame, map)| Body::new(&map.grid(), frame.transform_reference_robot(), self.parameters.spacing))
+                .map(|(frame, map)| {
+                    let body = Body::new(&map.grid(), frame.transform_reference_robot(), self.parameters.spacing);
+                    let is_kept = self.parameters.keep_reference && frame.robot == self.frames.reference;
+                    if is_kept { body.kept() } else { body }
+                })
                 .collect();
             match refine(&bodies, &self.parameters) {
                 Some(bends) => {

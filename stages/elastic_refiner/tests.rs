@@ -69,6 +69,15 @@ fn a_bent_map_is_laid_on_a_straight_one() {
 }
 
 #[test]
+fn a_map_that_is_kept_stays_and_the_other_does_all() {
+    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let bodies = [body(&map, &map.cells, Pose2::identity()).kept(), body(&map, &bent(&map, 0.2), Pose2::identity())];
+    let bends = refine(&bodies, &PARAMETERS()).unwrap();
+    assert!(bends[0].deformation.largest_move() < 1e-3);
+    assert!(apart(&bends, &bodies, 0.2, &places()).1 < 0.06);
+}
+
+#[test]
 fn maps_that_are_not_bent_stay_as_they_are() {
     let office = FloorPlan::office();
     let a = office.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(0.0, 0.0, 0.0));
@@ -173,6 +182,22 @@ fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has
         bends.iter().flat_map(|bend| &bend.nodes).all(|node| node.dx.hypot(node.dy) < 0.01),
         "it is straight by then"
     );
+}
+
+#[test]
+fn frames_that_change_little_go_through_and_are_bent_anew_at_the_end() {
+    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let (mut stage, _, mut frames) = stage("", &bent(&map, 0.2));
+    stage.take::<MapDeformation>("deformation").unwrap();
+    stage.take::<RobotFrames>("frames").unwrap();
+    for (x, bends) in [(0.05, 0), (0.3, 2), (0.33, 0)] {
+        frames.frames[1].x = x;
+        stage.give::<RobotFrames>("frames", "", LogTime(3), &frames).unwrap();
+        assert_eq!(stage.take::<MapDeformation>("deformation").unwrap().len(), bends, "{x}");
+        assert_eq!(stage.take::<RobotFrames>("frames").unwrap(), [frames.clone()]);
+    }
+    stage.finish(LogTime(4)).unwrap();
+    assert_eq!(stage.take::<MapDeformation>("deformation").unwrap().len(), 2);
 }
 
 #[test]

@@ -8,6 +8,9 @@ use crate::geometry::{Grid, GridGeometry, Point2, UNKNOWN, is_known};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
+/// What is no longer than this share of the distance between two nodes of a bend is straight.
+const LONGEST_STRAIGHT: f64 = 0.75;
+
 /// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`, which lies along the world's
 /// axes.
 ///
@@ -122,16 +125,23 @@ impl LookupRow<'_> {
         if from >= to {
             return None;
         }
-        let (mut start, mut step) = (self.start, self.lookup.step);
-        if let Some(bend) = self.lookup.bend {
-            let [one, other] = [from, to].map(|index| self.lookup.unbent(&(start + step * index as f64), bend));
-            step = (other - one) / (to - from) as f64;
-            start = one - step * from as f64;
+        let (mut start, mut step, mut bend) = (self.start, self.lookup.step, None);
+        if let Some(bent) = self.lookup.bend {
+            let ends = [from, to].map(|index| start + step * index as f64);
+            let length = (ends[1] - ends[0]).norm() * self.lookup.grid.geometry.resolution;
+            // A long stretch may bend within itself.
+            if length > LONGEST_STRAIGHT * bent.lattice.spacing() {
+                bend = Some(bent);
+            } else {
+                let [one, other] = ends.map(|end| self.lookup.unbent(&end, bent));
+                step = (other - one) / (to - from) as f64;
+                start = one - step * from as f64;
+            }
         }
         let middle = start + step * ((from + to) as f64 / 2.0);
         // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
-        let may_be_known = step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
-        may_be_known.then_some(Stretch { lookup: self.lookup, first, from, to, start, step })
+        let may_be_known = bend.is_some() || step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
+        may_be_known.then_some(Stretch { lookup: self.lookup, first, from, to, start, step, bend })
     }
 }
 
@@ -147,13 +157,17 @@ struct Stretch<'a> {
     /// by one cell.
     start: Point2,
     step: Vector2<f64>,
+    /// Through which each cell is looked up by itself, if it is.
+    bend: Option<&'a Deformation>,
 }
 
 impl Stretch<'_> {
     /// Hands out what the map says of every cell of the stretch that may fall on its known part.
     fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
         for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
-            take(cell, self.lookup.value(&(self.start + self.step * index as f64)));
+            let place = self.start + self.step * index as f64;
+            let place = self.bend.map_or(place, |bend| self.lookup.unbent(&place, bend));
+            take(cell, self.lookup.value(&place));
         }
     }
 }

@@ -3,7 +3,8 @@
 use super::kind;
 use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use gridweave_runtime::ros::{
-    Header, MapAgreement, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames, UnmergedRobot, encode,
+    DeformationNode, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
+    UnmergedRobot, encode,
 };
 use gridweave_runtime::stage::{Context, LoneStage, OutputEnd, OutputSink, StageError};
 use std::cell::RefCell;
@@ -30,6 +31,15 @@ impl Run {
     /// The same of frames.
     fn frames(&mut self, placed: &[(&str, f64)]) -> Vec<Fused> {
         self.0.give::<RobotFrames>("frames", "", TIME, &frames(placed)).unwrap();
+        self.fused()
+    }
+
+    /// The same of a bend, which displaces the map of a robot by `dx` metres about x = 0 and by nothing from x = 8 on.
+    fn bend(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
+        let node = |x: f64, dx: f64| [0.0, 8.0].map(|y| DeformationNode { x, y, dx, ..Default::default() });
+        let nodes = [node(0.0, dx), node(8.0, 0.0), node(16.0, 0.0)].concat();
+        let bend = MapDeformation { robot: robot.into(), spacing: 8.0, nodes, ..Default::default() };
+        self.0.give::<MapDeformation>("deformation", robot, TIME, &bend).unwrap();
         self.fused()
     }
 
@@ -71,6 +81,36 @@ fn frames(placed: &[(&str, f64)]) -> RobotFrames {
     let unmerged = vec![UnmergedRobot { robot: "robot9".into(), reason: "no alignment".into() }];
     let frames = placed.iter().map(frame).collect();
     RobotFrames { reference: "robot1".into(), frames, unmerged, ..Default::default() }
+}
+
+#[test]
+fn a_bent_map_is_drawn_as_it_is_bent_in_both_ways_to_carry_cells() {
+    for warp in ["inverse", "forward"] {
+        let mut run = Run::new(&format!("warp = \"{warp}\""));
+        run.map("robot1", 0.0, &[100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
+        let straight = run.frames(&[("robot1", 0.0)]);
+        assert_eq!(straight[0].2, [100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
+        assert!(run.bend("robot1", 2.4).is_empty(), "it waits for its frames");
+        // The left end goes to the right by two cells and the rest follows: the wall beyond the bend stays.
+        let bent = run.frames(&[("robot1", 0.0)]);
+        assert_eq!(bent[0].2.iter().filter(|cell| **cell == 100).count(), 2, "{bent:?}");
+        assert_eq!((bent[0].0, bent[0].2[0], bent[0].2[7]), (9, 100, 100), "{warp}: {bent:?}");
+        assert!(run.bend("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
+    }
+}
+
+#[test]
+fn a_bend_that_no_frames_follow_is_drawn_at_the_end_and_one_that_is_none_is_left_out() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[100, 0, 0]);
+    run.frames(&[("robot1", 0.0)]);
+    run.bend("robot1", f64::NAN);
+    assert_eq!((run.0.warnings().len(), run.finish().len()), (1, 0));
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[100, 0, 0]);
+    run.frames(&[("robot1", 0.0)]);
+    run.bend("robot1", 1.0);
+    assert_eq!(run.finish().len(), 1);
 }
 
 #[test]
