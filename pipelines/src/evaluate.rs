@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn the_truth_is_turned_to_the_reference_of_the_run() {
-        let place = |x, y, yaw| Isometry2::new(Vector2::new(x, y), yaw);
+        let place = |x, y, yaw| Isometry2::new(nalgebra::Vector2::new(x, y), yaw);
         let (robot2, robot3) = (place(10.0, 5.0, 1.0), place(-4.0, 2.0, -2.0));
         let seen = |pose: Isometry2<f64>| frame(pose.translation.x, pose.translation.y, pose.rotation.angle());
         let summary = json!({

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// Points of the walls of a map that are looked up in another, at most.
 const MOST_POINTS: usize = 12_000;
 /// Metres of wall between two points that are looked up, at the least.
-const LEAST_SPACING: f64 = 0.15;
+const LEAST_SPACING: f64 = 0.25;
 
 /// The nodes of one contact: four of each map.
 const NODES: usize = 8;

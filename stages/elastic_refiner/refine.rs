@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// How far walls may lie apart from round to round, as shares of the reach: wide at first, when the maps lie where the rigid
 /// frames have them, and at the end about as far as a wall is drawn wrong.
-const ROUNDS: [f64; 12] = [1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.45, 0.35, 0.25, 0.2, 0.2, 0.2];
+const ROUNDS: [f64; 11] = [1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.45, 0.35, 0.25, 0.18, 0.15];
 
 /// How one map is bent.
 #[derive(Clone, Debug)]

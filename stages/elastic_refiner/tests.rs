@@ -170,7 +170,7 @@ fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has
     assert_eq!(bends.iter().map(|bend| bend.robot.as_str()).collect::<Vec<_>>(), ["robot1", "robot2"]);
     assert_eq!(bends[1].header.frame_id, "robot2/map");
     assert!(bends[1].nodes.iter().any(|node| node.dx.hypot(node.dy) > 0.05) && bends[1].nodes[0].covariance[0] > 0.0);
-    assert_eq!(stage.take::<RobotFrames>("frames").unwrap(), [frames.clone()]);
+    assert_eq!(stage.take::<RobotFrames>("frames").unwrap(), std::slice::from_ref(&frames));
 
     let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
     let message = OccupancyGrid { info: map.info(), data: &data, ..Default::default() };
