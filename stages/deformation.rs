@@ -122,12 +122,6 @@ impl Lattice {
         (known > 0.0).then(|| found.map(|(node, weight)| node.map_or((any, 0.0), |node| (node, weight / known))))
     }
 
-    /// The node that lies nearest to a point.
-    fn nearest(&self, point: &Point2) -> Option<usize> {
-        let distance = |node: &usize| (self.position(*node) - point).norm_squared();
-        (0..self.len()).min_by(|one, other| distance(one).total_cmp(&distance(other)))
-    }
-
     fn node(&self, vertex: Vertex) -> Option<usize> {
         self.place(vertex).and_then(|place| self.nodes[place]).map(|node| node as usize)
     }
@@ -181,11 +175,9 @@ impl Deformation {
         fits.then(|| Self { lattice: Lattice::of(vertices, spacing), moves })
     }
 
-    /// Where a point of the map belongs, map frame. What lies beyond the lattice, as what a map has grown by does, goes with the
-    /// nearest node.
+    /// Where a point of the map belongs, map frame.
     pub fn apply(&self, point: &Point2) -> Point2 {
-        let corners = self.lattice.corners(point).or_else(|| self.lattice.nearest(point).map(|node| [(node, 0.25); 4]));
-        let Some(corners) = corners else { return *point };
+        let Some(corners) = self.lattice.corners(point) else { return *point };
         point
             + corners.iter().filter(|(_, weight)| *weight > 0.0).fold(Vector2::zeros(), |sum, &(node, weight)| {
                 let arm = point - self.lattice.position(node);
@@ -260,13 +252,6 @@ mod tests {
             let expected = point + Vector2::new(0.2, -0.1) + turn * quarter_turn(&point.coords);
             assert!((deformation.apply(&point) - expected).norm() < 1e-12);
         }
-    }
-
-    #[test]
-    fn what_a_map_has_grown_by_goes_with_the_node_beside_it() {
-        let deformation = deformation(|node| Vector3::new(if node.x > 12.0 { 0.3 } else { 0.0 }, 0.0, 0.0));
-        let beyond = Point2::new(25.0, 1.0);
-        assert!((deformation.apply(&beyond) - beyond - Vector2::new(0.3, 0.0)).norm() < 1e-12);
     }
 
     #[test]

@@ -5,9 +5,9 @@
 //! together, as the least squares of
 //!
 //! - walls: a point of a wall of one map lies on the same face of a wall of another, measured across that wall, with a
-//!   Geman-McClure kernel that narrows from round to round (graduated non-convexity, Yang et al. 2020) ([`contacts`]);
+//!   Geman-McClure kernel that narrows from round to round (graduated non-convexity, Yang et al. 2020);
 //! - bends: neighbouring nodes of a map are displaced and turned alike, as far as the drift of a SLAM allows, a random walk:
-//!   the variance grows with the distance ([`equations`]). Where only one map knows the place, this carries the bend on, and
+//!   the variance grows with the distance. Where only one map knows the place, this carries the bend on, and
 //!   the map is rigid in itself;
 //! - frames: the maps lie about where the rigid frames have them.
 //!
