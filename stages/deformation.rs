@@ -18,7 +18,9 @@ pub type Corners = [(usize, f64); 4];
 
 /// No node lies farther from the origin along x or y, in vertices.
 const MOST_VERTICES: f64 = 1e6;
-/// A lattice of a message may take so many vertices.
+/// A lattice has no more nodes than this, as their equations are solved together.
+const MOST_NODES: usize = 10_000;
+/// Nor does it take more vertices, with those between that have no node.
 const MOST_TABLE: i64 = 1 << 22;
 
 /// After so many rounds a place is carried back to within a thousandth of the displacement.
@@ -39,23 +41,16 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// A lattice with a node at each corner of each square of the side `spacing` in which the grid knows a cell.
-    pub fn over(grid: &Grid<'_>, spacing: f64) -> Self {
-        let geometry = &grid.geometry;
-        let width = geometry.width.max(1);
-        let mut vertices = BTreeMap::new();
-        let mut last = None;
-        for (index, _) in grid.cells.iter().enumerate().filter(|(_, cell)| is_known(**cell)) {
-            let cell = Cell { column: index % width, row: index / width };
-            let Some(square) = vertex_below(&geometry.centre(cell), spacing) else { continue };
-            if last.replace(square) != Some(square) {
-                let (column, row) = square;
-                for corner in [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)] {
-                    vertices.insert((corner.1, corner.0), corner);
-                }
+    /// A lattice with a node at each corner of each square of the side `spacing` in which the grid knows a cell; of twice the
+    /// side, or four times and so on, where that would take too many.
+    pub fn over(grid: &Grid<'_>, mut spacing: f64) -> Self {
+        loop {
+            let vertices = vertices_over(grid, spacing);
+            if vertices.len() <= MOST_NODES && table_size(&vertices) <= MOST_TABLE {
+                return Self::of(vertices, spacing);
             }
+            spacing *= 2.0;
         }
-        Self::of(vertices.into_values().collect(), spacing)
     }
 
     /// A lattice with nodes at the given vertices, which are in order: row by row.
@@ -132,6 +127,25 @@ impl Lattice {
         let row = usize::try_from(i64::from(row) - i64::from(self.first.1)).ok()?;
         (column < self.columns && row * self.columns < self.nodes.len()).then_some(row * self.columns + column)
     }
+}
+
+/// The corners of the squares of the side `spacing` in which the grid knows a cell, row by row.
+fn vertices_over(grid: &Grid<'_>, spacing: f64) -> Vec<Vertex> {
+    let geometry = &grid.geometry;
+    let width = geometry.width.max(1);
+    let mut vertices = BTreeMap::new();
+    let mut last = None;
+    for (index, _) in grid.cells.iter().enumerate().filter(|(_, cell)| is_known(**cell)) {
+        let cell = Cell { column: index % width, row: index / width };
+        let Some(square) = vertex_below(&geometry.centre(cell), spacing) else { continue };
+        if last.replace(square) != Some(square) {
+            let (column, row) = square;
+            for corner in [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)] {
+                vertices.insert((corner.1, corner.0), corner);
+            }
+        }
+    }
+    vertices.into_values().collect()
 }
 
 /// The vertex at the lower left of the square that a point lies in; none if it lies beyond all lattices.
@@ -252,6 +266,14 @@ mod tests {
             let expected = point + Vector2::new(0.2, -0.1) + turn * quarter_turn(&point.coords);
             assert!((deformation.apply(&point) - expected).norm() < 1e-12);
         }
+    }
+
+    #[test]
+    fn a_map_of_absurdly_large_cells_takes_no_more_nodes_than_others() {
+        let geometry = GridGeometry { width: 200, height: 200, resolution: 2000.0, origin: pose(0.0, 0.0, 0.0) };
+        let cells = vec![0; 200 * 200];
+        let lattice = Lattice::over(&Grid::new(geometry, &cells).unwrap(), 3.0);
+        assert!((4..=MOST_NODES).contains(&lattice.len()) && lattice.spacing() > 1000.0, "{}", lattice.len());
     }
 
     #[test]

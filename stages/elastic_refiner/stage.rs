@@ -110,9 +110,7 @@ impl ElasticRefiner {
                 Some(bends) => {
                     for ((frame, map), bend) in placed.iter().zip(&bends) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
-                        output
-                            .deformation
-                            .send(&frame.robot, &message(header, &frame.robot, self.parameters.spacing, bend))?;
+                        output.deformation.send(&frame.robot, &message(header, &frame.robot, bend))?;
                     }
                 }
                 None => output.warn("the maps cannot be bent onto each other: a frame lies too far away for numbers"),
@@ -122,7 +120,7 @@ impl ElasticRefiner {
     }
 }
 
-fn message(header: Header, robot: &str, spacing: f64, bend: &Bend) -> MapDeformation {
+fn message(header: Header, robot: &str, bend: &Bend) -> MapDeformation {
     let nodes = bend.deformation.moves.iter().zip(&bend.covariances).enumerate();
     let node = |(number, (by, covariance)): (usize, (&nalgebra::Vector3<f64>, _))| {
         let at = bend.deformation.lattice.position(number);
@@ -131,7 +129,7 @@ fn message(header: Header, robot: &str, spacing: f64, bend: &Bend) -> MapDeforma
     MapDeformation {
         header,
         robot: robot.to_owned(),
-        spacing,
+        spacing: bend.deformation.lattice.spacing(),
         nodes: nodes.map(node).collect(),
         wall_matched: bend.wall_matched,
     }
