@@ -2,14 +2,14 @@
 
 use crate::deformation::Lattice;
 use crate::geometry::{Grid, Point2, Pose2, is_free};
-use crate::walls::{LEAST_NORMAL_AGREEMENT, NORMAL_RADIUS, WallMap, before_wall};
+use crate::walls::{LEAST_NORMAL_AGREEMENT, WallMap, before_wall};
 use nalgebra::Vector2;
 
 /// A map that is placed in the world.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct Body<'a> {
     /// Its walls.
-    pub(super) walls: WallMap,
+    pub(super) walls: &'a WallMap,
     /// For each point of the walls, from which sides it is seen: that of its normal, and the other.
     pub(super) seen: Vec<Sides>,
     /// Its nodes.
@@ -27,10 +27,9 @@ pub(super) struct Sides {
     behind: bool,
 }
 
-impl Body {
-    /// A map that lies at `transform_world_map`, with nodes every `spacing` metres.
-    pub fn new(grid: &Grid<'_>, transform_world_map: Pose2, spacing: f64) -> Self {
-        let walls = WallMap::new(grid, NORMAL_RADIUS);
+impl<'a> Body<'a> {
+    /// A map with its walls that lies at `transform_world_map`, with nodes every `spacing` metres.
+    pub fn new(grid: &Grid<'_>, walls: &'a WallMap, transform_world_map: Pose2, spacing: f64) -> Self {
         let before = before_wall(grid.geometry.resolution);
         let is_seen = |point: &Point2, normal: &Vector2<f64>, side: f64| {
             is_free(grid.value_at(&(point + normal * (side * before))))

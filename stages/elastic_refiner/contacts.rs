@@ -34,7 +34,7 @@ pub(super) struct Contacts {
 /// A map, how it is bent so far, and the number of its first node among those of all maps.
 #[derive(Clone, Copy)]
 pub(super) struct Bent<'a> {
-    pub(super) body: &'a Body,
+    pub(super) body: &'a Body<'a>,
     pub(super) bend: &'a Deformation,
     pub(super) first: usize,
 }

@@ -3,8 +3,9 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::selected_inverse::SelectedInverse;
+use crate::deformation::Deformation;
 use crate::geometry::Point2;
-use nalgebra::{DVector, Matrix3, Vector3};
+use nalgebra::{DVector, Matrix3, Vector2, Vector3};
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix};
 use std::collections::BTreeMap;
@@ -25,7 +26,7 @@ pub(super) struct Equations {
 impl Equations {
     /// What is known of the nodes of the bodies without looking at walls. The nodes of all bodies are numbered one after
     /// the other.
-    pub(super) fn of_bends(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Self {
+    pub(super) fn of_bends(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Self {
         let nodes: usize = bodies.iter().map(|body| body.lattice.len()).sum();
         let mut equations = Self { blocks: BTreeMap::new(), vector: vec![Vector3::zeros(); nodes] };
         let mut first = 0;
@@ -52,17 +53,10 @@ impl Equations {
         (j, at_j): (usize, Point2),
         parameters: &ElasticRefinerParameters,
     ) {
-        let arm = at_j - at_i;
-        let distance = arm.norm();
-        let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * distance.sqrt();
-        let information = Matrix3::from_diagonal(&deviation.map(|deviation| deviation.powi(-2)));
-        // (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i)
-        let half = 0.5 * arm;
-        let by_i = -Matrix3::new(1.0, 0.0, -half.y, 0.0, 1.0, half.x, 0.0, 0.0, 1.0);
-        let by_j = Matrix3::new(1.0, 0.0, half.y, 0.0, 1.0, -half.x, 0.0, 0.0, 1.0);
-        for (row, by_row) in [(i, by_i), (j, by_j)] {
-            for (column, by_column) in [(i, by_i), (j, by_j)] {
-                self.add(row, column, &(by_row.transpose() * information * by_column));
+        let edge = Edge::new(&(at_j - at_i), parameters);
+        for (row, by_row) in [(i, edge.by_i), (j, edge.by_j)] {
+            for (column, by_column) in [(i, edge.by_i), (j, edge.by_j)] {
+                self.add(row, column, &(by_row.transpose() * edge.information * by_column));
             }
         }
     }
@@ -94,6 +88,39 @@ impl Equations {
         let moves = place.iter().map(|&place| solved.fixed_view::<3, 1>(3 * place, 0).into_owned()).collect();
         Some(Solution { moves, place, factor })
     }
+}
+
+/// What drift says of two nodes i and j that lie side by side.
+struct Edge {
+    /// How (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i) changes with what node i does.
+    by_i: Matrix3<f64>,
+    /// And with what node j does.
+    by_j: Matrix3<f64>,
+    /// The inverse of its covariance.
+    information: Matrix3<f64>,
+}
+
+impl Edge {
+    /// Of two nodes with `arm` from i to j.
+    fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
+        let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * arm.norm().sqrt();
+        let half = 0.5 * arm;
+        Self {
+            by_i: -Matrix3::new(1.0, 0.0, -half.y, 0.0, 1.0, half.x, 0.0, 0.0, 1.0),
+            by_j: Matrix3::new(1.0, 0.0, half.y, 0.0, 1.0, -half.x, 0.0, 0.0, 1.0),
+            information: Matrix3::from_diagonal(&deviation.map(|deviation| deviation.powi(-2))),
+        }
+    }
+}
+
+/// Half the squared bends between neighbouring nodes, in standard deviations.
+pub(super) fn bend_cost(bend: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
+    let edges = bend.lattice.edges().map(|(i, j)| {
+        let edge = Edge::new(&(bend.lattice.position(j) - bend.lattice.position(i)), parameters);
+        let residual = edge.by_i * bend.moves[i] + edge.by_j * bend.moves[j];
+        0.5 * residual.dot(&(edge.information * residual))
+    });
+    edges.sum()
 }
 
 /// What the nodes do.

@@ -3,7 +3,7 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::contacts::{Bent, Contacts, contacts};
-use super::equations::{Equations, Solution};
+use super::equations::{Equations, Solution, bend_cost};
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
 use nalgebra::Matrix3;
@@ -22,11 +22,14 @@ pub struct Bend {
     pub covariances: Vec<Matrix3<f64>>,
     /// The length of its walls that lie on walls of others, metres.
     pub wall_matched: f64,
+    /// How unlikely it is that a map bends so: the logarithm of how much likelier no bend is, half the squared bends between
+    /// neighbouring nodes in standard deviations.
+    pub cost: f64,
 }
 
 /// Bends placed maps, so that walls that several show lie on each other: for each body how it is bent. `None` if numbers
 /// are so large that the equations have no solution.
-pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<Vec<Bend>> {
+pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Vec<Bend>> {
     let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
     let of_bends = Equations::of_bends(bodies, parameters);
     let order = order(bodies);
@@ -59,6 +62,7 @@ pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<
     let mut covariances = solution.covariances().into_iter();
     let bend = |(deformation, wall_matched): (Deformation, f64)| Bend {
         covariances: covariances.by_ref().take(deformation.moves.len()).collect(),
+        cost: bend_cost(&deformation, parameters),
         deformation,
         wall_matched,
     };
@@ -67,7 +71,7 @@ pub fn refine(bodies: &[Body], parameters: &ElasticRefinerParameters) -> Option<
 }
 
 /// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.
-fn known_box(body: &Body, reach: f64) -> Option<[Point2; 2]> {
+fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     let mut points = body.walls.walls.points().iter().map(|point| body.transform_world_map * point);
     let first = points.next()?;
     let (low, high) = points.fold((first, first), |(low, high), point| (low.inf(&point), high.sup(&point)));
@@ -77,8 +81,8 @@ fn known_box(body: &Body, reach: f64) -> Option<[Point2; 2]> {
 
 /// The nodes of all bodies, by where they lie along the longer side of the world: those that have to do with each other
 /// lie near each other in this order.
-fn order(bodies: &[Body]) -> Vec<usize> {
-    let in_world = |body: &Body, node: usize| body.transform_world_map * body.lattice.position(node);
+fn order(bodies: &[Body<'_>]) -> Vec<usize> {
+    let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
     let places: Vec<Point2> =
         bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
     let Some(first) = places.first() else { return Vec::new() };

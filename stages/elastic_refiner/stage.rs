@@ -3,6 +3,7 @@
 use super::{Bend, Body, ElasticRefinerParameters, refine};
 use crate::geometry::row_by_row;
 use crate::robot_maps::RobotMaps;
+use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
 use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
@@ -28,7 +29,7 @@ impl Outputs for Bends {
 /// Bends the maps of placed robots.
 pub(super) struct ElasticRefiner {
     parameters: ElasticRefinerParameters,
-    maps: RobotMaps<()>,
+    maps: RobotMaps<WallsOnDemand>,
     frames: RobotFrames,
     /// The frames in which the maps were bent last, and the numbers of these maps.
     bent: (RobotFrames, BTreeMap<String, u64>),
@@ -53,7 +54,7 @@ impl ElasticRefiner {
         map: Received<'_, OccupancyGrid<'_>>,
         output: &Output<Bends>,
     ) -> Result<(), StageError> {
-        self.maps.keep(&map, output, |_| ());
+        self.maps.keep(&map, output, |_| WallsOnDemand::new());
         Ok(())
     }
 
@@ -98,10 +99,11 @@ impl ElasticRefiner {
         let has_news = placed.len() > 1 || self.has_sent;
         if self.parameters.enabled && has_news {
             self.has_sent = true;
-            let bodies: Vec<Body> = placed
+            let bodies: Vec<Body<'_>> = placed
                 .iter()
                 .map(|(frame, map)| {
-                    let body = Body::new(&map.grid(), frame.transform_reference_robot(), self.parameters.spacing);
+                    let (grid, walls) = (map.grid(), map.walls(NORMAL_RADIUS));
+                    let body = Body::new(&grid, walls, frame.transform_reference_robot(), self.parameters.spacing);
                     let is_kept = self.parameters.keep_reference && frame.robot == self.frames.reference;
                     if is_kept { body.kept() } else { body }
                 })

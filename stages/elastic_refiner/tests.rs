@@ -2,41 +2,24 @@
 
 use super::{Bend, Body, ElasticRefinerParameters, kind, refine};
 use crate::deformation::Deformation;
-use crate::geometry::{Cell, Grid, Point2, Pose2, UNKNOWN, pose};
-use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, pose};
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
+use crate::walls::{NORMAL_RADIUS, WallMap};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, MapDeformation, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{LoneStage, Parameters};
-use nalgebra::Vector2;
 
 const PARAMETERS: fn() -> ElasticRefinerParameters = ElasticRefinerParameters::default;
 
-/// The field by which a place of a building is drawn elsewhere: up to `most` metres, over half of the building.
-fn field(most: f64, place: &Point2) -> Vector2<f64> {
-    most * Vector2::new((place.y / 7.0).sin(), (place.x / 13.0).sin())
-}
-
-/// The map as it is drawn by a robot that errs by the field: what is at `place` shows at `place + field`.
-fn bent(map: &DrawnMap, most: f64) -> Vec<i8> {
-    let grid = Grid::new(map.geometry, &map.cells).unwrap();
-    let cells = (0..map.cells.len()).map(|index| {
-        let cell = Cell { column: index % map.geometry.width, row: index / map.geometry.width };
-        let shown = map.geometry.centre(cell);
-        let place = (0..5).fold(shown, |place, _| shown - field(most, &place));
-        grid.value_at(&place)
-    });
-    cells.collect()
-}
-
-fn body(map: &DrawnMap, cells: &[i8], transform_world_map: Pose2) -> Body {
-    Body::new(&Grid::new(map.geometry, cells).unwrap(), transform_world_map, PARAMETERS().spacing)
+fn body(map: &DrawnMap, transform_world_map: Pose2) -> Body<'_> {
+    Body::new(&map.view().grid, &map.walls, transform_world_map, PARAMETERS().spacing)
 }
 
 /// How far two maps of one building lie apart at its places, metres: the mean and the most, of those known to both.
-fn apart(bends: &[Bend], bodies: &[Body], most: f64, places: &[Point2]) -> (f64, f64) {
+fn apart(bends: &[Bend], bodies: &[Body<'_>], most: f64, places: &[Point2]) -> (f64, f64) {
     let distances = places.iter().map(|place| {
         let in_a = bodies[0].transform_world_map * bends[0].deformation.apply(place);
-        let in_b = bodies[1].transform_world_map * bends[1].deformation.apply(&(place + field(most, place)));
+        let in_b = bodies[1].transform_world_map * bends[1].deformation.apply(&(place + bend_at(most, place)));
         (in_a - in_b).norm()
     });
     let distances: Vec<f64> = distances.collect();
@@ -51,27 +34,34 @@ fn places() -> Vec<Point2> {
 fn a_bent_map_is_laid_on_a_straight_one() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     for most in [0.1, 0.4] {
-        let bodies = [body(&map, &map.cells, Pose2::identity()), body(&map, &bent(&map, most), Pose2::identity())];
+        let bent = map.bent(most);
+        let bodies = [body(&map, Pose2::identity()), body(&bent, Pose2::identity())];
         let rigid: Vec<Bend> = bodies
             .iter()
             .map(|body| Bend {
                 deformation: Deformation::none(body.lattice.clone()),
                 covariances: Vec::new(),
                 wall_matched: 0.0,
+                cost: 0.0,
             })
             .collect();
         let bends = refine(&bodies, &PARAMETERS()).unwrap();
         let (before, after) = (apart(&rigid, &bodies, most, &places()), apart(&bends, &bodies, most, &places()));
         assert!(before.1 > 0.9 * most, "{before:?}");
         assert!(after.0 < 0.02 && after.1 < 0.06, "{most}: {before:?} before, {after:?} after");
-        assert!(bends.iter().all(|bend| bend.wall_matched > 80.0));
+        assert!(
+            bends.iter().all(|bend| bend.wall_matched > 80.0 && bend.cost > 0.0 && bend.cost < 200.0 * most),
+            "{}",
+            bends[1].cost
+        );
     }
 }
 
 #[test]
 fn a_map_that_is_kept_stays_and_the_other_does_all() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let bodies = [body(&map, &map.cells, Pose2::identity()).kept(), body(&map, &bent(&map, 0.2), Pose2::identity())];
+    let bent = map.bent(0.2);
+    let bodies = [body(&map, Pose2::identity()).kept(), body(&bent, Pose2::identity())];
     let bends = refine(&bodies, &PARAMETERS()).unwrap();
     assert!(bends[0].deformation.largest_move() < 1e-3);
     assert!(apart(&bends, &bodies, 0.2, &places()).1 < 0.06);
@@ -82,7 +72,7 @@ fn maps_that_are_not_bent_stay_as_they_are() {
     let office = FloorPlan::office();
     let a = office.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(0.0, 0.0, 0.0));
     let b = office.draw(seen(4.0, -1.0, 21.0, 13.0), drawing(3.0, 1.0, 0.7));
-    let bodies = [body(&a, &a.cells, a.transform_world_map), body(&b, &b.cells, b.transform_world_map)];
+    let bodies = [body(&a, a.transform_world_map), body(&b, b.transform_world_map)];
     for bend in refine(&bodies, &PARAMETERS()).unwrap() {
         assert!(bend.deformation.moves.iter().all(|by| by.xy().norm() < 0.02 && by.z.abs() < 0.005), "{bend:?}");
     }
@@ -91,7 +81,8 @@ fn maps_that_are_not_bent_stay_as_they_are() {
 #[test]
 fn the_order_of_the_maps_does_not_matter() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let (a, b) = (body(&map, &map.cells, Pose2::identity()), body(&map, &bent(&map, 0.2), Pose2::identity()));
+    let bent = map.bent(0.2);
+    let (a, b) = (body(&map, Pose2::identity()), body(&bent, Pose2::identity()));
     let one = refine(&[a.clone(), b.clone()], &PARAMETERS()).unwrap();
     let other = refine(&[b, a], &PARAMETERS()).unwrap();
     for (one, other) in one.iter().zip(other.iter().rev()) {
@@ -106,7 +97,7 @@ fn where_nobody_else_knows_the_place_the_map_is_rigid_and_less_is_known_of_it() 
     // The other robot knows the left third, which is drawn 0.1 m to the right.
     let part = office.draw(seen(-1.0, -1.0, 6.0, 13.0), drawing(0.0, 0.0, 0.0));
     let whole = office.draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let bodies = [body(&part, &part.cells, Pose2::identity()), body(&whole, &whole.cells, pose(0.1, 0.0, 0.0))];
+    let bodies = [body(&part, Pose2::identity()), body(&whole, pose(0.1, 0.0, 0.0))];
     let bend = refine(&bodies, &PARAMETERS()).unwrap().remove(1);
     let move_at = |x: f64, y: f64| bend.deformation.apply(&Point2::new(x, y)) - Point2::new(x, y);
     assert!((move_at(19.0, 6.0) - move_at(9.0, 6.0)).norm() < 0.02, "{} {}", move_at(19.0, 6.0), move_at(9.0, 6.0));
@@ -125,14 +116,12 @@ fn where_nobody_else_knows_the_place_the_map_is_rigid_and_less_is_known_of_it() 
 #[test]
 fn numbers_without_bounds_are_refused_or_bounded() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 9.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let unknown = vec![UNKNOWN; map.cells.len()];
+    let cells = vec![UNKNOWN; map.cells.len()];
+    let walls = WallMap::new(&Grid::new(map.geometry, &cells).unwrap(), NORMAL_RADIUS);
+    let unknown = DrawnMap { cells, walls, ..map };
     assert!(refine(&[], &PARAMETERS()).is_some_and(|bends| bends.is_empty()));
     for transform in [pose(f64::NAN, 0.0, 0.0), pose(f64::INFINITY, 0.0, 0.0), pose(1e300, 0.0, 0.0)] {
-        let bodies = [
-            body(&map, &map.cells, Pose2::identity()),
-            body(&map, &map.cells, transform),
-            body(&map, &unknown, transform),
-        ];
+        let bodies = [body(&map, Pose2::identity()), body(&map, transform), body(&unknown, transform)];
         let bends = refine(&bodies, &PARAMETERS());
         assert!(bends.is_none_or(|bends| bends.iter().all(|bend| bend.deformation.largest_move() < 0.1)));
     }
@@ -165,7 +154,7 @@ fn stage(parameters: &str, map_b: &[i8]) -> (LoneStage, DrawnMap, RobotFrames) {
 #[test]
 fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has_grown() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let (mut stage, map, frames) = stage("", &bent(&map, 0.2));
+    let (mut stage, map, frames) = stage("", &map.bent(0.2).cells);
     let bends: Vec<MapDeformation> = stage.take("deformation").unwrap();
     assert_eq!(bends.iter().map(|bend| bend.robot.as_str()).collect::<Vec<_>>(), ["robot1", "robot2"]);
     assert_eq!(bends[1].header.frame_id, "robot2/map");
@@ -187,7 +176,7 @@ fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has
 #[test]
 fn frames_that_change_little_go_through_and_are_bent_anew_at_the_end() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let (mut stage, _, mut frames) = stage("", &bent(&map, 0.2));
+    let (mut stage, _, mut frames) = stage("", &map.bent(0.2).cells);
     stage.take::<MapDeformation>("deformation").unwrap();
     stage.take::<RobotFrames>("frames").unwrap();
     for (x, bends) in [(0.05, 0), (0.3, 2), (0.33, 0)] {

@@ -2,6 +2,7 @@
 
 use super::MergeVerifierParameters;
 use super::regions::RegionComparison;
+use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, is_known};
 use crate::walls::{WallMap, stride};
 
@@ -20,8 +21,25 @@ const CHANCE_RANGE: (f64, f64) = (0.02, 0.5);
 pub struct MapView<'a> {
     /// Its cells.
     pub grid: Grid<'a>,
-    /// Its walls and the samples of its known space.
+    /// Its walls and the samples of its known space, as they are bent.
     pub walls: &'a WallMap,
+    /// How it is bent; none if it is rigid.
+    pub bend: Option<&'a Deformation>,
+}
+
+impl<'a> MapView<'a> {
+    /// A map as it came, with its walls.
+    pub fn rigid(grid: Grid<'a>, walls: &'a WallMap) -> Self {
+        Self { grid, walls, bend: None }
+    }
+
+    /// The value of the cell at a place of the bent map.
+    pub(super) fn value_at(&self, place: &Point2) -> i8 {
+        match self.bend {
+            Some(bend) => self.grid.value_at(&bend.inverse(place)),
+            None => self.grid.value_at(place),
+        }
+    }
 }
 
 /// What two maps say of each other at one alignment.
@@ -111,6 +129,6 @@ fn chance(map: &MapView<'_>, tolerance: f64) -> f64 {
 fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, most_points: usize) -> f64 {
     let stride = stride(b.walls.samples.len(), most_points);
     let samples = b.walls.samples.iter().step_by(stride);
-    let known = samples.filter(|sample| is_known(a.grid.value_at(&(transform_a_b * sample.point)))).count();
+    let known = samples.filter(|sample| is_known(a.value_at(&(transform_a_b * sample.point)))).count();
     known as f64 * stride as f64 * b.walls.sample_area
 }

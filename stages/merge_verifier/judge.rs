@@ -1,5 +1,6 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
+use super::bending::BentPlace;
 use super::refusal::{Hypotheses, Hypothesis};
 use super::verdict::{Candidate, Verdict};
 use super::{
@@ -37,7 +38,7 @@ pub fn judge<'a>(
     let mut all: Vec<Candidate<'a>> = hypotheses
         .iter()
         .filter(|alignment| has_place(alignment))
-        .map(|alignment| Candidate { alignment, agreement: compare(a, b, &alignment.transform_a_b(), parameters) })
+        .map(|alignment| Candidate::rigid(alignment, compare(a, b, &alignment.transform_a_b(), parameters)))
         .collect();
     // The sort is stable, so that equals stay in the order of their sources and ranks.
     let is_provisional = |candidate: &Candidate<'_>| candidate.alignment.provisional;
@@ -53,8 +54,9 @@ pub fn judge<'a>(
         }
         all.retain(is_possible);
     }
-    let judge_one = |candidate: &Candidate<'a>| judge_one(a, b, candidate, &all, known.window.is_some(), parameters);
+    let is_expected = known.window.is_some();
     if let Some(asked) = known.hypothesis {
+        let judge_one = |candidate: &Candidate<'a>| judge_one(a, b, candidate, &all, is_expected, parameters);
         let count = all.len();
         let chosen = asked.checked_sub(1).and_then(|index| all.get(index));
         return match chosen {
@@ -65,9 +67,31 @@ pub fn judge<'a>(
             }
         };
     }
+    let rigid = best_of(a, b, &all, is_expected, parameters)?;
+    if rigid.refusal.is_none() || parameters.bend <= 0.0 {
+        return Some(rigid);
+    }
+    // Maps that contradict each other may do so because they are bent, and several places may be one if they are.
+    let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, parameters)).collect();
+    let as_bent = if bent.iter().any(|candidate| candidate.bent.is_some()) {
+        best_of(a, b, &bent, is_expected, parameters).filter(|verdict| verdict.refusal.is_none())
+    } else {
+        None
+    };
+    as_bent.or(Some(rigid))
+}
+
+/// The first hypothesis that is accepted; if none is, the most probable.
+fn best_of<'a>(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    all: &[Candidate<'a>],
+    is_expected: bool,
+    parameters: &MergeVerifierParameters,
+) -> Option<Verdict<'a>> {
     let mut best: Option<Verdict<'a>> = None;
-    for candidate in &all {
-        let verdict = judge_one(candidate);
+    for candidate in all {
+        let verdict = judge_one(a, b, candidate, all, is_expected, parameters);
         if verdict.refusal.is_none() {
             return Some(verdict);
         }
@@ -76,6 +100,22 @@ pub fn judge<'a>(
         }
     }
     best
+}
+
+/// A hypothesis with map b bent, if that lays more wall on wall; only where more speaks for it than against it, as it
+/// takes long.
+fn bent<'a>(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    rigid: &Candidate<'a>,
+    parameters: &MergeVerifierParameters,
+) -> Candidate<'a> {
+    let is_worth_it = rigid.alignment.accepted && rigid.agreement.evidence > 0.0;
+    let bent = is_worth_it.then(|| BentPlace::new(a, b, &rigid.alignment.transform_a_b(), parameters)).flatten();
+    match bent.filter(|bent| bent.agreement.evidence - bent.cost > rigid.agreement.evidence) {
+        Some(place) => Candidate { agreement: place.agreement, bent: Some(place), ..*rigid },
+        None => *rigid,
+    }
 }
 
 /// The judgement on a place at which the maps cannot lie by what the user knows.
@@ -110,10 +150,10 @@ fn judge_one<'a>(
     is_expected: bool,
     parameters: &MergeVerifierParameters,
 ) -> Verdict<'a> {
-    let Candidate { alignment, agreement } = candidate;
-    let transform_a_b = alignment.transform_a_b();
+    let Candidate { alignment, agreement, bent } = candidate;
+    let transform_a_b = candidate.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
-        Rival::of(&transform_a_b, &agreement.centre, &other.alignment.transform_a_b(), || other.agreement)
+        Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)
     };
     let found_too_by = all
         .iter()
@@ -143,6 +183,7 @@ fn judge_one<'a>(
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
         overlap: agreement.overlap,
+        bend_cost: bent.map(|bent| bent.cost),
         evidence_elsewhere,
     });
     let score = odds.probability();

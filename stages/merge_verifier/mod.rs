@@ -4,11 +4,13 @@
 //! Carpin, "Merging occupancy grid maps from multiple robots" (Proceedings of the IEEE 2006).
 //!
 //! - [`compare`]: what two maps say of each other at one alignment.
+//! - [`BentPlace`]: the same if the maps are bent, where they contradict each other as they came.
 //! - [`best_rival_nearby`]: where else they fit, for alignments of which nobody has looked for others.
 //! - [`judge`]: all hypotheses for a pair against each other; [`Refusal`] says why none is accepted.
 //! - [`Odds`]: how probable it is that an alignment is right.
 
 mod agreement;
+mod bending;
 mod judge;
 mod knowledge;
 mod parameters;
@@ -25,6 +27,7 @@ mod stage_tests;
 mod tests;
 
 pub use agreement::{Agreement, MapView, compare, compare_sampled};
+pub use bending::BentPlace;
 pub use judge::{UserKnowledge, judge};
 pub use parameters::MergeVerifierParameters;
 pub use refusal::{Hypotheses, Hypothesis, Refusal};

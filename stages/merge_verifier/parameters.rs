@@ -21,6 +21,13 @@ pub struct MergeVerifierParameters {
     /// Where a provisional alignment comes from a stage that has not looked for others itself, map b is also laid
     /// elsewhere: turned by quarter turns, and moved by up to this many metres. 0 only turns it.
     pub rival_reach: f64,
+    /// How maps bend, as for the `elastic_refiner`: standard deviation of the displacement of two places of a map against each
+    /// other, metres for the root of each metre between them. Maps that contradict each other are compared once more with
+    /// one bent onto the other. 0 compares them as they came.
+    pub bend: f64,
+    /// How maps turn, as for the `elastic_refiner`: standard deviation of the turn of two places of a map against each other,
+    /// radians for the root of each metre between them.
+    pub turn: f64,
     /// Which of the hypotheses that a refusal has listed is right, by somebody who has looked: by robot, which means its
     /// pair with the reference or with the only other robot, or by pair as ROBOT/ROBOT. From 1; 0 is the initial pose itself.
     pub hypotheses: BTreeMap<String, usize>,
@@ -34,6 +41,8 @@ impl Default for MergeVerifierParameters {
             region: 3.0,
             slide_deviation: 0.12,
             rival_reach: 4.0,
+            bend: 0.05,
+            turn: 0.01,
             hypotheses: BTreeMap::new(),
         }
     }
@@ -49,6 +58,8 @@ impl Parameters for MergeVerifierParameters {
             ("region", self.region, 0.1, 100.0),
             ("slide_deviation", self.slide_deviation, 1e-3, 10.0),
             ("rival_reach", self.rival_reach, 0.0, 100.0),
+            ("bend", self.bend, 0.0, 10.0),
+            ("turn", self.turn, 1e-6, 1.0),
         ];
         for (field, value, least, most) in ranges {
             if !(least..=most).contains(&value) {

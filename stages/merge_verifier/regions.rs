@@ -46,14 +46,14 @@ impl RegionComparison {
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
         for index in self.sample(b.walls) {
             let point = transform_a_b * b.walls.walls.points()[index];
-            if is_known(a.grid.value_at(&point)) {
+            if is_known(a.value_at(&point)) {
                 parts.entry(key(&point)).or_default().of_b.push(index);
             }
         }
         let transform_b_a = transform_a_b.inverse();
         for index in self.sample(a.walls) {
             let point = a.walls.walls.points()[index];
-            if is_known(b.grid.value_at(&(transform_b_a * point))) {
+            if is_known(b.value_at(&(transform_b_a * point))) {
                 parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
@@ -136,14 +136,14 @@ impl RegionComparison {
                     continue;
                 }
                 let is_seen_from = |side: f64| {
-                    is_free(other.grid.value_at(&(own + normal * (side * ahead))))
-                        && is_free(map.grid.value_at(&(point + turned * (side * ahead))))
+                    is_free(other.value_at(&(own + normal * (side * ahead))))
+                        && is_free(map.value_at(&(point + turned * (side * ahead))))
                 };
                 if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.wall_on_wall += length;
                     on_wall(&point);
                 }
-            } else if is_free(map.grid.value_at(&point)) {
+            } else if is_free(map.value_at(&point)) {
                 region.wall_on_free += length;
             }
         }

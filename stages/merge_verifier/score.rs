@@ -38,6 +38,9 @@ const BY_SHARE: f64 = 35.0;
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same where one map is bent onto the other: what was only bent agrees in nearly all then, and unrelated maps agree in
+/// little more than before.
+const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
 /// The same where the user knows the place: it is one building, and what contradicts is a bend, or was moved.
 const AGREEMENT_OF_HALVES_WHERE_EXPECTED: f64 = 0.4;
 /// The same where the maps share the area of one room.
@@ -91,6 +94,8 @@ pub struct Grounds {
     pub wall_agreement: f64,
     /// The area that both maps know, square metres.
     pub overlap: f64,
+    /// If the maps agree as they are bent: how unlikely such a bend is, see [`BentPlace`](super::BentPlace).
+    pub bend_cost: Option<f64>,
     /// The most evidence at another place, as a share of that here.
     pub evidence_elsewhere: f64,
 }
@@ -109,8 +114,16 @@ pub struct Odds {
 impl Odds {
     /// Of an alignment.
     pub fn new(grounds: &Grounds) -> Self {
-        let Grounds { origin, found_too, is_expected, evidence, wall_agreement, overlap, evidence_elsewhere } =
-            *grounds;
+        let Grounds {
+            origin,
+            found_too,
+            is_expected,
+            evidence,
+            wall_agreement,
+            overlap,
+            bend_cost,
+            evidence_elsewhere,
+        } = *grounds;
         // Tags, and another source, tell a place from those that are like it.
         let is_told = origin == Origin::Tags || found_too;
         let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
@@ -118,12 +131,15 @@ impl Odds {
             Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
             Origin::Search { .. } => {
                 let share_of_room = ((ROOM.1 - overlap) / (ROOM.1 - ROOM.0)).clamp(0.0, 1.0);
-                AGREEMENT_OF_HALVES + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - AGREEMENT_OF_HALVES)
+                let in_rooms = if bend_cost.is_some() { AGREEMENT_OF_HALVES_IF_BENT } else { AGREEMENT_OF_HALVES };
+                in_rooms + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - in_rooms)
             }
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
         };
         Self {
-            chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * origin.lead(found_too || is_expected),
+            chance: PRIOR
+                + BY_EVIDENCE * (evidence - bend_cost.unwrap_or_default())
+                + BY_LEAD * origin.lead(found_too || is_expected),
             likeness: BY_SHARE * (like - evidence_elsewhere),
             part: BY_AGREEMENT * (wall_agreement - halves),
         }
@@ -147,6 +163,7 @@ mod tests {
         evidence: 300.0,
         wall_agreement: 0.9,
         overlap: 200.0,
+        bend_cost: None,
         evidence_elsewhere: 0.0,
     };
 
@@ -193,6 +210,16 @@ mod tests {
         let searched = Origin::Search { lead: 20.0 };
         assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
+    }
+
+    #[test]
+    fn maps_that_are_bent_must_agree_in_more_and_pay_for_the_bend() {
+        let with = |wall_agreement: f64, bend_cost: Option<f64>| {
+            let origin = Origin::Search { lead: 8.0 };
+            Odds::new(&Grounds { origin, wall_agreement, bend_cost, evidence: 80.0, ..GROUNDS }).probability()
+        };
+        assert!(with(0.6, None) > 0.999 && with(0.6, Some(0.0)) < 0.01);
+        assert!(with(0.8, Some(10.0)) > 0.999 && with(0.8, Some(80.0)) < 0.99);
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
 use super::knowledge::{Knowledge, by_initial_poses};
-use super::{Agreement, MapView, MergeVerifierParameters, Verdict, judge};
+use super::{Agreement, BentPlace, MapView, MergeVerifierParameters, Verdict, judge};
+use crate::geometry::row_by_row;
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::robot_maps::{RobotMap, RobotMaps};
 use crate::robot_pair::RobotPair;
 use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
 use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
+use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage sends.
@@ -163,7 +165,7 @@ impl MergeVerifier {
 }
 
 fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
-    MapView { grid: map.grid(), walls: map.walls(NORMAL_RADIUS) }
+    MapView::rigid(map.grid(), map.walls(NORMAL_RADIUS))
 }
 
 /// What a judgement on a pair goes by, of so many hypotheses, without a header.
@@ -184,6 +186,11 @@ fn evidence(verdict: &Verdict<'_>, pair: &RobotPair, hypotheses: usize) -> Evide
 /// The outcome for a pair of which a place was proposed.
 fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Alignment {
     let accepted = verdict.refusal.is_none();
+    let mut alignment = verdict.candidate.alignment.clone();
+    if let Some(BentPlace { transform_a_b, covariance, .. }) = &verdict.candidate.bent {
+        alignment.set_transform_a_b(transform_a_b);
+        alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
+    }
     Alignment {
         accepted,
         provisional: false,
@@ -195,7 +202,7 @@ fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Ali
         } else {
             with_other_sources(reason, &verdict.candidate.alignment.source, proposed)
         },
-        ..verdict.candidate.alignment.clone()
+        ..alignment
     }
 }
 

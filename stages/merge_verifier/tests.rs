@@ -1,12 +1,12 @@
 //! Comparison and judgement on drawn floor plans.
 
 use super::{MergeVerifierParameters, Refusal, UserKnowledge, Verdict, compare, compare_sampled, judge};
-use crate::geometry::{Pose2, pose, row_by_row};
+use crate::geometry::{Point2, Pose2, point_jacobian, pose, row_by_row};
 use crate::place_window::PlaceWindow;
-use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
 use gridweave_runtime::ros::Alignment;
 use gridweave_runtime::stage::{InitialPose, Parameters};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The west and the east of the office, in frames of their own.
@@ -92,6 +92,47 @@ fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
     assert_eq!((verdict.refusal.clone(), verdict.candidate.alignment.rank), (None, 1), "{}", reason(&verdict));
     assert!(verdict.rival.is_some_and(|rival| (rival.shift - 1.5).abs() < 0.05));
     assert!(verdict.score > 0.999);
+}
+
+#[test]
+fn a_bent_map_is_compared_as_it_is_bent_and_laid_where_all_of_it_is_nearest() {
+    const MOST: f64 = 1.3;
+    let a = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let b = a.bent(MOST);
+    // Where one part of it fits, and where another does.
+    let maps = by_maps(&[pose(-0.65, -0.9, 0.0), pose(-0.75, 0.0, -0.04)]);
+    let rigid = MergeVerifierParameters { bend: 0.0, ..Default::default() };
+    let hypotheses: Vec<&Alignment> = maps.iter().collect();
+    let verdict = judge(&a.view(), &b.view(), &hypotheses, &UserKnowledge::default(), &rigid).unwrap();
+    assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
+    assert!(reason(&verdict).contains("as the maps are bent by 0.5"), "{}", reason(&verdict));
+    let bent = verdict.candidate.bent.unwrap();
+    assert!(bent.agreement.wall_agreement() > 0.95 && bent.cost > 1.0, "{bent:?}");
+    let places: Vec<Point2> =
+        (1..20).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect();
+    let off = places.iter().map(|place| bent.transform_a_b * (place + bend_at(MOST, place)) - place);
+    let off: Vec<Vector2<f64>> = off.collect();
+    let mean = off.iter().sum::<Vector2<f64>>() / off.len() as f64;
+    let variance = off.iter().map(|off| off.norm_squared()).sum::<f64>() / off.len() as f64;
+    assert!(mean.norm() < 0.1, "{mean}");
+    assert!((bent.bend / variance.sqrt() - 1.0).abs() < 0.2, "{} {}", bent.bend, variance.sqrt());
+    let about_middle = point_jacobian(&bent.transform_a_b, &Point2::new(10.0, 6.0));
+    let covariance = about_middle * bent.covariance * about_middle.transpose();
+    assert!((covariance.trace() / variance - 1.0).abs() < 0.5, "{covariance} {variance}");
+}
+
+#[test]
+fn the_map_of_another_building_is_not_bent_to_fit() {
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let a = FloorPlan::office().draw(part, drawing(0.0, 0.0, 0.0));
+    let b = FloorPlan::another_office().draw(part, drawing(0.0, 0.0, 0.0));
+    for place in [pose(1.5, 0.0, 0.0), pose(-3.0, 1.0, 0.1), pose(12.0, 0.0, PI / 2.0)] {
+        let maps = by_maps(&[place]);
+        let verdict = judged(&a, &b, &maps);
+        assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! The judgement on all hypotheses for a pair of robots, and what is said of it.
 
 use super::refusal::Hypotheses;
-use super::{Agreement, Refusal, Rival};
+use super::{Agreement, BentPlace, Refusal, Rival};
+use crate::geometry::Pose2;
 use gridweave_runtime::ros::Alignment;
 use std::fmt::Write;
 
@@ -10,8 +11,22 @@ use std::fmt::Write;
 pub struct Candidate<'a> {
     /// The hypothesis.
     pub alignment: &'a Alignment,
-    /// What the maps say.
+    /// What the maps say, as they are bent if they are.
     pub agreement: Agreement,
+    /// Where map b lies if it is bent; none if it is rigid.
+    pub bent: Option<BentPlace>,
+}
+
+impl<'a> Candidate<'a> {
+    /// A hypothesis with map b as it came.
+    pub(super) fn rigid(alignment: &'a Alignment, agreement: Agreement) -> Self {
+        Self { alignment, agreement, bent: None }
+    }
+
+    /// Where map b lies: `T_a_b`.
+    pub fn transform_a_b(&self) -> Pose2 {
+        self.bent.map_or_else(|| self.alignment.transform_a_b(), |bent| bent.transform_a_b)
+    }
 }
 
 /// The judgement on all hypotheses for a pair.
@@ -55,6 +70,9 @@ impl Verdict<'_> {
         match self.chosen {
             Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, which was asked for: {agree}")?,
             None => writeln!(text, "{agree} that both know")?,
+        }
+        if let Some(BentPlace { bend, .. }) = self.candidate.bent {
+            writeln!(text, "as the maps are bent by {bend:.2} m against each other")?;
         }
         write!(text, "\n{}", self.candidate.alignment.reason)?;
         if let Some(source) = self.found_too_by {

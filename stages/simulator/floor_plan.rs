@@ -268,6 +268,7 @@ fn corridor_door((left, right): (f64, f64), y: f64, random: &mut impl Rng) -> Do
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::PointIndex;
     use crate::simulator::free_space::FreeSpace;
     use proptest::prelude::*;
     use rand::SeedableRng;
@@ -331,8 +332,8 @@ mod tests {
             let space = FreeSpace::new(&plan.bounds, &plan.solids, &plan.corridors[0].centre());
             let places = space.places_in(&plan.bounds);
             let turned: Vec<Point2> = places.iter().map(|place| Point2::new(20.0 - place.x, 15.0 - place.y)).collect();
-            let near = |place: &Point2| turned.iter().any(|other| (other - place).norm() < 0.11);
-            let same = places.iter().filter(|place| near(place)).count();
+            let (turned, _) = PointIndex::new(&turned, 0.2);
+            let same = places.iter().filter(|place| turned.nearest(place, 0.11).is_some()).count();
             assert!(same as f64 > 0.98 * places.len() as f64, "{same} of {}", places.len());
         }
     }

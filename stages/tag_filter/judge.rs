@@ -4,7 +4,11 @@ use super::common::is_usable;
 use super::{Consensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
 use crate::geometry::RigidFit;
 use gridweave_runtime::ros::{CommonTag, TagEstimate};
+use nalgebra::Vector2;
 use std::collections::BTreeSet;
+
+/// Of tags that only agree as far as maps drift so many must: two that are about as far apart say next to nothing.
+const LEAST_BENT: usize = 3;
 
 /// Whether the tags that two robots have in common suffice for a merge, and why.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,14 +40,25 @@ pub struct RobotTags<'a> {
 /// Besides the paper's conditions on certainties, the tags that count must agree on one rigid transform; see the
 /// parameters for what makes an agreement strong enough.
 ///
+/// The maps of a SLAM drift. Where the places of the tags do not agree as they are, they are compared once more as uncertain
+/// as drift makes them, and that is how they are sent on.
+///
 /// Two tags always agree on some transform, up to their distance: it must be the same in both maps. That may be chance, as
 /// may be the agreement of three that lie near to each other. It suffices only where no other common tag contradicts it,
 /// and is provisional.
 pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> Judgement {
     let tags = common_tags(a.tags, b.tags, parameters.certainty);
-    let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| agreement(&tags, parameters));
+    let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| {
+        let rigid = agreement(&tags, parameters).map(|agreement| (tags.clone(), agreement));
+        rigid.or_else(|reason| {
+            let tags = of_bent_maps(&tags, parameters.map_drift);
+            let parameters =
+                TagFilterParameters { min_tags: parameters.min_tags.max(LEAST_BENT), ..parameters.clone() };
+            agreement(&tags, &parameters).map(|agreement| (tags, agreement)).map_err(|_| reason)
+        })
+    });
     match outcome {
-        Ok(Agreement { consensus, doubt }) => {
+        Ok((tags, Agreement { consensus, doubt })) => {
             let provisional = doubt.is_some();
             let reason = praise(&tags, &consensus) + &doubt.unwrap_or_default();
             let members = consensus.members.iter().filter_map(|&index| tags.get(index).cloned()).collect();
@@ -51,6 +66,26 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
         }
         Err(reason) => Judgement { tags, accepted: false, provisional: false, reason, fit: None },
     }
+}
+
+/// Tags whose places are as uncertain as those in maps that drift: the farther from the middle of all the more, by `drift`
+/// metres for the root of each metre.
+fn of_bent_maps(tags: &[CommonTag], drift: f64) -> Vec<CommonTag> {
+    let count = tags.len().max(1) as f64;
+    let middle = |place: fn(&CommonTag) -> [f64; 2]| {
+        tags.iter().fold(Vector2::zeros(), |sum, tag| sum + Vector2::from(place(tag)) / count)
+    };
+    let (middle_a, middle_b) = (middle(|tag| tag.a), middle(|tag| tag.b));
+    let drifted = |[xx, xy, yx, yy]: [f64; 4], from_middle: Vector2<f64>| {
+        let variance = drift * drift * from_middle.norm();
+        [xx + variance, xy, yx, yy + variance]
+    };
+    let tags = tags.iter().map(|tag| CommonTag {
+        covariance_a: drifted(tag.covariance_a, Vector2::from(tag.a) - middle_a),
+        covariance_b: drifted(tag.covariance_b, Vector2::from(tag.b) - middle_b),
+        ..tag.clone()
+    });
+    tags.collect()
 }
 
 /// The paper's conditions: how many tags there are, and how certain they are.
@@ -256,6 +291,30 @@ mod tests {
         assert!(judgement.accepted);
         assert_eq!(judgement.reason, "5 of 6 tags in common agree within 0.000 m; left out: tag2 (off by 1.46 m)");
         assert!(judgement.tags.iter().all(|tag| tag.tag_id != "tag2"));
+    }
+
+    /// As a map shows places whose west lies too far south and whose east too far north.
+    fn bent(most: f64) -> Vec<TagEstimate> {
+        let wide = SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y));
+        let mut tags = tags(&pose(-4.0, 0.0, 1.0), &wide);
+        for (tag, (x, _)) in tags.iter_mut().zip(wide) {
+            tag.y += most * (x / 12.0).sin();
+            tag.x += most * (x / 9.0).cos();
+        }
+        tags
+    }
+
+    #[test]
+    fn tags_in_bent_maps_agree_as_far_as_maps_drift() {
+        let a = tags(&pose(1.0, 2.0, 3.0), &SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y)));
+        let judgement = judged(&a, &bent(0.4));
+        assert!(judgement.accepted && judgement.tags.len() >= 5, "{judgement:?}");
+        let far = judgement.tags.iter().map(|tag| tag.covariance_b[0]).fold(0.0, f64::max);
+        assert!(far > 0.03, "what is far from the middle is known less well: {far}");
+        refused(&a, &bent(3.0), "the same ids");
+        let rigid = TagFilterParameters { map_drift: 0.0, ..Default::default() };
+        let robot = |robot, tags| RobotTags { robot, tags };
+        assert!(!judge(robot("robot1", &a), robot("robot2", &bent(0.4)), &rigid).accepted);
     }
 
     #[test]

@@ -20,6 +20,9 @@ pub struct TagFilterParameters {
     /// Standard deviation of a tag's place that comes from the bends of the maps, metres; it is added to that of the
     /// readings.
     pub map_stddev: f64,
+    /// How maps drift, metres for the root of each metre: where tags do not agree, they are compared once more with a
+    /// standard deviation that grows so from the middle of all. 0 does not.
+    pub map_drift: f64,
     /// More than this share of the common tags must agree.
     pub min_agreement: f64,
     /// What the tags say is provisional when tags at random places would agree as well with more than this probability;
@@ -49,6 +52,7 @@ impl Default for TagFilterParameters {
             min_tags: 2,
             gate: 3.5,
             map_stddev: 0.05,
+            map_drift: 0.05,
             min_agreement: 0.5,
             max_chance: 1e-3,
             max_provisional_chance: 0.3,
@@ -79,6 +83,7 @@ impl Parameters for TagFilterParameters {
         expect(self.min_tags >= 2, "min_tags", "must be 2 or more: one tag does not tell a rotation");
         expect(positive(self.gate), "gate", "must be above 0");
         expect(positive(self.map_stddev), "map_stddev", "must be above 0 m");
+        expect(self.map_drift >= 0.0 && self.map_drift.is_finite(), "map_drift", "must not be below 0 m");
         expect(share(self.min_agreement), "min_agreement", "must lie between 0 and 1");
         expect(self.max_chance > 0.0 && self.max_chance <= 1.0, "max_chance", "must be above 0, and at most 1");
         expect(
@@ -111,6 +116,7 @@ mod tests {
             min_tags: 1,
             gate: 0.0,
             map_stddev: f64::NAN,
+            map_drift: -0.1,
             min_agreement: -0.1,
             max_chance: 0.0,
             max_provisional_chance: 1.5,
@@ -119,6 +125,6 @@ mod tests {
             rival_distance: -1.0,
             min_change: f64::NAN,
         };
-        assert_eq!(wrong.check().len(), 12);
+        assert_eq!(wrong.check().len(), 13);
     }
 }

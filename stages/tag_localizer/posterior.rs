@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_spot_narrower_than_a_cell_is_resolved() {
-        let circle: Vec<_> = (0..900).map(|step| (0.4 + f64::from(step).cos(), -0.2 + f64::from(step).sin())).collect();
+        let circle: Vec<_> = (0..300).map(|step| (0.4 + f64::from(step).cos(), -0.2 + f64::from(step).sin())).collect();
         let tag = Point2::new(0.513, -0.291);
         let posterior = assert_equals_plain(&product(tag, &circle, &[0.05, -0.05], 0.0), GRID);
         assert!(posterior.leaf_size <= 0.005);

@@ -1,6 +1,6 @@
 //! Floor plans for tests, and maps of them as robots would draw them.
 
-use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN};
+use crate::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN};
 use crate::icp_refiner::FirstGuess;
 use crate::merge_verifier::MapView;
 use crate::walls::{NORMAL_RADIUS, WallMap};
@@ -123,7 +123,7 @@ impl FloorPlan {
         let mut cells = Vec::with_capacity(geometry.cell_count());
         for row in 0..geometry.height {
             for column in 0..geometry.width {
-                let point = transform_world_map * geometry.centre(crate::geometry::Cell { column, row });
+                let point = transform_world_map * geometry.centre(Cell { column, row });
                 let inside = (low.x..high.x).contains(&point.x) && (low.y..high.y).contains(&point.y);
                 cells.push(if inside { self.value(&point) } else { UNKNOWN });
             }
@@ -161,13 +161,31 @@ impl DrawnMap {
     }
 
     pub(crate) fn view(&self) -> MapView<'_> {
-        MapView { grid: Grid::new(self.geometry, &self.cells).unwrap(), walls: &self.walls }
+        MapView::rigid(Grid::new(self.geometry, &self.cells).unwrap(), &self.walls)
+    }
+
+    /// The map of a robot that errs: what this one shows at a place shows there displaced by [`bend_at`].
+    pub(crate) fn bent(&self, most: f64) -> Self {
+        let grid = Grid::new(self.geometry, &self.cells).unwrap();
+        let cells = (0..self.cells.len()).map(|index| {
+            let cell = Cell { column: index % self.geometry.width, row: index / self.geometry.width };
+            let shown = self.geometry.centre(cell);
+            grid.value_at(&(0..5).fold(shown, |place, _| shown - bend_at(most, &place)))
+        });
+        let cells: Vec<i8> = cells.collect();
+        let walls = WallMap::new(&Grid::new(self.geometry, &cells).unwrap(), NORMAL_RADIUS);
+        Self { cells, walls, ..*self }
     }
 
     /// `T_self_other`, as it was drawn.
     pub(crate) fn transform_to(&self, other: &Self) -> Pose2 {
         self.transform_world_map.inverse() * other.transform_world_map
     }
+}
+
+/// How a bent map displaces a place: by up to `most` metres along x and along y, in waves that are longer than a building.
+pub(crate) fn bend_at(most: f64, place: &Point2) -> Vector2<f64> {
+    most * Vector2::new((place.y / 7.0).sin(), (place.x / 13.0).sin())
 }
 
 pub(crate) fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {

@@ -1,6 +1,7 @@
 //! What registration and verification need of one map, made once for each map.
 
 use super::wall_line::{CellRows, LineFit, Window};
+use crate::deformation::Deformation;
 use crate::geometry::{Cell, Grid, Point2, PointIndex, is_free, is_known, is_occupied};
 use nalgebra::Vector2;
 
@@ -49,6 +50,16 @@ impl WallMap {
         let normals = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
         let (samples, sample_area) = known_samples(grid);
         Self { walls, normals, spacing: resolution, samples, sample_area }
+    }
+
+    /// The same walls and samples where a bend puts them. Bends turn so little that the normals stay.
+    #[must_use]
+    pub fn bent(&self, bend: &Deformation) -> Self {
+        let moved: Vec<Point2> = self.walls.points().iter().map(|point| bend.apply(point)).collect();
+        let (walls, order) = PointIndex::new(&moved, BUCKET_SIDE);
+        let normals = order.iter().map(|&i| self.normals[i]).collect();
+        let samples = self.samples.iter().map(|sample| KnownSample { point: bend.apply(&sample.point), ..*sample });
+        Self { walls, normals, samples: samples.collect(), ..*self }
     }
 }
 

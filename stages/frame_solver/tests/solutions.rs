@@ -124,12 +124,12 @@ fn an_alignment_in_no_cycle_is_not_checked() {
 
 #[test]
 fn robots_are_placed_right_in_spite_of_wrong_alignments() {
-    let team = Team::new(16, 6, 7).with_mistakes(0.1);
+    let team = Team::new(10, 5, 7).with_mistakes(0.1);
     let mut run = Run::new(None);
     (0..team.edges.len()).for_each(|index| run.align(&team.alignment(index)));
     let placed: Vec<(usize, Pose2)> =
-        (1..16).filter_map(|robot| Some((robot, run.pose_of(&Team::name(robot))?))).collect();
-    assert!(placed.len() >= 14, "{}", placed.len());
+        (1..10).filter_map(|robot| Some((robot, run.pose_of(&Team::name(robot))?))).collect();
+    assert!(placed.len() >= 8, "{}", placed.len());
     assert!(placed.iter().all(|(robot, pose)| !team.is_wrong(*robot, pose)));
 }
 

@@ -112,7 +112,7 @@ impl Aligner {
             let guess = icp_refiner::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
             let transform_a_b = refine(&a, &b, &guess, parameters).registration.transform_a_b;
             if let Some(parameters) = &self.verifier {
-                let (a, b) = (MapView { grid: maps.a, walls: &a }, MapView { grid: maps.b, walls: &b });
+                let (a, b) = (MapView::rigid(maps.a, &a), MapView::rigid(maps.b, &b));
                 std::hint::black_box(compare(&a, &b, &transform_a_b, parameters));
             }
             transform_a_b
