@@ -2,6 +2,7 @@
 
 use super::bending::BentPlace;
 use super::refusal::{Hypotheses, Hypothesis};
+use super::score::AGREEMENT_OF_HALVES_IF_BENT;
 use super::verdict::{Candidate, Verdict};
 use super::{
     Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
@@ -13,6 +14,9 @@ use gridweave_runtime::ros::Alignment;
 const LEAST_EVIDENCE: f64 = 1.0;
 /// Another place is like one if the share of the walls that agree is less by this at the most.
 const LIKENESS_MARGIN: f64 = 0.15;
+
+/// The share of the walls that agree at which nothing speaks against a place.
+const CLEAR_AGREEMENT: f64 = 0.9;
 
 /// What the user knows of a pair of robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,7 +60,7 @@ pub fn judge<'a>(
     }
     let is_expected = known.window.is_some();
     if let Some(asked) = known.hypothesis {
-        let judge_one = |candidate: &Candidate<'a>| judge_one(a, b, candidate, &all, is_expected, parameters);
+        let judge_one = |candidate: &Candidate<'a>| judge_one(a, b, candidate, &all, is_expected, false, parameters);
         let count = all.len();
         let chosen = asked.checked_sub(1).and_then(|index| all.get(index));
         return match chosen {
@@ -67,31 +71,29 @@ pub fn judge<'a>(
             }
         };
     }
-    let rigid = best_of(a, b, &all, is_expected, parameters)?;
+    let rigid = best_of(a, b, &all, is_expected, false, parameters)?;
     if rigid.refusal.is_none() || parameters.bend <= 0.0 {
         return Some(rigid);
     }
     // Maps that contradict each other may do so because they are bent, and several places may be one if they are.
     let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, parameters)).collect();
-    let as_bent = if bent.iter().any(|candidate| candidate.bent.is_some()) {
-        best_of(a, b, &bent, is_expected, parameters).filter(|verdict| verdict.refusal.is_none())
-    } else {
-        None
-    };
-    as_bent.or(Some(rigid))
+    let as_bent = best_of(a, b, &bent, is_expected, true, parameters);
+    as_bent.filter(|verdict| verdict.refusal.is_none()).or(Some(rigid))
 }
 
-/// The first hypothesis that is accepted; if none is, the most probable.
+/// The first hypothesis that is accepted; if none is, the most probable. `may_be_bent` tells that all were bent as far as that
+/// makes them better.
 fn best_of<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
     all: &[Candidate<'a>],
     is_expected: bool,
+    may_be_bent: bool,
     parameters: &MergeVerifierParameters,
 ) -> Option<Verdict<'a>> {
     let mut best: Option<Verdict<'a>> = None;
     for candidate in all {
-        let verdict = judge_one(a, b, candidate, all, is_expected, parameters);
+        let verdict = judge_one(a, b, candidate, all, is_expected, may_be_bent, parameters);
         if verdict.refusal.is_none() {
             return Some(verdict);
         }
@@ -148,6 +150,7 @@ fn judge_one<'a>(
     candidate: &Candidate<'a>,
     all: &[Candidate<'a>],
     is_expected: bool,
+    may_be_bent: bool,
     parameters: &MergeVerifierParameters,
 ) -> Verdict<'a> {
     let Candidate { alignment, agreement, bent } = candidate;
@@ -161,7 +164,14 @@ fn judge_one<'a>(
         .find(|other| rival_of(other).is_none())
         .map(|other| other.alignment.source.as_str());
     let by_evidence = |one: &Rival, other: &Rival| one.agreement.evidence.total_cmp(&other.agreement.evidence);
-    let another = all.iter().filter_map(|other| Some((other, rival_of(other)?)));
+    // Where a bend is no excuse, the maps cannot lie at a place at which they contradict each other, however much of them meets
+    // there, if there is one at which they do not.
+    let is_refuted = |other: &Candidate<'_>| {
+        may_be_bent
+            && agreement.wall_agreement() >= CLEAR_AGREEMENT
+            && other.agreement.wall_agreement() < AGREEMENT_OF_HALVES_IF_BENT
+    };
+    let another = all.iter().filter(|other| !is_refuted(other)).filter_map(|other| Some((other, rival_of(other)?)));
     let another = another.max_by(|(_, one), (_, other)| by_evidence(one, other));
     let is_told = !alignment.provisional || found_too_by.is_some() || is_expected;
     let mut rival = another.map(|(_, rival)| rival);

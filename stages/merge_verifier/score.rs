@@ -40,7 +40,7 @@ const BY_SHARE: f64 = 35.0;
 const AGREEMENT_OF_HALVES: f64 = 0.5;
 /// The same where one map is bent onto the other: what was only bent agrees in nearly all then, and unrelated maps agree in
 /// little more than before.
-const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
+pub(super) const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
 /// The same where the user knows the place: it is one building, and what contradicts is a bend, or was moved.
 const AGREEMENT_OF_HALVES_WHERE_EXPECTED: f64 = 0.4;
 /// The same where the maps share the area of one room.
