@@ -10,8 +10,10 @@ use std::collections::BTreeMap;
 
 /// Points of the walls of a map that are looked up in another, at most.
 const MOST_POINTS: usize = 12_000;
-/// Metres of wall between two points that are looked up, at the least.
+/// Metres of wall between two points that are looked up, at the least; and as a share of the reach, as what is looked for far away
+/// need not be known to a hand's breadth. Both are below the length of wall that counts as one measurement.
 const LEAST_SPACING: f64 = 0.25;
+const SPACING_BY_REACH: f64 = 0.25;
 
 /// The nodes of one contact: four of each map.
 const NODES: usize = 8;
@@ -49,7 +51,8 @@ impl Bent<'_> {
 /// nothing beyond.
 pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
     let points = b.body.walls.walls.points();
-    let every = stride(points.len(), MOST_POINTS).max((LEAST_SPACING / b.body.walls.spacing).round() as usize);
+    let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
+    let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
     let length = every as f64 * b.body.walls.spacing;
     // Both maps are looked up in each other, and say the same.
     let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);

@@ -58,6 +58,24 @@ pub(super) fn angular_office() -> FloorPlan {
     ])
 }
 
+/// A building of 70 x 22 m: rooms of all widths on both sides of a corridor.
+fn long_building() -> FloorPlan {
+    let mut walls =
+        vec![[0.0, 0.0, 70.0, 0.0], [70.0, 0.0, 70.0, 22.0], [70.0, 22.0, 0.0, 22.0], [0.0, 22.0, 0.0, 0.0]];
+    for (side, (corridor, outside)) in [(9.0, 0.0), (11.5, 22.0)].into_iter().enumerate() {
+        let mut x = 0.0;
+        for number in 0..40 {
+            // Between 2.5 and 7.5 m, in no order that comes again.
+            let width = 2.5 + f64::from((number * 37 + side as i32 * 23) % 51) / 10.0;
+            let end = f64::min(x + width, 70.0);
+            walls.push([x + 1.0, corridor, end, corridor]);
+            walls.push([end, corridor, end, outside]);
+            x = end;
+        }
+    }
+    FloorPlan::new(&walls)
+}
+
 fn all() -> crate::test_world::floor_plan::Seen {
     seen(-0.2, -0.2, 20.2, 12.2)
 }
@@ -66,6 +84,21 @@ fn all() -> crate::test_world::floor_plan::Seen {
 fn filled(width: usize, height: usize, value: i8) -> (GridGeometry, Vec<i8>) {
     let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(1.0, 2.0, 0.3) };
     (geometry, vec![value; width * height])
+}
+
+#[test]
+fn long_maps_that_are_bent_are_found() {
+    let plan = long_building();
+    let whole = seen(-0.2, -0.2, 70.2, 22.2);
+    // Turned by half a step of the search in narrow cells.
+    for (most, yaw) in [(0.0, 0.0175), (0.7, 0.0175), (0.7, 1.0)] {
+        let drawn = Drawing { resolution: 0.1, ..drawing(0.0, 0.0, 0.0) };
+        let a = plan.draw(whole, drawn);
+        let b = plan.draw(whole, Drawing { transform_world_map: pose(5.0, 3.0, yaw), ..drawn }).bent(most);
+        let found = align(&a, &b).unwrap();
+        let (metres, radians) = apart(&found.transform_a_b, &a.transform_to(&b), &b);
+        assert!(metres < 1.5 && radians < 0.06, "bent by {most}: {metres} m, {radians} rad: {found:?}");
+    }
 }
 
 #[test]

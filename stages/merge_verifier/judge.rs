@@ -104,17 +104,18 @@ fn best_of<'a>(
     best
 }
 
-/// A hypothesis with map b bent, if that lays more wall on wall; only where more speaks for it than against it, as it
-/// takes long.
+/// A hypothesis with map b bent, if that lays more wall on wall. As it takes long, only where more speaks for the hypothesis than
+/// against it, and where something does speak against it.
 fn bent<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
     rigid: &Candidate<'a>,
     parameters: &MergeVerifierParameters,
 ) -> Candidate<'a> {
-    let is_worth_it = rigid.alignment.accepted && rigid.agreement.evidence > 0.0;
+    let Agreement { evidence, .. } = rigid.agreement;
+    let is_worth_it = rigid.alignment.accepted && evidence > 0.0 && rigid.agreement.wall_agreement() < CLEAR_AGREEMENT;
     let bent = is_worth_it.then(|| BentPlace::new(a, b, &rigid.alignment.transform_a_b(), parameters)).flatten();
-    match bent.filter(|bent| bent.agreement.evidence - bent.cost > rigid.agreement.evidence) {
+    match bent.filter(|bent| bent.agreement.evidence - bent.cost > evidence) {
         Some(place) => Candidate { agreement: place.agreement, bent: Some(place), ..*rigid },
         None => *rigid,
     }

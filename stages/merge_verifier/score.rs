@@ -11,7 +11,10 @@
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, and where the maps share no more
 //!   than a room, nearly all: rooms of other buildings have the same corners and sizes, while a map is right in every room,
-//!   however it is bent as a whole. Tags have not looked at walls, and ask for more of them.
+//!   however it is bent as a whole. Where one map was bent onto the other they must agree in more: a bend lays what is of one
+//!   place on each other, and changes little elsewhere. Tags have not looked at walls, and ask for more of them.
+//!
+//! How unlikely a bend is counts against chance like evidence: bends and walls are measured in the same units.
 //!
 //! The form is that of a logistic model. Its weights were chosen on pairs of published maps, of recorded logs and of unrelated
 //! buildings, which `tests/experiments/README.md` names; on other maps they have not been judged. What comes out orders

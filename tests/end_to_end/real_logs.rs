@@ -1,27 +1,25 @@
-//! The maps of real logs are merged rightly, or not at all.
+//! The maps of real logs are merged rightly, or not at all, and alike on every engine.
 //!
 //! The logs and their truth lie in the folder that `GRIDWEAVE_LOGS` names: `NAME.mcap`, and `NAME.truth.json` where
 //! the robots' maps can be merged.
 
+use crate::engines_agree::{FAR_APART, assert_same_output};
 use crate::support::{gridweave, logs_in, real_logs};
 use serde_json::Value;
 use tempfile::TempDir;
 
 #[test]
 #[ignore = "needs GRIDWEAVE_LOGS: the folder of real logs"]
-fn every_pair_with_a_truth_is_right_and_no_other_is_merged() {
+fn every_pair_with_a_truth_is_right_on_every_engine_and_no_other_is_merged() {
     let logs = real_logs();
     let folder = TempDir::new().unwrap();
     let mut errors = Vec::new();
     for log in logs_in(&logs) {
         let name = log.file_stem().unwrap().to_str().unwrap();
-        let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--summary", "summary.json"];
-        let ended = gridweave(folder.path(), &args);
+        let (ended, summary) = assert_same_output(folder.path(), &log, &FAR_APART);
         let truth = log.with_extension("truth.json");
         if !truth.exists() {
             ended.assert(3, &["not merged"]);
-            let summary = std::fs::read(folder.path().join("summary.json")).unwrap();
-            let summary: Value = serde_json::from_slice(&summary).unwrap();
             let reason = summary["unmerged"]["robot2"].as_str().unwrap();
             println!("{name}: not merged: {reason}");
             assert_eq!(summary["frames"].as_object().unwrap().len(), 1);

@@ -41,6 +41,14 @@ pub(super) fn cases() -> Vec<Case> {
             log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
             propose(log, 3.0, &by_tags(&truth()));
         }),
+        case("stretched_map", |log| {
+            // The second robot takes each metre for 1.06 m.
+            let mut map = FloorPlan::office().draw(&left());
+            log.map(1.0, "robot1", &map);
+            map.info.resolution *= 1.06;
+            log.map(2.0, "robot2", &map);
+            by_maps(log, 3.0, &[pose(0.0, 0.0, 0.0), pose(-0.3, -0.3, 0.0)]);
+        }),
         case("mirrored", |log| {
             let mut mirrored = FloorPlan::office();
             mirrored.walls.iter_mut().for_each(|wall| (wall[1], wall[3]) = (10.0 - wall[1], 10.0 - wall[3]));

@@ -22,6 +22,11 @@ pub(super) fn cases() -> Vec<Case> {
             moved[2].x += 1.46;
             robots(log, &tags(&PLACES), &moved);
         }),
+        case("stretched_map", |log| {
+            // The second robot takes each metre for 1.03 m.
+            let wide = |by: f64| tags(&PLACES.map(|(x, y)| (3.0 * by * x, 3.0 * by * y)));
+            robots(log, &wide(1.0), &wide(1.03));
+        }),
         case("two_buildings", |log| {
             let elsewhere = [(3.0, 1.0), (-6.0, 2.0), (0.5, -7.0), (8.0, 8.0), (-1.0, 4.0), (2.0, -3.0)];
             robots(log, &tags(&PLACES), &tags(&elsewhere));
