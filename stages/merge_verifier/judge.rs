@@ -72,8 +72,12 @@ pub fn judge<'a>(
         };
     }
     let rigid = best_of(a, b, &all, is_expected, false, parameters)?;
-    if rigid.refusal.is_none() || parameters.bend <= 0.0 {
+    if parameters.bend <= 0.0 {
         return Some(rigid);
+    }
+    if rigid.refusal.is_none() {
+        // The frame that is nearest to all of a bent map, and not to the part of it that registration has come to.
+        return Some(Verdict { candidate: bent(a, b, &rigid.candidate, parameters), ..rigid });
     }
     // Maps that contradict each other may do so because they are bent, and several places may be one if they are.
     let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, parameters)).collect();
