@@ -43,7 +43,9 @@ impl Peaks {
         let step = 2.0 * parameters.rotation_step;
         let half_turns = (PI / step - 1e-9).ceil() as usize;
         let first = first_level(a, b, step);
-        let candidates: Vec<(usize, (Pose2, Point2))> = (first..first + SCALES)
+        // In a window all places are looked at closely, and wide cells find no others.
+        let scales = if window.is_some() { 1 } else { SCALES };
+        let candidates: Vec<(usize, (Pose2, Point2))> = (first..first + scales)
             .flat_map(|level| {
                 let (coarse_a, coarse_b) = (a.level(level), b.level(level));
                 let places = search(coarse_a, coarse_b, window, half_turns, penalty, parameters.apart, PLACES);
@@ -101,7 +103,7 @@ fn first_level(a: &PreparedMap, b: &PreparedMap, step: f64) -> usize {
     };
     let radius = radius(a).min(radius(b));
     let is_fine = |level: &usize| 0.5 * step * radius <= 2.0 * a.level(*level).cell;
-    (least..least + SCALES).find(is_fine).unwrap_or(least)
+    (least..).take(SCALES).find(is_fine).unwrap_or(least + SCALES - 1)
 }
 
 /// The first of some places within `metres` and `radians`, each with the middle of its walls in common.

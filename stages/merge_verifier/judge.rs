@@ -200,6 +200,7 @@ fn judge_one<'a>(
         overlap: agreement.overlap,
         bend_cost: bent.map(|bent| bent.cost),
         evidence_elsewhere,
+        agreement_elsewhere: rival.map_or(0.0, |rival| rival.agreement.wall_agreement()),
     });
     let score = odds.probability();
     let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {

@@ -38,6 +38,10 @@ const LIKE_SHARE: f64 = 0.7;
 const LIKE_SHARE_BESIDE_TAGS: f64 = 1.3;
 /// Per unit of that share.
 const BY_SHARE: f64 = 35.0;
+/// At the most, where the rival agrees in a smaller share of its walls than this place, and by how much smaller it begins to
+/// count and counts most: what contradicts itself more is less like.
+const BY_WORSE_AGREEMENT: f64 = 5.0;
+const WORSE_AGREEMENT: (f64, f64) = (0.1, 0.25);
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
@@ -101,6 +105,8 @@ pub struct Grounds {
     pub bend_cost: Option<f64>,
     /// The most evidence at another place, as a share of that here.
     pub evidence_elsewhere: f64,
+    /// The share of the walls that agree there, 0 to 1.
+    pub agreement_elsewhere: f64,
 }
 
 /// The odds, as logarithms, that an alignment is not wrong in one way each.
@@ -126,10 +132,13 @@ impl Odds {
             overlap,
             bend_cost,
             evidence_elsewhere,
+            agreement_elsewhere,
         } = *grounds;
         // Tags, and another source, tell a place from those that are like it.
         let is_told = origin == Origin::Tags || found_too;
         let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
+        let (from, most) = WORSE_AGREEMENT;
+        let worse = (wall_agreement - agreement_elsewhere - from) / (most - from);
         let halves = match origin {
             Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
             Origin::Search { .. } => {
@@ -143,7 +152,7 @@ impl Odds {
             chance: PRIOR
                 + BY_EVIDENCE * (evidence - bend_cost.unwrap_or_default())
                 + BY_LEAD * origin.lead(found_too || is_expected),
-            likeness: BY_SHARE * (like - evidence_elsewhere),
+            likeness: BY_SHARE * (like - evidence_elsewhere) + BY_WORSE_AGREEMENT * worse.clamp(0.0, 1.0),
             part: BY_AGREEMENT * (wall_agreement - halves),
         }
     }
@@ -168,6 +177,7 @@ mod tests {
         overlap: 200.0,
         bend_cost: None,
         evidence_elsewhere: 0.0,
+        agreement_elsewhere: 0.9,
     };
 
     fn probability(evidence: f64, evidence_elsewhere: f64, origin: Origin) -> f64 {
@@ -223,6 +233,19 @@ mod tests {
         };
         assert!(with(0.6, None) > 0.999 && with(0.6, Some(0.0)) < 0.01);
         assert!(with(0.8, Some(10.0)) > 0.999 && with(0.8, Some(80.0)) < 0.99);
+    }
+
+    #[test]
+    fn a_place_that_contradicts_itself_more_is_less_like() {
+        let with = |evidence_elsewhere: f64, agreement_elsewhere: f64| {
+            let origin = Origin::Search { lead: 8.0 };
+            let wall_agreement = 1.0;
+            let grounds =
+                Grounds { origin, wall_agreement, evidence_elsewhere, agreement_elsewhere, evidence: 80.0, ..GROUNDS };
+            Odds::new(&grounds).probability()
+        };
+        assert!(with(0.6, 0.95) < 0.99 && with(0.6, 0.75) > 0.999);
+        assert!(with(0.75, 0.5) < 0.99, "but there is as much that speaks for it");
     }
 
     #[test]

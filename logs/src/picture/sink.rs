@@ -24,8 +24,8 @@ impl Parameters for PictureParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "picture_sink",
-        "Draws the robots' last maps where they lie, each robot's walls in a colour of its own, or the merged map where there \
-         are none, at the end of the run. Writes nothing if no map has come.",
+        "Draws the robots' last maps where their frames lie, each robot's walls in a colour of its own, or the merged map where \
+         there are none, at the end of the run. Bends are not drawn, but in the merged map. Writes nothing if no map has come.",
         PictureSink::new,
     )
     .inputs("map", "the robots' maps, and the merged one, which is about no robot", PictureSink::map)
