@@ -66,7 +66,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         deformation,
         wall_matched,
     };
-    let is_finite = bends.iter().all(|bend| bend.largest_move().is_finite());
+    let is_finite = bends.iter().flat_map(|bend| &bend.moves).all(|by| by.iter().all(|value| value.is_finite()));
     is_finite.then(|| bends.into_iter().zip(matched).map(bend).collect())
 }
 

@@ -9,8 +9,7 @@ use crate::place_window::PlaceWindow;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Maps that are longer, in cells of the search, are searched in wider ones. In cells of more than about 0.8 m the walls
-/// of rooms can no longer be told apart.
+/// Maps that are longer, in cells of the search, are searched in wider ones.
 const MOST_CELLS: usize = 320;
 /// Maps are searched in cells of so many sizes, each twice as wide as the one before: the narrow ones for small maps, of which
 /// little is in common, and the wide ones for those that are bent.
@@ -43,7 +42,7 @@ impl Peaks {
         let step = 2.0 * parameters.rotation_step;
         let half_turns = (PI / step - 1e-9).ceil() as usize;
         let first = first_level(a, b, step);
-        // In a window all places are looked at closely, and wide cells find no others.
+        // A window holds few places, and narrow cells come by the right one.
         let scales = if window.is_some() { 1 } else { SCALES };
         let candidates: Vec<(usize, (Pose2, Point2))> = (first..first + scales)
             .flat_map(|level| {
@@ -94,7 +93,7 @@ impl Peaks {
 
 /// The first level in whose cells two maps are searched. Its cells are so wide that maps that are turned by half a step lie
 /// less than one of its cells, which are twice as wide in the search, beside their place at the ends of the shorter of them:
-/// in narrower cells, the right place of large maps lies between two rotations.
+/// in narrower cells, the right place of large maps lies between two rotations. It is not wider than maps are searched in anyway.
 fn first_level(a: &PreparedMap, b: &PreparedMap, step: f64) -> usize {
     let least = a.level_of_size(2 * MOST_CELLS).max(b.level_of_size(2 * MOST_CELLS)).max(JUDGED);
     let radius = |map: &PreparedMap| {

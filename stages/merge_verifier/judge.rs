@@ -14,7 +14,6 @@ use gridweave_runtime::ros::Alignment;
 const LEAST_EVIDENCE: f64 = 1.0;
 /// Another place is like one if the share of the walls that agree is less by this at the most.
 const LIKENESS_MARGIN: f64 = 0.15;
-
 /// The share of the walls that agree at which nothing speaks against a place.
 const CLEAR_AGREEMENT: f64 = 0.9;
 
