@@ -58,13 +58,17 @@ impl Parameters for MergeVerifierParameters {
             ("region", self.region, 0.1, 100.0),
             ("slide_deviation", self.slide_deviation, 1e-3, 10.0),
             ("rival_reach", self.rival_reach, 0.0, 100.0),
-            ("bend", self.bend, 0.0, 10.0),
             ("turn", self.turn, 1e-6, 1.0),
         ];
         for (field, value, least, most) in ranges {
             if !(least..=most).contains(&value) {
                 errors.push(ParameterError::new(field, format!("must lie between {least} and {most}, not {value}")));
             }
+        }
+        // Between them, squares of their inverses are no numbers.
+        if self.bend != 0.0 && !(1e-6..=10.0).contains(&self.bend) {
+            errors
+                .push(ParameterError::new("bend", format!("must be 0 or lie between 1e-6 and 10, not {}", self.bend)));
         }
         errors
     }

@@ -1,10 +1,10 @@
 //! Whether the tags that two robots have in common suffice for a merge.
 
 use super::common::is_usable;
+use super::drift::of_bent_maps;
 use super::{Consensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
 use crate::geometry::RigidFit;
 use gridweave_runtime::ros::{CommonTag, TagEstimate};
-use nalgebra::Vector2;
 use std::collections::BTreeSet;
 
 /// Of tags that only agree as far as maps drift so many must: two that are about as far apart say next to nothing.
@@ -66,26 +66,6 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
         }
         Err(reason) => Judgement { tags, accepted: false, provisional: false, reason, fit: None },
     }
-}
-
-/// Tags whose places are as uncertain as those in maps that drift: the farther from the middle of all the more, by `drift`
-/// metres for the root of each metre.
-fn of_bent_maps(tags: &[CommonTag], drift: f64) -> Vec<CommonTag> {
-    let count = tags.len().max(1) as f64;
-    let middle = |place: fn(&CommonTag) -> [f64; 2]| {
-        tags.iter().fold(Vector2::zeros(), |sum, tag| sum + Vector2::from(place(tag)) / count)
-    };
-    let (middle_a, middle_b) = (middle(|tag| tag.a), middle(|tag| tag.b));
-    let drifted = |[xx, xy, yx, yy]: [f64; 4], from_middle: Vector2<f64>| {
-        let variance = drift * drift * from_middle.norm();
-        [xx + variance, xy, yx, yy + variance]
-    };
-    let tags = tags.iter().map(|tag| CommonTag {
-        covariance_a: drifted(tag.covariance_a, Vector2::from(tag.a) - middle_a),
-        covariance_b: drifted(tag.covariance_b, Vector2::from(tag.b) - middle_b),
-        ..tag.clone()
-    });
-    tags.collect()
 }
 
 /// The paper's conditions: how many tags there are, and how certain they are.

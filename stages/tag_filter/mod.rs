@@ -13,6 +13,7 @@
 mod chance;
 mod common;
 mod consensus;
+mod drift;
 mod judge;
 mod parameters;
 mod stage;
