@@ -293,9 +293,11 @@ fn the_defaults_are_in_range_and_nonsense_is_not() {
         region: f64::NAN,
         slide_deviation: -1.0,
         rival_reach: 1e9,
+        bend: 1e-200,
+        turn: 0.0,
         ..MergeVerifierParameters::default()
     };
-    assert_eq!(nonsense.check().len(), 5);
+    assert_eq!(nonsense.check().len(), 7);
 }
 
 /// The nearly symmetric building, twice, and a place in each of its halves.
