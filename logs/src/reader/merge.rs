@@ -6,7 +6,7 @@ use super::damage::Damage;
 use super::file::LogFile;
 use gridweave_runtime::message::LogTime;
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::collections::binary_heap::PeekMut;
 use std::sync::Arc;
 
@@ -39,6 +39,9 @@ pub struct LogReader {
     given: bool,
     last_time: u64,
     damage: Vec<(usize, Damage)>,
+    /// The files that were changed while they were read. Blocks that were loaded ahead of the change do not make up for
+    /// those that were not.
+    changed: BTreeSet<usize>,
     bytes_taken: u64,
     bytes_total: u64,
 }
@@ -91,6 +94,7 @@ impl LogReader {
             given: false,
             last_time: 0,
             damage: Vec::new(),
+            changed: BTreeSet::new(),
             bytes_taken: 0,
             bytes_total,
         }
@@ -147,15 +151,15 @@ impl LogReader {
         {
             self.bytes_taken = self.bytes_taken.saturating_add(size);
             match load {
+                _ if self.changed.contains(&id.file) => {}
                 Ok(block) => {
                     if let Some(time) = block.time(0) {
                         self.active.push(Reverse(Active { time, id, index: 0, block }));
                     }
                 }
                 Err(_) if self.files.get(id.file).is_some_and(|file| file.bytes.is_cut()) => {
-                    if !self.damage.contains(&(id.file, Damage::Changed)) {
-                        self.damage.push((id.file, Damage::Changed));
-                    }
+                    self.changed.insert(id.file);
+                    self.damage.push((id.file, Damage::Changed));
                 }
                 Err(fault) => self.damage.push((id.file, Damage::BadChunk { fault })),
             }

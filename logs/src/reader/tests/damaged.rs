@@ -212,6 +212,33 @@ fn a_file_that_is_cut_while_it_is_read_says_so_at_whatever_place() {
     }
 }
 
+#[test]
+fn nothing_comes_from_behind_the_place_where_a_file_was_changed() {
+    let [cut, whole] = ["/a", "/b"].map(|topic| {
+        let mut log = TestLog::new(layouts()[0].clone());
+        for time in 0..40 {
+            log.raw(topic, "p/msg/A", time, &noise(time, 1 << 20)).flush();
+        }
+        log.finish()
+    });
+    let folder = Folder::new();
+    let paths = [folder.write("cut.mcap", &cut), folder.write("whole.mcap", &whole)];
+    let mut reader = open(&paths).unwrap();
+    std::fs::write(&paths[0], b"").unwrap();
+    let mut seen = [0, 0];
+    while let Some(message) = reader.next_message() {
+        let file = message.file;
+        seen[file] += 1;
+        if reader.take_damage() == [(0, Damage::Changed)] {
+            assert_eq!(file, 1);
+            std::fs::write(&paths[0], &cut).unwrap();
+            seen[0] = 100;
+        }
+    }
+    assert_eq!(seen, [100, 40]);
+    assert!(reader.take_damage().is_empty());
+}
+
 /// Bytes that nothing packs.
 fn noise(seed: u64, count: usize) -> Vec<u8> {
     let next =
