@@ -200,6 +200,12 @@ impl Deformation {
             })
     }
 
+    /// By how much what lies around a point is turned, radians.
+    pub fn turn(&self, point: &Point2) -> f64 {
+        let corners = self.lattice.corners(point);
+        corners.map_or(0.0, |corners| corners.iter().map(|&(node, weight)| weight * self.moves[node].z).sum())
+    }
+
     /// The point of the map that belongs at a place, map frame.
     pub fn inverse(&self, place: &Point2) -> Point2 {
         (0..INVERSE_ROUNDS).fold(*place, |point, _| place - (self.apply(&point) - point))

@@ -1,6 +1,6 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
 //! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `deformation`, `hypotheses`, `robot_maps` and `robot_pair`.
+//! in `geometry`, `walls`, `deformation`, `hypotheses`, `placement`, `robot_maps` and `robot_pair`.
 
 #![forbid(unsafe_code)]
 
@@ -14,9 +14,12 @@ pub mod icp_refiner;
 pub mod line_extractor;
 pub mod map_aligner;
 pub mod map_cleaner;
+pub mod map_placer;
 pub mod map_selector;
 pub mod merge_verifier;
+pub mod path_placer;
 pub mod place_window;
+pub mod placement;
 pub mod quadrant_classifier;
 pub mod robot_maps;
 pub mod robot_pair;
@@ -39,8 +42,10 @@ pub fn kinds() -> Vec<StageKind> {
         line_extractor::kind(),
         map_aligner::kind(),
         map_cleaner::kind(),
+        map_placer::kind(),
         map_selector::kind(),
         merge_verifier::kind(),
+        path_placer::kind(),
         quadrant_classifier::kind(),
         simulator::kind(),
         tag_filter::kind(),

@@ -27,6 +27,7 @@ definitions![
     "geometry_msgs/TwistWithCovariance",
     "geometry_msgs/Vector3",
     "gridweave_msgs/Alignment",
+    "gridweave_msgs/CommonPlace",
     "gridweave_msgs/CommonTag",
     "gridweave_msgs/CommonTags",
     "gridweave_msgs/DeformationNode",
@@ -39,6 +40,7 @@ definitions![
     "gridweave_msgs/RobotGroup",
     "gridweave_msgs/Segment",
     "gridweave_msgs/Segments",
+    "gridweave_msgs/Sharpness",
     "gridweave_msgs/SimulationTruth",
     "gridweave_msgs/TagEstimate",
     "gridweave_msgs/TagEstimates",
@@ -51,6 +53,7 @@ definitions![
     "nav_msgs/MapMetaData",
     "nav_msgs/OccupancyGrid",
     "nav_msgs/Odometry",
+    "nav_msgs/Path",
     "std_msgs/Header",
     "tf2_msgs/TFMessage",
 ];

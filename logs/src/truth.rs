@@ -46,7 +46,8 @@ impl TruthSink {
     }
 }
 
-/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note` and `centres` (robot to x, y).
+/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note`, `centres` (robot to x, y) and `common` (x and y in the
+/// second robot's map, and in the first's).
 fn to_json(truth: &SimulationTruth) -> Value {
     fn object<T>(entries: &[T], entry: impl Fn(&T) -> (&String, Value)) -> Value {
         entries.iter().map(entry).map(|(name, value)| (name.clone(), value)).collect::<Map<_, _>>().into()
@@ -56,8 +57,11 @@ fn to_json(truth: &SimulationTruth) -> Value {
         "frames": object(&truth.frames, |one| (&one.robot, json!({ "x": one.x, "y": one.y, "yaw": one.yaw }))),
         "tags": object(&truth.tags, |tag| (&tag.tag_id, json!([tag.x, tag.y]))),
         "note": "frames: pose of each robot's map frame in robot1's map frame, metres and radians; tags in robot1's \
-                 map frame; centres: middle of each robot's last map, in its own map frame (errors are taken there)",
+                 map frame; centres: middle of each robot's last map, in its own map frame (errors are taken there); \
+                 common: places that the first two robots have both driven through, x and y in the map frame of the \
+                 second and then of the first, as their maps show them",
         "centres": object(&truth.frames, |one| (&one.robot, json!(one.centre))),
+        "common": truth.common.iter().map(|place| [place.second, place.first].concat()).collect::<Vec<_>>(),
     })
 }
 
@@ -65,7 +69,7 @@ fn to_json(truth: &SimulationTruth) -> Value {
 mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
-    use gridweave_runtime::ros::{TrueFrame, TrueTag};
+    use gridweave_runtime::ros::{CommonPlace, TrueFrame, TrueTag};
     use gridweave_runtime::stage::LoneStage;
 
     #[test]
@@ -77,6 +81,7 @@ mod tests {
             resolution: 0.05,
             frames: vec![TrueFrame { robot: "robot2".into(), x: 1.0, y: 2.0, yaw: 0.5, centre: [5.0, 6.0] }],
             tags: vec![TrueTag { tag_id: "tag00".into(), x: 3.0, y: 4.0 }],
+            common: vec![CommonPlace { first: [1.0, 2.0], second: [3.0, 4.0] }],
             ..Default::default()
         };
         sink.give::<SimulationTruth>("truth", "", LogTime(1), &truth).unwrap();
@@ -85,6 +90,7 @@ mod tests {
         assert_eq!(json["frames"]["robot2"], json!({ "x": 1.0, "y": 2.0, "yaw": 0.5 }));
         assert_eq!(json["tags"]["tag00"], json!([3.0, 4.0]));
         assert_eq!(json["centres"]["robot2"], json!([5.0, 6.0]));
+        assert_eq!(json["common"], json!([[3.0, 4.0, 1.0, 2.0]]));
         assert!(json["note"].is_string());
     }
 }

@@ -13,7 +13,7 @@ use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::input_file;
-use nalgebra::{Isometry2, Point2};
+use nalgebra::{Isometry2, Matrix3, Point2, Vector3};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,6 +51,9 @@ pub struct RobotResult {
     pub error_m: Option<f64>,
     /// Error of its direction, degrees, 0 to 180; none if there is nothing to compare.
     pub error_deg: Option<f64>,
+    /// Squared error of its frame in x, y and yaw by the covariance that the run tells; none if there is nothing to compare,
+    /// or no covariance. Of frames whose covariance is right 95 % are below 7.81, and the mean is 3.
+    pub normalised_error_squared: Option<f64>,
     /// Why it is not merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
@@ -132,7 +135,8 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
     };
     let names: BTreeSet<&String> = run.frames.keys().chain(run.unmerged.keys()).chain(truth.frames.keys()).collect();
     let one = |robot: &&String| {
-        let found = run.frames.get(*robot).map(pose);
+        let frame = run.frames.get(*robot);
+        let found = frame.map(pose);
         let expected = truth.frames.get(*robot).map(|frame| transform_reference_truth * pose(frame));
         let errors = found.zip(expected).map(|(found, expected)| {
             let [x, y] = truth.centres.get(*robot).copied().unwrap_or_default();
@@ -159,6 +163,7 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
             outcome,
             error_m: errors.map(|(metres, _)| metres),
             error_deg: errors.map(|(_, degrees)| degrees),
+            normalised_error_squared: frame.zip(expected).and_then(|(frame, expected)| normalised(frame, &expected)),
             reason,
             transform_true_found: found.zip(expected).map(|(found, expected)| expected.inverse() * found),
         }
@@ -177,6 +182,15 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
         refused: count(&[RobotOutcome::Refused, RobotOutcome::RightlyRefused]),
         robots,
     })
+}
+
+/// The squared error of a frame by its covariance. `None` if it has none.
+fn normalised(found: &Frame, expected: &Isometry2<f64>) -> Option<f64> {
+    let turned = (expected.rotation.inverse() * pose(found).rotation).angle();
+    let moved = pose(found).translation.vector - expected.translation.vector;
+    let error = Vector3::new(moved.x, moved.y, turned);
+    let covariance = Matrix3::from_row_slice(&found.covariance).cholesky()?;
+    Some(error.dot(&covariance.solve(&error)))
 }
 
 impl RobotOutcome {
@@ -257,6 +271,19 @@ mod tests {
         assert!((robot2.error_deg.unwrap() - 0.573).abs() < 1e-3);
         assert!((evaluation.robots[1].error_m.unwrap() - 0.3).abs() < 1e-9);
         assert_eq!((evaluation.right, evaluation.wrong, evaluation.refused), (2, 0, 0));
+    }
+
+    #[test]
+    fn errors_are_weighed_by_the_covariance_that_the_run_tells() {
+        let with = |covariance: [f64; 9]| {
+            let found = json!({"x": 10.2, "y": 5.0, "yaw": 1.0 + 0.02, "covariance": covariance});
+            let frames = json!({"robot1": frame(0.0, 0.0, 0.0), "robot2": found});
+            let evaluation = run(&json!({"reference": "robot1", "frames": frames}), &truth()).unwrap();
+            evaluation.robots[0].normalised_error_squared
+        };
+        let weighed = with([0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0001]).unwrap();
+        assert!((weighed - 8.0).abs() < 1e-9, "{weighed}");
+        assert_eq!((with([0.0; 9]), with([-1.0; 9])), (None, None));
     }
 
     #[test]

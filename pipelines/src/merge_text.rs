@@ -1,7 +1,7 @@
 //! What a merge has found, for people.
 
 use crate::table::Table;
-use gridweave_logs::summary::{Frame, Summary};
+use gridweave_logs::summary::{Bend, Frame, Summary};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -16,6 +16,13 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result
             (_, all) => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
         }
         write!(out, "{}", frames_table(&merge.frames))?;
+        if !merge.bends.is_empty() {
+            writeln!(
+                out,
+                "how the maps are bent, and how well walls that several show come out as one (before, and bent):"
+            )?;
+            write!(out, "{}", bends_table(&merge.bends))?;
+        }
     }
     for (robot, reason) in &merge.unmerged {
         match short(reason) {
@@ -83,6 +90,23 @@ fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
     table
 }
 
+/// The most that each map is bent, and how far apart the drawings of its walls lie before and after.
+fn bends_table(bends: &BTreeMap<String, Bend>) -> Table {
+    let mut table = Table::new(["robot", "by m", "by deg", "over m", "walls apart m", "doubled walls"]);
+    for (robot, bend) in bends {
+        let (before, after) = (&bend.sharpness_rigid, &bend.sharpness);
+        table.row([
+            robot.clone(),
+            format!("{:.3}", bend.largest_m),
+            format!("{:.2}", bend.largest_deg),
+            format!("{:.0}", bend.over_m),
+            format!("{:.3}, {:.3}", before.apart_m, after.apart_m),
+            format!("{:.0} %, {:.0} %", 100.0 * before.doubled, 100.0 * after.doubled),
+        ]);
+    }
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,6 +133,21 @@ mod tests {
         assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
         assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
         assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
+    }
+
+    #[test]
+    fn bends_are_shown_with_what_they_do_to_the_walls() {
+        let sharpness = |apart_m: f64, doubled: f64| json!({"apart_m": apart_m, "doubled": doubled});
+        let bend = json!({
+            "largest_m": 0.25, "largest_deg": 1.5, "over_m": 40.0, "wall_matched_m": 90.0, "spacing": 3.0, "nodes": [],
+            "sharpness_rigid": sharpness(0.12, 0.4), "sharpness": sharpness(0.02, 0.01),
+        });
+        let frame = json!({"x": 0.0, "y": 0.0, "yaw": 0.0});
+        let text = text(json!({"reference": "robot1", "frames": {"robot1": frame}, "bends": {"robot1": bend}}));
+        let line = text.lines().find(|line| line.contains("0.250")).unwrap();
+        for part in ["robot1", "1.50", "40", "0.120, 0.020", "40 %, 1 %"] {
+            assert!(line.contains(part), "{text}");
+        }
     }
 
     #[test]

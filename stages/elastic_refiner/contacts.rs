@@ -50,17 +50,12 @@ impl Bent<'_> {
 /// Looks the walls of map b up in map a. What lies `reach` metres apart counts a quarter of what lies on each other, and
 /// nothing beyond.
 pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
-    let points = b.body.walls.walls.points();
-    let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
-    let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
-    let length = every as f64 * b.body.walls.spacing;
+    let (length, found) = find_all(a, b, reach);
     // Both maps are looked up in each other, and say the same.
     let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
     let mut sums: BTreeMap<[usize; NODES], Sum> = BTreeMap::new();
     let mut matched = 0.0;
-    for index in (0..points.len()).step_by(every) {
-        let point = points[index];
-        let Some(contact) = find(a, b, index, &point, reach) else { continue };
+    for (point, contact) in found {
         let kernel = (1.0 / (1.0 + (contact.residual / reach).powi(2))).powi(2);
         matched += kernel * length;
         let nodes = contact.nodes(a.first, b.first);
@@ -71,6 +66,21 @@ pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
         sum.vector.axpy(weight * kernel * contact.target, &row, 1.0);
     }
     Contacts { sums: sums.into_values().collect(), length: matched }
+}
+
+/// How far apart two drawings of a wall lie, across the wall, metres.
+pub(super) struct Apart {
+    /// As the rigid frames have them.
+    pub(super) rigid: f64,
+    /// As the maps are bent.
+    pub(super) bent: f64,
+}
+
+/// The walls of map b that lie within `reach` of walls of map a, as they are bent: the length that each stands for, metres, and how
+/// far apart they lie.
+pub(super) fn apart<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
+    let (length, found) = find_all(a, b, reach);
+    (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), bent: contact.residual.abs() }))
 }
 
 impl Contacts {
@@ -99,6 +109,16 @@ struct Contact {
     residual: f64,
     /// The same as the maps came, and so what the moves of the nodes must make up for.
     target: f64,
+}
+
+/// Points of the walls of map b, each with what it meets on map a, and the length of wall that each stands for, metres.
+fn find_all<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Item = (Point2, Contact)>) {
+    let points = b.body.walls.walls.points();
+    let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
+    let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
+    let found = points.iter().enumerate().step_by(every);
+    let found = found.filter_map(move |(index, point)| Some((*point, find(a, b, index, point, reach)?)));
+    (every as f64 * b.body.walls.spacing, found)
 }
 
 fn find(a: Bent<'_>, b: Bent<'_>, index: usize, point: &Point2, reach: f64) -> Option<Contact> {

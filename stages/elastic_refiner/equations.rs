@@ -91,18 +91,18 @@ impl Equations {
 }
 
 /// What drift says of two nodes i and j that lie side by side.
-struct Edge {
+pub(super) struct Edge {
     /// How (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i) changes with what node i does.
-    by_i: Matrix3<f64>,
+    pub(super) by_i: Matrix3<f64>,
     /// And with what node j does.
-    by_j: Matrix3<f64>,
+    pub(super) by_j: Matrix3<f64>,
     /// The inverse of its covariance.
-    information: Matrix3<f64>,
+    pub(super) information: Matrix3<f64>,
 }
 
 impl Edge {
     /// Of two nodes with `arm` from i to j.
-    fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
+    pub(super) fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
         let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * arm.norm().sqrt();
         let half = 0.5 * arm;
         Self {
@@ -132,10 +132,22 @@ pub(super) struct Solution {
 }
 
 impl Solution {
-    /// The covariance of each node.
-    pub(super) fn covariances(&self) -> Vec<Matrix3<f64>> {
-        let inverse = SelectedInverse::of(self.factor.l());
-        let of_node = |&place: &usize| Matrix3::from_fn(|row, column| inverse.at(3 * place + row, 3 * place + column));
-        self.place.iter().map(of_node).collect()
+    /// How uncertain the nodes are.
+    pub(super) fn covariances(&self) -> Covariances<'_> {
+        Covariances { place: &self.place, inverse: SelectedInverse::of(self.factor.l()) }
+    }
+}
+
+/// How uncertain nodes are, alone and together with those beside them.
+pub(super) struct Covariances<'a> {
+    place: &'a [usize],
+    inverse: SelectedInverse<'a>,
+}
+
+impl Covariances<'_> {
+    /// The covariance of what two nodes do that are one or lie side by side.
+    pub(super) fn of(&self, one: usize, other: usize) -> Matrix3<f64> {
+        let (one, other) = (3 * self.place[one], 3 * self.place[other]);
+        Matrix3::from_fn(|row, column| self.inverse.at(one + row, other + column))
     }
 }

@@ -18,17 +18,21 @@
 
 mod body;
 mod contacts;
+mod drift;
 mod equations;
 mod parameters;
 mod refine;
 mod selected_inverse;
+mod sharpness;
 mod stage;
 #[cfg(test)]
 mod tests;
 
 pub use body::Body;
+pub use drift::Drift;
 pub use parameters::ElasticRefinerParameters;
 pub use refine::{Bend, refine};
+pub use sharpness::sharpness;
 
 use gridweave_runtime::stage::StageKind;
 use stage::ElasticRefiner;
@@ -38,7 +42,7 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "elastic_refiner",
         "Bends the maps of all placed robots, so that walls that several have seen lie on each other. What is sent for each \
-         robot is a lattice of small displacements and turns with their covariances; the rigid frames stay as they are. The \
+         robot is a lattice of small displacements and turns with their covariances, and how sharp its walls come out; the rigid frames stay as they are. The \
          bends are estimated when other robots are placed, when a frame has changed by more than `min_move` or `min_turn`, \
          and at the end if anything has changed since.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),

@@ -15,7 +15,7 @@ pub struct ElasticRefinerParameters {
     /// Metres from node to node: within such a distance a map counts as rigid.
     pub spacing: f64,
     /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of
-    /// each metre between them.
+    /// each metre between them. What a map was found to do is told with its bend.
     pub bend: f64,
     /// How maps turn: standard deviation of the turn of two places of a map against each other, radians for the root of each
     /// metre between them.

@@ -3,6 +3,7 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::contacts::{Bent, Contacts, contacts};
+use super::drift::{Drift, drift};
 use super::equations::{Equations, Solution, bend_cost};
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
@@ -25,6 +26,8 @@ pub struct Bend {
     /// How unlikely it is that a map bends so: the logarithm of how much likelier no bend is, half the squared bends between
     /// neighbouring nodes in standard deviations.
     pub cost: f64,
+    /// How it bends; none if its walls tell too little of that.
+    pub drift: Option<Drift>,
 }
 
 /// Bends placed maps, so that walls that several show lie on each other: for each body how it is bent. `None` if numbers
@@ -59,15 +62,16 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         last = Some((solution, matched));
     }
     let (solution, matched) = last?;
-    let mut covariances = solution.covariances().into_iter();
-    let bend = |(deformation, wall_matched): (Deformation, f64)| Bend {
-        covariances: covariances.by_ref().take(deformation.moves.len()).collect(),
+    let covariances = solution.covariances();
+    let bend = |((deformation, wall_matched), &first): ((Deformation, f64), &usize)| Bend {
+        covariances: (first..first + deformation.moves.len()).map(|node| covariances.of(node, node)).collect(),
         cost: bend_cost(&deformation, parameters),
+        drift: drift(&deformation, first, &covariances, parameters),
         deformation,
         wall_matched,
     };
     let is_finite = bends.iter().flat_map(|bend| &bend.moves).all(|by| by.iter().all(|value| value.is_finite()));
-    is_finite.then(|| bends.into_iter().zip(matched).map(bend).collect())
+    is_finite.then(|| bends.into_iter().zip(matched).zip(&firsts).map(bend).collect())
 }
 
 /// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.

@@ -1,10 +1,10 @@
 //! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
 
-use super::{Bend, Body, ElasticRefinerParameters, refine};
+use super::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
 use crate::geometry::row_by_row;
 use crate::robot_maps::RobotMaps;
 use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
-use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames};
+use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames, Sharpness};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
 
@@ -110,9 +110,10 @@ impl ElasticRefiner {
                 .collect();
             match refine(&bodies, &self.parameters) {
                 Some(bends) => {
-                    for ((frame, map), bend) in placed.iter().zip(&bends) {
+                    let sharpness = sharpness(&bodies, &bends, &self.parameters);
+                    for (((frame, map), bend), sharpness) in placed.iter().zip(&bends).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
-                        output.deformation.send(&frame.robot, &message(header, &frame.robot, bend))?;
+                        output.deformation.send(&frame.robot, &message(header, &frame.robot, bend, sharpness))?;
                     }
                 }
                 None => output.warn("the maps cannot be bent onto each other: a frame lies too far away for numbers"),
@@ -122,7 +123,7 @@ impl ElasticRefiner {
     }
 }
 
-fn message(header: Header, robot: &str, bend: &Bend) -> MapDeformation {
+fn message(header: Header, robot: &str, bend: &Bend, [sharpness_rigid, sharpness]: [Sharpness; 2]) -> MapDeformation {
     let nodes = bend.deformation.moves.iter().zip(&bend.covariances).enumerate();
     let node = |(number, (by, covariance)): (usize, (&nalgebra::Vector3<f64>, _))| {
         let at = bend.deformation.lattice.position(number);
@@ -134,5 +135,9 @@ fn message(header: Header, robot: &str, bend: &Bend) -> MapDeformation {
         spacing: bend.deformation.lattice.spacing(),
         nodes: nodes.map(node).collect(),
         wall_matched: bend.wall_matched,
+        sharpness_rigid,
+        sharpness,
+        bend: bend.drift.map_or(0.0, |drift| drift.bend),
+        turn: bend.drift.map_or(0.0, |drift| drift.turn),
     }
 }

@@ -33,6 +33,7 @@ fn places() -> Vec<Point2> {
 #[test]
 fn a_bent_map_is_laid_on_a_straight_one() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let mut drifts = Vec::new();
     for most in [0.1, 0.4] {
         let bent = map.bent(most);
         let bodies = [body(&map, Pose2::identity()), body(&bent, Pose2::identity())];
@@ -43,6 +44,7 @@ fn a_bent_map_is_laid_on_a_straight_one() {
                 covariances: Vec::new(),
                 wall_matched: 0.0,
                 cost: 0.0,
+                drift: None,
             })
             .collect();
         let bends = refine(&bodies, &PARAMETERS()).unwrap();
@@ -54,7 +56,15 @@ fn a_bent_map_is_laid_on_a_straight_one() {
             "{}",
             bends[1].cost
         );
+        let [rigid, bent] = super::sharpness(&bodies, &bends, &PARAMETERS())[1];
+        assert!(rigid.apart > 0.2 * most && rigid.doubled > most, "{most}: {rigid:?}");
+        assert!(bent.apart < 0.03 && bent.doubled < 0.03, "{most}: {bent:?}");
+        drifts.push(bends[1].drift.unwrap());
     }
+    // What bends more is found to, though next to nothing is seen of small bends.
+    let [little, much] = drifts[..] else { panic!() };
+    assert!(much.bend > 2.0 * little.bend && much.turn > 1.5 * little.turn, "{little:?}, {much:?}");
+    assert!((0.005..0.05).contains(&much.bend) && (0.001..0.01).contains(&much.turn), "{much:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{Point2, Pose2};
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
-use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
+use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid};
 
 /// As many cells are looked at together.
 const BLOCK: usize = 64;
@@ -58,6 +58,18 @@ impl GridGeometry {
     /// The number of cells.
     pub fn cell_count(&self) -> usize {
         self.width * self.height
+    }
+
+    /// All of a grid's message but its cells, for a grid of at most `u32::MAX` columns and rows.
+    pub fn prefix(&self, header: Header) -> GridPrefix {
+        let info = MapMetaData {
+            map_load_time: header.stamp,
+            resolution: self.resolution as f32,
+            width: self.width as u32,
+            height: self.height as u32,
+            origin: self.origin.into(),
+        };
+        GridPrefix { header, info }
     }
 }
 

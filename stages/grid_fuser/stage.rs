@@ -4,14 +4,11 @@ use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, lay_out};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
-use crate::deformation::Deformation;
-use crate::geometry::{GridGeometry, Point2};
+use crate::geometry::Point2;
+use crate::placement::Placement;
 use crate::robot_maps::RobotMaps;
-use gridweave_runtime::ros::{
-    GridPrefix, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames,
-};
+use gridweave_runtime::ros::{Header, MapAgreement, MapDeformation, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
-use std::collections::BTreeMap;
 
 /// The kind `grid_fuser`.
 pub fn kind() -> StageKind {
@@ -61,11 +58,9 @@ struct GridFuser {
     table: EvidenceTable,
     parameters: GridFuserParameters,
     maps: RobotMaps<KnownArea>,
-    /// How the maps are bent, by robot.
-    bends: BTreeMap<String, Deformation>,
+    placement: Placement,
     /// Whether a bend has come that is in no fused map.
     has_new_bends: bool,
-    frames: RobotFrames,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
 }
@@ -77,9 +72,8 @@ impl GridFuser {
             table,
             parameters,
             maps: RobotMaps::default(),
-            bends: BTreeMap::new(),
+            placement: Placement::default(),
             has_new_bends: false,
-            frames: RobotFrames::default(),
             fused: None,
         }
     }
@@ -93,7 +87,7 @@ impl GridFuser {
         if !self.maps.keep(&map, output, KnownArea::of) {
             return Ok(());
         }
-        let is_placed = self.frames.frames.iter().any(|frame| frame.robot == map.robot());
+        let is_placed = self.placement.frames.frames.iter().any(|frame| frame.robot == map.robot());
         if is_placed { self.fuse(output) } else { Ok(()) }
     }
 
@@ -104,12 +98,7 @@ impl GridFuser {
         deformation: Received<'_, MapDeformation>,
         output: &Output<FusedMap>,
     ) -> Result<(), StageError> {
-        let robot = &deformation.robot;
-        let Some(bend) = Deformation::from_message(&deformation) else {
-            output.warn(format!("how the map of {robot} is bent was left out: its nodes do not lie on a lattice"));
-            return Ok(());
-        };
-        self.has_new_bends |= self.bends.insert(robot.clone(), bend.clone()).is_none_or(|before| before != bend);
+        self.has_new_bends |= self.placement.keep_bend(&deformation, output);
         Ok(())
     }
 
@@ -119,14 +108,15 @@ impl GridFuser {
         frames: Received<'_, RobotFrames>,
         output: &Output<FusedMap>,
     ) -> Result<(), StageError> {
-        self.frames = frames.into_content();
+        self.placement.frames = frames.into_content();
         let is_near = self.fused.as_ref().is_some_and(|fused| self.is_near(fused));
         if is_near && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
     }
 
     fn finish(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         let is_sent = self.fused.as_ref().is_some_and(|fused| {
-            (&fused.reference, self.placed(fused)) == (&self.frames.reference, self.placed(&self.frames))
+            (&fused.reference, self.placed(fused))
+                == (&self.placement.frames.reference, self.placed(&self.placement.frames))
         });
         if is_sent && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
     }
@@ -135,8 +125,8 @@ impl GridFuser {
     fn is_near(&self, fused: &RobotFrames) -> bool {
         let GridFuserParameters { min_move, min_turn, .. } = self.parameters;
         let is_near = |(one, next): (&RobotFrame, &RobotFrame)| one.is_near(next, min_move, min_turn);
-        let (before, after) = (self.placed(fused), self.placed(&self.frames));
-        fused.reference == self.frames.reference
+        let (before, after) = (self.placed(fused), self.placed(&self.placement.frames));
+        fused.reference == self.placement.frames.reference
             && before.len() == after.len()
             && before.into_iter().zip(after).all(is_near)
     }
@@ -150,16 +140,16 @@ impl GridFuser {
     }
 
     fn fuse(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
-        self.fused = Some(self.frames.clone());
+        self.fused = Some(self.placement.frames.clone());
         self.has_new_bends = false;
         if !output.map.is_read() && !output.conflicts.is_read() && !output.agreement.is_read() {
             return Ok(());
         }
-        let placed = self.placed(&self.frames);
+        let placed = self.placed(&self.placement.frames);
         let mut maps = Vec::with_capacity(placed.len());
         for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let bend = self.bends.get(&frame.robot);
+            let bend = self.placement.bend(&frame.robot);
             let placed = PlacedGrid { bend, ..PlacedGrid::rigid(map.grid(), frame.transform_reference_robot()) };
             maps.push((placed, &map.own));
         }
@@ -182,7 +172,7 @@ impl GridFuser {
         maps.retain(|_| takes_part.next().is_some_and(Result::is_ok));
         let Some(geometry) = layout.geometry else { return Ok(()) };
         let header = Header::new(output.log_time(), RobotFrames::WORLD);
-        let prefix = prefix(&geometry, header.clone());
+        let prefix = geometry.prefix(header.clone());
         let mut conflicts = vec![0; geometry.cell_count()];
         let mut agreement = None;
         let mut fuse = |cells: &mut [i8]| {
@@ -216,16 +206,4 @@ fn anchor(maps: &[(PlacedGrid<'_>, &KnownArea)]) -> Point2 {
     let corners = maps.iter().filter(|(_, area)| !area.is_empty()).map(|(map, _)| map.transform_world_grid());
     let mut finite = corners.filter(|corner| corner.translation.vector.iter().all(|value| value.is_finite()));
     finite.next().map_or(Point2::origin(), |corner| Point2::from(corner.translation.vector))
-}
-
-/// All of the fused map but its cells. The layout keeps the size within what the message can say.
-fn prefix(geometry: &GridGeometry, header: Header) -> GridPrefix {
-    let info = MapMetaData {
-        map_load_time: header.stamp,
-        resolution: geometry.resolution as f32,
-        width: geometry.width as u32,
-        height: geometry.height as u32,
-        origin: geometry.origin.into(),
-    };
-    GridPrefix { header, info }
 }

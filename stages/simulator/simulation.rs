@@ -7,9 +7,12 @@ use super::route::share_rooms;
 use super::tags::Tag;
 use super::truth::Truth;
 use super::world::{SimulationError, World};
-use crate::geometry::Point2;
+use crate::geometry::{Point2, PointIndex, Pose2};
 use gridweave_runtime::stage::Parameters as _;
 use rayon::prelude::*;
+
+/// Metres between places that two robots both have driven through, and how near the second passes by where the first was.
+const COMMON_SPACING: f64 = 0.5;
 
 /// A simulation.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,13 +65,38 @@ fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
             .map(|tag| (tag.id.clone(), transform_building_first.inverse_transform_point(&tag.place)))
             .collect(),
         centres: centres.collect(),
+        common: match robots {
+            [first, second, ..] => common_places(first, second),
+            _ => Vec::new(),
+        },
     }
+}
+
+/// Places that two robots both have driven through, as the map of the first shows them and as that of the second does: what a
+/// robot sees of a place is drawn as far off as it believes to be itself.
+fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
+    let place = |pose: &Pose2| Point2::from(pose.translation.vector);
+    let driven: Vec<Point2> = first.true_poses.iter().map(place).collect();
+    let (index, order) = PointIndex::new(&driven, COMMON_SPACING);
+    let mut common = Vec::new();
+    let mut last: Option<Point2> = None;
+    for (true_pose, pose) in second.true_poses.iter().zip(&second.poses) {
+        let at = place(true_pose);
+        if last.is_some_and(|last| (at - last).norm() < COMMON_SPACING) {
+            continue;
+        }
+        let Some(near) = index.nearest(&at, COMMON_SPACING) else { continue };
+        let tick = order[near.index];
+        common.push([first.poses[tick] * first.true_poses[tick].inverse_transform_point(&at), place(pose)]);
+        last = Some(at);
+    }
+    common
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Cell, Grid, Pose2, is_occupied};
+    use crate::geometry::{Cell, Grid, is_occupied};
     use gridweave_runtime::stage::ParameterError;
 
     /// A small building with two robots, exact poses and an exact lidar.
@@ -125,6 +153,19 @@ mod tests {
             let share = f64::from(near_wall as u32) / f64::from(on_first);
             assert!(share > 0.97, "seed {seed}: {share}");
         }
+    }
+
+    #[test]
+    fn common_places_are_one_place_where_poses_are_exact_and_lie_apart_where_they_drift() {
+        let apart = |drift: f64| {
+            let truth = simulate(&SimulatorParameters { drift, ..small() }, 3).unwrap().truth;
+            assert!(truth.common.len() > 10, "{}", truth.common.len());
+            let distance = |[first, second]: &[Point2; 2]| (first - truth.frames[1].1 * second).norm();
+            truth.common.iter().map(distance).fold(0.0, f64::max)
+        };
+        assert!(apart(0.0) < 1e-9);
+        let drifted = apart(0.01);
+        assert!(drifted > 0.02 && drifted < 1.0, "{drifted}");
     }
 
     #[test]

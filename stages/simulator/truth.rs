@@ -2,7 +2,7 @@
 
 use crate::geometry::{Point2, Pose2};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Header, SimulationTruth, TrueFrame, TrueTag};
+use gridweave_runtime::ros::{CommonPlace, Header, SimulationTruth, TrueFrame, TrueTag};
 
 /// The truth of a simulation.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,9 @@ pub struct Truth {
     pub tags: Vec<(String, Point2)>,
     /// The middle of each robot's last map, in its own map frame, metres.
     pub centres: Vec<(String, Point2)>,
+    /// Places that the first two robots both have driven through, as the map of the first shows them and as that of the second
+    /// does, each in its own map frame, metres.
+    pub common: Vec<[Point2; 2]>,
 }
 
 impl Truth {
@@ -32,11 +35,14 @@ impl Truth {
             }
         };
         let tag = |(id, place): &(String, Point2)| TrueTag { tag_id: id.clone(), x: place.x, y: place.y };
+        let common =
+            |[first, second]: &[Point2; 2]| CommonPlace { first: first.coords.into(), second: second.coords.into() };
         SimulationTruth {
             header: Header::new(log_time, format!("{first}/map")),
             resolution: self.resolution,
             frames: self.frames.iter().map(frame).collect(),
             tags: self.tags.iter().map(tag).collect(),
+            common: self.common.iter().map(common).collect(),
         }
     }
 }
@@ -53,6 +59,7 @@ mod tests {
             frames: vec![("robot1".into(), Pose2::identity()), ("robot2".into(), pose(1.0, 2.0, 0.5))],
             tags: vec![("tag00".into(), Point2::new(3.0, 4.0))],
             centres: vec![("robot1".into(), Point2::new(5.0, 6.0)), ("robot2".into(), Point2::new(7.0, 8.0))],
+            common: vec![[Point2::new(1.0, 2.0), Point2::new(3.0, 4.0)]],
         };
         let frame = |robot: &str, [x, y, yaw]: [f64; 3], centre| TrueFrame { robot: robot.into(), x, y, yaw, centre };
         let expected = SimulationTruth {
@@ -60,6 +67,7 @@ mod tests {
             resolution: 0.05,
             frames: vec![frame("robot1", [0.0; 3], [5.0, 6.0]), frame("robot2", [1.0, 2.0, 0.5], [7.0, 8.0])],
             tags: vec![TrueTag { tag_id: "tag00".into(), x: 3.0, y: 4.0 }],
+            common: vec![CommonPlace { first: [1.0, 2.0], second: [3.0, 4.0] }],
         };
         assert_eq!(truth.message(LogTime(9)), expected);
     }

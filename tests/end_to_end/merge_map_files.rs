@@ -2,6 +2,7 @@
 
 use crate::support::{Ended, TestMap, gridweave, gridweave_with, simulate};
 use gridweave_logs::map_file::{self, GridMap};
+use gridweave_logs::picture::robot_colour;
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, Pose, RosMessage, decode};
 use nalgebra::{Isometry2, Vector2};
 use serde_json::Value;
@@ -85,6 +86,11 @@ fn map_files_give_one_map_file_and_nothing_else() {
     expected.extend(["merged.pgm", "merged.png", "merged.yaml", "summary.json"].map(str::to_owned));
     expected.sort();
     assert_eq!(names(folder.path()), expected);
+    let picture = image::open(folder.path().join("merged.png")).unwrap().to_rgb8();
+    for robot in [0, 1] {
+        let walls = picture.pixels().filter(|pixel| pixel.0 == robot_colour(robot)).count();
+        assert!(walls > 50, "walls that robot {robot} alone has seen have its colour: {walls} pixels");
+    }
     let merged = map_file::load(&folder.path().join("merged.yaml")).unwrap();
     let known = |map: &GridMap| map.cells.iter().filter(|cell| **cell != -1).count();
     for robot in ["robot1.yaml", "robot2.yaml"] {

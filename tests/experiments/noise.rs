@@ -10,6 +10,7 @@ use super::statistics::{median, quantile, wilson_interval};
 use super::trial::World;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use gridweave::common_places::CommonPlaces;
 use gridweave::evaluate::RobotOutcome;
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
@@ -135,8 +136,16 @@ struct Trial {
     outcome: RobotOutcome,
     error_m: Option<f64>,
     error_deg: Option<f64>,
+    /// The squared error by the covariance that the merge tells.
+    normalised: Option<f64>,
+    /// How far apart places lie that both robots have driven through.
+    common: Option<CommonPlaces>,
     reason: String,
 }
+
+/// Of the squared errors in x, y and yaw of merges that tell their covariance rightly, 95 % are below this (chi-squared with
+/// three degrees of freedom).
+const NORMALISED_95: f64 = 7.815;
 
 /// Does the experiment.
 pub(super) fn run(args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
@@ -146,10 +155,24 @@ pub(super) fn run(args: &NoiseArgs, registry: &Registry, results: &mut Results) 
 }
 
 fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
-    let heads =
-        ["right", "wrong", "refused", "right, 95 % interval", "error m, median", "95 %", "error deg, median", "95 %"];
+    let heads = [
+        "right",
+        "wrong",
+        "refused",
+        "right, 95 % interval",
+        "error m, median",
+        "95 %",
+        "error deg, median",
+        "95 %",
+        "within the covariance's 95 %",
+        "common places m, rigid: median",
+        "90 %",
+        "bent: median",
+        "90 %",
+    ];
     let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
-    let mut data = Table::new([sweep.axis, "seed", "outcome", "error m", "error deg", "reason"]);
+    let mut data =
+        Table::new([sweep.axis, "seed", "outcome", "error m", "error deg", "normalised error squared", "reason"]);
     let mut shares: [Vec<(f64, f64)>; 3] = Default::default();
     let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
@@ -164,6 +187,17 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         let (low, high) = wilson_interval(counts[0], trials.len());
         let errors = |error: fn(&Trial) -> Option<f64>| trials.iter().filter_map(error).collect::<Vec<f64>>();
         let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
+        let normalised = errors(|trial| trial.normalised);
+        let within = normalised.iter().filter(|error| **error < NORMALISED_95).count();
+        let common_parts: [fn(&CommonPlaces) -> f64; 4] = [
+            |places| places.rigid.median_m,
+            |places| places.rigid.p90_m,
+            |places| places.bent.unwrap_or(places.rigid).median_m,
+            |places| places.bent.unwrap_or(places.rigid).p90_m,
+        ];
+        let common = common_parts.map(|part| {
+            median(&trials.iter().filter_map(|trial| trial.common.as_ref().map(part)).collect::<Vec<f64>>())
+        });
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
         table.row(
             [format!("{value}")]
@@ -172,13 +206,23 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
                 .chain([format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high)])
                 .chain(
                     [median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number),
-                ),
+                )
+                .chain([format!("{within} of {}", normalised.len())])
+                .chain(common.map(number)),
         );
         for trial in trials {
             let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-            let Trial { seed, outcome, error_m, error_deg, reason } = trial;
+            let Trial { seed, outcome, error_m, error_deg, normalised, reason, .. } = trial;
             let words = outcome.words().to_owned();
-            data.row([value.to_string(), seed.to_string(), words, number(error_m), number(error_deg), reason]);
+            data.row([
+                value.to_string(),
+                seed.to_string(),
+                words,
+                number(error_m),
+                number(error_deg),
+                number(normalised),
+                reason,
+            ]);
         }
     }
     let name = format!("noise_{}", sweep.name);
@@ -202,11 +246,14 @@ fn trials(sweep: &Sweep, value: f64, args: &NoiseArgs, registry: &Registry) -> R
     let one = |&seed: &u64| {
         let world = World::simulate(&world_settings, seed, registry)?;
         let merge = world.merge(&args.pipeline, &merge_settings, registry)?;
+        let common = merge.evaluation.common;
         Ok(merge.evaluation.robots.into_iter().map(move |robot| Trial {
             seed,
             outcome: robot.outcome,
             error_m: robot.error_m,
             error_deg: robot.error_deg,
+            normalised: robot.normalised_error_squared,
+            common,
             reason: robot.reason.unwrap_or_default(),
         }))
     };

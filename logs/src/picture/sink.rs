@@ -2,7 +2,7 @@
 
 use super::{MapLayer, Picture, PictureError, render_map, render_overlay};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{OccupancyGrid, RobotFrames};
+use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use nalgebra::Isometry2;
 use schemars::JsonSchema;
@@ -24,12 +24,11 @@ impl Parameters for PictureParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "picture_sink",
-        "Draws the robots' last maps where their frames lie, each robot's walls in a colour of its own, or the merged map where \
-         there are none, at the end of the run. Bends are not drawn, but in the merged map. Writes nothing if no map has come.",
+        "Draws the robots' maps as they lie in the merged one, each robot's walls in a colour of its own, or the merged map where \
+         there are none, at the end of the run. Writes nothing if there is no merged map.",
         PictureSink::new,
     )
-    .inputs("map", "the robots' maps, and the merged one, which is about no robot", PictureSink::map)
-    .inputs("frames", "where the robots' maps lie", PictureSink::frames)
+    .inputs("map", "the merged map, which is about no robot, and the robots' in the same frame", PictureSink::map)
     .finish(PictureSink::write)
     .build()
 }
@@ -38,7 +37,6 @@ struct PictureSink {
     file: PathBuf,
     /// The last map of each robot, and the merged one under an empty name.
     maps: BTreeMap<String, Message>,
-    frames: RobotFrames,
 }
 
 impl PictureSink {
@@ -49,16 +47,11 @@ impl PictureSink {
                 StageError::new(doing, "it has no file").with_help("give --picture FILE.png or file = \"FILE.png\"")
             );
         }
-        Ok(Self { file, maps: BTreeMap::new(), frames: RobotFrames::default() })
+        Ok(Self { file, maps: BTreeMap::new() })
     }
 
     fn map(&mut self, map: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
         self.maps.insert(map.robot().to_owned(), map.message().clone());
-        Ok(())
-    }
-
-    fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
-        self.frames = frames.into_content();
         Ok(())
     }
 
@@ -72,21 +65,17 @@ impl PictureSink {
     }
 
     fn draw(&self) -> Result<Picture, PictureError> {
-        let placed = self
-            .frames
-            .frames
-            .iter()
-            .filter_map(|frame| layer(self.maps.get(&frame.robot)?, frame.transform_reference_robot()));
-        let placed: Vec<MapLayer<'_>> = placed.collect();
-        match self.maps.get("").and_then(|merged| layer(merged, Isometry2::identity())) {
-            Some(merged) if placed.is_empty() => render_map(&merged),
-            _ => render_overlay(&placed),
+        let robots: Vec<MapLayer<'_>> =
+            self.maps.iter().filter(|(robot, _)| !robot.is_empty()).filter_map(|(_, map)| layer(map)).collect();
+        match self.maps.get("").and_then(layer) {
+            Some(merged) if robots.is_empty() => render_map(&merged),
+            _ => render_overlay(&robots),
         }
     }
 }
 
 /// None for a map that cannot be read, which was warned of when it came.
-fn layer(message: &Message, transform_world_map: Isometry2<f64>) -> Option<MapLayer<'_>> {
+fn layer(message: &Message) -> Option<MapLayer<'_>> {
     let grid: OccupancyGrid<'_> = message.decode().ok()?;
-    Some(MapLayer { info: grid.info, cells: grid.cells(), transform_world_map })
+    Some(MapLayer { info: grid.info, cells: grid.cells(), transform_world_map: Isometry2::identity() })
 }

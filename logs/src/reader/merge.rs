@@ -6,8 +6,8 @@ use super::damage::Damage;
 use super::file::LogFile;
 use gridweave_runtime::message::LogTime;
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap};
 use std::collections::binary_heap::PeekMut;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
 
 /// One message of a log, borrowed from the block that it came in.

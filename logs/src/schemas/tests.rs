@@ -119,8 +119,39 @@ fn result_messages_agree_with_their_definitions() {
 }
 
 #[test]
+fn bends_and_agreements_agree_with_their_definitions() {
+    let covariance = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
+    let node = DeformationNode { x: 1.0, y: 2.0, dx: 0.25, dy: 0.5, dyaw: 0.125, covariance };
+    assert_agrees(&MapDeformation {
+        header: header(),
+        robot: "robot22".into(),
+        spacing: 3.0,
+        nodes: vec![node, node],
+        wall_matched: 40.0,
+        sharpness_rigid: Sharpness { apart: 0.25, doubled: 0.5 },
+        sharpness: Sharpness { apart: 0.0625, doubled: 0.125 },
+        bend: 0.5,
+        turn: 0.25,
+    });
+    assert_agrees(&MapAgreement { header: header(), known_to_one: 1.0, known_to_several: 2.0, in_conflict: 0.5 });
+}
+
+#[test]
+fn a_truth_agrees_with_its_definition() {
+    assert_agrees(&SimulationTruth {
+        header: header(),
+        resolution: 0.05,
+        frames: vec![TrueFrame { robot: "robot1".into(), x: 1.0, y: 2.0, yaw: 3.0, centre: [4.0, 5.0] }],
+        tags: vec![TrueTag { tag_id: "tag1".into(), x: 1.0, y: 2.0 }],
+        common: vec![CommonPlace { first: [1.0, 2.0], second: [3.0, 4.0] }; 2],
+    });
+}
+
+#[test]
 fn standard_messages_agree_with_their_definitions() {
-    assert_agrees(&PoseStamped { header: header(), pose: pose() });
+    let stamped = PoseStamped { header: header(), pose: pose() };
+    assert_agrees(&stamped);
+    assert_agrees(&Path { header: header(), poses: vec![stamped.clone(), stamped] });
     let transform = TransformStamped {
         header: header(),
         child_frame_id: "robot2/map".into(),

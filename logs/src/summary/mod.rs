@@ -6,7 +6,7 @@ mod stage;
 pub use stage::kind;
 
 use gridweave_runtime::ros::{
-    DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts,
+    self, DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -60,6 +60,19 @@ pub struct Bend {
     pub over_m: f64,
     /// The length of its walls that were laid on walls of others, metres.
     pub wall_matched_m: f64,
+    /// How the walls that others show as well lie on theirs, as the rigid frames have them.
+    #[serde(default)]
+    pub sharpness_rigid: Sharpness,
+    /// The same, as the maps are bent.
+    #[serde(default)]
+    pub sharpness: Sharpness,
+    /// How it was found to bend: standard deviation of the displacement of two places against each other, metres for the root
+    /// of each metre between them; none if that is not known.
+    #[serde(default)]
+    pub bend_m_per_root_m: Option<f64>,
+    /// The same of the turn of two places, radians for the root of each metre.
+    #[serde(default)]
+    pub turn_rad_per_root_m: Option<f64>,
     /// From node to node along x and along y, metres.
     pub spacing: f64,
     /// The nodes: x, y, and by how much they are displaced along x and y, metres, and turned, radians.
@@ -75,9 +88,28 @@ impl From<&MapDeformation> for Bend {
             largest_deg: most(&|node| node.dyaw.abs()).to_degrees(),
             over_m: side(&|node| node.x).max(side(&|node| node.y)),
             wall_matched_m: message.wall_matched,
+            sharpness_rigid: message.sharpness_rigid.into(),
+            sharpness: message.sharpness.into(),
+            bend_m_per_root_m: (message.bend > 0.0).then_some(message.bend),
+            turn_rad_per_root_m: (message.turn > 0.0).then_some(message.turn),
             spacing: message.spacing,
             nodes: message.nodes.iter().map(|node| [node.x, node.y, node.dx, node.dy, node.dyaw]).collect(),
         }
+    }
+}
+
+/// How well walls that several maps show come out as one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sharpness {
+    /// The mean distance of one drawing of a wall from the other, across the wall, metres.
+    pub apart_m: f64,
+    /// The share of the walls whose two drawings look like two walls, 0 to 1.
+    pub doubled: f64,
+}
+
+impl From<ros::Sharpness> for Sharpness {
+    fn from(message: ros::Sharpness) -> Self {
+        Self { apart_m: message.apart, doubled: message.doubled }
     }
 }
 

@@ -9,11 +9,14 @@ use gridweave_logs::{map_file, picture, summary};
 use gridweave_runtime::engine::RunReport;
 use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use gridweave_runtime::stage::{InputPort, OutputPort, StageKind};
+use gridweave_stages::map_placer;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
+/// The topic of a robot's map as it lies in the merged one.
+const PLACED: &str = "/{robot}/merged_map";
 /// The process that the sinks share where stages have processes.
 const PROCESS: &str = "results";
 
@@ -36,13 +39,21 @@ impl ResultSinks {
         let file = folder.path().join("summary.json");
         let is_attached = attach(pipeline, &summary::kind(), &file, |_, _, _| true)?;
         let mut files = 0;
-        for (kind, asked) in [(map_file::kind(), &options.map), (picture::kind(), &options.picture)] {
+        if options.picture.is_some() {
+            // A picture shows what came from each robot, which nothing else of the run needs.
+            pipeline.attach(&map_placer::kind(), toml::Table::new(), PROCESS, |input, from, _| {
+                input.name != "map" || from.kind.inputs.is_empty()
+            });
+        }
+        for (kind, asked, topics) in [
+            (map_file::kind(), &options.map, [MERGED].as_slice()),
+            (picture::kind(), &options.picture, &[MERGED, PLACED]),
+        ] {
             let Some(path) = asked else { continue };
-            let is_merged = |output: &OutputPort| output.topic == Some(MERGED);
-            let is_drawn = kind.name == picture::kind().name;
-            if !attach(pipeline, &kind, path, |input, from, output| {
-                input.name != "map" || is_merged(output) || is_drawn && from.kind.inputs.is_empty()
-            })? {
+            let is_taken = |output: &OutputPort| output.topic.is_some_and(|topic| topics.contains(&topic));
+            if !is_merged(pipeline)
+                || !attach(pipeline, &kind, path, |input, _, output| input.name != "map" || is_taken(output))?
+            {
                 let text = format!("the pipeline `{}` has no stage that sends a merged map on {MERGED}", pipeline.name);
                 return Err(BadUse(format!("cannot write {}: {text}", path.display())).into());
             }
@@ -66,6 +77,12 @@ impl ResultSinks {
         }
         Ok(())
     }
+}
+
+/// Whether any stage sends a merged map.
+fn is_merged(pipeline: &Pipeline) -> bool {
+    let mut outputs = pipeline.stages.iter().flat_map(|stage| &stage.kind.outputs);
+    outputs.any(|output| output.topic == Some(MERGED))
 }
 
 fn attach(

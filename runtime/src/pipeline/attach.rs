@@ -1,12 +1,13 @@
 //! Stages that are added to a pipeline, or taken out of it, after it was read.
 
+use super::topics::standard_topics;
 use super::{DEFAULT_DEPTH, Overflow, Pipeline, Restart, StageSpec, Wire};
 use crate::stage::{InputPort, OutputPort, StageKind};
 
 impl Pipeline {
-    /// Adds a stage that only reads: each of its inputs is wired to all outputs of its type of which `takes` says that it
-    /// takes them. It runs in the process `process`. Does nothing, and gives `false`, if that leaves an input without a
-    /// wire that needs one.
+    /// Adds a stage that nothing reads but what is attached later: each of its inputs is wired to all outputs of its type of
+    /// which `takes` says that it takes them. It runs in the process `process`. Does nothing, and gives `false`, if that leaves
+    /// an input without a wire that needs one.
     pub fn attach(
         &mut self,
         kind: &StageKind,
@@ -33,11 +34,11 @@ impl Pipeline {
             name.push('_');
         }
         self.stages.push(StageSpec {
+            topics: standard_topics(kind, &name),
             name,
             kind: kind.clone(),
             parameters,
             inputs,
-            topics: Vec::new(),
             depth: DEFAULT_DEPTH,
             process: process.to_owned(),
             overflow: Vec::<Overflow>::new(),
@@ -81,6 +82,7 @@ mod tests {
         assert!(pipeline.attach(&kind, toml::Table::new(), "more", |_, _, output| output.topic == Some("/map")));
         let added = pipeline.stages.last().unwrap();
         assert_eq!((added.name.as_str(), added.process.as_str()), ("line_extractor", "more"));
+        assert_eq!(added.topics.len(), kind.outputs.len(), "those that read it must find them");
         let from: Vec<&str> = added.inputs.iter().map(|wire| pipeline.stages[wire.from_stage].name.as_str()).collect();
         assert_eq!(from, ["fuse"]);
         let text = pipeline.to_toml();

@@ -5,13 +5,22 @@ use super::document::{Entry, Item};
 use super::nearest::suggest;
 use super::values::{entries, text};
 use crate::message::{LONGEST_ROBOT_NAME, LONGEST_TOPIC};
-use crate::stage::StageKind;
+use crate::stage::{OutputPort, StageKind};
 
 /// The topic of an output port, and where it was given.
 #[derive(Debug)]
 pub(super) struct Topic {
     pub(super) template: String,
     pub(super) at: Location,
+}
+
+/// The topics of the outputs of a stage that is told none: the port's own, or else `/{robot}/STAGE/PORT`.
+pub(super) fn standard_topics(kind: &StageKind, stage: &str) -> Vec<String> {
+    let topic = |port: &OutputPort| match port.topic {
+        Some(own) => own.replace("{stage}", stage),
+        None => format!("/{{robot}}/{stage}/{}", port.name),
+    };
+    kind.outputs.iter().map(topic).collect()
 }
 
 /// The topics of a stage's outputs: the one given in `topics`, or else the port's own, or else
@@ -22,13 +31,9 @@ pub(super) fn read_topics(
     given: Option<&Item>,
     problems: &mut Problems,
 ) -> Vec<Topic> {
-    let standard = |port: &str| format!("/{{robot}}/{}/{port}", stage.key);
     let own = |topic: &str| topic.replace("{stage}", &stage.key);
-    let mut topics: Vec<Topic> = kind
-        .outputs
-        .iter()
-        .map(|port| Topic { template: port.topic.map_or_else(|| standard(port.name), own), at: stage.key_at.clone() })
-        .collect();
+    let standard = standard_topics(kind, &stage.key).into_iter();
+    let mut topics: Vec<Topic> = standard.map(|template| Topic { template, at: stage.key_at.clone() }).collect();
     for Entry { key, key_at, item } in given.map(|item| entries(item, "topics", problems)).unwrap_or_default() {
         let port = kind.outputs.iter().position(|port| port.name == key);
         let Some(topic) = port.and_then(|port| topics.get_mut(port)) else {

@@ -318,38 +318,6 @@ pub struct MapAgreement {
     pub in_conflict: f64,
 }
 
-/// A node of the lattice that says how a map is bent. What lies around it moves with it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct DeformationNode {
-    /// Where it stands in the map as it came, metres.
-    pub x: f64,
-    /// Metres.
-    pub y: f64,
-    /// By how much it is displaced, metres.
-    pub dx: f64,
-    /// Metres.
-    pub dy: f64,
-    /// By how much what lies around it is turned, radians.
-    pub dyaw: f64,
-    /// Covariance of (dx, dy, dyaw), 3 x 3.
-    pub covariance: [f64; 9],
-}
-
-/// How one robot's map is bent: where each place of it belongs, before the map is placed in the world as a whole.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MapDeformation {
-    /// Time, and the robot's map frame.
-    pub header: Header,
-    /// Whose map.
-    pub robot: String,
-    /// From node to node along x and along y, metres.
-    pub spacing: f64,
-    /// The nodes, on a lattice through the origin of the map frame, row by row. Between them the displacement is bilinear.
-    pub nodes: Vec<DeformationNode>,
-    /// The length of its walls that were laid on walls of others, metres.
-    pub wall_matched: f64,
-}
-
 /// Where a simulated robot's map lies in truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueFrame {
@@ -387,6 +355,17 @@ pub struct SimulationTruth {
     pub frames: Vec<TrueFrame>,
     /// The tags, by id.
     pub tags: Vec<TrueTag>,
+    /// Places that the first two robots both have driven through.
+    pub common: Vec<CommonPlace>,
+}
+
+/// A place as the maps of two robots show it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CommonPlace {
+    /// x and y in the map frame of the first robot, metres.
+    pub first: [f64; 2],
+    /// x and y in the map frame of the second robot, metres.
+    pub second: [f64; 2],
 }
 
 impl RobotFrames {
@@ -397,5 +376,5 @@ impl RobotFrames {
 ros_messages!(
     "gridweave_msgs":
     TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement,
-    MapDeformation, SimulationTruth
+    SimulationTruth
 );

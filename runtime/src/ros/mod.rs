@@ -5,22 +5,24 @@
 
 pub mod cell;
 mod codec;
+mod deformation;
 mod geometry;
 mod gridweave;
 mod nav;
 mod std_msgs;
 
 pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
+pub use deformation::{DeformationNode, MapDeformation, Sharpness};
 pub use geometry::{
     Point, Pose, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, TFMessage, Transform,
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonTag, CommonTags, DeformationNode, Evidence, MapAgreement, MapDeformation, MapDirection,
-    RobotFrame, RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange,
-    TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
+    Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RobotFrame, RobotFrames,
+    RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag,
+    UnmergedRobot, Verdict, Verdicts,
 };
-pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry};
+pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use std_msgs::{Header, Time};
 
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,8 @@
 //! `nav_msgs`.
 
-use super::{EncodeError, Header, Pose, PoseWithCovariance, RosMessage, Time, Vector3, encode_into, ros_messages};
+use super::{
+    EncodeError, Header, Pose, PoseStamped, PoseWithCovariance, RosMessage, Time, Vector3, encode_into, ros_messages,
+};
 use serde::{Deserialize, Serialize};
 
 /// `nav_msgs/msg/MapMetaData`.
@@ -83,7 +85,15 @@ pub struct Odometry {
     pub twist_covariance: [[f64; 6]; 6],
 }
 
-ros_messages!("nav_msgs": Odometry);
+/// `nav_msgs/msg/Path`: poses in the order in which they were reached.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Path {
+    pub header: Header,
+    pub poses: Vec<PoseStamped>,
+}
+
+ros_messages!("nav_msgs": Odometry, Path);
 
 #[cfg(test)]
 mod tests {

@@ -12,6 +12,7 @@ mod logs;
 mod map_aligner;
 mod map_cleaner;
 mod merge_verifier;
+mod placers;
 mod quadrant_classifier;
 mod result_sinks;
 mod tag_filter;
@@ -56,6 +57,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         map_aligner::cases(),
         map_cleaner::cases(),
         merge_verifier::cases(),
+        placers::cases(),
         quadrant_classifier::cases(),
         result_sinks::cases(),
         tag_filter::cases(),

@@ -2,8 +2,8 @@
 
 use super::Case;
 use gridweave_runtime::ros::{
-    Alignment, MapAgreement, OccupancyGrid, RobotFrame, RobotFrames, RobotGroup, SimulationTruth, TrueFrame, TrueTag,
-    UnmergedRobot, Verdict, Verdicts,
+    Alignment, CommonPlace, MapAgreement, OccupancyGrid, RobotFrame, RobotFrames, RobotGroup, SimulationTruth,
+    TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
 use gridweave_tests::{LogBuilder, TestMap, header};
 
@@ -21,20 +21,17 @@ pub(super) fn cases() -> Vec<Case> {
             log.message(1.0, "/robot_frames", &RobotFrames::default());
         }),
         Case::new("map_file_sink", "the_last_map", |log| {
-            merged(log, 1.0, &TestMap::filled(3, 2, 0.05, 0));
+            in_world(log, 1.0, "/map", &TestMap::filled(3, 2, 0.05, 0));
             let mut last = TestMap::filled(4, 2, 0.05, 0).at(1.5, -2.25, 0.5);
             last.cells = vec![0, 100, -1, 50, 24, 25, 64, 65];
-            merged(log, 2.0, &last);
+            in_world(log, 2.0, "/map", &last);
         }),
         Case::new("picture_sink", "two_robots", |log| {
-            merged(log, 1.0, &TestMap::room());
-            log.map(2.0, "robot1", &TestMap::room()).map(3.0, "robot2", &TestMap::room());
-            log.message(4.0, "/robot_frames", &frames());
+            in_world(log, 1.0, "/map", &TestMap::room());
+            in_world(log, 2.0, "/robot1/merged_map", &TestMap::room());
+            in_world(log, 2.0, "/robot2/merged_map", &TestMap::room().at(1.5, -0.75, 0.45));
         }),
-        Case::new("picture_sink", "no_robot_is_placed", |log| {
-            merged(log, 1.0, &TestMap::room());
-            log.message(2.0, "/robot_frames", &RobotFrames::default());
-        }),
+        Case::new("picture_sink", "no_robot_is_placed", |log| in_world(log, 1.0, "/map", &TestMap::room())),
         Case::new("truth_sink", "two_robots", |log| {
             let frame =
                 |robot: &str, x: f64| TrueFrame { robot: robot.into(), x, y: 2.0, yaw: -0.5, centre: [3.0, 4.0] };
@@ -43,15 +40,16 @@ pub(super) fn cases() -> Vec<Case> {
                 resolution: 0.05,
                 frames: vec![frame("robot1", 0.0), frame("robot2", 7.25)],
                 tags: vec![TrueTag { tag_id: "tag00".into(), x: 1.0, y: -1.0 }],
+                common: vec![CommonPlace { first: [1.0, 2.0], second: [3.0, 4.0] }],
             };
             log.message(1.0, "/truth", &truth);
         }),
     ]
 }
 
-fn merged(log: &mut LogBuilder, seconds: f64, map: &TestMap) {
+fn in_world(log: &mut LogBuilder, seconds: f64, topic: &str, map: &TestMap) {
     let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
-    log.message(seconds, "/map", &OccupancyGrid { header: header(seconds, "world"), info: map.info, data: &data });
+    log.message(seconds, topic, &OccupancyGrid { header: header(seconds, "world"), info: map.info, data: &data });
 }
 
 /// Two robots that are merged, and two that are merged with each other only.

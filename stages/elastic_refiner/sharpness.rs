@@ -1,0 +1,50 @@
+//! How sharp the merged map is: whether walls that several maps show come out once.
+
+use super::contacts::{Bent, apart};
+use super::{Bend, Body, ElasticRefinerParameters};
+use gridweave_runtime::ros::Sharpness;
+use rayon::prelude::*;
+
+/// Metres. Drawings of one wall that lie farther apart look like two walls: two cells of most maps.
+const DOUBLED: f64 = 0.1;
+/// Metres. Walls that lie farther apart when the maps are bent are taken for different ones.
+const SAME_WALL: f64 = 0.5;
+
+/// Lengths of wall, metres.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    length: f64,
+    apart: f64,
+    doubled: f64,
+}
+
+impl Sum {
+    fn add(&mut self, length: f64, apart: f64) {
+        self.length += length;
+        self.apart += length * apart;
+        self.doubled += if apart > DOUBLED { length } else { 0.0 };
+    }
+
+    fn sharpness(self) -> Sharpness {
+        let share = |part: f64| if self.length > 0.0 { part / self.length } else { 0.0 };
+        Sharpness { apart: share(self.apart), doubled: share(self.doubled) }
+    }
+}
+
+/// For each body, how the walls that others show as well lie on theirs: as the rigid frames have them, and as the maps are bent.
+/// Of walls that no other shows there is nothing to say.
+pub fn sharpness(bodies: &[Body<'_>], bends: &[Bend], parameters: &ElasticRefinerParameters) -> Vec<[Sharpness; 2]> {
+    let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body].deformation, first: 0 };
+    let of_body = |b: usize| {
+        let (mut rigid, mut as_bent) = (Sum::default(), Sum::default());
+        for a in (0..bodies.len()).filter(|a| *a != b) {
+            let (length, found) = apart(bent(a), bent(b), SAME_WALL.min(parameters.reach));
+            for at in found {
+                rigid.add(length, at.rigid);
+                as_bent.add(length, at.bent);
+            }
+        }
+        [rigid.sharpness(), as_bent.sharpness()]
+    };
+    (0..bodies.len()).into_par_iter().map(of_body).collect()
+}
