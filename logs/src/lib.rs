@@ -5,6 +5,7 @@ pub mod dynamic;
 pub mod file;
 pub mod info;
 pub mod map_file;
+pub mod names;
 pub mod picture;
 mod qos;
 pub mod reader;

@@ -4,14 +4,14 @@ use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, RosMessage};
 use std::collections::BTreeMap;
 
 /// The key of a channel's metadata under which rosbag2 keeps it.
-const KEY: &str = "offered_qos_profiles";
+pub(crate) const KEY: &str = "offered_qos_profiles";
 
 /// Reliable, and the last message is kept for those who come later (transient local), as map servers and static
 /// transforms are sent.
 ///
 /// Policies are the numbers of `rmw`, which every version of rosbag2 since Foxy reads, names being for later versions
 /// only. The times stand for "without limit".
-const LATCHED: &str = "\
+pub(crate) const LATCHED: &str = "\
 - history: 1
   depth: 1
   reliability: 1

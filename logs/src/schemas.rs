@@ -1,4 +1,5 @@
-//! The definitions of the ROS 2 types that Gridweave writes, from the `.msg` files in `logs/msg`.
+//! The definitions of the ROS 2 types that Gridweave writes, and of common ones that older bags hold without a definition, from
+//! the `.msg` files in `logs/msg`.
 
 use std::borrow::Cow;
 
@@ -15,17 +16,30 @@ macro_rules! definitions {
 definitions![
     "builtin_interfaces/Duration",
     "builtin_interfaces/Time",
+    "geometry_msgs/Accel",
+    "geometry_msgs/AccelStamped",
     "geometry_msgs/Point",
+    "geometry_msgs/Point32",
+    "geometry_msgs/PointStamped",
+    "geometry_msgs/Polygon",
+    "geometry_msgs/PolygonStamped",
     "geometry_msgs/Pose",
+    "geometry_msgs/PoseArray",
     "geometry_msgs/PoseStamped",
     "geometry_msgs/PoseWithCovariance",
     "geometry_msgs/PoseWithCovarianceStamped",
     "geometry_msgs/Quaternion",
+    "geometry_msgs/QuaternionStamped",
     "geometry_msgs/Transform",
     "geometry_msgs/TransformStamped",
     "geometry_msgs/Twist",
+    "geometry_msgs/TwistStamped",
     "geometry_msgs/TwistWithCovariance",
+    "geometry_msgs/TwistWithCovarianceStamped",
     "geometry_msgs/Vector3",
+    "geometry_msgs/Vector3Stamped",
+    "geometry_msgs/Wrench",
+    "geometry_msgs/WrenchStamped",
     "gridweave_msgs/Alignment",
     "gridweave_msgs/CommonPlace",
     "gridweave_msgs/CommonTag",
@@ -50,18 +64,42 @@ definitions![
     "gridweave_msgs/UnmergedRobot",
     "gridweave_msgs/Verdict",
     "gridweave_msgs/Verdicts",
+    "nav_msgs/GridCells",
     "nav_msgs/MapMetaData",
     "nav_msgs/OccupancyGrid",
     "nav_msgs/Odometry",
     "nav_msgs/Path",
+    "rosgraph_msgs/Clock",
+    "sensor_msgs/CameraInfo",
+    "sensor_msgs/CompressedImage",
+    "sensor_msgs/Image",
+    "sensor_msgs/Imu",
+    "sensor_msgs/JointState",
+    "sensor_msgs/LaserEcho",
+    "sensor_msgs/LaserScan",
+    "sensor_msgs/MagneticField",
+    "sensor_msgs/MultiEchoLaserScan",
+    "sensor_msgs/NavSatFix",
+    "sensor_msgs/NavSatStatus",
+    "sensor_msgs/PointCloud2",
+    "sensor_msgs/PointField",
+    "sensor_msgs/Range",
+    "sensor_msgs/RegionOfInterest",
+    "std_msgs/Bool",
+    "std_msgs/ColorRGBA",
+    "std_msgs/Empty",
+    "std_msgs/Float32",
+    "std_msgs/Float64",
     "std_msgs/Header",
+    "std_msgs/Int32",
+    "std_msgs/String",
     "tf2_msgs/TFMessage",
 ];
 
 /// The schema of a ROS 2 type as a log holds it (encoding `ros2msg`): the definition of the type, and then that of
 /// every type that it uses, each once, after a line of 80 `=` and a line `MSG: package/Type`.
 ///
-/// `name` is `package/msg/Type` or `package/Type`. `None` if the type is none that Gridweave writes.
+/// `name` is `package/msg/Type` or `package/Type`. `None` if the type is none of those.
 pub fn schema_text(name: &str) -> Option<String> {
     let name = name.replacen("/msg/", "/", 1);
     let mut text = definition(&name)?.to_owned();

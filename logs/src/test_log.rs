@@ -1,5 +1,6 @@
 //! Small logs for tests.
 
+use crate::schemas::schema_text;
 use gridweave_runtime::ros::encode;
 use mcap::WriteOptions;
 use serde::Serialize;
@@ -32,7 +33,8 @@ impl TestLog {
         data: &[u8],
         metadata: &BTreeMap<String, String>,
     ) -> &mut Self {
-        let schema = self.writer.add_schema(type_name, "ros2msg", b"# a schema").unwrap();
+        let text = schema_text(type_name).unwrap_or_default();
+        let schema = self.writer.add_schema(type_name, "ros2msg", text.as_bytes()).unwrap();
         let channel_id = self.writer.add_channel(schema, topic, "cdr", metadata).unwrap();
         self.sequence += 1;
         let header = mcap::records::MessageHeader {

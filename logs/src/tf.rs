@@ -1,14 +1,17 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish one edge at a time.
 
-use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, TFMessage, Time, Transform};
-use gridweave_runtime::stage::{TfFrames, match_robot};
+use crate::schemas::full_type_name;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, RosMessage, TFMessage, Time, Transform};
+use gridweave_runtime::stage::{TfFrames, frame_of_robot, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Whether tf messages come on `topic`, and the prefix of the frames in them: `/tf` and `/tf_static` have frames with
+/// Whether transforms come on a channel, and the prefix of the frames in them: `/tf` and `/tf_static` have frames with
 /// their full names, `/robot1/tf` and `/robot1/tf_static` frames that lack the `robot1/` before them.
-pub fn tf_topic(topic: &str) -> Option<&str> {
-    let (namespace, last) = topic.rsplit_once('/')?;
+pub fn tf_topic(channel: &Channel) -> Option<&str> {
+    let is_tf = channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME;
+    let (namespace, last) = channel.topic.rsplit_once('/').filter(|_| is_tf)?;
     let robot = namespace.rsplit_once('/').map_or(namespace, |(_, robot)| robot);
     matches!(last, "tf" | "tf_static").then_some(robot)
 }
@@ -145,15 +148,15 @@ impl TfPoses {
         let mut changed: BTreeMap<String, Time> = BTreeMap::new();
         let mut unusable = 0;
         for edge in &message.transforms {
-            let parent = full_name(prefix, &edge.header.frame_id);
-            let child = full_name(prefix, &edge.child_frame_id);
+            let parent = frame_of_robot(prefix, &edge.header.frame_id);
+            let child = frame_of_robot(prefix, &edge.child_frame_id);
             if !self.tree.insert(&parent, &child, &edge.transform, is_static) {
                 unusable += 1;
                 continue;
             }
             self.recognise(&parent);
             self.recognise(&child);
-            changed.insert(child, edge.header.stamp);
+            changed.insert(child.into_owned(), edge.header.stamp);
         }
         (self.poses(&changed), unusable)
     }
@@ -185,13 +188,6 @@ impl TfPoses {
         let untied = |(_, (map, base)): &(&String, &(String, String))| self.tree.chain(map, base).is_none();
         self.robots.iter().filter(untied).map(|(robot, _)| robot.as_str()).collect()
     }
-}
-
-/// A frame's name with the prefix of its robot, if it lacks it, and without the slash that ROS 1 put before names.
-fn full_name(prefix: &str, frame: &str) -> String {
-    let frame = frame.trim_start_matches('/');
-    let has_prefix = frame.strip_prefix(prefix).is_some_and(|rest| prefix.is_empty() || rest.starts_with('/'));
-    if has_prefix { frame.to_owned() } else { format!("{prefix}/{frame}") }
 }
 
 #[cfg(test)]

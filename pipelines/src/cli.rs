@@ -1,6 +1,8 @@
 //! What the command line may say, and who does it.
 
-use crate::commands::{check, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate};
+use crate::commands::{
+    check, convert, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate,
+};
 use crate::interrupt;
 use crate::status::Status;
 use anyhow::Result;
@@ -37,6 +39,8 @@ enum Command {
     Kinds(kinds::KindsArgs),
     /// Show what is in logs (topics, types, counts, times, robots) or in map files.
     Info(info::InfoArgs),
+    /// Write logs of any kind that is read as one MCAP file.
+    Convert(convert::ConvertArgs),
     /// Compare a summary with the truth.
     Evaluate(evaluate::EvaluateArgs),
     /// Simulate robots in a building, and write a log and its truth.
@@ -67,6 +71,7 @@ impl Command {
             self,
             Self::Run(_)
                 | Self::Merge(_)
+                | Self::Convert(_)
                 | Self::Simulate(_)
                 | Self::Demo(_)
                 | Self::Golden(_)
@@ -92,6 +97,7 @@ impl Cli {
             Command::Graph(args) => graph::graph(&args, registry),
             Command::Kinds(args) => kinds::kinds(&args, registry),
             Command::Info(args) => info::info(&args, registry),
+            Command::Convert(args) => convert::convert(&args, registry),
             Command::Evaluate(args) => evaluate::command(&args),
             Command::Simulate(args) => simulate::simulate(&args, registry),
             Command::Demo(args) => demo::demo(&args, registry),

@@ -138,10 +138,7 @@ impl RunSummary {
         for (stage, area) in self.stages.iter().filter_map(|stage| Some((&stage.name, stage.area?))) {
             write_areas(out, stage, &area)?;
         }
-        for (stage, what, count) in self.warnings() {
-            let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
-            writeln!(out, "warning: {stage}: {what} ({times})")?;
-        }
+        self.warning_lines().try_for_each(|line| writeln!(out, "{line}"))?;
         // Only a live run has any of these.
         for StageSummary { name, dropped, restarts, .. } in &self.stages {
             if *dropped > 0 {
@@ -156,6 +153,14 @@ impl RunSummary {
             table.row([name.clone(), messages_in.to_string(), messages_out.to_string(), format!("{busy_ms:.1}")]);
         }
         write!(out, "\n{table}")
+    }
+
+    /// The warnings for people, a line each.
+    pub(crate) fn warning_lines(&self) -> impl Iterator<Item = String> {
+        self.warnings().map(|(stage, what, count)| {
+            let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
+            format!("warning: {stage}: {what} ({times})")
+        })
     }
 
     /// All warnings: stage, text, count.

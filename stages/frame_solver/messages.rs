@@ -7,6 +7,7 @@ use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
     Alignment, Header, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot, Verdict,
 };
+use gridweave_runtime::stage::frame_of_robot;
 use std::collections::BTreeMap;
 
 /// Where the robots' maps lie. `frame_ids` are the names of the map frames of robots that have sent a map.
@@ -79,12 +80,8 @@ pub(super) fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
 
 /// The name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
 pub(super) fn prefixed(robot: &str, frame_id: &str) -> String {
-    let frame_id = frame_id.trim_start_matches('/');
-    match frame_id.strip_prefix(robot) {
-        Some(rest) if rest.starts_with(['/', '_']) => frame_id.to_owned(),
-        _ if frame_id.is_empty() => format!("{robot}/map"),
-        _ => format!("{robot}/{frame_id}"),
-    }
+    let frame_id = if frame_id.trim_start_matches('/').is_empty() { "map" } else { frame_id };
+    frame_of_robot(robot, frame_id).into_owned()
 }
 
 /// The frames of the message as transforms from `world`, and those of groups from the groups' own frames.

@@ -35,8 +35,9 @@ fn an_empty_file() {
 fn a_file_that_is_no_log() {
     for (bytes, word) in [
         (&b"what is this? not a log, for sure"[..], "MCAP"),
-        (b"#ROSBAG V2.0\n and so on and so on", "ROS 1"),
-        (b"SQLite format 3\0 and so on and so on", "ros2 bag convert"),
+        (b"#ROSBAG V1.2\n and so on and so on", "ROS 1"),
+        (b"#ROSBAG V2.0\n and so on and so on", "no whole message is left"),
+        (b"SQLite format 3\0 and so on and so on", "the database cannot be read"),
     ] {
         let folder = TempDir::new().unwrap();
         fs::write(folder.path().join("in.mcap"), bytes).unwrap();

@@ -7,6 +7,7 @@
 
 mod bad_input;
 mod closed_output;
+mod containers;
 mod engines_agree;
 mod far_from_the_origin;
 mod full_shared_memory;
@@ -22,6 +23,7 @@ mod merge_map_files;
 mod merge_output;
 mod methods;
 mod mirrored_tag;
+mod names;
 mod output_files;
 mod processes;
 mod real_logs;

@@ -6,6 +6,7 @@ use super::target::Target;
 use gridweave::shipped::registry;
 use gridweave_logs::dynamic::{JsonOptions, Schema};
 use gridweave_logs::info::inspect;
+use gridweave_logs::names::{self, NameRules};
 use gridweave_logs::reader;
 use gridweave_logs::schemas::schema_text;
 use gridweave_runtime::engine::{EngineKind, run};
@@ -94,7 +95,8 @@ pub(crate) fn small_log(options: WriteOptions) -> Vec<u8> {
 
 fn read(folder: &Path) {
     let paths = [folder.join(LOG)];
-    let info = inspect(&paths, &RobotTopics::default());
+    let log = names::Input { robot: None, path: folder.join(LOG) };
+    let info = inspect(&[log], &NameRules::default(), &RobotTopics::default());
     let Ok(mut log) = reader::open(&paths) else { return };
     let files = log.files().clone();
     let (mut messages, mut last) = (0, 0);

@@ -24,6 +24,7 @@ mod definition;
 mod json;
 mod path;
 mod reader;
+mod recode;
 mod schema;
 mod value;
 
@@ -35,5 +36,6 @@ pub use decode::DecodeError;
 pub use json::JsonOptions;
 pub use path::{FieldPath, PathError};
 pub use reader::DecodeFault;
+pub use recode::Recoder;
 pub use schema::{Schema, SchemaError};
 pub use value::{Array, Scalar, Value};

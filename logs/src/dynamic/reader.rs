@@ -1,4 +1,4 @@
-//! CDR by hand: numbers and texts, aligned as the encoding wants it.
+//! CDR by hand: numbers and texts, aligned as the encoding wants it; and the encoding of ROS 1, which aligns nothing.
 
 /// What is wrong with a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -26,6 +26,8 @@ pub(super) struct CdrReader<'a> {
     body: &'a [u8],
     at: usize,
     big_endian: bool,
+    /// Whether the fields follow each other without a gap, as in ROS 1.
+    packed: bool,
 }
 
 /// A number of fixed size.
@@ -59,7 +61,22 @@ impl<'a> CdrReader<'a> {
             [0, 1, ..] => false,
             _ => return None,
         };
-        Some(Self { body, at: 0, big_endian })
+        Some(Self { body, at: 0, big_endian, packed: false })
+    }
+
+    /// Reads a message as ROS 1 encodes it: little-endian, without gaps, texts without a zero byte.
+    pub(super) fn ros1(body: &'a [u8]) -> Self {
+        Self { body, at: 0, big_endian: false, packed: true }
+    }
+
+    /// Whether numbers are big-endian.
+    pub(super) fn is_big_endian(&self) -> bool {
+        self.big_endian
+    }
+
+    /// Whether the message is encoded as in ROS 1.
+    pub(super) fn is_ros1(&self) -> bool {
+        self.packed
     }
 
     /// How many bytes are left.
@@ -67,8 +84,11 @@ impl<'a> CdrReader<'a> {
         self.body.len().saturating_sub(self.at)
     }
 
-    fn align(&mut self, size: usize) {
-        self.at = self.at.next_multiple_of(size);
+    /// Goes on to where a number of this size may begin.
+    pub(super) fn align(&mut self, size: usize) {
+        if !self.packed {
+            self.at = self.at.next_multiple_of(size);
+        }
     }
 
     /// The next bytes, as they are.
@@ -109,10 +129,14 @@ impl<'a> CdrReader<'a> {
 
     /// The next text: its length with the zero byte behind it, and its bytes.
     pub(super) fn text(&mut self) -> Result<&'a str, DecodeFault> {
+        std::str::from_utf8(self.text_bytes()?).map_err(|_| DecodeFault::Text)
+    }
+
+    /// The bytes of the next text, without the zero byte behind it.
+    pub(super) fn text_bytes(&mut self) -> Result<&'a [u8], DecodeFault> {
         let length = self.number::<4, u32>()? as usize;
         let bytes = self.bytes(length)?;
         // Some writers give an empty text no zero byte.
-        let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
-        std::str::from_utf8(text).map_err(|_| DecodeFault::Text)
+        Ok(bytes.strip_suffix(&[0]).unwrap_or(bytes))
     }
 }

@@ -18,6 +18,8 @@ pub struct Schema {
 /// One type of a schema.
 #[derive(Clone, Debug)]
 pub(super) struct MessageType {
+    /// `package/Type`.
+    pub(super) name: String,
     pub(super) fields: Vec<Field>,
     /// The fewest bytes that a value takes, and at least 1.
     pub(super) least_size: usize,
@@ -160,7 +162,7 @@ impl Builder {
         }
         let text = self.sections.get(name).ok_or_else(|| SchemaError::Undefined(name.to_owned()))?;
         let lines = fields(text).map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
-        let mut made = MessageType { fields: Vec::with_capacity(lines.len()), least_size: 0 };
+        let mut made = MessageType { name: name.to_owned(), fields: Vec::with_capacity(lines.len()), least_size: 0 };
         let mut names = BTreeSet::new();
         for FieldLine { name: field, of, count } in lines {
             if !names.insert(field.clone()) {

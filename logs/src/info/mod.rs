@@ -7,13 +7,14 @@ mod tests;
 
 pub use robots::RobotInfo;
 
-use crate::reader::{self, Damage, LogFile, LogReader, ReadError};
+use crate::names::{self, Input, NameError, NameRules, Names, Renamed};
+use crate::reader::{Damage, LogFile, LogReader};
 use crate::source::Role;
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::RobotTopics;
 use robots::RobotSurvey;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// What is in one or more logs. Times are seconds since the epoch of the logs.
@@ -31,6 +32,9 @@ pub struct LogInfo {
     pub duration: f64,
     /// The topics, by name and then by type.
     pub topics: Vec<TopicInfo>,
+    /// How robots were named without being asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
     /// What was recognised of each robot.
     pub robots: BTreeMap<String, RobotInfo>,
     /// What stands in the way of using the logs, or of merging the robots' maps.
@@ -42,6 +46,11 @@ pub struct LogInfo {
 pub struct FileInfo {
     /// Its path.
     pub path: PathBuf,
+    /// What it is: `MCAP` or `SQLite`, and whether it is packed.
+    pub container: String,
+    /// The robot that all of it was put under.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
     /// Its size in bytes.
     pub size: u64,
     /// How many messages were read from it.
@@ -57,8 +66,10 @@ pub struct FileInfo {
 /// One topic of a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TopicInfo {
-    /// Its name.
+    /// Its name, under that of its robot.
     pub topic: String,
+    /// The names that it has in the logs.
+    pub logged: BTreeSet<String>,
     /// The type of its messages; empty if the log does not tell.
     #[serde(rename = "type")]
     pub type_name: String,
@@ -74,21 +85,32 @@ pub struct TopicInfo {
     pub last: f64,
 }
 
-/// Reads the logs at `paths` through, and says what is in them. `robots` says how topics are told apart.
-pub fn inspect(paths: &[PathBuf], robots: &RobotTopics) -> Result<LogInfo, ReadError> {
-    let mut reader = reader::open(paths)?;
+/// Reads logs through, and says what is in them. `rules` say what topics are called, and `robots` how they are told apart.
+///
+/// # Errors
+/// A log cannot be read, or the rules do not fit what is in them.
+pub fn inspect(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<LogInfo, NameError> {
+    let (mut reader, names) = names::open(inputs, rules, robots)?;
     let files = reader.files().clone();
     let mut info = LogInfo { files: files.iter().map(file_info).collect(), ..Default::default() };
+    info.remark = names.remark().map(str::to_owned);
+    for (number, file) in info.files.iter_mut().enumerate() {
+        file.robot = names.robot_of_file(number).map(str::to_owned);
+    }
     for (file, log) in info.files.iter_mut().zip(files.iter()) {
         log.damage().iter().for_each(|damage| file.add(damage));
     }
     let mut topics = Topics { known: vec![Vec::new(); files.len()], entries: Vec::new() };
-    let mut survey = RobotSurvey::new(robots.clone());
+    let mut survey = RobotSurvey::new(robots.clone(), names.channels());
+    let mut renamed = Vec::new();
     let mut times: Option<(LogTime, LogTime)> = None;
     while let Some(message) = reader.next_message() {
         let (index, time) = (message.file, message.log_time);
         let Some(file) = info.files.get_mut(index) else { continue };
-        let Some(entry) = topics.find(&files, index, message.channel, &mut survey) else {
+        if !names.wants(index, message.channel) {
+            continue;
+        }
+        let Some(entry) = topics.find(&files, &names, index, message.channel, &mut survey) else {
             file.add(&Damage::UnknownChannel { channel: message.channel });
             continue;
         };
@@ -103,7 +125,9 @@ pub fn inspect(paths: &[PathBuf], robots: &RobotTopics) -> Result<LogInfo, ReadE
         topic.last = time.seconds();
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
-        survey.take(*role, robot, &topic.topic, message.data);
+        // Transforms are looked into, and their frames are to have the names that a merge gives them.
+        let is_renamed = *role == Role::Tf && names.rename_frames(&message, &mut renamed) == Renamed::Copied;
+        survey.take(*role, robot, &topic.topic, if is_renamed { &renamed } else { message.data });
     }
     add_late_damage(&mut reader, &mut info);
     if let Some((first, last)) = times {
@@ -129,6 +153,7 @@ fn file_info(file: &LogFile) -> FileInfo {
     let name = |compression: &String| if compression.is_empty() { "none".to_owned() } else { compression.clone() };
     FileInfo {
         path: file.path().to_owned(),
+        container: file.container(),
         size: file.size(),
         chunks: file.chunks(),
         compression: file.compressions().iter().map(name).collect(),
@@ -156,7 +181,14 @@ struct Entry {
 }
 
 impl Topics {
-    fn find(&mut self, files: &[LogFile], file: usize, number: u16, survey: &mut RobotSurvey) -> Option<&mut Entry> {
+    fn find(
+        &mut self,
+        files: &[LogFile],
+        names: &Names,
+        file: usize,
+        number: u16,
+        survey: &mut RobotSurvey,
+    ) -> Option<&mut Entry> {
         let known = self.known.get_mut(file)?;
         let place = usize::from(number);
         if known.len() <= place {
@@ -165,11 +197,14 @@ impl Topics {
         let index = match known[place] {
             Some(index) => index,
             None => {
-                let channel = files.get(file)?.channel(number)?;
-                let index = self.entries.iter().position(|entry| entry.is_of(&channel)).unwrap_or(self.entries.len());
+                let channel = names.channel(file, number)?;
+                let index = self.entries.iter().position(|entry| entry.is_of(channel)).unwrap_or(self.entries.len());
                 if index == self.entries.len() {
-                    let (role, robot) = survey.classify(&channel);
-                    self.entries.push(Entry { role, robot, info: topic_info(channel) });
+                    let (role, robot) = survey.classify(channel);
+                    self.entries.push(Entry { role, robot, info: topic_info(channel.clone()) });
+                }
+                if let (Some(entry), Some(logged)) = (self.entries.get_mut(index), files.get(file)?.channel(number)) {
+                    entry.info.logged.insert(logged.topic);
                 }
                 known[place] = Some(index);
                 index

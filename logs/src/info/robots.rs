@@ -2,7 +2,7 @@
 
 use super::LogInfo;
 use crate::schemas::full_type_name;
-use crate::source::{Classified, Role, classify};
+use crate::source::{Classified, RobotChannels, Role};
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
@@ -36,6 +36,7 @@ struct TagRangeStart {
 /// Takes up messages one by one.
 pub(super) struct RobotSurvey {
     topics: RobotTopics,
+    roles: RobotChannels,
     mismatches: BTreeSet<String>,
     /// Topics with maps that were not recognised as a robot's.
     other_maps: BTreeSet<String>,
@@ -46,8 +47,10 @@ pub(super) struct RobotSurvey {
 }
 
 impl RobotSurvey {
-    pub(super) fn new(topics: RobotTopics) -> Self {
+    /// For logs with these channels.
+    pub(super) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
         Self {
+            roles: RobotChannels::new(topics.clone(), channels),
             tf: topics.tf.clone().map(TfPoses::new),
             topics,
             mismatches: BTreeSet::new(),
@@ -59,7 +62,7 @@ impl RobotSurvey {
 
     /// What a channel carries, and of which robot.
     pub(super) fn classify(&mut self, channel: &Channel) -> (Role, String) {
-        let Classified { role, robot, mismatch } = classify(&self.topics, channel);
+        let Classified { role, robot, mismatch } = self.roles.classify(channel);
         self.mismatches.extend(mismatch);
         match role {
             Role::Other if full_type_name(&channel.schema_name) == OccupancyGrid::NAME => {

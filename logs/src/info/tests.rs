@@ -22,7 +22,8 @@ fn two_robots() -> TestLog {
 
 fn inspect_bytes(bytes: &[u8]) -> LogInfo {
     let folder = Folder::new();
-    inspect(&[folder.write("a.mcap", bytes)], &RobotTopics::default()).unwrap()
+    let log = Input { robot: None, path: folder.write("a.mcap", bytes) };
+    inspect(&[log], &NameRules::default(), &RobotTopics::default()).unwrap()
 }
 
 #[test]
@@ -75,7 +76,7 @@ fn a_log_whose_run_ended_early_says_so() {
     ] {
         let log = LogWriter::create(&path, LogOptions::default()).unwrap();
         log.finish(outcome).unwrap();
-        let info = inspect(std::slice::from_ref(&path), &RobotTopics::default()).unwrap();
+        let info = inspect(&[Input::new(&path)], &NameRules::default(), &RobotTopics::default()).unwrap();
         let said = info.problems.iter().any(|problem| problem.contains(expected.unwrap_or("ended early")));
         assert_eq!(said, expected.is_some(), "{:?}", info.problems);
     }

@@ -71,7 +71,10 @@ impl Ahead {
         let load = match load {
             // A thread that has failed has found something in the block that no reader can handle.
             Loading::Thread(thread) => thread.join().unwrap_or(Err(ChunkFault::Records)),
-            Loading::Later => self.block(id)?.load(&self.files[id.file].bytes),
+            Loading::Later => {
+                let file = &self.files[id.file];
+                self.block(id)?.load(&file.storage, &file.layout.definitions)
+            }
         };
         self.begin();
         Some((id, size, load))
@@ -101,7 +104,7 @@ impl Ahead {
         let files = Arc::clone(&self.files);
         let load = move || {
             let file = &files[id.file];
-            file.layout.blocks[id.block].load(&file.bytes)
+            file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions)
         };
         // Without a thread to be had the block is loaded when its turn comes.
         std::thread::Builder::new().name("log block".into()).spawn(load).map_or(Loading::Later, Loading::Thread)

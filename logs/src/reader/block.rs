@@ -5,7 +5,11 @@ use super::bytes::FileBytes;
 use super::chunk::{Chunk, LARGEST};
 use super::damage::ChunkFault;
 use super::definitions::Definitions;
+use super::packed::{ZSTD_MAGIC, unpack_messages};
 use super::record::{MessageRecord, record_at};
+use super::ros1::BagChunk;
+use super::sqlite::Rows;
+use super::storage::Storage;
 use mcap::records::op;
 use std::ops::Range;
 
@@ -27,6 +31,10 @@ pub(crate) enum Records {
     Bare(Range<usize>),
     /// In a chunk.
     Chunk(Chunk),
+    /// In rows of a database.
+    Rows(Rows),
+    /// In a chunk of a bag of ROS 1.
+    Ros1(BagChunk),
 }
 
 impl Block {
@@ -37,6 +45,8 @@ impl Block {
             // The size of a chunk that is cut may not have been written yet.
             Records::Chunk(chunk) if chunk.cut => chunk.data.len() as u64,
             Records::Chunk(chunk) => chunk.size,
+            Records::Rows(rows) => rows.size,
+            Records::Ros1(chunk) => chunk.size,
         }
     }
 
@@ -48,6 +58,8 @@ impl Block {
             }
             Records::Bare(range) => file.read(range.clone()).ok_or(ChunkFault::Records),
             Records::Chunk(chunk) => chunk.contents(file),
+            // Databases and bags have no records of MCAP.
+            Records::Rows(_) | Records::Ros1(_) => Err(ChunkFault::Records),
         }
     }
 
@@ -56,11 +68,21 @@ impl Block {
         matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
     }
 
-    /// Makes the block's messages ready to be given out.
-    pub(crate) fn load(&self, file: &FileBytes) -> Result<LoadedBlock, ChunkFault> {
-        let records = self.contents(file)?;
-        let messages = index_messages(&records, self.may_be_cut())?;
-        Ok(LoadedBlock { records, messages })
+    /// Makes the block's messages ready to be given out. `definitions` are those of its file.
+    pub(crate) fn load(&self, storage: &Storage, definitions: &Definitions) -> Result<LoadedBlock, ChunkFault> {
+        let (records, lost) = match (&self.records, storage) {
+            (Records::Rows(rows), Storage::Sqlite(database)) => rows.contents(database)?,
+            (Records::Ros1(chunk), Storage::Ros1(bag)) => chunk.messages(bag)?,
+            (_, Storage::Mcap(file)) => (self.contents(file)?, 0),
+            _ => return Err(ChunkFault::Records),
+        };
+        let index = Index::of(&records, self.may_be_cut())?;
+        if !index.may_be_packed {
+            return Ok(LoadedBlock { records, messages: index.messages, lost });
+        }
+        let records = unpack_messages(&records, definitions)?;
+        let messages = Index::of(&records, self.may_be_cut())?.messages;
+        Ok(LoadedBlock { records, messages, lost })
     }
 
     /// Reads the block through for what its header does not say, or does not say reliably.
@@ -99,6 +121,8 @@ pub(crate) struct LoadedBlock {
     records: Vec<u8>,
     /// By log time, and at equal times by position.
     messages: Vec<MessagePlace>,
+    /// How many messages of the block could not be read.
+    pub(crate) lost: u64,
 }
 
 /// Where a message lies in its block.
@@ -108,24 +132,34 @@ struct MessagePlace {
     position: usize,
 }
 
-/// The places of the messages among `records`, in the order they are given out.
-fn index_messages(records: &[u8], may_be_cut: bool) -> Result<Vec<MessagePlace>, ChunkFault> {
-    let mut messages = Vec::with_capacity(records.len() / 256);
-    let mut position = 0;
-    while let Some(record) = record_at(records, position) {
-        if record.opcode == op::MESSAGE {
-            let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
-            messages.push(MessagePlace { log_time: message.log_time, position });
+/// The messages among some records.
+struct Index {
+    /// The places of the messages, in the order they are given out.
+    messages: Vec<MessagePlace>,
+    /// Whether one of them begins as a message does that is compressed by itself.
+    may_be_packed: bool,
+}
+
+impl Index {
+    fn of(records: &[u8], may_be_cut: bool) -> Result<Self, ChunkFault> {
+        let mut index = Self { messages: Vec::with_capacity(records.len() / 256), may_be_packed: false };
+        let mut position = 0;
+        while let Some(record) = record_at(records, position) {
+            if record.opcode == op::MESSAGE {
+                let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
+                index.messages.push(MessagePlace { log_time: message.log_time, position });
+                index.may_be_packed |= message.data.starts_with(ZSTD_MAGIC);
+            }
+            position = record.end();
         }
-        position = record.end();
+        if position != records.len() && !may_be_cut {
+            return Err(ChunkFault::Records);
+        }
+        if !index.messages.is_sorted() {
+            index.messages.sort_unstable();
+        }
+        Ok(index)
     }
-    if position != records.len() && !may_be_cut {
-        return Err(ChunkFault::Records);
-    }
-    if !messages.is_sorted() {
-        messages.sort_unstable();
-    }
-    Ok(messages)
 }
 
 impl LoadedBlock {

@@ -26,9 +26,14 @@ impl FileBytes {
     /// Opens a regular file.
     pub(crate) fn open(path: &Path) -> io::Result<Self> {
         let file = input_file::open(path)?;
-        let length = usize::try_from(file.metadata()?.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
         // A folder is opened as well, and cannot be read.
         file.read_at(&mut [0], 0)?;
+        Self::of(file)
+    }
+
+    /// The bytes of a file that is open.
+    pub(crate) fn of(file: File) -> io::Result<Self> {
+        let length = usize::try_from(file.metadata()?.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
         Ok(Self { file, length })
     }
 

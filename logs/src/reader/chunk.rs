@@ -108,7 +108,8 @@ fn reserve(size: u64, data: &[u8]) -> Result<Vec<u8>, ChunkFault> {
     Ok(buffer)
 }
 
-fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
+/// The contents of one or more frames of zstd, at most `size` bytes and one more.
+pub(crate) fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = reserve(size, data)?;
     if buffer.capacity() as u64 >= size {
         let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
@@ -121,7 +122,8 @@ fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     Ok(buffer)
 }
 
-fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
+/// The contents of one or more frames of lz4, at most `size` bytes and one more.
+pub(crate) fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = reserve(size, data)?;
     let mut rest = data;
     // The data may be several frames; a decoder reads one, and stops behind it.

@@ -50,9 +50,38 @@ pub enum Damage {
     /// Another program has changed the file meanwhile.
     #[error("the file was changed while it was read; what comes behind the change was not read")]
     Changed,
+    /// A file that is packed breaks off, or is damaged.
+    #[error("the packed file is damaged or not whole; what comes before that was read")]
+    CutPack,
+    /// Rows of a database cannot be read.
+    #[error("the messages from number {from} on{} are not readable: the database is damaged", up_to(.to))]
+    LostRows {
+        /// The number of the first.
+        from: i64,
+        /// The number of the next one that can be read; none if there is no other.
+        to: Option<i64>,
+    },
+    /// Messages of a database or of a bag of ROS 1 cannot be read, although those around them can.
+    #[error("{count} messages are not readable: they are damaged, or do not fit their definition")]
+    LostMessages {
+        /// How many.
+        count: u64,
+    },
+    /// A database was not closed, and what its recorder wrote last is in another file.
+    #[error(
+        "the recorder did not close the database, and what is in {rest} was not read; `sqlite3 FILE 'pragma wal_checkpoint'` on a copy of both takes it up"
+    )]
+    NotClosed {
+        /// The other file.
+        rest: String,
+    },
     /// A chunk holds messages that are older than its header and its index both say.
     #[error("a message was found out of order, because the index of its chunk is wrong; it was given a later log time")]
     LateMessage,
+}
+
+fn up_to(number: &Option<i64>) -> String {
+    number.map(|number| format!(" to {}", number.saturating_sub(1))).unwrap_or_default()
 }
 
 /// What is wrong with a chunk.
@@ -67,7 +96,7 @@ pub enum ChunkFault {
     #[error("it cannot be decompressed")]
     Decompression,
     /// It is compressed in a way that this program does not know.
-    #[error("its compression `{0}` is not known (none, lz4 and zstd are)")]
+    #[error("its compression `{0}` is not known (none, lz4 and zstd are; `rosbag decompress` unpacks a ROS 1 bag)")]
     UnknownCompression(String),
     /// It does not consist of whole records.
     #[error("it does not consist of whole records")]

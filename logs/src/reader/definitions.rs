@@ -47,6 +47,15 @@ impl Definitions {
         }
     }
 
+    /// Puts in a channel of the given number, which is neither 0 nor the greatest, and its schema, which has the same.
+    pub(crate) fn insert(&mut self, number: u16, channel: Channel) {
+        let Channel { topic, message_encoding, schema_name: name, schema_encoding: encoding, schema: text, metadata } =
+            channel;
+        let schema = if name.is_empty() { 0 } else { number };
+        self.schemas.insert(schema, Schema { name, encoding, text });
+        self.channels.insert(number, ChannelRecord { schema, topic, message_encoding, metadata });
+    }
+
     /// Takes up what another part of the same file says.
     pub(crate) fn merge(&mut self, other: Self) {
         self.redefined += other.redefined;
@@ -56,6 +65,11 @@ impl Definitions {
         for (id, channel) in other.channels {
             self.redefined += usize::from(differs(&mut self.channels, id, channel));
         }
+    }
+
+    /// Whether the messages of a channel are encoded in CDR.
+    pub(crate) fn is_cdr(&self, id: u16) -> bool {
+        self.channels.get(&id).is_some_and(|channel| channel.message_encoding == "cdr")
     }
 
     /// How many channels are known.

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum ReadError {
     /// No file was named.
-    #[error("no log is given: name an MCAP file, or the folder of a ROS 2 bag")]
+    #[error("no log is given: name a file (MCAP, SQLite of rosbag2, ROS 1 bag), or the folder of a ROS 2 bag")]
     NothingGiven,
     /// The path does not exist.
     #[error("{}: there is no such file or folder", .path.display())]
@@ -36,14 +36,30 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The file is something else.
-    #[error("{}: it is not an MCAP log but looks like {looks_like}; {cure}", .path.display())]
-    NotMcap {
+    #[error("{}: it is no log that can be read (MCAP, SQLite of rosbag2, ROS 1 bag) but looks like {looks_like}; {cure}", .path.display())]
+    NotALog {
         /// The file.
         path: PathBuf,
         /// What its first bytes say, such as "a ROS 1 bag".
         looks_like: &'static str,
         /// What would mend it.
         cure: &'static str,
+    },
+    /// A file that is packed cannot be unpacked.
+    #[error("{}: it cannot be unpacked: {cause}; there must be room for all of it where temporary files are, which TMPDIR names", .path.display())]
+    Unpack {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        cause: std::io::Error,
+    },
+    /// A database is none of rosbag2, or too damaged.
+    #[error("{}: the database cannot be read: {cause}", .path.display())]
+    Database {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
     },
     /// The file begins as a log does and breaks off, or is damaged, before its first whole message.
     #[error("{}: it is damaged, and no whole message is left in it ({damage}); take another copy", .path.display())]
@@ -54,13 +70,13 @@ pub enum ReadError {
         damage: super::Damage,
     },
     /// A folder is no bag.
-    #[error("{}: the folder holds neither metadata.yaml nor an .mcap file; name the log itself", .path.display())]
+    #[error("{}: the folder holds neither metadata.yaml nor an .mcap or .db3 file; name the log itself", .path.display())]
     NotABag {
         /// The folder.
         path: PathBuf,
     },
     /// The description of a ROS 2 bag cannot be understood.
-    #[error("{}: it does not describe a ROS 2 bag of MCAP files ({cause}); name the .mcap files instead", .path.display())]
+    #[error("{}: it does not describe a ROS 2 bag ({cause}); name its .mcap or .db3 files instead", .path.display())]
     BagDescription {
         /// The `metadata.yaml`.
         path: PathBuf,

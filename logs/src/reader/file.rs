@@ -5,6 +5,10 @@ use super::damage::Damage;
 use super::error::ReadError;
 use super::guess::looks_like;
 use super::layout::Layout;
+use super::packed::{Unpacked, ZSTD_MAGIC, unpack_file};
+use super::ros1::{self, Bag};
+use super::sqlite::{self, Database};
+use super::storage::Storage;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,11 +17,13 @@ use std::path::{Path, PathBuf};
 /// As much of a file is looked at to see what it is.
 const HEAD: usize = 1 << 10;
 
-/// One MCAP file, opened for reading.
+/// One file of messages, opened for reading: MCAP, a database of rosbag2, or a bag of ROS 1, as it is or packed with zstd.
 #[derive(Debug)]
 pub struct LogFile {
     path: PathBuf,
-    pub(crate) bytes: FileBytes,
+    size: u64,
+    is_packed: bool,
+    pub(crate) storage: Storage,
     pub(crate) layout: Layout,
 }
 
@@ -25,25 +31,31 @@ impl LogFile {
     /// Opens a file and finds out what it consists of. Only what its own index leaves open is read through.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, ReadError> {
         let path = path.into();
-        let bytes = FileBytes::open(&path).map_err(|error| ReadError::io(&path, error))?;
-        let head = bytes.read(0..bytes.len().min(HEAD)).unwrap_or_default();
-        if head.is_empty() {
-            return Err(ReadError::Empty { path });
-        }
-        if !head.starts_with(MAGIC) {
-            // A file that breaks off within the magic bytes is a log of which nothing is left.
-            if MAGIC.starts_with(&head) {
-                return Err(ReadError::NothingLeft { path, damage: Damage::NoEnd { position: 0 } });
+        let packed = FileBytes::open(&path).map_err(|error| ReadError::io(&path, error))?;
+        let size = packed.len() as u64;
+        let is_packed = head(&packed).starts_with(ZSTD_MAGIC);
+        let (storage, layout) = match is_packed {
+            false => open_storage(&path, None, packed)?,
+            true => {
+                let unpacked = unpack_file(&packed);
+                let Unpacked { bytes, name, is_whole } =
+                    unpacked.map_err(|cause| ReadError::Unpack { path: path.clone(), cause })?;
+                let (storage, mut layout) = open_storage(&path, Some(&name), bytes)?;
+                layout.damage.extend((!is_whole).then_some(Damage::CutPack));
+                (storage, layout)
             }
-            let (looks_like, cure) = looks_like(&head);
-            return Err(ReadError::NotMcap { path, looks_like, cure });
-        }
-        let layout = Layout::of(&bytes);
+        };
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
             Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
-            _ => Ok(Self { path, bytes, layout }),
+            _ => Ok(Self { path, size, is_packed, storage, layout }),
         }
+    }
+
+    /// What the file is: `MCAP`, `SQLite` or `ROS 1 bag`, and whether it is packed.
+    pub fn container(&self) -> String {
+        let packed = if self.is_packed { ", packed with zstd" } else { "" };
+        format!("{}{packed}", self.storage.name())
     }
 
     /// The file's path, as it was given.
@@ -53,7 +65,7 @@ impl LogFile {
 
     /// How long the file was when it was opened, bytes.
     pub fn size(&self) -> u64 {
-        self.bytes.len() as u64
+        self.size
     }
 
     /// The channel with the given number in this file.
@@ -91,4 +103,36 @@ impl LogFile {
     pub fn first_time(&self) -> Option<u64> {
         self.layout.blocks.iter().map(|block| block.first_time).min()
     }
+}
+
+fn head(bytes: &FileBytes) -> Vec<u8> {
+    bytes.read(0..bytes.len().min(HEAD)).unwrap_or_default()
+}
+
+/// The container that a file begins as, and its layout. A packed file was unpacked to `unpacked`.
+fn open_storage(path: &Path, unpacked: Option<&Path>, bytes: FileBytes) -> Result<(Storage, Layout), ReadError> {
+    let path = || path.to_owned();
+    let head = head(&bytes);
+    if head.is_empty() {
+        return Err(ReadError::Empty { path: path() });
+    }
+    if head.starts_with(MAGIC) {
+        let layout = Layout::of(&bytes);
+        return Ok((Storage::Mcap(bytes), layout));
+    }
+    if head.starts_with(sqlite::MAGIC) {
+        let opened = Database::open(&path(), unpacked, bytes);
+        let (database, layout) = opened.map_err(|cause| ReadError::Database { path: path(), cause })?;
+        return Ok((Storage::Sqlite(database), layout));
+    }
+    if head.starts_with(ros1::MAGIC) {
+        let (bag, layout) = Bag::open(bytes);
+        return Ok((Storage::Ros1(bag), layout));
+    }
+    // A file that breaks off within the magic bytes is a log of which nothing is left.
+    if [MAGIC, sqlite::MAGIC, ros1::MAGIC].iter().any(|magic| magic.starts_with(&head)) {
+        return Err(ReadError::NothingLeft { path: path(), damage: Damage::NoEnd { position: 0 } });
+    }
+    let (looks_like, cure) = looks_like(&head);
+    Err(ReadError::NotALog { path: path(), looks_like, cure })
 }

@@ -2,11 +2,8 @@
 
 /// What the first bytes of a file that is not MCAP say, and what would mend it.
 pub(crate) fn looks_like(bytes: &[u8]) -> (&'static str, &'static str) {
-    const CONVERT: &str = "convert it: `ros2 bag convert -i BAG -o out.yaml` with `storage_id: mcap` in out.yaml";
-    const KNOWN: [(&[u8], &str, &str); 9] = [
-        (b"#ROSBAG V", "a ROS 1 bag", "convert it to a ROS 2 bag in MCAP, for example with `rosbags-convert`"),
-        (b"SQLite format 3", "a ROS 2 bag in SQLite (.db3)", CONVERT),
-        (b"\x28\xb5\x2f\xfd", "a file packed with zstd", "unpack it with `zstd -d`"),
+    const KNOWN: [(&[u8], &str, &str); 7] = [
+        (b"#ROSBAG V", "a ROS 1 bag of an old version of the format", "bring it up to date with `rosbag fix`"),
         (b"\x1f\x8b", "a file packed with gzip", "unpack it with `gunzip`"),
         (b"BZh", "a file packed with bzip2", "unpack it with `bunzip2`"),
         (b"PK\x03\x04", "a ZIP archive", "unpack it with `unzip`"),
@@ -33,9 +30,8 @@ mod tests {
 
     #[test]
     fn bags_of_other_kinds_are_named_with_a_cure() {
-        assert_eq!(looks_like(b"#ROSBAG V2.0\n").0, "a ROS 1 bag");
-        let (what, cure) = looks_like(b"SQLite format 3\0\x10");
-        assert!(what.contains(".db3") && cure.contains("ros2 bag convert"));
+        let (what, cure) = looks_like(b"#ROSBAG V1.2\n");
+        assert!(what.starts_with("a ROS 1 bag of an old version") && cure.contains("rosbag fix"));
         assert_eq!(looks_like(b"image: map.pgm\nresolution: 0.05\n").0, "text");
         assert_eq!(looks_like(b"\x89MCAP0\n\x01").0, "an MCAP log that was copied as text");
         assert_eq!(looks_like(&[0; 20]).0, "nothing but zeros");

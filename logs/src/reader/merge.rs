@@ -153,11 +153,14 @@ impl LogReader {
             match load {
                 _ if self.changed.contains(&id.file) => {}
                 Ok(block) => {
+                    if block.lost > 0 {
+                        self.damage.push((id.file, Damage::LostMessages { count: block.lost }));
+                    }
                     if let Some(time) = block.time(0) {
                         self.active.push(Reverse(Active { time, id, index: 0, block }));
                     }
                 }
-                Err(_) if self.files.get(id.file).is_some_and(|file| file.bytes.is_cut()) => {
+                Err(_) if self.files.get(id.file).is_some_and(|file| file.storage.is_cut()) => {
                     self.changed.insert(id.file);
                     self.damage.push((id.file, Damage::Changed));
                 }

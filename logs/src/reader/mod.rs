@@ -1,7 +1,7 @@
-//! Reads MCAP files in the order of log time.
+//! Reads MCAP files, databases of rosbag2 and bags of ROS 1 in the order of log time.
 //!
 //! A file is walked over once, from record to record, which finds its **blocks**: its chunks, and runs of records without a
-//! chunk. A block's time span is taken from its header where the index behind it says
+//! chunk, or of rows. A block's time span is taken from its header where the index behind it says
 //! the same, and is looked up in the block itself otherwise. Blocks are then loaded (decompressed and checked) a few
 //! ahead of their use, in the order of their first message, and merged: by log time, then by file, then by position in
 //! the file. A message is borrowed from its block; nothing is copied.
@@ -31,8 +31,12 @@ mod guess;
 mod layout;
 mod merge;
 mod outcome;
+mod packed;
 mod paths;
 mod record;
+mod ros1;
+mod sqlite;
+mod storage;
 mod summary;
 
 #[cfg(test)]
@@ -49,5 +53,5 @@ use std::path::PathBuf;
 /// Opens the logs at `paths`: MCAP files, and folders of ROS 2 bags.
 pub fn open(paths: &[PathBuf]) -> Result<LogReader, ReadError> {
     let files = log_files(paths)?;
-    Ok(LogReader::new(files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?))
+    Ok(LogReader::new(files.into_iter().map(|(_, file)| LogFile::open(file)).collect::<Result<_, _>>()?))
 }

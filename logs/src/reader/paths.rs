@@ -15,24 +15,23 @@ struct Description {
 #[derive(Deserialize)]
 struct BagInformation {
     relative_file_paths: Vec<PathBuf>,
-    #[serde(default)]
-    storage_identifier: String,
 }
 
-/// The log files that `paths` stand for, in order. A folder stands for the ROS 2 bag in it, as does its
-/// `metadata.yaml`.
-pub fn log_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, ReadError> {
+/// The log files that `paths` stand for, in order, each with the number of its path among `paths`. A folder stands for the
+/// ROS 2 bag in it, as does its `metadata.yaml`.
+pub fn log_files(paths: &[PathBuf]) -> Result<Vec<(usize, PathBuf)>, ReadError> {
     let mut files = Vec::new();
-    for path in paths {
+    for (number, path) in paths.iter().enumerate() {
         let metadata = std::fs::metadata(path).map_err(|error| ReadError::io(path, error))?;
-        match path.file_name() {
-            _ if metadata.is_dir() => files.extend(bag_files(path)?),
-            Some(name) if name == "metadata.yaml" => files.extend(described_files(path)?),
-            _ => files.push(path.clone()),
-        }
+        let of_path = match path.file_name() {
+            _ if metadata.is_dir() => bag_files(path)?,
+            Some(name) if name == "metadata.yaml" => described_files(path)?,
+            _ => vec![path.clone()],
+        };
+        files.extend(of_path.into_iter().map(|file| (number, file)));
     }
     let mut seen = BTreeSet::new();
-    for path in &files {
+    for (_, path) in &files {
         let place = std::fs::canonicalize(path).map_err(|error| ReadError::io(path, error))?;
         if !seen.insert(place) {
             return Err(ReadError::Duplicate { path: path.clone() });
@@ -53,7 +52,7 @@ fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|error| ReadError::io(folder, error))? {
         let path = entry.map_err(|error| ReadError::io(folder, error))?.path();
-        if path.extension().is_some_and(|extension| extension == "mcap") && path.is_file() {
+        if is_log(&path) && path.is_file() {
             files.push(path);
         }
     }
@@ -69,13 +68,6 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let text = input_file::read_text(description).map_err(|error| ReadError::io(description, error))?;
     let bag: Description = serde_norway::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let bag = bag.rosbag2_bagfile_information;
-    if bag.storage_identifier.starts_with("sqlite") {
-        return Err(wrong(format!(
-            "its storage is {}; convert it with `ros2 bag convert -i BAG -o out.yaml`, and `storage_id: mcap` in \
-             out.yaml",
-            bag.storage_identifier
-        )));
-    }
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));
     }
@@ -85,5 +77,27 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
         return Err(wrong(format!("{} leads out of the bag", outside.display())));
     }
     let folder = description.parent().unwrap_or(Path::new(""));
-    Ok(bag.relative_file_paths.iter().map(|file| folder.join(file)).collect())
+    Ok(bag.relative_file_paths.iter().map(|file| described_file(folder, file)).collect())
+}
+
+/// Where a file is that a description names. Up to Foxy files were named from outside of the bag's folder; and some were packed,
+/// or unpacked, since.
+fn described_file(folder: &Path, file: &Path) -> PathBuf {
+    let named = folder.join(file);
+    let beside = |file: &Path| {
+        let mut packed = file.as_os_str().to_owned();
+        packed.push(".zstd");
+        [file.to_owned(), PathBuf::from(packed), file.with_extension("")]
+    };
+    let by_name = folder.join(file.file_name().unwrap_or_default());
+    let mut candidates = beside(&named).into_iter().chain(beside(&by_name));
+    // One that is not there is told of under the name that it should have.
+    candidates.find(|path| is_log(path) && path.is_file()).unwrap_or(named)
+}
+
+/// Whether a file is called as those of a bag.
+fn is_log(path: &Path) -> bool {
+    let is_called = |path: &Path| path.extension().is_some_and(|ending| ending == "mcap" || ending == "db3");
+    let is_packed = path.extension().is_some_and(|ending| ending == "zstd" || ending == "zst");
+    is_called(path) || is_packed && path.file_stem().is_some_and(|name| is_called(Path::new(name)))
 }

@@ -70,6 +70,26 @@ impl<'a> MessageRecord<'a> {
     }
 }
 
+/// Appends a message as a record.
+pub(crate) fn push_message(
+    records: &mut Vec<u8>,
+    channel: u16,
+    sequence: u32,
+    log_time: u64,
+    publish_time: u64,
+    data: &[u8],
+) {
+    let length = (MessageRecord::FIELDS + data.len()) as u64;
+    records.reserve(HEAD + MessageRecord::FIELDS + data.len());
+    records.push(op::MESSAGE);
+    records.extend_from_slice(&length.to_le_bytes());
+    records.extend_from_slice(&channel.to_le_bytes());
+    records.extend_from_slice(&sequence.to_le_bytes());
+    records.extend_from_slice(&log_time.to_le_bytes());
+    records.extend_from_slice(&publish_time.to_le_bytes());
+    records.extend_from_slice(data);
+}
+
 /// Little-endian fields, taken off the front of a body one by one; `None` past its end.
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 

@@ -220,6 +220,6 @@ fn a_schema_is_laid_out_as_in_a_bag() {
     assert_eq!(titles[4..], ["MSG: geometry_msgs/Quaternion"]);
     assert_eq!(schema.lines().filter(|line| *line == "=".repeat(80)).count(), 5);
     assert_eq!(schema_text("geometry_msgs/PoseStamped").unwrap(), schema);
-    assert_eq!(schema_text("sensor_msgs/msg/LaserScan"), None);
+    assert_eq!(schema_text("visualization_msgs/msg/Marker"), None);
     assert_eq!(schema_text(""), None);
 }

@@ -11,9 +11,10 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use route::{Classified, Role, classify};
+pub(crate) use route::{Classified, RobotChannels, Role};
 pub use stage::McapSource;
 
+use crate::names::{Convention, Input, NameRules};
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange};
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
@@ -24,9 +25,18 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
-    /// The logs to read: MCAP files, and folders of ROS 2 bags. The messages of several are merged by log time.
-    /// `--input` on the command line stands in for it.
+    /// The logs to read: MCAP files, and folders of ROS 2 bags. The messages of several are merged by log time. `ROBOT=LOG`
+    /// puts the topics and frames of a log under the name of its robot. `--input` on the command line stands in for it.
     pub files: Vec<PathBuf>,
+    /// Whose names topics and frames bear: those of their robots, or those that they were logged with.
+    pub names: Convention,
+    /// Topics that get other names, as `OLD=NEW`, with or without the name of their robot. `{robot}` stands for one part of
+    /// both.
+    pub rename: Vec<String>,
+    /// The robots to read; the topics of others are left out. All if none are given.
+    pub only_robots: Vec<String>,
+    /// The topics to read, `{robot}` standing for any one part: `["/{robot}/map", "/tf"]`. All if none are given.
+    pub only_topics: Vec<String>,
     /// Seconds from the first message of the logs at which to begin. The last map of each robot before that, and other
     /// latched messages, are sent at the beginning.
     pub start: f64,
@@ -34,9 +44,29 @@ pub struct SourceParameters {
     pub end: Option<f64>,
 }
 
+impl SourceParameters {
+    /// The logs, and whose they are.
+    fn inputs(&self) -> Vec<Input> {
+        self.files.iter().map(|file| Input::new(file)).collect()
+    }
+
+    /// How topics and robots are named.
+    ///
+    /// # Errors
+    /// An entry of `rename` is none.
+    fn rules(&self) -> Result<NameRules, String> {
+        let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
+        let (robots, topics) = (self.only_robots.clone(), self.only_topics.clone());
+        Ok(NameRules { convention: self.names, renames, robots, topics })
+    }
+}
+
 impl Parameters for SourceParameters {
     fn check(&self) -> Vec<ParameterError> {
         let mut errors = Vec::new();
+        if let Err(wrong) = self.rules() {
+            errors.push(ParameterError::new("rename", wrong));
+        }
         if !(self.start.is_finite() && self.start >= 0.0) {
             errors.push(ParameterError::new("start", "must be 0 s or more"));
         }

@@ -3,7 +3,8 @@
 use super::RobotMessages;
 use super::carry::{Carried, Carry, Latch};
 use super::pose::{NoPose, pose_with_covariance};
-use super::route::{PoseSource, Role, classify};
+use super::route::{PoseSource, RobotChannels, Role};
+use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -40,6 +41,15 @@ impl Route {
     }
 }
 
+/// What becomes of the messages of a channel.
+#[derive(Clone, Copy)]
+enum Target {
+    /// They take the route of this index.
+    Route(usize),
+    /// Nobody asked for them, or they cannot be passed on.
+    Nothing,
+}
+
 /// What a message is, besides its bytes.
 #[derive(Clone, Copy)]
 struct Stamp {
@@ -50,10 +60,14 @@ struct Stamp {
 /// Sends messages to the ports that their channels call for.
 pub(crate) struct Router {
     robots: RobotTopics,
+    roles: RobotChannels,
+    names: Names,
     files: Arc<[LogFile]>,
+    /// A message whose frames have other names than in the log.
+    renamed: Vec<u8>,
     routes: Vec<Route>,
-    /// For every file and channel number: the route's index, once it is known.
-    by_number: Vec<Vec<Option<usize>>>,
+    /// For every file and channel number: what becomes of its messages, once it is known.
+    by_number: Vec<Vec<Option<Target>>>,
     by_channel: BTreeMap<Channel, usize>,
     tf: Option<TfPoses>,
     /// Whether poses were made from transforms.
@@ -61,9 +75,12 @@ pub(crate) struct Router {
 }
 
 impl Router {
-    pub(crate) fn new(robots: RobotTopics, files: Arc<[LogFile]>) -> Self {
+    pub(crate) fn new(robots: RobotTopics, names: Names, files: Arc<[LogFile]>) -> Self {
         Self {
             tf: robots.tf.clone().map(TfPoses::new),
+            roles: RobotChannels::new(robots.clone(), names.channels()),
+            names,
+            renamed: Vec::new(),
             robots,
             by_number: vec![Vec::new(); files.len()],
             files,
@@ -77,7 +94,35 @@ impl Router {
     pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let Some(route) = self.route(message, output)? else { return Ok(()) };
         let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
-        self.send_on(route, stamp, message.data, output)
+        let mut renamed = std::mem::take(&mut self.renamed);
+        let data = self.named_data(message, &mut renamed, output);
+        let sent = self.send_on(route, stamp, data, output);
+        self.renamed = renamed;
+        sent
+    }
+
+    /// How topics and frames are called.
+    pub(crate) fn names(&self) -> &Names {
+        &self.names
+    }
+
+    /// The message with the names that its frames have beside those of other robots.
+    fn named_data<'a>(
+        &self,
+        message: &LogMessage<'a>,
+        renamed: &'a mut Vec<u8>,
+        output: &Output<RobotMessages>,
+    ) -> &'a [u8] {
+        match self.names.rename_frames(message, renamed) {
+            Renamed::Copied => renamed,
+            Renamed::AsLogged => message.data,
+            Renamed::Unreadable => {
+                let topic = self.names.channel(message.file, message.channel).map_or("", |channel| &channel.topic);
+                output
+                    .warn(format!("messages on `{topic}` do not fit their type, and name frames as they were logged"));
+                message.data
+            }
+        }
     }
 
     /// Takes up a message before the start: keeps what is latched, and learns the frames.
@@ -89,12 +134,18 @@ impl Router {
     ) -> Result<(), StageError> {
         let Some(index) = self.route(message, output)? else { return Ok(()) };
         let Some(route) = self.routes.get(index) else { return Ok(()) };
-        carry.keep(index, route.latch, message);
+        if route.latch == Latch::No && route.role != Role::Tf {
+            return Ok(());
+        }
+        let mut renamed = std::mem::take(&mut self.renamed);
+        let message = LogMessage { data: self.named_data(message, &mut renamed, output), ..*message };
+        carry.keep(index, route.latch, &message);
         if let (Role::Tf, Some(tf)) = (route.role, &mut self.tf)
             && let Ok(transforms) = decode::<TFMessage>(message.data)
         {
             tf.update(&route.robot, is_static(&route.channel.topic), &transforms);
         }
+        self.renamed = renamed;
         Ok(())
     }
 
@@ -167,38 +218,52 @@ impl Router {
         Ok(())
     }
 
-    /// The index of the message's route; `None` if the log does not describe its channel, or if it cannot be passed on.
+    /// The index of the message's route; `None` if nobody asked for it, if the log does not describe its channel, or if it
+    /// cannot be passed on.
     fn route(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let number = usize::from(message.channel);
-        let known = self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten());
-        if known.is_some() {
-            return Ok(known);
+        match self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten()) {
+            Some(Target::Route(index)) => return Ok(Some(index)),
+            Some(Target::Nothing) => return Ok(None),
+            None => {}
         }
         let Some(file) = self.files.get(message.file) else { return Ok(None) };
-        let Some(channel) = file.channel(message.channel) else {
+        let Some(channel) = self.names.channel(message.file, message.channel).cloned() else {
             let damage = Damage::UnknownChannel { channel: message.channel };
             output.warn(format!("{}: {damage}", file.path().display()));
             return Ok(None);
         };
-        let index = match self.by_channel.get(&channel) {
-            Some(&index) => index,
-            None => match self.add_route(channel, output)? {
-                Some(index) => index,
-                None => return Ok(None),
-            },
+        let target = match self.names.wants(message.file, message.channel) {
+            false => Target::Nothing,
+            true => {
+                let index = match self.by_channel.get(&channel) {
+                    Some(&index) => index,
+                    None => match self.add_route(channel, output)? {
+                        Some(index) => index,
+                        None => return Ok(None),
+                    },
+                };
+                if let Some(why) = self.names.frames_left(message.file, message.channel) {
+                    output.warn(why);
+                }
+                Target::Route(index)
+            }
         };
         if let Some(file) = self.by_number.get_mut(message.file) {
             file.resize(file.len().max(number + 1), None);
-            file[number] = Some(index);
+            file[number] = Some(target);
         }
-        Ok(Some(index))
+        Ok(match target {
+            Target::Route(index) => Some(index),
+            Target::Nothing => None,
+        })
     }
 
     /// Adds a route for a channel; `None` if its name is too long, and nothing that this program does needs it.
     fn add_route(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let index = self.routes.len();
         let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
-        let classified = classify(&self.robots, &channel);
+        let classified = self.roles.classify(&channel);
         let topic = match FixedText::new(&channel.topic) {
             Err(error) if classified.role == Role::Other => {
                 output.warn(format!("messages on a topic were left out: its name {error}"));

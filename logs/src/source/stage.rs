@@ -3,7 +3,8 @@
 use super::carry::{Carry, Window};
 use super::router::Router;
 use super::{RobotMessages, SourceParameters};
-use crate::reader::{self, LogFile, LogReader};
+use crate::names::{self, Convention};
+use crate::reader::{LogFile, LogReader};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 
@@ -18,6 +19,8 @@ pub struct McapSource {
     /// What is latched before the start; `None` once it has been sent.
     carry: Option<Carry>,
     begun: bool,
+    /// Whether robots are looked for.
+    names_robots: bool,
 }
 
 impl McapSource {
@@ -36,14 +39,17 @@ impl McapSource {
             )
             .with_help("write them as in map_frame = \"{robot}/map\""));
         }
-        let reader = reader::open(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let rules = parameters.rules().map_err(|error| StageError::new(doing(), error))?;
+        let opened = names::open(&parameters.inputs(), &rules, &context.robots);
+        let (reader, names) = opened.map_err(|error| StageError::new(doing(), error))?;
         let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
         Ok(Self {
-            router: Router::new(context.robots.clone(), reader.files().clone()),
+            router: Router::new(context.robots.clone(), names, reader.files().clone()),
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
             carry: Some(Carry::default()),
             begun: false,
+            names_robots: rules.convention == Convention::ByRobot,
         })
     }
 
@@ -51,6 +57,9 @@ impl McapSource {
         let files = self.reader.files().clone();
         let mut damage = self.reader.take_damage();
         if !std::mem::replace(&mut self.begun, true) {
+            if let Some(remark) = self.router.names().remark() {
+                output.warn(remark);
+            }
             let found_at_opening = |(index, file): (usize, &LogFile)| {
                 file.damage().iter().map(move |damage| (index, damage.clone())).collect::<Vec<_>>()
             };
@@ -66,7 +75,9 @@ impl McapSource {
     fn end(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
         self.warn_of_damage(output);
-        self.router.warn_of_missing(output);
+        if self.names_robots {
+            self.router.warn_of_missing(output);
+        }
         Ok(false)
     }
 }

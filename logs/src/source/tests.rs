@@ -81,6 +81,11 @@ fn run(files: Vec<PathBuf>) -> Run {
     try_run(files, "", RobotTopics::default()).unwrap()
 }
 
+/// The same, with the names that are in the logs.
+fn run_as_logged(files: Vec<PathBuf>) -> Run {
+    try_run(files, "names = 'as_logged'", RobotTopics::default()).unwrap()
+}
+
 fn write(fill: impl FnOnce(&mut TestLog)) -> (Folder, Vec<PathBuf>) {
     let folder = Folder::new();
     let mut log = TestLog::new(layouts()[3].clone());
@@ -113,7 +118,7 @@ fn each_message_comes_on_its_port_as_it_was_logged() {
             .add("/robot2/tag_ranges", TagRange::NAME, 12, &reading())
             .raw("/robot1/scan", "sensor_msgs/msg/LaserScan", 13, b"scan");
     });
-    let run = run(files);
+    let run = run_as_logged(files);
     let mut announced = BTreeMap::<&str, Vec<_>>::new();
     for (port, robot, topic, number) in [
         ("map", "robot1", "/robot1/map", 1),
@@ -175,7 +180,7 @@ fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
             .add("/robot3/pose", PoseStamped::NAME, 13, &without)
             .raw("/robot3/pose", PoseStamped::NAME, 14, b"cut");
     });
-    let run = run(files);
+    let run = run_as_logged(files);
     let poses: Vec<PoseWithCovarianceStamped> =
         run.on("pose").iter().map(|message| message.decode().unwrap()).collect();
     assert_eq!(poses[0], PoseWithCovarianceStamped { header: odometry.header.clone(), pose: odometry.pose });
@@ -244,7 +249,7 @@ fn tf_gives_poses_and_goes_on_as_it_is() {
     assert_eq!(poses, ["robot1", "robot2"]);
     assert_eq!(run.on("pose")[1].decode::<PoseWithCovarianceStamped>().unwrap().header.frame_id, "robot2/map");
     assert_eq!(run.times("other"), [1, 2, 3, 4, 5]);
-    assert_eq!(run.warnings.len(), 4, "not finite, not readable, no map, no tags: {:?}", run.warnings);
+    assert_eq!(run.warnings.len(), 5, "not finite, not readable (twice), no map, no tags: {:?}", run.warnings);
     let robots = RobotTopics { tf: Some(frames("map")), ..Default::default() };
     assert!(try_run(files, "", robots).err().unwrap().to_string().contains("{robot}/map"));
 }
@@ -266,7 +271,8 @@ fn what_is_latched_before_the_start_is_carried_over() {
     });
     let run = try_run(files.clone(), "start = 1.5\nend = 3.0", RobotTopics::default()).unwrap();
     assert_eq!(run.times("map"), [second * 3 / 2]);
-    assert_eq!(run.on("map")[0].decode::<OccupancyGrid<'_>>().unwrap(), grid());
+    let named = OccupancyGrid { header: Header { frame_id: "robot1/map".into(), ..Default::default() }, ..grid() };
+    assert_eq!(run.on("map")[0].decode::<OccupancyGrid<'_>>().unwrap(), named);
     let others: Vec<_> = run.on("other").iter().map(|message| message.bytes().to_vec()).collect();
     assert_eq!(others, [b"a", b"d", b"b", b"S", b"S"]);
     let times: Vec<_> = run.sent.iter().map(|(_, header, _)| header.log_time).collect();
@@ -297,8 +303,9 @@ fn a_source_without_files_says_how_to_give_them() {
 
 #[test]
 fn parameters_out_of_range_are_told() {
-    let wrong = SourceParameters { files: Vec::new(), start: -1.0, end: Some(f64::NAN) };
-    assert_eq!(wrong.check().iter().map(|error| error.field).collect::<Vec<_>>(), ["start", "end"]);
+    let wrong =
+        SourceParameters { rename: vec!["/map".into()], start: -1.0, end: Some(f64::NAN), ..Default::default() };
+    assert_eq!(wrong.check().iter().map(|error| error.field).collect::<Vec<_>>(), ["rename", "start", "end"]);
     assert!(SourceParameters::default().check().is_empty());
 }
 

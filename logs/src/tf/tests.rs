@@ -74,22 +74,26 @@ fn a_base_that_never_moves_has_a_pose() {
 #[test]
 fn frames_without_prefix_get_the_robots() {
     let mut tf = robots();
-    let prefix = tf_topic("/robot2/tf").unwrap();
+    let channel = channel("/robot2/tf", TFMessage::NAME);
+    let prefix = tf_topic(&channel).unwrap();
     let transforms = message([edge("map", "/odom", 1.0, 0.0, 0.0), edge("odom", "robot2/base_link", 1.0, 0.0, 0.0)]);
     let (poses, _) = tf.update(prefix, false, &transforms);
     assert_eq!(poses[0].0, "robot2");
     assert_eq!(poses[0].1.pose.position.x, 2.0);
-    assert_eq!(full_name("r1", "r10/map"), "r1/r10/map");
-    assert_eq!(full_name("", "/map"), "map");
+}
+
+fn channel(topic: &str, type_name: &str) -> Channel {
+    let (topic, schema_name) = (topic.to_owned(), type_name.to_owned());
+    Channel { topic, schema_name, message_encoding: "cdr".into(), ..Default::default() }
 }
 
 #[test]
 fn tf_topics_are_told_from_others() {
-    let found: Vec<_> = ["/tf", "tf", "/tf_static", "/robot1/tf", "/fleet/r2/tf_static", "/tf2", "/robot1/tf/x"]
-        .map(tf_topic)
-        .into_iter()
-        .collect();
+    let topics = ["/tf", "tf", "/tf_static", "/robot1/tf", "/fleet/r2/tf_static", "/tf2", "/robot1/tf/x"];
+    let channels = topics.map(|topic| channel(topic, "tf2_msgs/TFMessage"));
+    let found: Vec<_> = channels.iter().map(tf_topic).collect();
     assert_eq!(found, [Some(""), None, Some(""), Some("robot1"), Some("r2"), None, None]);
+    assert_eq!(tf_topic(&channel("/tf", "std_msgs/msg/String")), None);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `gridweave info`: what is in logs, or in map files.
 
 use super::map_file_info;
-use crate::job::Inputs;
+use crate::job::{Inputs, NamingOptions};
 use crate::shipped;
 use crate::status::Status;
 use crate::table::Table;
@@ -9,6 +9,7 @@ use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info::{self, LogInfo, TopicInfo};
+use gridweave_logs::names::{Convention, Input};
 use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use gridweave_runtime::stage::RobotTopics;
@@ -18,12 +19,14 @@ use std::path::PathBuf;
 /// What `gridweave info` is told.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// Logs (MCAP files or rosbag2 folders), or map files (map_server YAML).
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), each as LOG or ROBOT=LOG, or map files (map_server YAML).
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Take the topic patterns of this pipeline to tell robots apart.
     #[arg(long)]
     pub(crate) pipeline: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) names: NamingOptions,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -43,7 +46,8 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
         None => RobotTopics::default(),
         Some(path) => shipped::load(path, &Overrides::default(), registry)?.robots,
     };
-    let found = info::inspect(&args.inputs, &robots)?;
+    let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
+    let found = info::inspect(&inputs, &args.names.rules(Convention::ByRobot)?, &robots)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&found)?),
         false => print(to_text(&found)),
@@ -61,10 +65,14 @@ fn to_text(found: &LogInfo) -> String {
 fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
     for file in &found.files {
         let packed = match file.chunks {
-            0 => "no chunks".to_owned(),
-            chunks => format!("{chunks} chunks ({})", file.compression.join(", ")),
+            0 => file.container.clone(),
+            chunks => format!("{}, {chunks} chunks ({})", file.container, file.compression.join(", ")),
         };
-        writeln!(text, "{}  {}, {packed}", file.path.display(), size(file.size))?;
+        let robot = file.robot.as_ref().map(|robot| format!(", of {robot}")).unwrap_or_default();
+        writeln!(text, "{}  {}, {packed}{robot}", file.path.display(), size(file.size))?;
+    }
+    if let Some(remark) = &found.remark {
+        writeln!(text, "{remark}")?;
     }
     let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
     writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;
@@ -90,7 +98,7 @@ fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
     let mut table = Table::new(["topic", "type", "messages", "size", "first s", "last s"]);
     for topic in topics {
         table.row([
-            topic.topic.clone(),
+            topic_text(topic),
             if topic.type_name.is_empty() { "(no schema)".into() } else { topic.type_name.clone() },
             topic.messages.to_string(),
             size(topic.bytes),
@@ -99,6 +107,15 @@ fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
         ]);
     }
     table
+}
+
+/// The topic, and what the logs call it if that is something else.
+fn topic_text(topic: &TopicInfo) -> String {
+    let others: Vec<&str> = topic.logged.iter().map(String::as_str).filter(|logged| *logged != topic.topic).collect();
+    match others.is_empty() {
+        true => topic.topic.clone(),
+        false => format!("{} (logged as {})", topic.topic, others.join(", ")),
+    }
 }
 
 /// A number of bytes with a fitting unit.

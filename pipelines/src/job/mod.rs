@@ -4,11 +4,13 @@ mod inputs;
 mod options;
 mod outputs;
 pub(crate) mod progress;
+mod reading;
 mod results;
 
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
+pub(crate) use reading::{NamingOptions, ReadingOptions};
 
 use crate::shipped;
 use crate::status::{BadUse, Status};
@@ -158,6 +160,7 @@ impl Job<'_> {
         if self.options.results_only {
             overrides.set_for_kind(LOG_SINK, "pass_input", false);
         }
+        self.options.reading.set(&mut overrides);
         for setting in &self.options.set {
             overrides.set(setting).map_err(|error| BadUse(error.to_string()))?;
         }

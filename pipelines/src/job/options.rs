@@ -1,5 +1,6 @@
 //! What all commands that run a pipeline have in common.
 
+use super::ReadingOptions;
 use clap::Args;
 use gridweave_runtime::engine::EngineKind;
 use std::path::PathBuf;
@@ -40,6 +41,8 @@ pub(crate) struct RunOptions {
     /// Read map files by their thresholds to the letter, also where these make unknown cells free or leave no walls.
     #[arg(long)]
     pub(crate) literal_thresholds: bool,
+    #[command(flatten)]
+    pub(crate) reading: ReadingOptions,
     /// Set a parameter of a stage.
     #[arg(long, value_name = "STAGE.PARAMETER=VALUE")]
     pub(crate) set: Vec<String>,

@@ -6,6 +6,7 @@ use crate::status::BadUse;
 use anyhow::{Result, bail};
 use gridweave_logs::file::{check_writable, resolve};
 use gridweave_logs::map_file;
+use gridweave_logs::names::Input;
 use gridweave_runtime::pipeline::Pipeline;
 use std::path::{Path, PathBuf};
 
@@ -44,7 +45,8 @@ pub(crate) fn logs(pipeline: &Pipeline) -> Vec<PathBuf> {
 
 /// All that the sources read.
 fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
-    let mut inputs = files_of(pipeline, "mcap_source", "files");
+    let logs = files_of(pipeline, "mcap_source", "files");
+    let mut inputs: Vec<PathBuf> = logs.iter().map(|log| Input::new(log).path).collect();
     for map in files_of(pipeline, "map_file_source", "files") {
         // A map that cannot be read is an error of the run.
         inputs.extend(map_file::image_of(&map));

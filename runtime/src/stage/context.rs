@@ -2,6 +2,7 @@
 
 use super::InitialPoses;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// What a stage is told of its pipeline when it is made.
 #[derive(Clone, Debug, Default)]
@@ -78,9 +79,39 @@ pub fn match_robot<'a>(pattern: &str, text: &'a str) -> Option<&'a str> {
     (!robot.is_empty() && !robot.contains('/')).then_some(robot)
 }
 
+/// The name of a robot's frame in a tree of frames that holds all robots: the frame `map` of `robot1` is `robot1/map`. One that
+/// bears the robot's name, as `robot1/map` and `robot1_map` do, has its name. The slash that ROS 1 puts before names goes.
+///
+/// Without a robot, and for a frame without a name, nothing is put before it.
+pub fn frame_of_robot<'a>(robot: &str, frame: &'a str) -> Cow<'a, str> {
+    let frame = frame.trim_start_matches('/');
+    let bears_name = frame.strip_prefix(robot).is_some_and(|rest| robot.is_empty() || rest.starts_with(['/', '_']));
+    match bears_name || frame.is_empty() {
+        true => Cow::Borrowed(frame),
+        false => Cow::Owned(format!("{robot}/{frame}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_bears_its_robots_name_once() {
+        for (robot, frame, expected) in [
+            ("robot1", "map", "robot1/map"),
+            ("robot1", "/map", "robot1/map"),
+            ("robot1", "robot1/map", "robot1/map"),
+            ("robot1", "robot1_map", "robot1_map"),
+            ("robot1", "robot1", "robot1/robot1"),
+            ("robot1", "robot12/map", "robot1/robot12/map"),
+            ("robot1", "", ""),
+            ("", "/map", "map"),
+        ] {
+            assert_eq!(frame_of_robot(robot, frame), expected, "{robot} {frame}");
+            assert_eq!(frame_of_robot(robot, expected), expected);
+        }
+    }
 
     #[test]
     fn a_robot_is_one_part_of_a_topic() {

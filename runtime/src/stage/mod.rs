@@ -56,7 +56,7 @@ mod received;
 mod registry;
 
 pub use builder::StageBuilder;
-pub use context::{Context, InputWire, RobotTopics, TfFrames, match_robot};
+pub use context::{Context, InputWire, RobotTopics, TfFrames, frame_of_robot, match_robot};
 pub use error::StageError;
 pub use initial_poses::{InitialPose, InitialPoses};
 pub use kind::{Source, StageKind};

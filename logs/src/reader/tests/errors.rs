@@ -23,10 +23,10 @@ fn missing_and_empty_files_are_told_apart() {
 #[test]
 fn another_kind_of_file_is_named_with_a_cure() {
     let folder = Folder::new();
-    let text = error(folder.write("a.bag", b"#ROSBAG V2.0\n\x45\0\0\0op=\x03")).to_string();
+    let text = error(folder.write("a.bag", b"#ROSBAG V1.2\n\x45\0\0\0op=\x03")).to_string();
     assert!(text.contains("a.bag") && text.contains("ROS 1 bag"), "{text}");
     let text = error(folder.write("a.db3", b"SQLite format 3\0")).to_string();
-    assert!(text.contains("ros2 bag convert"), "{text}");
+    assert!(text.contains("the database cannot be read"), "{text}");
 }
 
 #[test]
@@ -70,12 +70,6 @@ fn a_bag_folder_is_read_in_the_order_of_its_description() {
         assert_eq!(seen.iter().map(|seen| &seen.3[..]).collect::<Vec<_>>(), [b"1", b"0"]);
     }
     assert!(matches!(open(&[folder.path(), one]), Err(ReadError::Duplicate { .. })));
-    std::fs::write(
-        &description,
-        "rosbag2_bagfile_information: {storage_identifier: sqlite3, relative_file_paths: [a.db3]}",
-    )
-    .unwrap();
-    assert!(error(folder.path()).to_string().contains("ros2 bag convert"));
     for outside in ["../bag_0.mcap", "/etc/passwd", "bag/../../bag_0.mcap"] {
         let text = format!("rosbag2_bagfile_information: {{relative_file_paths: [{outside}]}}");
         std::fs::write(&description, text).unwrap();

@@ -24,15 +24,16 @@ pub enum NameError {
     },
 }
 
-/// The name of a robot for every map file, in the order of the files: that of the file without its ending or, where
-/// several are called alike, that of its folder. Names are parts of topics: what cannot stand there becomes `_`.
+/// The name of a robot for every file of a map or a log, in the order of the files: that of the file without its ending or,
+/// where several are called alike, that of its folder. A folder has no ending. Names are parts of topics: what cannot stand
+/// there becomes `_`.
 ///
 /// # Errors
 ///
 /// A file is given twice, or two robots would have one name.
 pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
     check_once(files)?;
-    let stems: Vec<String> = files.iter().map(|file| topic_part(file.file_stem())).collect();
+    let stems: Vec<String> = files.iter().map(|file| own_name(file)).collect();
     let count = |stem: &String| stems.iter().filter(|other| *other == stem).count();
     let name = |(file, stem): (&PathBuf, &String)| match count(stem) {
         1 => stem.clone(),
@@ -56,6 +57,13 @@ fn check_once(files: &[PathBuf]) -> Result<(), NameError> {
     match places.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => Err(NameError::GivenTwice(pair[0].clone())),
         None => Ok(()),
+    }
+}
+
+fn own_name(file: &Path) -> String {
+    match file.is_dir() {
+        true => topic_part(file.canonicalize().unwrap_or_else(|_| file.to_owned()).file_name()),
+        false => topic_part(file.file_stem()),
     }
 }
 

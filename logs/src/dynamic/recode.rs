@@ -1,0 +1,201 @@
+//! Messages copied field by field: with other names of frames, or out of the encoding of ROS 1.
+
+use super::decode::DecodeError;
+use super::definition::{Count, Primitive};
+use super::reader::{CdrReader, DecodeFault};
+use super::schema::{Element, Field, MessageType, Schema};
+use std::borrow::Cow;
+
+/// The encapsulations of plain CDR, whose first two bytes say the byte order.
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+const BIG_ENDIAN: [u8; 4] = [0, 0, 0, 0];
+
+/// The type that has a field more in ROS 1: `uint32 seq`, before all others.
+const HEADER: &str = "std_msgs/Header";
+const SEQ_SIZE: usize = 4;
+
+/// Copies messages of one type, field by field.
+#[derive(Clone, Debug)]
+pub struct Recoder {
+    schema: Schema,
+}
+
+impl Recoder {
+    /// For the messages of a schema. `None` if it has texts that cannot be copied (`wstring`).
+    pub fn new(schema: Schema) -> Option<Self> {
+        let is_wide = |field: &Field| matches!(field.of, Element::Primitive(Primitive::WideText));
+        let is_copied = !schema.types.iter().flat_map(|of| &of.fields).any(is_wide);
+        is_copied.then_some(Self { schema })
+    }
+
+    /// Whether messages name frames: in texts that are called `frame_id`, or end so as `child_frame_id` does.
+    pub fn names_frames(&self) -> bool {
+        self.schema.types.iter().flat_map(|of| &of.fields).any(is_frame)
+    }
+
+    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames. `false`, and nothing is appended, if
+    /// it keeps them all.
+    ///
+    /// # Errors
+    /// The message does not fit its schema. What was appended by then is taken back.
+    pub fn rename_frames(
+        &self,
+        message: &[u8],
+        rename: &dyn Fn(&str) -> Cow<'_, str>,
+        copy: &mut Vec<u8>,
+    ) -> Result<bool, DecodeError> {
+        let reader = || CdrReader::new(message).ok_or(DecodeError::Encapsulation);
+        // Most messages name few frames, and are long.
+        if !self.walk(reader()?, rename, None)? {
+            return Ok(false);
+        }
+        self.walk(reader()?, rename, Some(copy))
+    }
+
+    /// Appends a message that is encoded as in ROS 1 to `copy`, as little-endian CDR. The schema is that of ROS 2, in which a
+    /// header has no `seq`.
+    ///
+    /// # Errors
+    /// The message does not fit its schema. What was appended by then is taken back.
+    pub fn append_ros1(&self, message: &[u8], copy: &mut Vec<u8>) -> Result<(), DecodeError> {
+        self.walk(CdrReader::ros1(message), &|frame| Cow::Borrowed(frame), Some(copy)).map(|_| ())
+    }
+
+    /// Walks over the fields, and appends them to `copy` if there is one. Whether a frame got another name.
+    fn walk(
+        &self,
+        mut reader: CdrReader<'_>,
+        rename: &dyn Fn(&str) -> Cow<'_, str>,
+        mut copy: Option<&mut Vec<u8>>,
+    ) -> Result<bool, DecodeError> {
+        let big_endian = reader.is_big_endian();
+        let begin = copy.as_ref().map_or(0, |copy| copy.len());
+        if let Some(copy) = &mut copy {
+            copy.reserve(reader.left() + 64);
+            copy.extend_from_slice(if big_endian { &BIG_ENDIAN } else { &LITTLE_ENDIAN });
+        }
+        let body = copy.as_ref().map_or(0, |copy| copy.len());
+        let mut walk = Walk { schema: &self.schema, rename, is_renamed: false };
+        let mut writer = Writer { bytes: copy, body, big_endian };
+        let Some(root) = self.schema.root() else { return Ok(false) };
+        walk.message(root, &mut reader, &mut writer).map_err(|(path, fault)| {
+            if let Some(copy) = writer.bytes {
+                copy.truncate(begin);
+            }
+            DecodeError::Field { path, fault }
+        })?;
+        Ok(walk.is_renamed)
+    }
+}
+
+fn is_frame(field: &Field) -> bool {
+    matches!(field.of, Element::Primitive(Primitive::Text)) && field.name.ends_with("frame_id")
+}
+
+/// The field that could not be copied, and why.
+type Fault = (String, DecodeFault);
+
+struct Walk<'a> {
+    schema: &'a Schema,
+    rename: &'a dyn Fn(&str) -> Cow<'_, str>,
+    is_renamed: bool,
+}
+
+impl Walk<'_> {
+    fn message(&mut self, of: &MessageType, reader: &mut CdrReader<'_>, writer: &mut Writer<'_>) -> Result<(), Fault> {
+        let own = |fault| (of.name.clone(), fault);
+        if reader.is_ros1() && of.name == HEADER {
+            reader.bytes(SEQ_SIZE).map_err(own)?;
+        }
+        if of.fields.is_empty() {
+            // A message without fields is one byte in CDR, and nothing in ROS 1.
+            if !reader.is_ros1() {
+                reader.bytes(1).map_err(own)?;
+            }
+            writer.put(&[0]);
+        }
+        of.fields.iter().try_for_each(|field| self.field(field, reader, writer))
+    }
+
+    fn field(&mut self, field: &Field, reader: &mut CdrReader<'_>, writer: &mut Writer<'_>) -> Result<(), Fault> {
+        let own = |fault| (field.name.clone(), fault);
+        let count = match field.count {
+            Count::One => 1,
+            Count::Fixed(count) => count,
+            Count::Any => {
+                let count = reader.number::<4, u32>().map_err(own)?;
+                writer.u32(count);
+                count as usize
+            }
+        };
+        // Checked first, so that a damaged count copies nothing.
+        let least = self.schema.least_size(field.of).checked_mul(count);
+        if field.count != Count::One && !least.is_some_and(|least| least <= reader.left()) {
+            return Err(own(DecodeFault::Count(count)));
+        }
+        match field.of {
+            Element::Message(index) => {
+                let schema = self.schema;
+                let of = schema.types.get(index).ok_or_else(|| own(DecodeFault::End))?;
+                (0..count).try_for_each(|_| self.message(of, reader, writer))
+            }
+            Element::Primitive(Primitive::Text) if is_frame(field) => (0..count).try_for_each(|_| {
+                let frame = reader.text().map_err(own)?;
+                let renamed = (self.rename)(frame);
+                self.is_renamed |= renamed != frame;
+                writer.text(renamed.as_bytes());
+                Ok(())
+            }),
+            Element::Primitive(Primitive::Text) => (0..count).try_for_each(|_| {
+                writer.text(reader.text_bytes().map_err(own)?);
+                Ok(())
+            }),
+            Element::Primitive(Primitive::WideText) => Err(own(DecodeFault::WideText)),
+            Element::Primitive(_) if count == 0 => Ok(()),
+            Element::Primitive(primitive) => {
+                let size = primitive.least_size();
+                reader.align(size);
+                let length = size.checked_mul(count).ok_or_else(|| own(DecodeFault::Count(count)))?;
+                let numbers = reader.bytes(length).map_err(own)?;
+                writer.align(size);
+                writer.put(numbers);
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Appends fields in CDR, if there is something to append them to.
+struct Writer<'a> {
+    bytes: Option<&'a mut Vec<u8>>,
+    /// Where the fields begin; alignment counts from here.
+    body: usize,
+    big_endian: bool,
+}
+
+impl Writer<'_> {
+    fn put(&mut self, bytes: &[u8]) {
+        if let Some(copy) = &mut self.bytes {
+            copy.extend_from_slice(bytes);
+        }
+    }
+
+    fn align(&mut self, size: usize) {
+        if let Some(copy) = &mut self.bytes {
+            let at = (copy.len() - self.body).next_multiple_of(size);
+            copy.resize(self.body + at, 0);
+        }
+    }
+
+    fn u32(&mut self, number: u32) {
+        self.align(4);
+        self.put(&if self.big_endian { number.to_be_bytes() } else { number.to_le_bytes() });
+    }
+
+    fn text(&mut self, text: &[u8]) {
+        // A text that is longer does not fit into a message.
+        self.u32(u32::try_from(text.len() + 1).unwrap_or(u32::MAX));
+        self.put(text);
+        self.put(&[0]);
+    }
+}

@@ -1,0 +1,31 @@
+//! Why logs cannot be named.
+
+use crate::reader::ReadError;
+use crate::source::map_file;
+
+/// Logs cannot be opened and named.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NameError {
+    /// A log cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// Logs look alike, and so do their names.
+    #[error("the logs look alike, and their names do not tell them apart: {0}; or say whose they are: ROBOT=LOG")]
+    Alike(#[from] map_file::NameError),
+    /// A robot that was asked for is not there.
+    #[error("there is nothing of a robot `{robot}` in the logs: {}", listed(.known))]
+    NoSuchRobot {
+        /// What was asked for.
+        robot: String,
+        /// The robots that are there.
+        known: Vec<String>,
+    },
+}
+
+fn listed(robots: &[String]) -> String {
+    match robots.is_empty() {
+        true => "no robot was recognised in them".to_owned(),
+        false => format!("the robots in them are {}", robots.join(", ")),
+    }
+}

@@ -1,0 +1,99 @@
+//! Topics and frames under the names of their robots.
+//!
+//! Programs of one robot call its map `/map` and its frames `map` and `base_link`, and so do those of the next. What several
+//! robots have logged is one tree of frames, and one set of topics, only once each has the name of its robot before it: the
+//! topic `/map` of `robot1` becomes `/robot1/map`, and the frame `map` becomes `robot1/map` in every message that names it.
+//! Transforms are the exception: those of all robots are on `/tf` and `/tf_static`, where programs look for them.
+//!
+//! Which robot that is, is said by the user ([`Input`]), by the names of files where several logs look alike, or by the
+//! topics of a log: `/robot1/tf` tells of the frames of `robot1`.
+
+mod alike;
+mod channel;
+mod error;
+mod input;
+mod naming;
+mod rename;
+mod rules;
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use channel::Renamed;
+pub use error::NameError;
+pub use input::Input;
+pub use rename::TopicRename;
+pub use rules::{Convention, NameRules};
+
+use crate::reader::{LogFile, LogMessage, LogReader, log_files};
+use channel::NamedChannel;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::stage::RobotTopics;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// The channels of logs, as they are called beside those of other robots.
+#[derive(Debug)]
+pub struct Names {
+    /// By file, and by the channel's number in it.
+    channels: Vec<BTreeMap<u16, NamedChannel>>,
+    /// By file: the robot that it was put under.
+    robots: Vec<Option<String>>,
+    remark: Option<String>,
+}
+
+/// Opens logs, and names what is in them. `robots` says how topics are told apart.
+///
+/// # Errors
+/// A log cannot be read, or the rules do not fit what is in them.
+pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<(LogReader, Names), NameError> {
+    let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
+    let (input_of, files): (Vec<usize>, Vec<PathBuf>) = log_files(&paths)?.into_iter().unzip();
+    let files: Vec<LogFile> = files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?;
+    let names = naming::name(&files, &input_of, inputs, rules, robots)?;
+    Ok((LogReader::new(files), names))
+}
+
+impl Names {
+    /// The channel with the given number in a file, as it is called here; none if its file does not describe it.
+    pub fn channel(&self, file: usize, number: u16) -> Option<&Channel> {
+        self.named(file, number).map(|named| &named.channel)
+    }
+
+    /// All channels, as they are called here.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.channels.iter().flat_map(BTreeMap::values).map(|named| &named.channel)
+    }
+
+    /// Whether the rules ask for the messages of a channel.
+    pub fn wants(&self, file: usize, number: u16) -> bool {
+        self.named(file, number).is_none_or(|named| named.is_wanted)
+    }
+
+    /// The robot that all of a file was put under.
+    pub fn robot_of_file(&self, file: usize) -> Option<&str> {
+        self.robots.get(file)?.as_deref()
+    }
+
+    /// What the user should know of how robots were named without being asked.
+    pub fn remark(&self) -> Option<&str> {
+        self.remark.as_deref()
+    }
+
+    /// Why the frames in the messages of a channel stay as they were logged, although others get their robot's name.
+    pub fn frames_left(&self, file: usize, number: u16) -> Option<String> {
+        self.named(file, number)?.frames_left()
+    }
+
+    /// Puts the frames in a message under its robot. Where that changes anything, the message is in `copy`.
+    pub(crate) fn rename_frames(&self, message: &LogMessage<'_>, copy: &mut Vec<u8>) -> Renamed {
+        match self.named(message.file, message.channel) {
+            Some(named) => named.rename_frames(message.data, copy),
+            None => Renamed::AsLogged,
+        }
+    }
+
+    fn named(&self, file: usize, number: u16) -> Option<&NamedChannel> {
+        self.channels.get(file)?.get(&number)
+    }
+}

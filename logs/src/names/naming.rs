@@ -1,0 +1,151 @@
+//! From what logs hold, and what was said of them, to the names of their channels.
+
+use super::channel::NamedChannel;
+use super::{Convention, Input, NameError, NameRules, Names, alike};
+use crate::reader::LogFile;
+use crate::source::{RobotChannels, Role};
+use crate::tf::{is_static, tf_topic};
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::stage::RobotTopics;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A channel on its way to its name.
+struct Draft {
+    file: usize,
+    number: u16,
+    channel: Channel,
+    /// Whether it has the name already that the user wants it to have.
+    is_renamed: bool,
+    /// The robot that its frames are put under.
+    robot: Option<String>,
+}
+
+/// Names the channels of `files`, which belong to the `inputs` of the given numbers.
+pub(super) fn name(
+    files: &[LogFile],
+    input_of: &[usize],
+    inputs: &[Input],
+    rules: &NameRules,
+    robots: &RobotTopics,
+) -> Result<Names, NameError> {
+    let mut drafts: Vec<Draft> = drafts(files, rules);
+    let mut of_inputs: Vec<Vec<&Channel>> = vec![Vec::new(); inputs.len()];
+    for Draft { file, channel, .. } in &drafts {
+        if let Some(of_input) = input_of.get(*file).and_then(|&input| of_inputs.get_mut(input)) {
+            of_input.push(channel);
+        }
+    }
+    let (of_input, remark) = match rules.convention {
+        Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
+        Convention::ByRobot => alike::name(inputs, &of_inputs, robots)?,
+    };
+    let robot_of_file: Vec<Option<String>> =
+        input_of.iter().map(|&input| of_input.get(input).cloned().flatten()).collect();
+    put_under_robots(&mut drafts, &robot_of_file, rules);
+
+    let roles = RobotChannels::new(robots.clone(), drafts.iter().map(|draft| &draft.channel));
+    let known = known_robots(&roles, &drafts);
+    if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
+        return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.into_iter().collect() });
+    }
+    let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
+    for Draft { file, number, channel, robot, .. } in drafts {
+        let classified = roles.classify(&channel);
+        let is_map = classified.role == Role::Map;
+        // The frame of a robot's map, and of its poses in it, is the robot's in any case.
+        let is_robots = is_map || matches!(classified.role, Role::Pose(_));
+        let by_role = is_robots && rules.convention == Convention::ByRobot;
+        let robot = robot.or(by_role.then(|| classified.robot.to_owned())).unwrap_or_default();
+        let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));
+        if let Some(of_file) = channels.get_mut(file) {
+            of_file.insert(number, NamedChannel::new(channel, robot, is_map, is_wanted));
+        }
+    }
+    Ok(Names { channels, robots: robot_of_file, remark })
+}
+
+/// The channels of all files, with the topics that the user wants them to have.
+fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
+    let draft = |file: usize, number: u16, channel: Channel| {
+        let renamed = rules.renamed(&channel.topic);
+        let is_renamed = renamed.is_some();
+        let topic = renamed.unwrap_or_else(|| channel.topic.clone());
+        Draft { file, number, channel: Channel { topic, ..channel }, is_renamed, robot: None }
+    };
+    let of_file = |(file, log): (usize, &LogFile)| {
+        log.channels().map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
+    };
+    files.iter().enumerate().flat_map(of_file).collect()
+}
+
+/// Puts topics and frames under the robots of their files, or of the namespaces that they are in.
+fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rules: &NameRules) {
+    let of_file = |file: usize| robot_of_file.get(file).and_then(Option::as_deref);
+    let trees = own_trees(drafts.iter().filter(|draft| of_file(draft.file).is_none()).map(|draft| &draft.channel));
+    for Draft { file, channel, is_renamed, robot, .. } in drafts {
+        let prefix = match of_file(*file) {
+            Some(robot) => robot,
+            None if rules.convention == Convention::AsLogged => continue,
+            None => match tree_of(&trees, &channel.topic) {
+                Some(robot) => robot,
+                None => continue,
+            },
+        };
+        if let Some(topic) = shared_topic(channel) {
+            channel.topic = topic.to_owned();
+        } else if of_file(*file).is_some() {
+            channel.topic = topic_of_robot(prefix, &channel.topic);
+        }
+        if let Some(topic) = rules.renamed(&channel.topic).filter(|_| !*is_renamed) {
+            channel.topic = topic;
+        }
+        *robot = Some(prefix.to_owned());
+    }
+}
+
+/// The topic that transforms of all robots are on, for a channel of transforms.
+fn shared_topic(channel: &Channel) -> Option<&'static str> {
+    tf_topic(channel)?;
+    Some(if is_static(&channel.topic) { "/tf_static" } else { "/tf" })
+}
+
+fn topic_of_robot(robot: &str, topic: &str) -> String {
+    let topic = topic.trim_start_matches('/');
+    match topic.strip_prefix(robot).is_some_and(|rest| rest.starts_with('/')) {
+        true => format!("/{topic}"),
+        false => format!("/{robot}/{topic}"),
+    }
+}
+
+/// The namespaces that have transforms of their own, and their robots: `/robot1/` for `/robot1/tf`.
+fn own_trees<'a>(channels: impl Iterator<Item = &'a Channel>) -> BTreeMap<String, String> {
+    let tree = |channel: &'a Channel| {
+        let robot = tf_topic(channel).filter(|robot| !robot.is_empty())?;
+        let (namespace, _) = channel.topic.rsplit_once('/')?;
+        Some((format!("{namespace}/"), robot.to_owned()))
+    };
+    channels.filter_map(tree).collect()
+}
+
+/// The robot in whose namespace a topic is.
+fn tree_of<'a>(trees: &'a BTreeMap<String, String>, topic: &str) -> Option<&'a str> {
+    // Of namespaces within each other the inner one counts.
+    let within = trees.iter().filter(|(namespace, _)| topic.starts_with(namespace.as_str()));
+    within.max_by_key(|(namespace, _)| namespace.len()).map(|(_, robot)| robot.as_str())
+}
+
+/// The robots that topics tell of.
+fn known_robots(roles: &RobotChannels, drafts: &[Draft]) -> BTreeSet<String> {
+    let robot = |draft: &Draft| {
+        let classified = roles.classify(&draft.channel);
+        (!matches!(classified.role, Role::Other | Role::Tf)).then(|| classified.robot.to_owned())
+    };
+    drafts.iter().filter_map(robot).collect()
+}
+
+/// The robot under whose name a topic is, if it is that of a known one.
+fn robot_of<'a>(known: &BTreeSet<String>, robots: &RobotTopics, topic: &'a str) -> Option<&'a str> {
+    let (namespace, _) = robots.map.split_once("{robot}")?;
+    let (robot, _) = topic.strip_prefix(namespace)?.split_once('/')?;
+    known.contains(robot).then_some(robot)
+}

@@ -1,0 +1,245 @@
+//! One bag: where its chunks are, and what their messages are in ROS 2.
+
+use super::MAGIC;
+use super::definition::{translate, type_name};
+use super::record::{BAG, CHUNK, CONNECTION, Header, INDEX, MESSAGE, record_at, record_in, time};
+use crate::dynamic::{Recoder, Schema};
+use crate::qos;
+use crate::reader::block::{Block, Records};
+use crate::reader::bytes::{FileBytes, Window};
+use crate::reader::chunk::{LARGEST, decompress_lz4};
+use crate::reader::damage::{ChunkFault, Damage};
+use crate::reader::layout::Layout;
+use crate::reader::record::{Fields, push_message};
+use gridweave_runtime::message::Channel;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// The most connections of a bag: channels have numbers of 16 bits, and 0 and 65535 stand for none.
+const MOST_CONNECTIONS: usize = 65534;
+
+/// A bag of ROS 1.
+#[derive(Debug)]
+pub(crate) struct Bag {
+    pub(crate) file: FileBytes,
+    connections: Connections,
+}
+
+/// By their numbers in the bag.
+type Connections = BTreeMap<u32, Connection>;
+
+/// What is known of the messages of a connection.
+#[derive(Debug)]
+struct Connection {
+    /// Its number as a channel.
+    channel: u16,
+    /// Makes messages of ROS 2 of its messages; none if nobody knows how they are laid out.
+    recoder: Option<Recoder>,
+}
+
+/// A chunk of a bag.
+#[derive(Clone, Debug)]
+pub(crate) struct BagChunk {
+    compression: String,
+    /// Bytes of its contents, uncompressed.
+    pub(crate) size: u64,
+    /// Where its contents lie in the file.
+    data: Range<usize>,
+}
+
+impl Bag {
+    /// Finds out what the bag in a file consists of.
+    pub(crate) fn open(file: FileBytes) -> (Self, Layout) {
+        let mut walk = Walk { layout: Layout::default(), connections: BTreeMap::new(), unsure: Vec::new() };
+        walk.walk(&file);
+        walk.survey(&file);
+        let Walk { layout, connections, .. } = walk;
+        (Self { file, connections }, layout)
+    }
+}
+
+/// The walk over the records of a bag.
+struct Walk {
+    layout: Layout,
+    connections: Connections,
+    /// For every block, whether the time that it spans is still to be found.
+    unsure: Vec<bool>,
+}
+
+impl Walk {
+    fn walk(&mut self, file: &FileBytes) {
+        let mut window = Window::new(file);
+        let mut position = MAGIC.len();
+        let mut is_closed = false;
+        while position < file.len() {
+            let record = record_in(&mut window, position).filter(|(_, data)| data.end <= file.len());
+            let Some((header, data)) = record else {
+                self.layout.damage.push(Damage::NoEnd { position });
+                return;
+            };
+            position = data.end;
+            let Some(header) = Header::parse(&header) else {
+                self.layout.damage.push(Damage::Unreadable { position: data.start, length: data.len() });
+                continue;
+            };
+            match header.opcode() {
+                // A recorder writes where the connections are when it closes the bag.
+                Some(BAG) => {
+                    is_closed = header.bytes("index_pos").is_some_and(|place| place.iter().any(|byte| *byte != 0))
+                }
+                Some(CHUNK) => self.chunk(&header, data),
+                Some(INDEX) => self.index(&header, &file.read(data).unwrap_or_default()),
+                Some(CONNECTION) => self.connection(&header, &file.read(data).unwrap_or_default()),
+                _ => {}
+            }
+        }
+        if !is_closed {
+            self.layout.damage.push(Damage::NoEnd { position });
+        }
+    }
+
+    fn chunk(&mut self, header: &Header<'_>, data: Range<usize>) {
+        let compression = header.text("compression").unwrap_or_default();
+        let size = u64::from(header.u32("size").unwrap_or(0));
+        self.layout.chunks += 1;
+        self.layout.compressions.insert(if compression == "none" { String::new() } else { compression.clone() });
+        let records = Records::Ros1(BagChunk { compression, size, data });
+        self.layout.blocks.push(Block { first_time: u64::MAX, last_time: 0, records });
+        self.unsure.push(true);
+    }
+
+    /// The times of messages of one connection in the last chunk.
+    fn index(&mut self, header: &Header<'_>, data: &[u8]) {
+        let (Some(block), Some(unsure)) = (self.layout.blocks.last_mut(), self.unsure.last_mut()) else { return };
+        if header.u32("ver") != Some(1) {
+            return;
+        }
+        let mut fields = Fields(data);
+        while let (Some(time), Some(_)) = (time(&mut fields), fields.u32()) {
+            block.first_time = block.first_time.min(time);
+            block.last_time = block.last_time.max(time);
+            *unsure = false;
+        }
+    }
+
+    fn connection(&mut self, header: &Header<'_>, data: &[u8]) {
+        let (Some(number), Some(told)) = (header.u32("conn"), Header::parse(data)) else { return };
+        if self.connections.contains_key(&number) || self.connections.len() >= MOST_CONNECTIONS {
+            return;
+        }
+        // It has just been held that there are not so many.
+        let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
+        let topic = header.text("topic").or_else(|| told.text("topic")).unwrap_or_default();
+        let schema_name = type_name(&told.text("type").unwrap_or_default());
+        let schema = translate(&told.text("message_definition").unwrap_or_default());
+        let recoder = Schema::parse(&schema_name, &schema).ok().and_then(Recoder::new);
+        let latched = told.bytes("latching") == Some(b"1");
+        let offered = if latched { qos::LATCHED } else { "" };
+        let message_encoding = if recoder.is_some() { "cdr" } else { "ros1" };
+        let description = Channel {
+            topic,
+            message_encoding: message_encoding.to_owned(),
+            schema_name,
+            schema_encoding: "ros2msg".to_owned(),
+            schema: schema.into_bytes(),
+            metadata: BTreeMap::from([(qos::KEY.to_owned(), offered.to_owned())]),
+        };
+        self.layout.definitions.insert(channel, description);
+        self.connections.insert(number, Connection { channel, recoder });
+    }
+
+    /// Reads chunks through whose times are not known, or all if connections may be in them that are nowhere else.
+    fn survey(&mut self, file: &FileBytes) {
+        let is_whole = self.layout.damage.is_empty();
+        let blocks = std::mem::take(&mut self.layout.blocks);
+        for (mut block, unsure) in blocks.into_iter().zip(std::mem::take(&mut self.unsure)) {
+            if is_whole && !unsure {
+                self.layout.blocks.push(block);
+                continue;
+            }
+            let Records::Ros1(chunk) = &block.records else { continue };
+            let contents = match chunk.contents(file) {
+                Ok(contents) => contents,
+                Err(fault) => {
+                    self.layout.damage.push(Damage::BadChunk { fault });
+                    continue;
+                }
+            };
+            let mut position = 0;
+            while let Some((header, data, end)) = record_at(&contents, position) {
+                position = end;
+                match header.opcode() {
+                    Some(CONNECTION) => self.connection(&header, data),
+                    Some(MESSAGE) => {
+                        let Some(time) = header.time("time") else { continue };
+                        block.first_time = block.first_time.min(time);
+                        block.last_time = block.last_time.max(time);
+                    }
+                    _ => {}
+                }
+            }
+            // A chunk without messages gives nothing.
+            if block.first_time <= block.last_time {
+                self.layout.blocks.push(block);
+            }
+        }
+    }
+}
+
+impl BagChunk {
+    /// The records of the chunk, uncompressed.
+    fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
+        let most = self.size.max(self.data.len() as u64);
+        if most > LARGEST {
+            return Err(ChunkFault::TooMuch { size: most });
+        }
+        let data = file.read(self.data.clone()).ok_or(ChunkFault::Records)?;
+        let contents = match self.compression.as_str() {
+            "none" => data,
+            "lz4" => decompress_lz4(&data, self.size)?,
+            other => return Err(ChunkFault::UnknownCompression(other.to_owned())),
+        };
+        match contents.len() as u64 == self.size {
+            true => Ok(contents),
+            false => Err(ChunkFault::Decompression),
+        }
+    }
+
+    /// The messages of the chunk as records of MCAP, in CDR; and how many of them do not fit their definition.
+    pub(crate) fn messages(&self, bag: &Bag) -> Result<(Vec<u8>, u64), ChunkFault> {
+        let contents = self.contents(&bag.file)?;
+        let (mut records, mut lost) = (Vec::with_capacity(contents.len() + contents.len() / 4), 0);
+        let mut message = Vec::new();
+        let (mut position, mut sequence) = (0, 0_u32);
+        while let Some((header, data, end)) = record_at(&contents, position) {
+            position = end;
+            if header.opcode() != Some(MESSAGE) {
+                continue;
+            }
+            let (Some(number), Some(time)) = (header.u32("conn"), header.time("time")) else {
+                lost += 1;
+                continue;
+            };
+            sequence = sequence.wrapping_add(1);
+            let connection = bag.connections.get(&number);
+            let channel = connection.map_or(0, |connection| connection.channel);
+            message.clear();
+            match connection.and_then(|connection| connection.recoder.as_ref()) {
+                None => message.extend_from_slice(data),
+                Some(recoder) if recoder.append_ros1(data, &mut message).is_err() => {
+                    lost += 1;
+                    continue;
+                }
+                Some(_) => {}
+            }
+            if records.len() as u64 > LARGEST {
+                return Err(ChunkFault::TooLarge);
+            }
+            push_message(&mut records, channel, sequence, time, time, &message);
+        }
+        if position != contents.len() {
+            lost += 1;
+        }
+        Ok((records, lost))
+    }
+}

@@ -1,0 +1,229 @@
+use super::definition::{translate, type_name};
+use crate::dynamic::{FieldPath, Schema};
+use crate::reader::{ChunkFault, Damage, LogFile, LogReader, ReadError};
+use crate::test_log::Folder;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Header, PoseStamped, RosMessage, decode};
+use std::path::Path;
+
+const POSE: &str = "\
+# A pose.
+Header header
+Pose pose
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: geometry_msgs/Pose
+Point position
+Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+";
+
+/// Writes a bag record by record.
+struct Bag(Vec<u8>);
+
+fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (name, value) in fields {
+        bytes.extend_from_slice(&((name.len() + 1 + value.len()) as u32).to_le_bytes());
+        bytes.extend_from_slice(name.as_bytes());
+        bytes.push(b'=');
+        bytes.extend_from_slice(value);
+    }
+    bytes
+}
+
+fn record(header: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
+    let header = fields(header);
+    let mut bytes = (header.len() as u32).to_le_bytes().to_vec();
+    bytes.extend_from_slice(&header);
+    bytes.extend_from_slice(&(data.len() as u32).to_le_bytes());
+    bytes.extend_from_slice(data);
+    bytes
+}
+
+fn connection(number: u32, topic: &str, type_name: &str, definition: &str) -> Vec<u8> {
+    let told = fields(&[
+        ("topic", topic.as_bytes()),
+        ("type", type_name.as_bytes()),
+        ("message_definition", definition.as_bytes()),
+        ("latching", b"1"),
+    ]);
+    record(&[("op", &[7]), ("conn", &number.to_le_bytes()), ("topic", topic.as_bytes())], &told)
+}
+
+fn time_bytes(time: u64) -> Vec<u8> {
+    let (seconds, rest) = ((time / 1_000_000_000) as u32, (time % 1_000_000_000) as u32);
+    [seconds.to_le_bytes(), rest.to_le_bytes()].concat()
+}
+
+fn message(number: u32, time: u64, data: &[u8]) -> Vec<u8> {
+    record(&[("op", &[2]), ("conn", &number.to_le_bytes()), ("time", &time_bytes(time))], data)
+}
+
+impl Bag {
+    fn new(is_closed: bool) -> Self {
+        let place: u64 = if is_closed { 4117 } else { 0 };
+        let header: [(&str, &[u8]); 4] = [
+            ("op", &[3]),
+            ("index_pos", &place.to_le_bytes()),
+            ("conn_count", &1_u32.to_le_bytes()),
+            ("chunk_count", &1_u32.to_le_bytes()),
+        ];
+        Self([super::MAGIC.to_vec(), record(&header, &[b' '; 100])].concat())
+    }
+
+    fn chunk(mut self, compression: &str, contents: &[u8], times: &[u64]) -> Self {
+        let data = match compression {
+            "lz4" => {
+                let mut encoder = lz4::EncoderBuilder::new().build(Vec::new()).unwrap();
+                std::io::Write::write_all(&mut encoder, contents).unwrap();
+                encoder.finish().0
+            }
+            _ => contents.to_vec(),
+        };
+        let size = (contents.len() as u32).to_le_bytes();
+        self.0.extend(record(&[("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)], &data));
+        let entries: Vec<u8> = times.iter().flat_map(|time| [time_bytes(*time), vec![0; 4]].concat()).collect();
+        let count = (times.len() as u32).to_le_bytes();
+        let header: [(&str, &[u8]); 4] = [("op", &[4]), ("ver", &[1, 0, 0, 0]), ("conn", &[0; 4]), ("count", &count)];
+        self.0.extend(record(&header, &entries));
+        self
+    }
+
+    fn end(mut self, connections: &[Vec<u8>]) -> Vec<u8> {
+        connections.iter().for_each(|connection| self.0.extend_from_slice(connection));
+        self.0
+    }
+}
+
+/// A pose as ROS 1 encodes it.
+fn pose(x: f64) -> Vec<u8> {
+    let mut bytes = [7_u32, 3, 5, 3].map(u32::to_le_bytes).concat();
+    bytes.extend_from_slice(b"map");
+    for number in [x, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    bytes
+}
+
+fn read(path: &Path) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<Damage>), ReadError> {
+    let file = LogFile::open(path)?;
+    let mut damage = file.damage().to_vec();
+    let mut reader = LogReader::new(vec![file]);
+    let files = reader.files().clone();
+    let mut messages = Vec::new();
+    while let Some(message) = reader.next_message() {
+        let topic = files[0].channel(message.channel).map(|channel| channel.topic).unwrap_or_default();
+        messages.push((topic, message.log_time.0, message.data.to_vec()));
+    }
+    damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
+    Ok((messages, damage))
+}
+
+fn expected(x: f64) -> PoseStamped {
+    let mut pose = PoseStamped { header: Header::new(LogTime(3_000_000_005), "map"), ..Default::default() };
+    (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) = (x, 2.0, 3.0);
+    pose
+}
+
+#[test]
+fn messages_come_by_time_as_those_of_ros_2() {
+    let folder = Folder::new();
+    let told = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
+    for compression in ["none", "lz4"] {
+        let late =
+            [told.clone(), message(0, 2_000_000_009, &pose(1.0)), message(0, 1_000_000_000, &pose(4.0))].concat();
+        let bag = Bag::new(true).chunk(compression, &late, &[2_000_000_009, 1_000_000_000]);
+        let bag = bag.chunk(compression, &message(0, 1_500_000_000, &pose(5.0)), &[1_500_000_000]);
+        let path = folder.write("a.bag", &bag.end(&[told.clone()]));
+        let (messages, damage) = read(&path).unwrap();
+        assert_eq!(damage, []);
+        let times: Vec<u64> = messages.iter().map(|(_, time, _)| *time).collect();
+        assert_eq!(times, [1_000_000_000, 1_500_000_000, 2_000_000_009]);
+        let poses: Vec<PoseStamped> = messages.iter().map(|(.., data)| decode(data).unwrap()).collect();
+        assert_eq!(poses, [4.0, 5.0, 1.0].map(expected));
+
+        let file = LogFile::open(&path).unwrap();
+        let (_, channel) = file.channels().next().unwrap();
+        assert_eq!((channel.schema_name.as_str(), channel.message_encoding.as_str()), (PoseStamped::NAME, "cdr"));
+        assert!(crate::qos::is_transient_local(&channel.metadata));
+        let schema = Schema::of_channel(&channel).unwrap();
+        let field: FieldPath = "header.stamp.sec".parse().unwrap();
+        assert_eq!(schema.decode(&messages[0].2).unwrap().find(&field).unwrap().to_string(), "3");
+        assert_eq!(file.container(), "ROS 1 bag");
+    }
+}
+
+#[test]
+fn definitions_have_the_names_of_ros_2() {
+    assert_eq!(type_name("nav_msgs/OccupancyGrid"), "nav_msgs/msg/OccupancyGrid");
+    assert_eq!(type_name("tf/tfMessage"), "tf2_msgs/msg/TFMessage");
+    let text = translate(
+        "time[] at\nduration d\nbyte b\nchar c\nint32 A=1 # time\nHeader header\nstd_msgs/Header h\nfloat32[3] x",
+    );
+    let own: Vec<&str> = text.lines().take(8).collect();
+    let expected = [
+        "builtin_interfaces/Time[] at",
+        "builtin_interfaces/Duration d",
+        "int8 b",
+        "uint8 c",
+        "int32 A=1 # time",
+        "std_msgs/Header header",
+        "std_msgs/Header h",
+        "float32[3] x",
+    ];
+    assert_eq!(own, expected);
+    Schema::parse("a/A", &text).unwrap();
+}
+
+#[test]
+fn a_bag_that_is_cut_or_was_not_closed_is_read_as_far_as_it_goes() {
+    let folder = Folder::new();
+    let told = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
+    let first = [told.clone(), message(0, 1, &pose(1.0))].concat();
+    let bag = Bag::new(false).chunk("none", &first, &[1]).chunk("none", &message(0, 2, &pose(2.0)), &[2]);
+    let bytes = bag.end(&[]);
+    let (messages, damage) = read(&folder.write("open.bag", &bytes)).unwrap();
+    assert_eq!(messages.len(), 2);
+    assert!(matches!(damage[..], [Damage::NoEnd { .. }]), "{damage:?}");
+    for length in 0..bytes.len() {
+        if let Ok((messages, damage)) = read(&folder.write("cut.bag", &bytes[..length])) {
+            assert!(
+                messages.len() <= 2 && damage.iter().any(|damage| matches!(damage, Damage::NoEnd { .. })),
+                "{length}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_told_and_the_rest_is_read() {
+    let folder = Folder::new();
+    let told = connection(0, "/p", "geometry_msgs/PoseStamped", POSE);
+    let unknown = connection(1, "/q", "a/B", "C c");
+    let contents =
+        [message(0, 1, b"short"), message(0, 2, &pose(1.0)), message(1, 3, b"raw"), message(9, 4, b"?")].concat();
+    let bag = Bag::new(true).chunk("none", &contents, &[1, 2, 3, 4]).chunk("bz2", b"", &[5]);
+    let path = folder.write("a.bag", &bag.end(&[told, unknown]));
+    let (messages, damage) = read(&path).unwrap();
+    let found: Vec<(&str, u64)> = messages.iter().map(|(topic, time, _)| (topic.as_str(), *time)).collect();
+    assert_eq!(found, [("/p", 2), ("/q", 3), ("", 4)]);
+    assert_eq!(messages[1].2, b"raw");
+    assert_eq!(LogFile::open(&path).unwrap().channels().nth(1).unwrap().1.message_encoding, "ros1");
+    assert!(damage.contains(&Damage::LostMessages { count: 1 }), "{damage:?}");
+    assert!(damage.contains(&Damage::BadChunk { fault: ChunkFault::UnknownCompression("bz2".into()) }), "{damage:?}");
+}

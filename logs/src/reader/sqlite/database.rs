@@ -1,0 +1,123 @@
+//! One database, opened to be read and never to be written.
+
+use super::rows::survey;
+use super::tables;
+use super::torn::Pages;
+use crate::reader::bytes::FileBytes;
+use crate::reader::damage::Damage;
+use crate::reader::layout::Layout;
+use rusqlite::{Connection, OpenFlags};
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The most bytes of a header that say how long the database is.
+const HEADER: usize = 100;
+
+/// A database of rosbag2.
+#[derive(Debug)]
+pub(crate) struct Database {
+    /// The file, as it was when it was opened.
+    file: FileBytes,
+    /// One thread reads at a time.
+    connection: Mutex<Connection>,
+    /// The numbers that the topics have as channels, by their numbers in the database.
+    channels: BTreeMap<i64, u16>,
+    /// The numbers of rows whose messages are not whole, rising.
+    torn: Vec<i64>,
+}
+
+impl Database {
+    /// Opens the database in the file at `path`, and finds out what it consists of. A packed one was unpacked to `unpacked`.
+    ///
+    /// # Errors
+    /// What is wrong with it, if no message can be read.
+    pub(crate) fn open(path: &Path, unpacked: Option<&Path>, file: FileBytes) -> Result<(Self, Layout), String> {
+        let told = |error: rusqlite::Error| error.to_string();
+        let connection = connect(unpacked.unwrap_or(path)).map_err(told)?;
+        let mut layout = Layout::default();
+        let cut = cut(&file);
+        let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
+        layout.damage.extend(cut);
+        layout.damage.extend(beside(path));
+        let topics = tables::read_topics(&connection, &mut layout)?;
+        let channels = topics.into_iter().collect();
+        survey(&connection, &mut layout).map_err(told)?;
+        if layout.blocks.is_empty() && !layout.damage.is_empty() && layout.definitions.channel_count() == 0 {
+            return Err("there is no topic in it that can be read".to_owned());
+        }
+        Ok((Self { file, connection: Mutex::new(connection), channels, torn }, layout))
+    }
+
+    pub(crate) fn is_cut(&self) -> bool {
+        self.file.is_cut()
+    }
+
+    pub(super) fn connection(&self) -> MutexGuard<'_, Connection> {
+        // A thread that has failed leaves a connection that can be used.
+        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the message of a row is not whole.
+    pub(super) fn is_torn(&self, row: i64) -> bool {
+        self.torn.binary_search(&row).is_ok()
+    }
+
+    /// The number that a topic has as a channel; one that no channel has if the database does not describe it.
+    pub(super) fn channel(&self, topic: i64) -> u16 {
+        self.channels.get(&topic).copied().unwrap_or(0)
+    }
+}
+
+fn torn_rows(connection: &Connection, file: &FileBytes) -> Vec<i64> {
+    let query = "SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND name = 'messages'";
+    let root = connection.query_row(query, [], |row| row.get::<_, i64>(0)).ok();
+    let root = root.and_then(|root| usize::try_from(root).ok());
+    root.and_then(|root| Some(Pages::new(file)?.torn_rows(root))).unwrap_or_default()
+}
+
+/// A connection that writes nothing, neither to the database nor beside it, and runs no code that a database brings with it.
+fn connect(path: &Path) -> rusqlite::Result<Connection> {
+    let mut uri = "file:".to_owned();
+    for &byte in path.as_os_str().as_bytes() {
+        match byte {
+            b'/' | b'.' | b'-' | b'_' => uri.push(byte.into()),
+            _ if byte.is_ascii_alphanumeric() => uri.push(byte.into()),
+            _ => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri.push_str("?mode=ro&immutable=1");
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = Connection::open_with_flags(uri, flags)?;
+    // With a schema that could be written, one that is cut is read as far as it goes; nothing can be, as it is read only.
+    connection.execute_batch(
+        "PRAGMA writable_schema = ON; PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;",
+    )?;
+    Ok(connection)
+}
+
+/// Whether the file is shorter than its header says.
+fn cut(file: &FileBytes) -> Option<Damage> {
+    let header = file.read(0..HEADER)?;
+    let number = |at: usize| Some(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?));
+    let page_size = match u16::from_be_bytes(header.get(16..18)?.try_into().ok()?) {
+        1 => 65536,
+        size => usize::from(size),
+    };
+    // The number of pages counts if it was written by whoever wrote last.
+    let pages = usize::try_from(number(28)?).ok().filter(|_| number(24) == number(92))?;
+    (pages.checked_mul(page_size)? > file.len()).then(|| Damage::NoEnd { position: file.len() })
+}
+
+/// What a recorder that was killed has left beside the database, which is not read.
+fn beside(path: &Path) -> Option<Damage> {
+    ["-wal", "-journal"].iter().find_map(|ending| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        let rest = PathBuf::from(name);
+        let is_rest = fs::metadata(&rest).is_ok_and(|file| file.len() > 0);
+        is_rest.then(|| Damage::NotClosed { rest: rest.display().to_string() })
+    })
+}

@@ -1,0 +1,217 @@
+//! The rows of the table of messages: found in runs, and read a run at a time.
+
+use super::database::Database;
+use crate::reader::block::{Block, Records};
+use crate::reader::chunk::LARGEST;
+use crate::reader::damage::{ChunkFault, Damage};
+use crate::reader::layout::Layout;
+use crate::reader::record::push_message;
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Row, Statement};
+
+/// A run is ended when its messages have so many bytes, or there are so many of them.
+const RUN_BYTES: u64 = 1 << 20;
+const RUN_ROWS: u64 = 16 << 10;
+/// So many places where rows cannot be read are gone around.
+const MOST_GAPS: u64 = 1000;
+
+/// A run of rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows {
+    /// The number of the first row.
+    first: i64,
+    /// The number of the last row.
+    last: i64,
+    /// How many there are.
+    count: u64,
+    /// The bytes of their messages.
+    pub(crate) size: u64,
+}
+
+/// What is known of a row without its message.
+struct Place {
+    number: i64,
+    time: u64,
+    size: u64,
+}
+
+impl Place {
+    fn of(row: &Row<'_>) -> rusqlite::Result<Self> {
+        let time = row.get_ref(1)?.as_i64().unwrap_or(0);
+        let size = row.get_ref(2)?.as_i64().unwrap_or(0);
+        Ok(Self { number: row.get(0)?, time: u64::try_from(time).unwrap_or(0), size: u64::try_from(size).unwrap_or(0) })
+    }
+}
+
+/// Walks over all rows, and puts the runs of them into the layout as blocks.
+pub(super) fn survey(connection: &Connection, layout: &mut Layout) -> rusqlite::Result<()> {
+    // The length of a message is known without reading it.
+    let query = "SELECT rowid, timestamp, length(data) FROM messages WHERE rowid >= ?1 ORDER BY rowid";
+    let mut statement = connection.prepare(query)?;
+    let mut runs = Runs { layout, run: None };
+    let (mut from, mut gaps) = (i64::MIN, 0);
+    loop {
+        let mut last = None;
+        let ended = walk(&mut statement, from, |place| {
+            last = Some(place.number);
+            runs.push(&place);
+        });
+        let next = last.map_or(Some(from), |last: i64| last.checked_add(1));
+        match (ended, next) {
+            (Ok(()), _) | (_, None) => break,
+            (Err(_), Some(lost_from)) => {
+                // A run that is read is one without a gap.
+                runs.end();
+                gaps += 1;
+                let found = (gaps <= MOST_GAPS).then(|| behind(&mut statement, lost_from.max(0))).flatten();
+                runs.layout.damage.push(Damage::LostRows { from: lost_from.max(0), to: found });
+                match found {
+                    Some(found) => from = found,
+                    None => break,
+                }
+            }
+        }
+    }
+    runs.end();
+    Ok(())
+}
+
+fn walk(statement: &mut Statement<'_>, from: i64, mut take: impl FnMut(Place)) -> rusqlite::Result<()> {
+    let mut rows = statement.query([from])?;
+    while let Some(row) = rows.next()? {
+        take(Place::of(row)?);
+    }
+    Ok(())
+}
+
+/// A number behind `lost` from which on a row can be read; none if no other can be.
+fn behind(statement: &mut Statement<'_>, lost: i64) -> Option<i64> {
+    // Whether there is a row that can be read, or an error.
+    let mut first_from = |from: i64| -> Result<Option<i64>, ()> {
+        let mut rows = statement.query([from]).map_err(|_| ())?;
+        let row = rows.next().map_err(|_| ())?;
+        row.map(|row| row.get(0)).transpose().map_err(|_| ())
+    };
+    let (mut bad, mut step) = (lost, 1_i64);
+    let mut good = loop {
+        let from = lost.checked_add(step)?;
+        match first_from(from) {
+            Ok(found) => break found?.min(from),
+            Err(()) => bad = from,
+        }
+        step = step.checked_mul(2)?;
+    };
+    while good - bad > 1 {
+        let middle = bad + (good - bad) / 2;
+        match first_from(middle) {
+            Ok(_) => good = middle,
+            Err(()) => bad = middle,
+        }
+    }
+    Some(good)
+}
+
+/// Makes blocks of rows as they come.
+struct Runs<'a> {
+    layout: &'a mut Layout,
+    run: Option<Block>,
+}
+
+impl Runs<'_> {
+    fn push(&mut self, place: &Place) {
+        let Place { number, time, size } = *place;
+        let run = self.run.get_or_insert(Block {
+            first_time: time,
+            last_time: time,
+            records: Records::Rows(Rows { first: number, last: number, count: 0, size: 0 }),
+        });
+        run.first_time = run.first_time.min(time);
+        run.last_time = run.last_time.max(time);
+        let Records::Rows(rows) = &mut run.records else { return };
+        rows.last = number;
+        rows.count += 1;
+        rows.size = rows.size.saturating_add(size);
+        if rows.size >= RUN_BYTES || rows.count >= RUN_ROWS {
+            self.end();
+        }
+    }
+
+    fn end(&mut self) {
+        self.layout.blocks.extend(self.run.take());
+    }
+}
+
+impl Rows {
+    /// The messages of the rows as records of MCAP, and how many of them could not be read.
+    pub(crate) fn contents(&self, database: &Database) -> Result<(Vec<u8>, u64), ChunkFault> {
+        if self.size > LARGEST {
+            return Err(ChunkFault::TooMuch { size: self.size });
+        }
+        let connection = database.connection();
+        let mut reading = Reading { database, records: Vec::new(), read: 0, last: None };
+        // The size is the word of the database only.
+        let _ = reading.records.try_reserve(usize::try_from(self.size.min(2 * RUN_BYTES)).unwrap_or(0));
+        if reading.all(&connection, self).is_err() {
+            reading.one_by_one(&connection, self).map_err(|_| ChunkFault::Records)?;
+        }
+        if reading.records.len() as u64 > 2 * LARGEST {
+            return Err(ChunkFault::TooLarge);
+        }
+        Ok((reading.records, self.count.saturating_sub(reading.read)))
+    }
+}
+
+struct Reading<'a> {
+    database: &'a Database,
+    records: Vec<u8>,
+    /// How many rows were read, and the last of them.
+    read: u64,
+    last: Option<i64>,
+}
+
+impl Reading<'_> {
+    /// Reads all rows of a run, up to one that cannot be read.
+    fn all(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
+        let query =
+            "SELECT rowid, timestamp, topic_id, data FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid";
+        let mut statement = connection.prepare(query)?;
+        let mut found = statement.query([rows.first, rows.last])?;
+        while let Some(row) = found.next()? {
+            self.take(row)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the rows behind the last one, each by itself: one whose message cannot be read is left out.
+    fn one_by_one(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
+        let mut next =
+            connection.prepare("SELECT rowid FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid LIMIT 1")?;
+        let mut one = connection.prepare("SELECT rowid, timestamp, topic_id, data FROM messages WHERE rowid = ?1")?;
+        let mut from = self.last.map_or(Some(rows.first), |last| last.checked_add(1));
+        while let Some(start) = from.filter(|from| *from <= rows.last) {
+            let Ok(number) = next.query_row([start, rows.last], |row| row.get::<_, i64>(0)) else { break };
+            // The row is lost if it cannot be read.
+            let _ = one.query_row([number], |row| self.take(row));
+            from = number.checked_add(1);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, row: &Row<'_>) -> rusqlite::Result<()> {
+        let number: i64 = row.get(0)?;
+        self.last = Some(number);
+        if self.database.is_torn(number) {
+            return Ok(());
+        }
+        let (time, topic) = match (row.get_ref(1)?, row.get_ref(2)?) {
+            (ValueRef::Integer(time), ValueRef::Integer(topic)) => (u64::try_from(time).unwrap_or(0), topic),
+            _ => return Ok(()),
+        };
+        let (ValueRef::Blob(data) | ValueRef::Text(data)) = row.get_ref(3)? else { return Ok(()) };
+        let channel = self.database.channel(topic);
+        // Numbers count from 1; those that do not fit begin anew.
+        push_message(&mut self.records, channel, number as u32, time, time, data);
+        self.read += 1;
+        Ok(())
+    }
+}

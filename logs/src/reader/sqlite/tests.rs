@@ -1,0 +1,240 @@
+use crate::reader::{Damage, LogFile, LogReader, ReadError, open};
+use crate::schemas::schema_text;
+use crate::test_log::Folder;
+use gridweave_runtime::ros::{PoseStamped, RosMessage, encode};
+use rusqlite::Connection;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The tables as rosbag2 makes them up to Humble.
+const TABLES: &str = "
+    CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+        serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+    CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);
+    CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+";
+
+/// Writes a bag with two topics and gives its path; `messages` are the topic, the time and the bytes of each.
+fn bag(folder: &Folder, name: &str, messages: &[(i64, u64, Vec<u8>)]) -> PathBuf {
+    let path = folder.path().join(name);
+    let mut connection = Connection::open(&path).unwrap();
+    connection.execute_batch(TABLES).unwrap();
+    let topics = [(1, "/robot1/pose", PoseStamped::NAME), (7, "/x", "p/msg/X")];
+    for (id, topic, name) in topics {
+        let values = (id, topic, name, "cdr", "- durability: 1");
+        connection.execute("INSERT INTO topics VALUES (?1, ?2, ?3, ?4, ?5)", values).unwrap();
+    }
+    let transaction = connection.transaction().unwrap();
+    for (topic, time, data) in messages {
+        let query = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?1, ?2, ?3)";
+        transaction.execute(query, (topic, *time as i64, data)).unwrap();
+    }
+    transaction.commit().unwrap();
+    connection.close().unwrap();
+    path
+}
+
+/// What a reader gives: topic, time and bytes of each message; and the damage.
+fn read(path: &Path) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<Damage>), ReadError> {
+    let file = LogFile::open(path)?;
+    let mut damage = file.damage().to_vec();
+    let mut reader = LogReader::new(vec![file]);
+    let files = reader.files().clone();
+    let mut messages = Vec::new();
+    while let Some(message) = reader.next_message() {
+        let topic = files[0].channel(message.channel).map(|channel| channel.topic).unwrap_or_default();
+        messages.push((topic, message.log_time.0, message.data.to_vec()));
+    }
+    damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
+    Ok((messages, damage))
+}
+
+/// Rows whose messages differ in length and order.
+fn many(count: u64) -> Vec<(i64, u64, Vec<u8>)> {
+    let row = |number: u64| {
+        let time = 1000 + (number ^ 3);
+        (if number % 3 == 0 { 7 } else { 1 }, time, vec![number as u8; 20 + (number as usize * 37) % 9000])
+    };
+    (0..count).map(row).collect()
+}
+
+#[test]
+fn messages_come_by_time_with_what_is_known_of_their_types() {
+    let folder = Folder::new();
+    let pose = encode(&PoseStamped::default()).unwrap();
+    let path = bag(
+        &folder,
+        "a.db3",
+        &[(7, 30, b"late".to_vec()), (1, 10, pose.clone()), (7, 20, b"x".to_vec()), (9, 20, vec![1])],
+    );
+    let (messages, damage) = read(&path).unwrap();
+    let expected =
+        [("/robot1/pose", 10, pose), ("/x", 20, b"x".to_vec()), ("", 20, vec![1]), ("/x", 30, b"late".to_vec())];
+    assert_eq!(messages, expected.map(|(topic, time, data)| (topic.to_owned(), time, data)));
+    assert_eq!(damage, []);
+    let file = LogFile::open(&path).unwrap();
+    let [(_, one), (_, two)] = &file.channels().collect::<Vec<_>>()[..] else { panic!() };
+    assert_eq!(one.schema, schema_text(PoseStamped::NAME).unwrap().into_bytes());
+    assert_eq!(
+        (one.message_encoding.as_str(), one.metadata["offered_qos_profiles"].as_str()),
+        ("cdr", "- durability: 1")
+    );
+    assert_eq!((two.schema_name.as_str(), two.schema.as_slice()), ("p/msg/X", &[][..]));
+    assert_eq!((file.container().as_str(), file.first_time()), ("SQLite", Some(10)));
+}
+
+#[test]
+fn definitions_that_a_database_holds_count() {
+    let folder = Folder::new();
+    let path = bag(&folder, "a.db3", &[(7, 1, vec![0])]);
+    let connection = Connection::open(&path).unwrap();
+    let more = "
+        CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
+            encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
+        INSERT INTO message_definitions VALUES (1, 'p/msg/X', 'ros2msg', 'int8 x', 'RIHS01_1');
+        CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
+        INSERT INTO metadata VALUES (1, 9, 'version: 9');
+        ALTER TABLE topics ADD COLUMN type_description_hash TEXT NOT NULL DEFAULT 'RIHS01_1';";
+    connection.execute_batch(more).unwrap();
+    connection.close().unwrap();
+    let file = LogFile::open(&path).unwrap();
+    let (_, channel) = file.channels().nth(1).unwrap();
+    assert_eq!((channel.schema.as_slice(), channel.schema_encoding.as_str()), (&b"int8 x"[..], "ros2msg"));
+    assert_eq!(channel.metadata["topic_type_hash"], "RIHS01_1");
+    assert_eq!(file.metadata("rosbag2").unwrap()["serialized_metadata"], "version: 9");
+}
+
+#[test]
+fn long_bags_come_in_runs_and_nothing_is_written_beside_them() {
+    let folder = Folder::new();
+    let rows = many(3000);
+    let path = bag(&folder, "a#b?c%.db3", &rows);
+    let before = fs::read(&path).unwrap();
+    let (messages, damage) = read(&path).unwrap();
+    assert!(messages.len() == rows.len() && messages.is_sorted_by_key(|(_, time, _)| *time));
+    let mut expected: Vec<_> = rows.iter().map(|(_, time, data)| (*time, data.clone())).collect();
+    expected.sort();
+    assert!(messages.into_iter().map(|(_, time, data)| (time, data)).eq(expected));
+    assert_eq!(damage, []);
+    assert!(LogFile::open(&path).unwrap().layout.blocks.len() > 5);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert!(fs::read(&path).unwrap() == before);
+}
+
+#[test]
+fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
+    let folder = Folder::new();
+    let rows = many(400);
+    let whole = fs::read(bag(&folder, "a.db3", &rows)).unwrap();
+    let is_of_bag = |messages: &[(String, u64, Vec<u8>)]| {
+        messages.iter().filter(|(_, time, data)| rows.iter().any(|(_, at, bytes)| at == time && bytes == data)).count()
+    };
+    let mut most = 0;
+    for part in 1..40 {
+        let path = folder.write("cut.db3", &whole[..whole.len() * part / 40]);
+        match read(&path) {
+            Ok((messages, damage)) => {
+                assert!(damage.iter().any(|damage| matches!(damage, Damage::NoEnd { .. })), "{part}: {damage:?}");
+                assert_eq!(is_of_bag(&messages), messages.len(), "{part}");
+                most = most.max(messages.len());
+            }
+            Err(error) => {
+                assert!(matches!(error, ReadError::Database { .. } | ReadError::NothingLeft { .. }), "{error}")
+            }
+        }
+    }
+    assert!(most > 300, "{most}");
+    // A page in the middle that is lost takes its own messages with it, those that go on in it, and at worst those of all pages under it.
+    let (mut told, mut all) = (0, 0);
+    for page in 10..60 {
+        let mut bytes = whole.clone();
+        bytes[page * 4096..][..4096].fill(0xa5);
+        let (messages, damage) = read(&folder.write("bad.db3", &bytes)).unwrap();
+        let right = is_of_bag(&messages);
+        assert!(right > 150 && messages.len() - right < 10, "{page}: {right} of {}", messages.len());
+        all += right;
+        told += usize::from(!damage.is_empty());
+    }
+    assert!(told > 10 && all > 50 * 350, "{told} {all}");
+}
+
+#[test]
+fn what_is_no_bag_is_told_and_nothing_that_it_brings_along_is_run() {
+    let folder = Folder::new();
+    let made = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        Connection::open(&path).unwrap().execute_batch(text).unwrap();
+        path
+    };
+    let other = made("other.db3", "CREATE TABLE people(name TEXT)");
+    assert!(read(&other).unwrap_err().to_string().contains("no table `topics`"));
+    let endless = "CREATE TABLE topics(id, name, type);
+        CREATE VIEW messages AS WITH RECURSIVE r(id) AS (SELECT 1 UNION ALL SELECT 1 FROM r) SELECT id FROM r;";
+    assert!(read(&made("view.db3", endless)).unwrap_err().to_string().contains("no table `messages`"));
+    let empty = bag(&folder, "empty.db3", &[]);
+    assert_eq!(read(&empty).unwrap(), (Vec::new(), Vec::new()));
+    let short = folder.write("short.db3", b"SQLite form");
+    assert!(matches!(read(&short), Err(ReadError::NothingLeft { .. })));
+}
+
+#[test]
+fn what_a_killed_recorder_has_left_beside_a_database_is_told() {
+    let folder = Folder::new();
+    let path = bag(&folder, "a.db3", &many(3));
+    folder.write("a.db3-wal", b"more");
+    let (messages, damage) = read(&path).unwrap();
+    assert_eq!(messages.len(), 3);
+    assert!(matches!(&damage[..], [Damage::NotClosed { rest }] if rest.ends_with("a.db3-wal")));
+}
+
+#[test]
+fn files_and_messages_that_are_packed_are_unpacked() {
+    let folder = Folder::new();
+    let pack = |bytes: &[u8]| zstd::bulk::compress(bytes, 1).unwrap();
+    let rows = many(50);
+    let packed: Vec<_> = rows.iter().map(|(topic, time, data)| (*topic, *time, pack(data))).collect();
+    let expected = read(&bag(&folder, "plain.db3", &rows)).unwrap();
+    assert_eq!(read(&bag(&folder, "messages.db3", &packed)).unwrap(), expected);
+    let whole = pack(&fs::read(folder.path().join("plain.db3")).unwrap());
+    let path = folder.write("plain.db3.zstd", &whole);
+    assert_eq!(read(&path).unwrap(), expected);
+    assert_eq!(LogFile::open(&path).unwrap().container(), "SQLite, packed with zstd");
+    let cut = folder.write("cut.db3.zstd", &whole[..whole.len() / 2]);
+    match read(&cut) {
+        Ok((_, damage)) => assert!(damage.contains(&Damage::CutPack)),
+        Err(error) => assert!(matches!(error, ReadError::Database { .. } | ReadError::Empty { .. }), "{error}"),
+    }
+    // A message that begins as a packed one and is none stays as it is.
+    let odd = [crate::reader::packed::ZSTD_MAGIC, b"odd"].concat();
+    let (messages, _) = read(&bag(&folder, "odd.db3", &[(7, 1, odd.clone())])).unwrap();
+    assert_eq!(messages[0].2, odd);
+}
+
+#[test]
+fn a_folder_is_read_by_its_description_or_without_one() {
+    let folder = Folder::new();
+    let inner = folder.path().join("bag");
+    fs::create_dir(&inner).unwrap();
+    bag(&folder, "bag/bag_0.db3", &[(7, 5, vec![5])]);
+    bag(&folder, "bag/bag_1.db3", &[(7, 4, vec![4])]);
+    let times = || {
+        let mut reader = open(std::slice::from_ref(&inner)).unwrap();
+        std::iter::from_fn(|| reader.next_message().map(|message| message.log_time.0)).collect::<Vec<_>>()
+    };
+    assert_eq!(times(), [4, 5]);
+    let describe = |files: &str| {
+        let text = format!(
+            "rosbag2_bagfile_information:\n  version: 3\n  storage_identifier: sqlite3\n  relative_file_paths: [{files}]\n"
+        );
+        fs::write(inner.join("metadata.yaml"), text).unwrap();
+    };
+    describe("bag_1.db3");
+    assert_eq!(times(), [4]);
+    describe("bag/bag_0.db3");
+    assert_eq!(times(), [5], "Foxy and older name files from outside");
+    let packed = zstd::bulk::compress(&fs::read(inner.join("bag_0.db3")).unwrap(), 1).unwrap();
+    fs::write(inner.join("bag_0.db3.zstd"), packed).unwrap();
+    fs::remove_file(inner.join("bag_0.db3")).unwrap();
+    describe("bag_0.db3, bag_1.db3");
+    assert_eq!(times(), [4, 5]);
+}

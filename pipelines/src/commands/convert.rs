@@ -1,0 +1,44 @@
+//! `gridweave convert`: logs of any container that is read, written as one MCAP file.
+
+use crate::job::{Inputs, Job, Output, ReadingOptions, RunOptions, is_yaml};
+use crate::status::{BadUse, Status};
+use crate::terminal::{print_line, say};
+use anyhow::Result;
+use clap::Args;
+use gridweave_runtime::stage::Registry;
+use std::path::{Path, PathBuf};
+
+/// The pipeline that passes logs on as they are.
+const PIPELINE: &str = "cut";
+
+/// What `gridweave convert` is told.
+#[derive(Debug, Args)]
+pub(crate) struct ConvertArgs {
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), written as one, by log time. ROBOT=LOG puts the topics
+    /// and frames of a log under the name of its robot.
+    #[arg(required = true, value_name = "LOG")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The MCAP file to write.
+    #[arg(short, long, value_name = "OUT.mcap")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) reading: ReadingOptions,
+}
+
+/// Writes logs as one MCAP file.
+pub(crate) fn convert(args: &ConvertArgs, registry: &Registry) -> Result<Status> {
+    if Inputs::of(&args.inputs)? == Inputs::MapFiles || is_yaml(&args.output) {
+        let text = "`convert` reads logs and writes an MCAP file; map files are merged: `gridweave merge A.yaml B.yaml -o OUT`";
+        return Err(BadUse(text.to_owned()).into());
+    }
+    let options = RunOptions { reading: args.reading.clone(), ..Default::default() };
+    let (pipeline, output) = (Path::new(PIPELINE), Output::Log(&args.output));
+    let summary = Job { pipeline, inputs: &args.inputs, output, options: &options, registry }.run()?;
+    for line in summary.warning_lines() {
+        say(line);
+    }
+    // It only passes on, and the last stage takes all.
+    let messages = summary.stages.last().map_or(0, |stage| stage.messages_in);
+    print_line(format_args!("wrote {messages} messages to {}", args.output.display()))?;
+    Ok(Status::Done)
+}
