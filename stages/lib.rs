@@ -1,9 +1,10 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
 //! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `deformation`, `hypotheses`, `placement`, `robot_maps` and `robot_pair`.
+//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `placement`, `robot_maps` and `robot_pair`.
 
 #![forbid(unsafe_code)]
 
+pub mod acceptance_index;
 pub mod deformation;
 pub mod elastic_refiner;
 pub mod frame_solver;
