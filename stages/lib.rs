@@ -25,6 +25,7 @@ pub mod quadrant_classifier;
 pub mod robot_maps;
 pub mod robot_pair;
 pub mod simulator;
+pub mod skeleton;
 pub mod tag_filter;
 pub mod tag_localizer;
 #[cfg(test)]

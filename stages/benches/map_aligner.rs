@@ -5,17 +5,14 @@
 // A bench that cannot go on has nothing better to do than to stop.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use gridweave_stages::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+mod building;
+
+use building::draw;
+use gridweave_stages::geometry::Grid;
 use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
 use std::time::Instant;
 
 const RUNS: usize = 7;
-const RESOLUTION: f64 = 0.05;
-/// Mean width of a room, metres.
-const ROOM: f64 = 5.0;
-const HALF_WALL: f64 = 0.06;
-/// Half the width of a door, metres.
-const HALF_DOOR: f64 = 0.5;
 
 fn main() {
     println!("| grid, cells | known, m | median, ms | least, ms |\n| --- | --- | --- | --- |");
@@ -36,46 +33,4 @@ fn main() {
         times.sort_by(f64::total_cmp);
         println!("| {cells} x {cells} | {known} x {known} | {:.0} | {:.0} |", times[RUNS / 2], times[0]);
     }
-}
-
-/// The map of a robot that has seen a square of `known` metres of a building, all of it, its frame turned by `yaw`.
-fn draw(cells: usize, known: f64, yaw: f64) -> (GridGeometry, Vec<i8>) {
-    let half = 0.5 * cells as f64 * RESOLUTION;
-    let origin = Pose2::translation(-half, -half);
-    let geometry = GridGeometry { width: cells, height: cells, resolution: RESOLUTION, origin };
-    let transform_building_map = pose(0.0, 0.0, yaw);
-    let values = (0..cells * cells).map(|index| {
-        let cell = Cell { column: index % cells, row: index / cells };
-        let point = transform_building_map * geometry.centre(cell);
-        let is_inside = point.x.abs().max(point.y.abs()) < 0.5 * known;
-        if is_inside { value(&point) } else { UNKNOWN }
-    });
-    let values = values.collect();
-    (geometry, values)
-}
-
-/// What is at a point of a building without end: rooms of all widths, with doors.
-fn value(point: &Point2) -> i8 {
-    let (across, along) = (wall_near(point.y, 0), wall_near(point.x, 1000 + cell_of(point.y)));
-    let is_wall = |distance: f64, door: f64| distance.abs() < HALF_WALL && door.abs() > HALF_DOOR;
-    let door_across = point.x - (f64::from(cell_of(point.x)) + 0.2 + 0.6 * spread(cell_of(point.x), across.1)) * ROOM;
-    let door_along = point.y - (f64::from(cell_of(point.y)) + 0.3 + 0.4 * spread(cell_of(point.y), along.1)) * ROOM;
-    if is_wall(across.0, door_across) || is_wall(along.0, door_along) { 100 } else { 0 }
-}
-
-fn cell_of(along: f64) -> i32 {
-    (along / ROOM).floor() as i32
-}
-
-/// The signed distance from the wall near a place along an axis, and the number of the wall.
-fn wall_near(along: f64, row: i32) -> (f64, i32) {
-    let number = cell_of(along);
-    (along - (f64::from(number) + 0.3 + 0.4 * spread(number, row)) * ROOM, number)
-}
-
-/// A number from 0 to 1 that looks random, for two whole numbers.
-fn spread(one: i32, other: i32) -> f64 {
-    let mixed = (one as u32).wrapping_mul(0x9e37_79b9) ^ (other as u32).wrapping_mul(0x85eb_ca6b);
-    let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
-    f64::from(mixed >> 8) / f64::from(1 << 24)
 }

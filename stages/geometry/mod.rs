@@ -2,11 +2,13 @@
 //!
 //! A rigid transform is written `T_a_b` in text and `transform_a_b` in code: it takes a point in frame b to frame a.
 
+mod cell_box;
 mod grid;
 mod point_index;
 mod pose;
 mod rigid_fit;
 
+pub use cell_box::CellBox;
 pub use grid::{Cell, Grid, GridError, GridGeometry, most_cells_over};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 pub use point_index::{Buckets, Neighbour, PointIndex};

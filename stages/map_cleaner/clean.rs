@@ -2,8 +2,8 @@
 
 use super::MapCleanerParameters;
 use super::objects::loose_cells;
-use super::passages::{KnownBox, wide_known_space};
-use crate::geometry::{Grid, UNKNOWN, is_occupied};
+use super::passages::wide_known_space;
+use crate::geometry::{CellBox, Grid, UNKNOWN, is_known, is_occupied};
 
 /// Clears what is no wall out of `cells`, which hold the same as `grid`: what becomes unknown says nothing for or against a
 /// place at which two maps may lie.
@@ -12,7 +12,7 @@ use crate::geometry::{Grid, UNKNOWN, is_occupied};
 /// - Known space that is narrower than a robot, such as rays through glass and open doors. Walls stay.
 pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8]) {
     let radius = (0.5 * parameters.min_passage / grid.geometry.resolution).min(1e6) as usize;
-    if let (true, Some(known_box)) = (radius > 0, KnownBox::of(grid)) {
+    if let (true, Some(known_box)) = (radius > 0, CellBox::holding(grid, is_known)) {
         let wide = wide_known_space(grid, &known_box, radius);
         for (row, wide) in known_box.rows.clone().zip(wide.chunks_exact(known_box.columns.len())) {
             let start = row * grid.geometry.width;

@@ -1,37 +1,12 @@
 //! Known space that is too narrow for a robot to have seen it well.
 
-use crate::geometry::{Grid, is_known};
+use crate::geometry::{CellBox, Grid, is_known};
 use std::ops::Range;
-
-/// The part of a grid that holds all of its known cells.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct KnownBox {
-    pub(super) rows: Range<usize>,
-    pub(super) columns: Range<usize>,
-}
-
-impl KnownBox {
-    /// With one unknown cell to each side where the grid goes on. None if nothing is known.
-    pub(super) fn of(grid: &Grid<'_>) -> Option<Self> {
-        let (width, height) = (grid.geometry.width, grid.geometry.height);
-        let mut known: Option<Self> = None;
-        for (row, cells) in grid.cells.chunks_exact(width.max(1)).enumerate() {
-            let is_known = |value: &i8| is_known(*value);
-            let Some(first) = cells.iter().position(is_known) else { continue };
-            let last = cells.iter().rposition(is_known).unwrap_or(first);
-            let columns = known.as_ref().map_or(first..last, |known| known.columns.clone());
-            let rows = known.map_or(row, |known| known.rows.start)..row;
-            known = Some(Self { rows, columns: columns.start.min(first)..columns.end.max(last) });
-        }
-        let with_rim = |range: Range<usize>, count: usize| range.start.saturating_sub(1)..(range.end + 2).min(count);
-        known.map(|known| Self { rows: with_rim(known.rows, height), columns: with_rim(known.columns, width) })
-    }
-}
 
 /// Whether each cell of the box, row by row, is known and lies in a square of `2 * radius + 1` known cells: the morphological
 /// opening of the known space by that square (Serra 1982). Beyond the border of the grid all is known, so that a map that is
 /// cut off there loses nothing.
-pub(super) fn wide_known_space(grid: &Grid<'_>, known_box: &KnownBox, radius: usize) -> Vec<bool> {
+pub(super) fn wide_known_space(grid: &Grid<'_>, known_box: &CellBox, radius: usize) -> Vec<bool> {
     let (width, height) = (known_box.columns.len(), known_box.rows.len());
     let mut known = Vec::with_capacity(width * height);
     for row in known_box.rows.clone() {

@@ -1,8 +1,8 @@
 //! Cleaning of small maps that are drawn by hand.
 
-use super::passages::{KnownBox, wide_known_space};
+use super::passages::wide_known_space;
 use super::{MapCleanerParameters, clean};
-use crate::geometry::{Grid, GridGeometry, UNKNOWN, pose};
+use crate::geometry::{CellBox, Grid, GridGeometry, UNKNOWN, is_known, pose};
 use gridweave_runtime::stage::Parameters;
 use proptest::prelude::*;
 
@@ -95,7 +95,7 @@ proptest! {
         let around = |column: i32, row: i32| (row - reach..=row + reach).flat_map(move |row| (column - reach..=column + reach).map(move |column| (column, row)));
         let is_eroded = |column: i32, row: i32| !around(column, row)
             .any(|(column, row)| is_on_grid(column, row) && cells[row as usize * width + column as usize] == UNKNOWN);
-        let Some(known_box) = KnownBox::of(&grid) else { return Ok(()) };
+        let Some(known_box) = CellBox::holding(&grid, is_known) else { return Ok(()) };
         let wide = wide_known_space(&grid, &known_box, radius);
         for (index, is_wide) in wide.into_iter().enumerate() {
             let column = (known_box.columns.start + index % known_box.columns.len()) as i32;

@@ -77,6 +77,24 @@ fn wall_messages_agree_with_their_definitions() {
 }
 
 #[test]
+fn a_topological_map_agrees_with_its_definition() {
+    let node = |x: f64, kind: &str| TopologicalNode { x, y: 2.0, kind: kind.into(), probability: 0.75 };
+    let path = |start: u32, end: u32| TopologicalPath {
+        start,
+        end,
+        length: 3.5,
+        probability: 0.5,
+        points: vec![pose().position, Point { x: 4.0, y: 5.0, z: 6.0 }],
+    };
+    assert_agrees(&TopologicalMap {
+        header: header(),
+        robot: "robot1".into(),
+        nodes: vec![node(1.0, "end"), node(3.0, "junction"), node(5.0, "")],
+        paths: vec![path(0, 1), path(2, 1)],
+    });
+}
+
+#[test]
 fn result_messages_agree_with_their_definitions() {
     let covariance = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
     assert_agrees(&Alignment {

@@ -10,6 +10,7 @@ mod geometry;
 mod gridweave;
 mod nav;
 mod std_msgs;
+mod topological;
 
 pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
 pub use deformation::{DeformationNode, MapDeformation, Sharpness};
@@ -24,6 +25,7 @@ pub use gridweave::{
 };
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use std_msgs::{Header, Time};
+pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};
 
 use serde::{Deserialize, Serialize};
 
