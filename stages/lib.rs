@@ -1,27 +1,33 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
 //! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `placement`, `robot_maps` and `robot_pair`.
+//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `log_odds`, `placement`, `robot_maps`, `robot_pair` and
+//! `skeleton`.
 
 #![forbid(unsafe_code)]
 
 pub mod acceptance_index;
 pub mod deformation;
+pub mod edge_matcher;
 pub mod elastic_refiner;
+pub mod entropy_fuser;
 pub mod frame_solver;
 pub mod geometry;
 pub mod grid_fuser;
 pub mod hypotheses;
 pub mod icp_refiner;
 pub mod line_extractor;
+pub mod log_odds;
 pub mod map_aligner;
 pub mod map_cleaner;
 pub mod map_placer;
 pub mod map_selector;
 pub mod merge_verifier;
 pub mod path_placer;
+pub mod pgvd_extractor;
 pub mod place_window;
 pub mod placement;
 pub mod quadrant_classifier;
+pub mod radon_aligner;
 pub mod robot_maps;
 pub mod robot_pair;
 pub mod simulator;
@@ -30,6 +36,7 @@ pub mod tag_filter;
 pub mod tag_localizer;
 #[cfg(test)]
 mod test_world;
+pub mod uncertain_transform;
 pub mod walls;
 
 use gridweave_runtime::stage::StageKind;
@@ -37,7 +44,9 @@ use gridweave_runtime::stage::StageKind;
 /// All stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
     vec![
+        edge_matcher::kind(),
         elastic_refiner::kind(),
+        entropy_fuser::kind(),
         frame_solver::kind(),
         grid_fuser::kind(),
         icp_refiner::kind(),
@@ -48,9 +57,12 @@ pub fn kinds() -> Vec<StageKind> {
         map_selector::kind(),
         merge_verifier::kind(),
         path_placer::kind(),
+        pgvd_extractor::kind(),
         quadrant_classifier::kind(),
+        radon_aligner::kind(),
         simulator::kind(),
         tag_filter::kind(),
         tag_localizer::kind(),
+        uncertain_transform::kind(),
     ]
 }

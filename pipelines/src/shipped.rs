@@ -10,9 +10,10 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 }
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 10] = [
+const SHIPPED: [(&str, &str); 11] = [
     ("auto_merge", include_str!("../auto_merge.toml")),
     ("cut", include_str!("../cut.toml")),
+    ("group_mapping", include_str!("../group_mapping.toml")),
     ("live", include_str!("../live.toml")),
     ("live_merge", include_str!("../live_merge.toml")),
     ("map_file_merge", include_str!("../map_file_merge.toml")),

@@ -2,7 +2,7 @@
 
 use super::{Point2, Pose2};
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
-use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid};
+use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, Time};
 
 /// As many cells are looked at together.
 const BLOCK: usize = 64;
@@ -60,16 +60,20 @@ impl GridGeometry {
         self.width * self.height
     }
 
-    /// All of a grid's message but its cells, for a grid of at most `u32::MAX` columns and rows.
-    pub fn prefix(&self, header: Header) -> GridPrefix {
-        let info = MapMetaData {
-            map_load_time: header.stamp,
+    /// What a message says of a grid that was made at a time. The sides must be less than 2^32.
+    pub fn meta_data(&self, map_load_time: Time) -> MapMetaData {
+        MapMetaData {
+            map_load_time,
             resolution: self.resolution as f32,
             width: self.width as u32,
             height: self.height as u32,
             origin: self.origin.into(),
-        };
-        GridPrefix { header, info }
+        }
+    }
+
+    /// All of a grid's message but its cells. The sides must be less than 2^32.
+    pub fn prefix(&self, header: Header) -> GridPrefix {
+        GridPrefix { info: self.meta_data(header.stamp), header }
     }
 }
 

@@ -13,4 +13,4 @@ pub use grid::{Cell, Grid, GridError, GridGeometry, most_cells_over};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 pub use point_index::{Buckets, Neighbour, PointIndex};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};
-pub use rigid_fit::{PointPair, RigidFit, fit_rigid, point_jacobian};
+pub use rigid_fit::{PointPair, RigidFit, covariance_about, fit_rigid, point_jacobian};

@@ -2,7 +2,7 @@
 //!
 //! Least squares in closed form: Kabsch 1976 and Umeyama 1991, in the plane and without scale.
 
-use super::{Point2, Pose2, wrap_angle};
+use super::{Point2, Pose2, quarter_turn, wrap_angle};
 use nalgebra::{Isometry2, Matrix2, Matrix2x3, Matrix3, Vector2};
 
 /// The same point in two frames.
@@ -45,6 +45,19 @@ impl RigidFit {
 pub fn point_jacobian(transform_a_b: &Pose2, b: &Point2) -> Matrix2x3<f64> {
     let turned = transform_a_b.rotation * b.coords;
     Matrix2x3::new(1.0, 0.0, -turned.y, 0.0, 1.0, turned.x)
+}
+
+/// The covariance of (x, y, yaw) of a `T_a_b` that lays a point of b on a place of a with a covariance, square metres, and turns
+/// b about there with a variance, square radians, independent of it.
+pub fn covariance_about(transform_a_b: &Pose2, b: &Point2, of_place: &Matrix2<f64>, yaw_variance: f64) -> Matrix3<f64> {
+    // t = a - R b, so that a turn moves t against the way that it moves the point.
+    let arm = -quarter_turn(&(transform_a_b.rotation * b.coords));
+    let mut covariance = Matrix3::zeros();
+    covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&(of_place + arm * arm.transpose() * yaw_variance));
+    covariance.fixed_view_mut::<2, 1>(0, 2).copy_from(&(arm * yaw_variance));
+    covariance.fixed_view_mut::<1, 2>(2, 0).copy_from(&(arm.transpose() * yaw_variance));
+    covariance[(2, 2)] = yaw_variance;
+    covariance
 }
 
 /// The `T_a_b` that makes the weighted sum of the squared distances between `a` and `T_a_b * b` least.
@@ -191,6 +204,24 @@ mod tests {
         let square = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
         let reflected = square.map(|(x, y)| PointPair { a: Point2::new(-x, y), b: Point2::new(x, y), weight: 1.0 });
         assert_eq!(fit_rigid(&reflected), None, "a reflected square fits every rotation as badly");
+    }
+
+    #[test]
+    fn a_transform_that_lays_a_point_on_a_place_is_as_uncertain_there_as_that() {
+        let (transform_a_b, b) = (pose(3.0, -2.0, 0.8), Point2::new(5.0, 7.0));
+        let of_place = Matrix2::new(0.04, 0.01, 0.01, 0.09);
+        let covariance = covariance_about(&transform_a_b, &b, &of_place, 0.02);
+        let at = |point: &Point2| {
+            let jacobian = point_jacobian(&transform_a_b, point);
+            jacobian * covariance * jacobian.transpose()
+        };
+        assert!((at(&b) - of_place).norm() < 1e-12, "{}", at(&b));
+        // A metre away the turn moves it across.
+        let along = of_place
+            + transform_a_b.rotation.to_rotation_matrix().matrix()
+                * Matrix2::new(0.0, 0.0, 0.0, 0.02)
+                * transform_a_b.rotation.to_rotation_matrix().matrix().transpose();
+        assert!((at(&(b + Vector2::new(1.0, 0.0))) - along).norm() < 1e-12);
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod full_shared_memory;
 mod golden;
 mod golden_mistakes;
 mod golden_runner;
+mod group_mapping;
 mod interrupted;
 mod live;
 mod live_restarts;

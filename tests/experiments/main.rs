@@ -17,6 +17,7 @@ mod methods;
 mod noise;
 mod plot;
 mod processor_time;
+mod radon;
 mod results;
 mod statistics;
 mod trial;
@@ -48,6 +49,8 @@ enum Experiment {
     FewTags(few_tags::FewTagsArgs),
     /// Merging by the maps alone: random pairs, pairs of two buildings, buildings whose parts are alike, and teams.
     Align(align::AlignArgs),
+    /// The energy of the Radon transform over the angle, of the maps of a log (Saeedi et al., "Group mapping").
+    Radon(radon::RadonArgs),
     /// How often a merge succeeds as tags, odometry and overlap get worse.
     Noise(noise::NoiseArgs),
 }
@@ -62,6 +65,7 @@ fn main() -> Result<()> {
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::Align(args) => align::run(args, &registry, &mut results),
+        Experiment::Radon(args) => radon::run(args, &mut results),
         Experiment::Noise(args) => noise::run(args, &registry, &mut results),
     }?;
     results.say_where();

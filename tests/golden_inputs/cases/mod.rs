@@ -6,6 +6,7 @@ mod drawing;
 mod elastic_refiner;
 mod frame_solver;
 mod grid_fuser;
+mod group_mapping;
 mod icp_refiner;
 mod line_extractor;
 mod logs;
@@ -51,6 +52,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         elastic_refiner::cases(),
         frame_solver::cases(),
         grid_fuser::cases(),
+        group_mapping::cases(),
         icp_refiner::cases(),
         line_extractor::cases(),
         logs::cases(),

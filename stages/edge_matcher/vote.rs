@@ -1,0 +1,56 @@
+//! Pairs of edges that are alike, and the translations that they vote for.
+
+use super::EdgeMatcherParameters;
+use super::edge::{Edge, SHAPE_POINTS};
+use nalgebra::{UnitComplex, Vector2};
+
+/// What two edges that are alike say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vote {
+    /// The places of the edges of map a and of map b in their lists.
+    pub edges: [usize; 2],
+    /// The translation that lays the middle of the edge of b, turned, on that of a, metres.
+    pub translation: Vector2<f64>,
+    /// The length of the shorter edge times both probabilities, metres.
+    pub weight: f64,
+    /// How far the points of both edges are apart then, the root of the mean square, metres.
+    pub residual: f64,
+}
+
+/// The votes of all pairs of edges that are alike once map b is turned, by the edges of a and then of b.
+pub fn votes(a: &[Edge], b: &[Edge], rotation: &UnitComplex<f64>, parameters: &EdgeMatcherParameters) -> Vec<Vote> {
+    let turned: Vec<[Vector2<f64>; SHAPE_POINTS]> =
+        b.iter().map(|edge| edge.shape.map(|point| rotation * point)).collect();
+    let mut votes = Vec::new();
+    for (number_a, edge_a) in a.iter().enumerate() {
+        for (number_b, (edge_b, shape_b)) in b.iter().zip(&turned).enumerate() {
+            let longer = edge_a.length.max(edge_b.length);
+            if (edge_a.length - edge_b.length).abs() > parameters.length_tolerance * longer {
+                continue;
+            }
+            let residual = residual(edge_a, edge_b, shape_b);
+            if residual <= parameters.shape_tolerance {
+                votes.push(Vote {
+                    edges: [number_a, number_b],
+                    translation: edge_a.middle.coords - rotation * edge_b.middle.coords,
+                    weight: edge_a.length.min(edge_b.length) * edge_a.probability * edge_b.probability,
+                    residual,
+                });
+            }
+        }
+    }
+    votes
+}
+
+/// How far the points of two edges are apart, the root of the mean square, in the better of both directions in which the
+/// ends are of the same degrees; without end if they are in none.
+fn residual(a: &Edge, b: &Edge, turned_b: &[Vector2<f64>; SHAPE_POINTS]) -> f64 {
+    let root = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
+        let squares: f64 = a.shape.iter().zip(points).map(|(a, b)| (a - b).norm_squared()).sum();
+        (squares / SHAPE_POINTS as f64).sqrt()
+    };
+    let [first, last] = b.is_dead_end;
+    let forth = if a.is_dead_end == [first, last] { root(&mut turned_b.iter()) } else { f64::INFINITY };
+    let back = if a.is_dead_end == [last, first] { root(&mut turned_b.iter().rev()) } else { f64::INFINITY };
+    forth.min(back)
+}
