@@ -18,9 +18,10 @@
 //! - **When it is accepted**: at least `min_edges` edges of each map take part, and the best translation elsewhere gathers no
 //!   more than the share `max_runner_up` of its votes. The paper states no such test.
 //!
-//! The method has no verification of its own beyond that vote: nothing asks whether the walls of the maps lie on each other, or
-//! whether free space contradicts walls. Buildings whose corridors are alike are merged wrongly, and so are maps whose rotation
-//! was taken wrongly by a quarter turn. It is here for comparison; where a merge matters, take `map_merge`.
+//! The published method has no verification of its own, and none is added here beyond the vote: nothing asks whether the walls
+//! of the maps lie on each other, or whether free space contradicts walls. Buildings whose corridors are alike can be merged
+//! wrongly, and so can maps whose rotation was taken wrongly by a quarter turn. It is here for comparison; where a merge
+//! matters, take `map_merge`.
 //!
 //! - [`Edge`]: a path of a topological map with what it is compared by.
 //! - [`votes`]: the pairs of edges that are alike.

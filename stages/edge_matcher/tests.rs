@@ -39,6 +39,8 @@ fn made_up(transform_place_map: &Pose2, probability: impl Fn(usize) -> f64) -> T
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
     #[test]
     fn the_translation_between_two_maps_of_one_place_is_found(
         ax in -9.0..9.0, ay in -9.0..9.0, ayaw in -3.0..3.0, bx in -9.0..9.0, by in -9.0..9.0, byaw in -3.0..3.0,

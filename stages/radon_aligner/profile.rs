@@ -119,6 +119,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
         #[test]
         fn the_shift_between_two_profiles_is_found_to_a_part_of_a_bin(a in -50.0..50.0, b in -50.0..50.0) {
             let (a_profile, b_profile) =

@@ -98,6 +98,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
         #[test]
         fn the_rotation_between_two_peaks_is_found_to_a_part_of_a_step(a in 0.0..360.0, b in 0.0..360.0) {
             let found = peak(360, a, 5.0).rotation_of(&peak(360, b, 5.0)).unwrap();

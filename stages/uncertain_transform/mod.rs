@@ -40,7 +40,7 @@ pub use convolve::{TILE, convolve, convolve_exactly};
 pub use kernel::Kernel;
 pub use parameters::UncertainTransformParameters;
 pub use point_covariance::PointCovariance;
-pub use transform::{Transformed, transform};
+pub use transform::{NotTransformed, Transformed, transform};
 
 use gridweave_runtime::stage::StageKind;
 use stage::UncertainTransform;
