@@ -13,6 +13,7 @@ pub mod entropy_fuser;
 pub mod frame_solver;
 pub mod geometry;
 pub mod grid_fuser;
+pub mod hough_spectrum_aligner;
 pub mod hypotheses;
 pub mod icp_refiner;
 pub mod line_extractor;
@@ -22,6 +23,7 @@ pub mod map_cleaner;
 pub mod map_placer;
 pub mod map_selector;
 pub mod merge_verifier;
+pub mod pair_aligner;
 pub mod path_placer;
 pub mod pgvd_extractor;
 pub mod place_window;
@@ -49,6 +51,7 @@ pub fn kinds() -> Vec<StageKind> {
         entropy_fuser::kind(),
         frame_solver::kind(),
         grid_fuser::kind(),
+        hough_spectrum_aligner::kind(),
         icp_refiner::kind(),
         line_extractor::kind(),
         map_aligner::kind(),

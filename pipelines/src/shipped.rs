@@ -10,13 +10,15 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 }
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 11] = [
+const SHIPPED: [(&str, &str); 13] = [
     ("auto_merge", include_str!("../auto_merge.toml")),
     ("cut", include_str!("../cut.toml")),
     ("group_mapping", include_str!("../group_mapping.toml")),
+    ("hough_spectrum", include_str!("../hough_spectrum.toml")),
     ("live", include_str!("../live.toml")),
     ("live_merge", include_str!("../live_merge.toml")),
     ("map_file_merge", include_str!("../map_file_merge.toml")),
+    ("map_files_to_log", include_str!("../map_files_to_log.toml")),
     ("map_merge", include_str!("../map_merge.toml")),
     ("simulate", include_str!("../simulate.toml")),
     ("tag_direction", include_str!("../tag_direction.toml")),

@@ -76,12 +76,12 @@ pub(super) fn cases() -> Vec<Case> {
 }
 
 /// What robot1 sees of the place; its map frame is the building's.
-fn left() -> View {
+pub(super) fn left() -> View {
     View::of([-0.2, -0.2], [11.5, 10.2], CELL)
 }
 
 /// What robot2 sees, in a map frame of its own.
-fn right() -> View {
+pub(super) fn right() -> View {
     View { transform_building_map: truth(), ..View::of([2.0, -0.2], [14.2, 10.2], CELL) }
 }
 
@@ -91,7 +91,7 @@ fn truth() -> Pose2 {
 }
 
 /// An L of 14 x 10 m with rooms of all sizes and slanted walls, which looks the same from nowhere else.
-fn place() -> FloorPlan {
+pub(super) fn place() -> FloorPlan {
     FloorPlan::new(&[
         [0.0, 0.0, 14.0, 0.0],
         [14.0, 0.0, 14.0, 6.6],
@@ -112,7 +112,7 @@ fn place() -> FloorPlan {
     ])
 }
 
-fn maps(log: &mut LogBuilder) {
+pub(super) fn maps(log: &mut LogBuilder) {
     log.map(1.0, "robot1", &place().draw(&left()));
     log.map(2.0, "robot2", &place().draw(&right()));
 }

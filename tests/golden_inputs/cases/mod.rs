@@ -7,6 +7,7 @@ mod elastic_refiner;
 mod frame_solver;
 mod grid_fuser;
 mod group_mapping;
+mod hough_spectrum_aligner;
 mod icp_refiner;
 mod line_extractor;
 mod logs;
@@ -53,6 +54,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         frame_solver::cases(),
         grid_fuser::cases(),
         group_mapping::cases(),
+        hough_spectrum_aligner::cases(),
         icp_refiner::cases(),
         line_extractor::cases(),
         logs::cases(),
