@@ -1,7 +1,7 @@
 //! What the command line may say, and who does it.
 
 use crate::commands::{
-    check, convert, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate,
+    check, compare, convert, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate,
 };
 use crate::interrupt;
 use crate::status::Status;
@@ -43,6 +43,8 @@ enum Command {
     Convert(convert::ConvertArgs),
     /// Compare a summary with the truth.
     Evaluate(evaluate::EvaluateArgs),
+    /// Run several pipelines on the same logs, and compare how right, how fast and how large they are.
+    Compare(compare::CompareArgs),
     /// Simulate robots in a building, and write a log and its truth.
     Simulate(simulate::SimulateArgs),
     /// Simulate three robots, merge their maps, and compare with the truth.
@@ -62,6 +64,9 @@ enum Command {
     /// Run one process of a pipeline on the engine `processes`, which starts it.
     #[command(hide = true)]
     Stage(processes::StageArgs),
+    /// Run one run of a comparison, which starts it, and tell what that takes.
+    #[command(hide = true)]
+    Measure(compare::measure::MeasureArgs),
 }
 
 impl Command {
@@ -74,6 +79,7 @@ impl Command {
                 | Self::Convert(_)
                 | Self::Simulate(_)
                 | Self::Demo(_)
+                | Self::Compare(_)
                 | Self::Golden(_)
                 | Self::Play(_)
                 | Self::Record(_)
@@ -99,6 +105,7 @@ impl Cli {
             Command::Info(args) => info::info(&args, registry),
             Command::Convert(args) => convert::convert(&args, registry),
             Command::Evaluate(args) => evaluate::command(&args),
+            Command::Compare(args) => compare::compare(&args, registry),
             Command::Simulate(args) => simulate::simulate(&args, registry),
             Command::Demo(args) => demo::demo(&args, registry),
             Command::Golden(args) => golden::golden(&args, registry),
@@ -108,6 +115,7 @@ impl Cli {
             Command::Top(args) => live::top(&args, registry),
             Command::Clean => processes::clean(),
             Command::Stage(args) => processes::stage(&args, registry),
+            Command::Measure(args) => compare::measure::measure(&args),
         }
     }
 }

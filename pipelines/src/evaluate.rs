@@ -101,7 +101,7 @@ struct Truth {
 /// # Errors
 /// A file cannot be read or is not what it should be; or the truth knows robots, but not the summary's reference.
 pub fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
-    let merge: Summary = read(summary, "the summary of a run")?;
+    let merge = read_summary(summary)?;
     evaluate_summary(&merge, truth)
         .with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
 }
@@ -112,6 +112,16 @@ pub fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
 /// The truth cannot be read or is not what it should be; or it knows robots, but not the summary's reference.
 pub fn evaluate_summary(summary: &Summary, truth: &Path) -> Result<Evaluation> {
     measure(summary, &read(truth, "a truth file")?)
+}
+
+/// What `--summary` has written.
+pub(crate) fn read_summary(path: &Path) -> Result<Summary> {
+    read(path, "the summary of a run")
+}
+
+/// Whether there is a truth that [`evaluate`] can read.
+pub(crate) fn check_truth(path: &Path) -> Result<()> {
+    read::<Truth>(path, "a truth file").map(|_| ())
 }
 
 /// A JSON file.

@@ -7,6 +7,7 @@
 
 mod bad_input;
 mod closed_output;
+mod compare;
 mod containers;
 mod engines_agree;
 mod far_from_the_origin;

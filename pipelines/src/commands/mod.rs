@@ -1,6 +1,7 @@
 //! The commands of `gridweave`: a file or a folder each, with what it is told and what it does.
 
 pub(crate) mod check;
+pub(crate) mod compare;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod evaluate;

@@ -1,0 +1,69 @@
+//! A process that runs one program, and tells what that has taken.
+//!
+//! The system tells the peak of memory of the largest of all processes that a process has waited for; so each run has
+//! somebody of its own who waits for it.
+
+use crate::interrupt::stop_on_interrupt;
+use crate::status::Status;
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use nix::sys::resource::{UsageWho, getrusage};
+use nix::sys::time::TimeValLike;
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
+use std::process::{Command, ExitStatus};
+use std::time::Instant;
+
+/// What `gridweave measure` is told.
+#[derive(Debug, Args)]
+pub(crate) struct MeasureArgs {
+    /// Where to write what it has taken, as JSON.
+    #[arg(long, value_name = "FILE")]
+    usage: PathBuf,
+    /// What `gridweave` is told.
+    #[arg(last = true, required = true)]
+    command: Vec<OsString>,
+}
+
+/// What a run has taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Usage {
+    /// Seconds on the clock.
+    pub(super) time_s: f64,
+    /// Seconds of all processors.
+    pub(super) cpu_s: f64,
+    /// The most memory that its largest process has held, bytes.
+    pub(super) memory_bytes: u64,
+    /// How it ended: its exit status, as `Ok`, or what ended it.
+    pub(super) end: Result<i32, String>,
+}
+
+/// Runs `gridweave` as it is told, and writes what that has taken.
+pub(crate) fn measure(args: &MeasureArgs) -> Result<Status> {
+    // A run that is interrupted ends in order, and this waits for it.
+    stop_on_interrupt("the run is ended");
+    let program = std::env::current_exe().context("cannot find the program itself")?;
+    let start = Instant::now();
+    let ended = Command::new(&program).args(&args.command).status();
+    let ended = ended.with_context(|| format!("cannot start {}", program.display()))?;
+    let time_s = start.elapsed().as_secs_f64();
+    let used = getrusage(UsageWho::RUSAGE_CHILDREN).context("cannot tell what the run has taken")?;
+    let usage = Usage {
+        time_s,
+        cpu_s: (used.user_time() + used.system_time()).num_microseconds() as f64 * 1e-6,
+        memory_bytes: u64::try_from(used.max_rss()).unwrap_or_default() * 1024,
+        end: end(ended),
+    };
+    std::fs::write(&args.usage, serde_json::to_vec(&usage)?)
+        .map_err(|error| anyhow!("cannot write {}: {error}", args.usage.display()))?;
+    Ok(Status::Done)
+}
+
+fn end(status: ExitStatus) -> Result<i32, String> {
+    status.code().ok_or_else(|| match status.signal() {
+        Some(signal) => format!("it was ended by signal {signal}"),
+        None => "it has ended in no known way".to_owned(),
+    })
+}

@@ -1,0 +1,154 @@
+//! `gridweave compare`: pipelines side by side on the same inputs.
+//!
+//! The inputs become [`cases`], logs with their truth. Every pipeline merges every one of them in a process of its own
+//! ([`merge_case`]), under another one that [`measure`]s what it takes; so a run that crashes is a result as others are. What
+//! came out is held against the truth ([`score`]), gathered in rows ([`rows`]) and printed ([`report`]).
+
+mod cases;
+pub(crate) mod measure;
+mod merge_case;
+mod report;
+mod rows;
+mod score;
+
+use crate::interrupt::stop_on_interrupt;
+use crate::job::progress::Gauge;
+use crate::shipped;
+use crate::status::{BadUse, Status};
+use crate::terminal::{print, print_line};
+use anyhow::{Context, Result, bail};
+use cases::Case;
+use clap::Args;
+use gridweave_logs::file::replace;
+use gridweave_runtime::pipeline::Mode;
+use gridweave_runtime::stage::Registry;
+use merge_case::{Merge, MergeResult};
+use rayon::prelude::*;
+use report::Report;
+use rows::RowsBy;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What `gridweave compare` is told.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  gridweave compare --pipelines map_merge hough_spectrum --inputs logs/ one.mcap --csv table.csv
+
+A robot is right if it is merged less than 0.5 m, at the middle of its map, and 1 degree off the truth, as `evaluate` has it; \
+of a pair of map files, the places in common must lie on each other. Success is right, or rightly refused; refused are only \
+those that belong to the others. Errors are those of all robots that were merged, right or wrong. Times are medians over runs, \
+on the clock (several at once lengthen it) and of all processors; memory is the peak of the largest process.
+
+Exit status: 0 if all runs came to an end, whether they merged or not; 1 if a run failed, or the truth cannot be read; 2 for \
+bad use.")]
+pub(crate) struct CompareArgs {
+    /// Pipeline files, or names of shipped pipelines such as `map_merge`.
+    #[arg(long, required = true, num_args = 1.., value_name = "PIPELINE")]
+    pipelines: Vec<PathBuf>,
+    /// Logs (MCAP files or rosbag2 folders), each with its truth beside it as NAME.truth.json; or folders: all logs in it, or all
+    /// pairs of map files that its pairs.json lists.
+    #[arg(long, required = true, num_args = 1.., value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// Run each pipeline on each log with the seeds 1 to N.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    seeds: u64,
+    /// How many runs go on at once; as many as there are processors unless given. Times are best taken with 1.
+    #[arg(long, value_name = "COUNT")]
+    jobs: Option<NonZeroUsize>,
+    /// Take logs without a truth as those of robots that have nothing to do with each other, which must not be merged.
+    #[arg(long)]
+    unrelated: bool,
+    /// A row for each log, for each input as it was given (a folder is one), or for each pipeline only.
+    #[arg(long, value_enum, default_value_t = RowsBy::Log)]
+    by: RowsBy,
+    /// Write the table as comma-separated values, too.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Print the table in Markdown.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Print JSON: the rows of the table, and every run.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the pipelines and prints how they came out.
+pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status> {
+    let pipelines = names(&args.pipelines)?;
+    let folder = tempfile::tempdir().context("cannot make a folder for the outputs of the runs")?;
+    let cases = cases::of(&args.inputs, args.unrelated, folder.path(), registry)?;
+    for pipeline in &args.pipelines {
+        check(pipeline, &cases[0].log, registry)?;
+    }
+    let results = run_all(args, &cases, folder.path())?;
+    let report = Report::new(&pipelines, &cases, results, args.by);
+    if let Some(path) = &args.csv {
+        replace(&[(path, report.to_csv().as_bytes())])?;
+    }
+    match (args.json, args.markdown) {
+        (true, _) => print_line(report.to_json()),
+        (_, true) => print(report.to_markdown()),
+        _ => print(report.to_text()),
+    }?;
+    Ok(if report.has_failed() { Status::Failed } else { Status::Done })
+}
+
+/// What the table calls the pipelines: by their file names, where these differ.
+fn names(pipelines: &[PathBuf]) -> Result<Vec<String>, BadUse> {
+    let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stems: Vec<String> = pipelines.iter().map(stem).collect();
+    for (place, pipeline) in pipelines.iter().enumerate() {
+        if pipelines[..place].contains(pipeline) {
+            return Err(BadUse(format!("the pipeline {} is given twice", pipeline.display())));
+        }
+    }
+    let is_alone = |name: &String| stems.iter().filter(|other| *other == name).count() == 1;
+    let name = |(pipeline, stem): (&PathBuf, &String)| match is_alone(stem) {
+        true => stem.clone(),
+        false => pipeline.display().to_string(),
+    };
+    Ok(pipelines.iter().zip(&stems).map(name).collect())
+}
+
+/// Whether a pipeline can be run on logs: what is wrong with it is told before anything runs.
+fn check(pipeline: &Path, log: &Path, registry: &Registry) -> Result<()> {
+    let overrides = merge_case::overrides(log, Path::new("out.mcap"))?;
+    let loaded = shipped::load(pipeline, &overrides, registry)?;
+    if loaded.mode == Mode::Live {
+        let text = format!("the pipeline {} is live: only replays can be compared", pipeline.display());
+        return Err(BadUse(text).into());
+    }
+    Ok(())
+}
+
+/// Every pipeline on every case with every seed, in this order, however they end.
+fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<MergeResult>> {
+    let merges: Vec<Merge<'_>> = (0..args.pipelines.len())
+        .flat_map(|pipeline| (0..cases.len()).map(move |case| (pipeline, case)))
+        .flat_map(|(pipeline, case)| (1..=args.seeds).map(move |seed| (pipeline, case, seed)))
+        .map(|(pipeline, case, seed)| Merge { pipeline, file: &args.pipelines[pipeline], case, seed })
+        .collect();
+    let threads = args.jobs.map_or(0, NonZeroUsize::get);
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads for the runs")?;
+    let stop = stop_on_interrupt("no more runs are begun, and those that go on come to their end");
+    let (gauge, done) = (Gauge::new(true), AtomicUsize::new(0));
+    let run = |(number, merge): (usize, &Merge<'_>)| -> Result<MergeResult> {
+        if stop.load(Ordering::Relaxed) {
+            bail!("interrupted");
+        }
+        let result = merge.run(&cases[merge.case], &folder.join(format!("run{number}")))?;
+        let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+        let share = count as f64 / merges.len() as f64;
+        gauge.show(share, format_args!("{count} of {} runs", merges.len()));
+        Ok(result)
+    };
+    let results: Result<Vec<MergeResult>> = pool.install(|| merges.par_iter().enumerate().map(run).collect());
+    gauge.finish();
+    match stop.load(Ordering::Relaxed) {
+        true => bail!("interrupted"),
+        false => results,
+    }
+}

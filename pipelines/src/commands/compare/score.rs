@@ -1,0 +1,148 @@
+//! What a run has found, held against the truth.
+
+use crate::common_places::{self, CommonPlace};
+use crate::evaluate::{RobotOutcome, evaluate, read_summary};
+use anyhow::Result;
+use gridweave_logs::summary::Summary;
+use gridweave_stages::geometry::{Point2, PointPair, fit_rigid};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Metres. The places in common may lie farther apart than the best rigid transform leaves them by this in the median.
+const RIGHT_MEDIAN: f64 = 0.5;
+/// Metres. The same for nine of ten.
+const RIGHT_P90: f64 = 1.0;
+
+/// What is true of a log.
+#[derive(Debug)]
+pub(super) enum Truth {
+    /// What `evaluate` reads.
+    Frames(PathBuf),
+    /// Places that two maps have in common.
+    Places {
+        /// Robots a and b.
+        robots: [String; 2],
+        places: PairTruth,
+    },
+}
+
+/// What is true of a pair of map files.
+#[derive(Debug, Deserialize)]
+pub(super) struct PairTruth {
+    /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. None if the maps have nothing in common.
+    common: Vec<CommonPlace>,
+    /// How far apart the best rigid transform leaves them, as the maps are bent, metres: in the median, and nine of ten.
+    #[serde(default)]
+    rigid_median: f64,
+    #[serde(default)]
+    rigid_p90: f64,
+}
+
+/// What became of a robot beside the reference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Scored {
+    pub(super) robot: String,
+    pub(super) outcome: RobotOutcome,
+    /// Metres, at the middle of its map; for a pair of map files, the median over the places in common.
+    pub(super) error_m: Option<f64>,
+    pub(super) error_deg: Option<f64>,
+}
+
+impl Truth {
+    /// Scores what a summary says.
+    pub(super) fn score(&self, summary: &Path) -> Result<Vec<Scored>> {
+        match self {
+            Self::Frames(truth) => {
+                let robots = evaluate(summary, truth)?.robots.into_iter();
+                let scored = robots.map(|robot| Scored {
+                    robot: robot.robot,
+                    outcome: robot.outcome,
+                    error_m: robot.error_m,
+                    error_deg: robot.error_deg,
+                });
+                Ok(scored.collect())
+            }
+            Self::Places { robots: [a, b], places } => {
+                let (outcome, errors) = places.score(&read_summary(summary)?, a, b);
+                let (error_m, error_deg) = errors.unzip();
+                Ok(vec![Scored { robot: b.clone(), outcome, error_m, error_deg }])
+            }
+        }
+    }
+}
+
+impl PairTruth {
+    /// What became of map b, and its error in metres and degrees.
+    fn score(&self, run: &Summary, a: &str, b: &str) -> (RobotOutcome, Option<(f64, f64)>) {
+        let merged = run.frames.get(a).zip(run.frames.get(b));
+        let Some((frame_a, frame_b)) = merged else {
+            let refused = if self.common.is_empty() { RobotOutcome::RightlyRefused } else { RobotOutcome::Refused };
+            return (refused, None);
+        };
+        let Some(measured) = common_places::measure(run, [a, b], &self.common) else {
+            return (RobotOutcome::Wrong, None);
+        };
+        let (median, p90) = (measured.rigid.median_m, measured.rigid.p90_m);
+        let is_right = median < RIGHT_MEDIAN + self.rigid_median && p90 < RIGHT_P90 + self.rigid_p90;
+        let found = common_places::pose(frame_a).inverse() * common_places::pose(frame_b);
+        let pair = |[x_b, y_b, x_a, y_a]: &CommonPlace| PointPair {
+            a: Point2::new(*x_a, *y_a),
+            b: Point2::new(*x_b, *y_b),
+            weight: 1.0,
+        };
+        let best = fit_rigid(&self.common.iter().map(pair).collect::<Vec<_>>());
+        let degrees =
+            best.map_or(f64::NAN, |best| best.transform_a_b.rotation.angle_to(&found.rotation).abs().to_degrees());
+        (if is_right { RobotOutcome::Right } else { RobotOutcome::Wrong }, Some((median, degrees)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_logs::summary::Frame;
+
+    fn summary(frames: &[(&str, [f64; 3])]) -> Summary {
+        let frame =
+            |&(robot, [x, y, yaw]): &(&str, [f64; 3])| (robot.to_owned(), Frame { x, y, yaw, ..Default::default() });
+        Summary { frames: frames.iter().map(frame).collect(), ..Default::default() }
+    }
+
+    /// Map b lies at (10, 0) in map a, and is turned by a quarter.
+    fn truth() -> PairTruth {
+        let common = [[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [2.0, 2.0]].map(|[x, y]| [x, y, 10.0 - y, x]).to_vec();
+        PairTruth { common, rigid_median: 0.1, rigid_p90: 0.2 }
+    }
+
+    #[test]
+    fn places_in_common_say_whether_a_pair_is_right() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        for (frame_b, expected, metres) in [
+            ([10.0, 0.0, quarter], RobotOutcome::Right, 0.0),
+            ([10.0, 0.55, quarter], RobotOutcome::Right, 0.55),
+            ([10.0, 0.65, quarter], RobotOutcome::Wrong, 0.65),
+        ] {
+            let (outcome, errors) = truth().score(&summary(&[("a", [0.0; 3]), ("b", frame_b)]), "a", "b");
+            let (error_m, error_deg) = errors.unwrap();
+            assert_eq!(outcome, expected);
+            assert!((error_m - metres).abs() < 1e-9 && error_deg < 1e-6, "{error_m} {error_deg}");
+        }
+    }
+
+    #[test]
+    fn the_frame_of_the_first_map_need_not_be_the_world() {
+        let run =
+            summary(&[("a", [5.0, 1.0, 3.0]), ("b", [5.0 + 10.0 * 3f64.cos(), 1.0 + 10.0 * 3f64.sin(), 3.0 + 1.571])]);
+        let (outcome, errors) = truth().score(&run, "a", "b");
+        assert!(outcome == RobotOutcome::Right && errors.unwrap().1 < 0.02, "{errors:?}");
+    }
+
+    #[test]
+    fn maps_with_nothing_in_common_must_not_be_merged() {
+        let nothing = PairTruth { common: Vec::new(), rigid_median: 0.0, rigid_p90: 0.0 };
+        let (merged, refused) = (summary(&[("a", [0.0; 3]), ("b", [0.0; 3])]), summary(&[("a", [0.0; 3])]));
+        assert_eq!(nothing.score(&merged, "a", "b"), (RobotOutcome::Wrong, None));
+        assert_eq!(nothing.score(&refused, "a", "b"), (RobotOutcome::RightlyRefused, None));
+        assert_eq!(truth().score(&refused, "a", "b"), (RobotOutcome::Refused, None));
+    }
+}
