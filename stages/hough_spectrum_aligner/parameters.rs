@@ -23,8 +23,9 @@ pub struct HoughSpectrumParameters {
     pub translations: usize,
     /// Peaks nearer to a higher one than this are left out, metres.
     pub apart: f64,
-    /// The least acceptance index omega at which the best place is accepted, 0 to 1. In maps of six buildings that were drawn from
-    /// laser scans, pairs that came to lie rightly had 0.97 and more, and pairs of different buildings up to 0.951 at their best place.
+    /// The least acceptance index omega at which the best place is accepted, 0 to 1. In maps that were drawn from laser scans in six
+    /// buildings, pairs that came to lie rightly had 0.97 and more, and maps of different buildings up to 0.951; other maps, of
+    /// mostly free space, have more at wrong places.
     pub min_omega: f64,
     /// The least share of the smaller map of which the other must say something, 0 to 1. The paper asks for none, and maps
     /// that share a few cells nearly always agree on them.

@@ -117,9 +117,12 @@ fn a_run_that_is_killed_is_told_with_what_it_has_taken() {
     let pipeline = r#"
         [stages.log]
         kind = "mcap_source"
+        [stages.source]
+        kind = "troubled_source"
+        count = 10
         [stages.trouble]
         kind = "troubled_stage"
-        inputs = ["log.pose"]
+        inputs = ["source"]
         at = 3
         what = "abort"
         [stages.output]
