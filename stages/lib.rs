@@ -30,6 +30,7 @@ pub mod place_window;
 pub mod placement;
 pub mod quadrant_classifier;
 pub mod radon_aligner;
+pub mod random_walk_aligner;
 pub mod robot_maps;
 pub mod robot_pair;
 pub mod simulator;
@@ -63,6 +64,7 @@ pub fn kinds() -> Vec<StageKind> {
         pgvd_extractor::kind(),
         quadrant_classifier::kind(),
         radon_aligner::kind(),
+        random_walk_aligner::kind(),
         simulator::kind(),
         tag_filter::kind(),
         tag_localizer::kind(),

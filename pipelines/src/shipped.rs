@@ -10,7 +10,7 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 }
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 13] = [
+const SHIPPED: [(&str, &str); 14] = [
     ("auto_merge", include_str!("../auto_merge.toml")),
     ("cut", include_str!("../cut.toml")),
     ("group_mapping", include_str!("../group_mapping.toml")),
@@ -20,6 +20,7 @@ const SHIPPED: [(&str, &str); 13] = [
     ("map_file_merge", include_str!("../map_file_merge.toml")),
     ("map_files_to_log", include_str!("../map_files_to_log.toml")),
     ("map_merge", include_str!("../map_merge.toml")),
+    ("random_walk", include_str!("../random_walk.toml")),
     ("simulate", include_str!("../simulate.toml")),
     ("tag_direction", include_str!("../tag_direction.toml")),
     ("tag_merge", include_str!("../tag_merge.toml")),

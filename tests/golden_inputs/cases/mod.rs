@@ -16,6 +16,7 @@ mod map_cleaner;
 mod merge_verifier;
 mod placers;
 mod quadrant_classifier;
+mod random_walk_aligner;
 mod result_sinks;
 mod tag_filter;
 mod tag_localizer;
@@ -63,6 +64,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         merge_verifier::cases(),
         placers::cases(),
         quadrant_classifier::cases(),
+        random_walk_aligner::cases(),
         result_sinks::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),
