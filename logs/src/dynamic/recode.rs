@@ -130,7 +130,7 @@ impl Walk<'_> {
         };
         // Checked first, so that a damaged count copies nothing.
         let least = self.schema.least_size(field.of).checked_mul(count);
-        if field.count != Count::One && !least.is_some_and(|least| least <= reader.left()) {
+        if field.count != Count::One && least.is_none_or(|least| least > reader.left()) {
             return Err(own(DecodeFault::Count(count)));
         }
         match field.of {

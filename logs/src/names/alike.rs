@@ -53,7 +53,7 @@ fn robotless_topics<'a>(channels: &[&'a Channel], robots: &RobotTopics) -> BTree
         !matches!(roles.classify(channel).role, Role::Other | Role::Tf)
             || tf_topic(channel).is_some_and(|robot| !robot.is_empty())
     };
-    if channels.iter().any(|channel| names_robot(channel)) {
+    if channels.iter().any(names_robot) {
         return BTreeSet::new();
     }
     let topics = channels.iter().filter(|channel| tells_of_a_robot(channel)).map(|channel| channel.topic.as_str());

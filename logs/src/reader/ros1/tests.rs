@@ -120,7 +120,10 @@ fn pose(x: f64) -> Vec<u8> {
     bytes
 }
 
-fn read(path: &Path) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<Damage>), ReadError> {
+/// The topic, the time and the bytes of a message.
+type Seen = (String, u64, Vec<u8>);
+
+fn read(path: &Path) -> Result<(Vec<Seen>, Vec<Damage>), ReadError> {
     let file = LogFile::open(path)?;
     let mut damage = file.damage().to_vec();
     let mut reader = LogReader::new(vec![file]);
@@ -149,7 +152,7 @@ fn messages_come_by_time_as_those_of_ros_2() {
             [told.clone(), message(0, 2_000_000_009, &pose(1.0)), message(0, 1_000_000_000, &pose(4.0))].concat();
         let bag = Bag::new(true).chunk(compression, &late, &[2_000_000_009, 1_000_000_000]);
         let bag = bag.chunk(compression, &message(0, 1_500_000_000, &pose(5.0)), &[1_500_000_000]);
-        let path = folder.write("a.bag", &bag.end(&[told.clone()]));
+        let path = folder.write("a.bag", &bag.end(std::slice::from_ref(&told)));
         let (messages, damage) = read(&path).unwrap();
         assert_eq!(damage, []);
         let times: Vec<u64> = messages.iter().map(|(_, time, _)| *time).collect();

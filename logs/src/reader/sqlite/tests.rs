@@ -34,8 +34,11 @@ fn bag(folder: &Folder, name: &str, messages: &[(i64, u64, Vec<u8>)]) -> PathBuf
     path
 }
 
+/// The topic, the time and the bytes of a message.
+type Seen = (String, u64, Vec<u8>);
+
 /// What a reader gives: topic, time and bytes of each message; and the damage.
-fn read(path: &Path) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<Damage>), ReadError> {
+fn read(path: &Path) -> Result<(Vec<Seen>, Vec<Damage>), ReadError> {
     let file = LogFile::open(path)?;
     let mut damage = file.damage().to_vec();
     let mut reader = LogReader::new(vec![file]);
@@ -53,7 +56,7 @@ fn read(path: &Path) -> Result<(Vec<(String, u64, Vec<u8>)>, Vec<Damage>), ReadE
 fn many(count: u64) -> Vec<(i64, u64, Vec<u8>)> {
     let row = |number: u64| {
         let time = 1000 + (number ^ 3);
-        (if number % 3 == 0 { 7 } else { 1 }, time, vec![number as u8; 20 + (number as usize * 37) % 9000])
+        (if number.is_multiple_of(3) { 7 } else { 1 }, time, vec![number as u8; 20 + (number as usize * 37) % 9000])
     };
     (0..count).map(row).collect()
 }
