@@ -38,8 +38,11 @@ fn write_database(log: &Path, database: &Path, is_wanted: impl Fn(&str) -> bool,
     connection.close().unwrap();
 }
 
-/// For every topic its type, its definition, and the times and bytes of its messages.
-fn contents(log: &Path) -> BTreeMap<String, (String, Vec<u8>, Vec<(u64, Vec<u8>)>)> {
+/// The type and the definition of a topic, and the times and bytes of its messages.
+type Contents = (String, Vec<u8>, Vec<(u64, Vec<u8>)>);
+
+/// What is on every topic of a log.
+fn contents(log: &Path) -> BTreeMap<String, Contents> {
     let mut reader = LogReader::new(vec![LogFile::open(log).unwrap()]);
     let files = reader.files().clone();
     let mut contents = BTreeMap::new();
