@@ -39,6 +39,8 @@ pub mod tag_filter;
 pub mod tag_localizer;
 #[cfg(test)]
 mod test_world;
+pub mod topology_extractor;
+pub mod topology_matcher;
 pub mod uncertain_transform;
 pub mod walls;
 
@@ -68,6 +70,8 @@ pub fn kinds() -> Vec<StageKind> {
         simulator::kind(),
         tag_filter::kind(),
         tag_localizer::kind(),
+        topology_extractor::kind(),
+        topology_matcher::kind(),
         uncertain_transform::kind(),
     ]
 }

@@ -30,6 +30,7 @@ pub fn kinds() -> Vec<StageKind> {
         source::kind(),
         source::live_kind(),
         source::map_file::kind(),
+        source::topology_file::kind(),
         summary::kind(),
         truth::kind(),
     ]

@@ -25,6 +25,7 @@ const SHIPPED: [(&str, &str); 14] = [
     ("tag_direction", include_str!("../tag_direction.toml")),
     ("tag_merge", include_str!("../tag_merge.toml")),
     ("tag_only", include_str!("../tag_only.toml")),
+    ("topological", include_str!("../topological.toml")),
 ];
 
 /// Loads a pipeline file, or the shipped pipeline of that name.

@@ -61,14 +61,14 @@ impl SkeletonGraph {
         });
         let paths = traced.paths.iter().map(|(nodes, places)| {
             let cells: Vec<Cell> = places.iter().map(|place| window.cell(*place)).collect();
-            SkeletonPath { nodes: *nodes, length: length(&cells, window.geometry.resolution), cells }
+            SkeletonPath { nodes: *nodes, length: way_length(&cells, window.geometry.resolution), cells }
         });
         Self { nodes: nodes.collect(), paths: paths.collect() }
     }
 }
 
 /// The length of a way through cells of `resolution` metres, by chords: cell by cell, slanted ways would come out too long.
-fn length(cells: &[Cell], resolution: f64) -> f64 {
+pub fn way_length(cells: &[Cell], resolution: f64) -> f64 {
     let chosen = (0..cells.len()).step_by(CHORD).chain(cells.len().checked_sub(1));
     let chosen: Vec<Cell> = chosen.map(|place| cells[place]).collect();
     let chord = |pair: &[Cell]| {

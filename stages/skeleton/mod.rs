@@ -25,7 +25,7 @@ mod tests;
 
 pub use distance::DistanceMap;
 pub use free_space::FreeSpace;
-pub use graph::{NodeKind, SkeletonGraph, SkeletonNode, SkeletonPath};
+pub use graph::{NodeKind, SkeletonGraph, SkeletonNode, SkeletonPath, way_length};
 pub use thinning::Skeleton;
 pub use window::Window;
 

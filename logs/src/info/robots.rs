@@ -92,7 +92,7 @@ impl RobotSurvey {
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
                 }
             }
-            Role::Tf | Role::Other => {}
+            Role::Topology | Role::Tf | Role::Other => {}
         }
     }
 

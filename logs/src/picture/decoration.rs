@@ -10,7 +10,7 @@ const X_AXIS: Rgb<u8> = Rgb([200, 30, 30]);
 const Y_AXIS: Rgb<u8> = Rgb([30, 150, 30]);
 
 /// A length for lines and gaps that suits the size of the picture, pixels.
-fn unit(view: &View) -> f64 {
+pub(super) fn unit(view: &View) -> f64 {
     (f64::from(view.width.max(view.height)) / 500.0).max(1.0)
 }
 
@@ -32,7 +32,7 @@ pub(super) fn draw_axes(image: &mut RgbImage, view: &View) {
 }
 
 /// A line with round ends, its edges smoothed.
-fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness: f64, colour: Rgb<u8>) {
+pub(super) fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness: f64, colour: Rgb<u8>) {
     let reach = thickness / 2.0 + 1.0;
     let low = |a: f64, b: f64| (a.min(b) - reach).max(0.0) as u32;
     let high = |a: f64, b: f64, limit: u32| ((a.max(b) + reach).max(0.0) as u32).min(limit);

@@ -11,12 +11,14 @@ mod error;
 mod layer;
 mod sink;
 mod view;
+mod ways;
 
 pub use colour::robot_colour;
 pub use difference::render_difference;
 pub use error::PictureError;
 pub use layer::MapLayer;
 pub use sink::kind;
+pub use ways::Ways;
 
 use crate::file::replace;
 use colour::{FREE, OCCUPIED, UNKNOWN};
@@ -55,7 +57,7 @@ impl Picture {
 
 /// One map: unknown cells grey, free ones white, occupied ones black.
 pub fn render_map(map: &MapLayer<'_>) -> Result<Picture, PictureError> {
-    render(std::slice::from_ref(map), |shares| {
+    render(std::slice::from_ref(map), &[], |shares| {
         let Coverage { wall, free } = shares.first().copied().unwrap_or_default();
         colour::mix(colour::mix(UNKNOWN, FREE, free), OCCUPIED, wall)
     })
@@ -63,12 +65,17 @@ pub fn render_map(map: &MapLayer<'_>) -> Result<Picture, PictureError> {
 
 /// The maps of several robots, each where its pose puts it: walls in the colour that [`robot_colour`] gives the map by
 /// its place in the list, free space in a light tint of it. Where walls of two maps meet, the colour is darker.
-pub fn render_overlay(maps: &[MapLayer<'_>]) -> Result<Picture, PictureError> {
-    render(maps, colour::overlay)
+/// Topological maps are drawn on top.
+pub fn render_overlay(maps: &[MapLayer<'_>], ways: &[Ways<'_>]) -> Result<Picture, PictureError> {
+    render(maps, ways, colour::overlay)
 }
 
 /// Draws the maps; `paint` gives the colour of a pixel from the share of walls and free space that each map has in it.
-fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync) -> Result<Picture, PictureError> {
+fn render(
+    maps: &[MapLayer<'_>],
+    ways: &[Ways<'_>],
+    paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync,
+) -> Result<Picture, PictureError> {
     let layers: Vec<PlacedLayer<'_>> = maps
         .iter()
         .enumerate()
@@ -89,6 +96,7 @@ fn render(maps: &[MapLayer<'_>], paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync) 
             pixel.copy_from_slice(&paint(&shares).0);
         }
     });
+    ways.iter().for_each(|ways| ways.draw(&mut image, &view));
     decoration::draw_axes(&mut image, &view);
     let (image, scale_bar) = decoration::frame_with_scale_bar(&image, &view);
     Ok(Picture { image, metres_per_pixel: view.metres_per_pixel, scale_bar })

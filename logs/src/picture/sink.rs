@@ -1,8 +1,8 @@
 //! The stage `picture_sink`.
 
-use super::{MapLayer, Picture, PictureError, render_map, render_overlay};
+use super::{MapLayer, Picture, PictureError, Ways, render_map, render_overlay};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::OccupancyGrid;
+use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, TopologicalMap};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use nalgebra::Isometry2;
 use schemars::JsonSchema;
@@ -25,10 +25,12 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "picture_sink",
         "Draws the robots' maps as they lie in the merged one, each robot's walls in a colour of its own, or the merged map where \
-         there are none, at the end of the run. Writes nothing if there is no merged map.",
+         there are none, and topological maps on them, at the end of the run. Writes nothing if there is no merged map.",
         PictureSink::new,
     )
     .inputs("map", "the merged map, which is about no robot, and the robots' in the same frame", PictureSink::map)
+    .optional_inputs("topology", "the robots' topological maps", PictureSink::topology)
+    .optional_inputs("frames", "where topological maps lie, which are not bent", PictureSink::frames)
     .finish(PictureSink::write)
     .build()
 }
@@ -37,6 +39,9 @@ struct PictureSink {
     file: PathBuf,
     /// The last map of each robot, and the merged one under an empty name.
     maps: BTreeMap<String, Message>,
+    frames: RobotFrames,
+    /// The last topological map of each robot.
+    topologies: BTreeMap<String, TopologicalMap>,
 }
 
 impl PictureSink {
@@ -47,11 +52,21 @@ impl PictureSink {
                 StageError::new(doing, "it has no file").with_help("give --picture FILE.png or file = \"FILE.png\"")
             );
         }
-        Ok(Self { file, maps: BTreeMap::new() })
+        Ok(Self { file, maps: BTreeMap::new(), frames: RobotFrames::default(), topologies: BTreeMap::new() })
     }
 
     fn map(&mut self, map: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
         self.maps.insert(map.robot().to_owned(), map.message().clone());
+        Ok(())
+    }
+
+    fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
+        self.frames = frames.into_content();
+        Ok(())
+    }
+
+    fn topology(&mut self, map: Received<'_, TopologicalMap>, _: &Output<()>) -> Result<(), StageError> {
+        self.topologies.insert(map.robot().to_owned(), map.into_content());
         Ok(())
     }
 
@@ -69,8 +84,16 @@ impl PictureSink {
             self.maps.iter().filter(|(robot, _)| !robot.is_empty()).filter_map(|(_, map)| layer(map)).collect();
         match self.maps.get("").and_then(layer) {
             Some(merged) if robots.is_empty() => render_map(&merged),
-            _ => render_overlay(&robots),
+            _ => render_overlay(&robots, &self.ways()),
         }
+    }
+
+    fn ways(&self) -> Vec<Ways<'_>> {
+        let placed = self.frames.frames.iter().filter_map(|frame| {
+            let map = self.topologies.get(&frame.robot)?;
+            Some(Ways { map, transform_world_map: frame.transform_reference_robot() })
+        });
+        placed.collect()
     }
 }
 

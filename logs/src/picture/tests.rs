@@ -1,5 +1,5 @@
 use super::*;
-use gridweave_runtime::ros::MapMetaData;
+use gridweave_runtime::ros::{MapMetaData, Point, TopologicalMap, TopologicalNode, TopologicalPath};
 use nalgebra::{Isometry2, Vector2};
 
 fn info(width: u32, height: u32, resolution: f32) -> MapMetaData {
@@ -56,7 +56,7 @@ fn every_robot_has_a_colour_and_what_several_see_stands_out() {
     let place = at(50.0, 50.0, 0.0);
     let left = MapLayer { transform_world_map: place, ..layer(info(4, 1, 0.1), &[100, 0, 100, 0]) };
     let right = MapLayer { cells: &[-1, -1, 100, 0], ..left };
-    let picture = render_overlay(&[left, right]).unwrap();
+    let picture = render_overlay(&[left, right], &[]).unwrap();
     let [own_wall, own_free, common_wall, common_free] = [0, 1, 2, 3].map(|column| cell(&picture, column, 0));
     assert_eq!(own_wall, robot_colour(0));
     assert!(own_free[0] < 220 && own_free[2] > 235, "a light blue, not {own_free:?}");
@@ -94,8 +94,32 @@ fn axes_are_drawn_at_the_origin_of_the_world() {
 }
 
 #[test]
+fn ways_and_places_are_drawn_where_the_map_lies() {
+    let cells = [0; 4000];
+    let map = MapLayer { transform_world_map: at(50.0, 50.0, 0.0), ..layer(info(100, 40, 0.1), &cells) };
+    let node = |x: f64, kind: &str| TopologicalNode { x, y: 2.0, kind: kind.into(), probability: 1.0 };
+    let points = [2.0, f64::NAN, 4.0, 8.0].map(|x| Point { x, y: 2.0, z: 0.0 }).to_vec();
+    let topology = TopologicalMap {
+        nodes: vec![node(2.0, "junction"), node(8.0, "door"), node(1e12, "end")],
+        paths: vec![TopologicalPath { start: 0, end: 1, points, ..Default::default() }],
+        ..Default::default()
+    };
+    let ways = Ways { map: &topology, transform_world_map: at(50.0, 50.0, 0.0) };
+    let picture = render_overlay(&[map], &[ways]).unwrap();
+    let margin = (picture.image.width() as f64 - 10.0 / picture.metres_per_pixel) / 2.0;
+    let colour = |x: f64| {
+        let [u, v] = [x, 2.0].map(|along| margin + along / picture.metres_per_pixel);
+        picture.image.get_pixel(u as u32, v as u32).0
+    };
+    assert_eq!([2.0, 6.0, 8.0].map(colour), [[200, 30, 30], [40, 40, 160], [220, 120, 0]]);
+    let plain = render_overlay(&[map], &[]).unwrap();
+    let differ = picture.image.pixels().zip(plain.image.pixels()).filter(|(one, other)| one != other).count();
+    assert!(differ < 40_000, "what is no number is not drawn: {differ}");
+}
+
+#[test]
 fn what_is_no_map_is_an_error() {
-    let text = |layers: &[MapLayer<'_>]| render_overlay(layers).unwrap_err().to_string();
+    let text = |layers: &[MapLayer<'_>]| render_overlay(layers, &[]).unwrap_err().to_string();
     let good = layer(info(1, 1, 0.1), &[0]);
     assert_eq!(text(&[]), "there is nothing to show: no cell of any map is known");
     assert_eq!(text(&[layer(info(2, 1, 0.1), &[-1, -1])]), "there is nothing to show: no cell of any map is known");
@@ -110,7 +134,7 @@ fn maps_that_lie_far_apart_make_a_picture_of_bounded_size() {
     let near = layer(info(1, 1, 0.1), &[100]);
     for distance in [1e3, 1e9, 1e200] {
         let far = MapLayer { transform_world_map: at(distance, 0.0, 1.0), ..near };
-        if let Ok(picture) = render_overlay(&[near, far]) {
+        if let Ok(picture) = render_overlay(&[near, far], &[]) {
             assert!(picture.image.width() < 2600 && picture.image.height() < 2600);
         }
     }
@@ -120,11 +144,11 @@ fn maps_that_lie_far_apart_make_a_picture_of_bounded_size() {
 fn a_picture_is_the_same_every_time_and_can_be_saved() {
     let folder = tempfile::tempdir().unwrap();
     let map = MapLayer { transform_world_map: at(1.0, 2.0, 0.3), ..layer(info(3, 1, 0.1), &[0, 100, -1]) };
-    let picture = render_overlay(&[map, map]).unwrap();
+    let picture = render_overlay(&[map, map], &[]).unwrap();
     let path = folder.path().join("picture.png");
     picture.save_png(&path).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    assert_eq!(bytes, render_overlay(&[map, map]).unwrap().png().unwrap());
+    assert_eq!(bytes, render_overlay(&[map, map], &[]).unwrap().png().unwrap());
     assert_eq!(image::load_from_memory(&bytes).unwrap().to_rgb8(), picture.image);
     let error = picture.save_png(&folder.path().join("missing/picture.png")).unwrap_err().to_string();
     assert!(error.contains("missing/picture.png") && error.contains("folder exists"), "{error}");

@@ -1,5 +1,5 @@
 //! Where messages come from: `mcap_source` gives those of MCAP logs, each on the port that its topic and type call for;
-//! [`map_file`] gives the maps of map files.
+//! [`map_file`] gives the maps of map files, and [`topology_file`] topological maps that were drawn by hand.
 
 mod carry;
 pub mod map_file;
@@ -7,6 +7,7 @@ mod pose;
 mod route;
 mod router;
 mod stage;
+pub mod topology_file;
 
 #[cfg(test)]
 mod tests;
@@ -15,7 +16,7 @@ pub(crate) use route::{Classified, RobotChannels, Role};
 pub use stage::McapSource;
 
 use crate::names::{Convention, Input, NameRules};
-use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange};
+use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange, TopologicalMap};
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -81,7 +82,7 @@ impl Parameters for SourceParameters {
 pub fn kind() -> StageKind {
     StageKind::source(
         "mcap_source",
-        "Reads MCAP logs and ROS 2 bags by log time, and tells maps, poses and tag readings of the robots apart",
+        "Reads MCAP logs and ROS 2 bags by log time, and tells maps, poses, tag readings and topological maps of the robots apart",
         McapSource::new,
     )
 }
@@ -100,6 +101,7 @@ pub struct RobotMessages {
     pub(crate) map: Out<OccupancyGrid<'static>>,
     pub(crate) pose: Out<PoseWithCovarianceStamped>,
     pub(crate) tags: Out<TagRange>,
+    pub(crate) topology: Out<TopologicalMap>,
     pub(crate) other: Out<AnyMessage>,
 }
 
@@ -113,6 +115,7 @@ impl Outputs for RobotMessages {
                  covariance, odometry, or tf",
             ),
             tags: ports.output("tags", "range readings of tags, as they were logged or sent"),
+            topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
             other: ports.any_output(
                 "other",
                 "all other messages, and those from which poses were made, as they were logged or sent",

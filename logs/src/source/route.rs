@@ -3,7 +3,9 @@
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
-use gridweave_runtime::ros::{OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange};
+use gridweave_runtime::ros::{
+    OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange, TopologicalMap,
+};
 use gridweave_runtime::stage::{RobotTopics, match_robot};
 use std::collections::BTreeSet;
 
@@ -16,6 +18,8 @@ pub(crate) enum Role {
     Pose(PoseSource),
     /// Tag readings of a robot.
     Tags,
+    /// Topological maps of a robot.
+    Topology,
     /// Transforms from which poses of robots are made.
     Tf,
     /// Anything else.
@@ -85,6 +89,7 @@ impl RobotChannels {
             ("map", Some(&self.topics.map), OccupancyGrid::NAME, role_of_map as fn(&str) -> Option<Role>),
             ("pose", has_topic.then_some(&self.topics.pose), PoseStamped::NAME, role_of_pose),
             ("tags", Some(&self.topics.tags), TagRange::NAME, role_of_tags),
+            ("topology", Some(&self.topics.topology), TopologicalMap::NAME, role_of_topology),
         ];
         let mut other = Classified { role: Role::Other, robot: "", mismatch: None };
         for (field, pattern, expected, role_of) in expectations {
@@ -132,4 +137,8 @@ fn role_of_pose(type_name: &str) -> Option<Role> {
 
 fn role_of_tags(type_name: &str) -> Option<Role> {
     (type_name == TagRange::NAME).then_some(Role::Tags)
+}
+
+fn role_of_topology(type_name: &str) -> Option<Role> {
+    (type_name == TopologicalMap::NAME).then_some(Role::Topology)
 }

@@ -171,6 +171,7 @@ impl Router {
         match route.role {
             Role::Map => route.send(stamp, data, &output.map, output.log_time()),
             Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
+            Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
             Role::Pose(_) | Role::Tf | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
         }?;
         match route.role {

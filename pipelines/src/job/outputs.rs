@@ -47,6 +47,7 @@ pub(crate) fn logs(pipeline: &Pipeline) -> Vec<PathBuf> {
 fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     let logs = files_of(pipeline, "mcap_source", "files");
     let mut inputs: Vec<PathBuf> = logs.iter().map(|log| Input::new(log).path).collect();
+    inputs.extend(files_of(pipeline, "topology_file_source", "files"));
     for map in files_of(pipeline, "map_file_source", "files") {
         // A map that cannot be read is an error of the run.
         inputs.extend(map_file::image_of(&map));

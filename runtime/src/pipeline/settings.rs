@@ -95,12 +95,13 @@ impl Settings {
 
     /// Takes in the section `[robots]`.
     pub(super) fn read_robots(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 4] = ["map", "pose", "tags", "tf"];
+        const KEYS: [&str; 5] = ["map", "pose", "tags", "topology", "tf"];
         for Entry { key, key_at, item } in entries(section, "[robots]", problems) {
             let topic = match key.as_str() {
                 "map" => &mut self.robots.map,
                 "pose" => &mut self.robots.pose,
                 "tags" => &mut self.robots.tags,
+                "topology" => &mut self.robots.topology,
                 "tf" => {
                     self.robots.tf = read_frames(item, key_at, problems);
                     continue;

@@ -52,6 +52,8 @@ pub struct RobotTopics {
     pub pose: String,
     /// Range readings of tags.
     pub tags: String,
+    /// Topological maps.
+    pub topology: String,
     /// Poses from tf instead of from a pose topic.
     pub tf: Option<TfFrames>,
 }
@@ -68,7 +70,13 @@ pub struct TfFrames {
 
 impl Default for RobotTopics {
     fn default() -> Self {
-        Self { map: "/{robot}/map".into(), pose: "/{robot}/pose".into(), tags: "/{robot}/tag_ranges".into(), tf: None }
+        Self {
+            map: "/{robot}/map".into(),
+            pose: "/{robot}/pose".into(),
+            tags: "/{robot}/tag_ranges".into(),
+            topology: "/{robot}/topology".into(),
+            tf: None,
+        }
     }
 }
 

@@ -20,6 +20,7 @@ mod random_walk_aligner;
 mod result_sinks;
 mod tag_filter;
 mod tag_localizer;
+mod topology;
 
 use gridweave_tests::LogBuilder;
 use std::fs;
@@ -68,6 +69,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         result_sinks::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),
+        topology::cases(),
     ]
     .concat()
 }

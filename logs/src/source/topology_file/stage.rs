@@ -1,0 +1,52 @@
+//! The stage `topology_file_source`.
+
+use super::{FileTopologies, TopologyFileSourceParameters, load};
+use crate::source::map_file::robot_names;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::Header;
+use gridweave_runtime::stage::{Context, Output, Source, StageError};
+use std::path::PathBuf;
+
+/// Files tell no time; see [`MapFileSource`](crate::source::map_file::MapFileSource).
+const INTERVAL: u64 = 1_000_000_000;
+
+/// Reads topological maps; see the [module](super).
+pub struct TopologyFileSource {
+    /// Robots and files, by the robots' names, so that the order in which files are given changes nothing.
+    maps: Vec<(String, PathBuf)>,
+    sent: usize,
+}
+
+impl TopologyFileSource {
+    /// Names the robots. The files are read one after the other, each when it is to be sent.
+    pub fn new(parameters: TopologyFileSourceParameters, context: &Context) -> Result<Self, StageError> {
+        let doing = || format!("read the topological maps of stage `{}`", context.stage);
+        if parameters.files.is_empty() {
+            let help = "give files = [...], a JSON file for each robot";
+            return Err(StageError::new(doing(), "no file is given").with_help(help));
+        }
+        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let mut maps: Vec<(String, PathBuf)> = names.into_iter().zip(parameters.files).collect();
+        maps.sort();
+        Ok(Self { maps, sent: 0 })
+    }
+}
+
+impl Source for TopologyFileSource {
+    type Outputs = FileTopologies;
+
+    fn next(&mut self, output: &Output<FileTopologies>) -> Result<bool, StageError> {
+        let Some((robot, file)) = self.maps.get(self.sent) else { return Ok(false) };
+        self.sent += 1;
+        output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
+        let mut map = load(file).map_err(|error| StageError::new("read a topological map", error))?;
+        map.header = Header::new(output.log_time(), format!("{robot}/map"));
+        map.robot.clone_from(robot);
+        output.0.send(robot, &map)?;
+        Ok(self.sent < self.maps.len())
+    }
+
+    fn progress(&self) -> Option<f64> {
+        Some(self.sent as f64 / self.maps.len().max(1) as f64)
+    }
+}
