@@ -10,7 +10,7 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
 }
 
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 14] = [
+const SHIPPED: [(&str, &str); 15] = [
     ("auto_merge", include_str!("../auto_merge.toml")),
     ("cut", include_str!("../cut.toml")),
     ("group_mapping", include_str!("../group_mapping.toml")),
