@@ -1,6 +1,6 @@
 //! Pipelines are compared on the same logs, and whatever becomes of a run is a result.
 
-use crate::support::{Ended, gridweave, simulate};
+use crate::support::{Ended, SMALL_BUILDING, gridweave, simulate};
 use gridweave_logs::map_file::{self, GridMap};
 use gridweave_runtime::ros::MapMetaData;
 use serde_json::{Value, json};
@@ -8,31 +8,13 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// A small building, mapped with exact poses, in which the robots share most of what they see.
-const WORLD: [&str; 14] = [
-    "--robots",
-    "2",
-    "--set",
-    "width=12",
-    "--set",
-    "height=10",
-    "--set",
-    "drift=0",
-    "--set",
-    "overlap=0.9",
-    "--set",
-    "tags=24",
-    "--set",
-    "beams=180",
-];
-
 /// A folder with logs of two worlds and their truths.
 fn worlds() -> TempDir {
     let folder = TempDir::new().unwrap();
     let logs = folder.path().join("logs");
     fs::create_dir(&logs).unwrap();
     for (name, seed) in [("one.mcap", "2"), ("two.mcap", "5")] {
-        simulate(&logs, name, &[&WORLD[..], &["--seed", seed]].concat());
+        simulate(&logs, name, &[&SMALL_BUILDING[..], &["--seed", seed]].concat());
     }
     folder
 }

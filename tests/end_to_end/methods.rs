@@ -1,30 +1,13 @@
 //! The paper's methods 1, 2 and 3, as the pipelines that ship: each merges, and each is as exact as it can be.
 
-use crate::support::{gridweave, simulate, start_program};
+use crate::support::{SMALL_BUILDING, gridweave, simulate, start_program};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// A small building, mapped with exact poses, in which the robots share most of what they see.
-const WORLD: [&str; 16] = [
-    "--robots",
-    "2",
-    "--seed",
-    "2",
-    "--set",
-    "width=12",
-    "--set",
-    "height=10",
-    "--set",
-    "drift=0",
-    "--set",
-    "overlap=0.9",
-    "--set",
-    "tags=24",
-    "--set",
-    "beams=180",
-];
+/// The world of these tests.
+const SEED: [&str; 2] = ["--seed", "2"];
 
 /// How far robot2 is from the truth: metres at the middle of its map, and degrees.
 struct Errors {
@@ -52,7 +35,7 @@ fn merge(folder: &Path, pipeline: &str) -> (Errors, Value) {
 fn the_three_methods_merge_and_each_uses_what_the_paper_says() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
-    simulate(folder, "in.mcap", &WORLD);
+    simulate(folder, "in.mcap", &[&SMALL_BUILDING[..], &SEED].concat());
     let (tags, summary) = merge(folder, "tag_only");
     assert_eq!(summary["alignments"][0]["method"], "tags");
     assert!(summary["stages"].get("lines").is_none(), "no wall takes part: {summary}");
@@ -73,8 +56,8 @@ fn the_three_methods_merge_and_each_uses_what_the_paper_says() {
 fn without_walls_to_compare_robots_without_common_tags_are_still_refused() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
-    let few_tags = WORLD.map(|word| if word == "tags=24" { "tags=2" } else { word });
-    simulate(folder, "in.mcap", &few_tags);
+    let few_tags = SMALL_BUILDING.map(|word| if word == "tags=24" { "tags=2" } else { word });
+    simulate(folder, "in.mcap", &[&few_tags[..], &SEED].concat());
     for pipeline in ["tag_only", "tag_direction"] {
         let run = ["run", pipeline, "--input", "in.mcap", "--output", "out.mcap"];
         gridweave(folder, &run).assert(3, &["not merged: robot2", "in common"]);
@@ -87,7 +70,7 @@ fn the_experiment_writes_its_tables_and_plots() {
     let folder = folder.path();
     let logs = folder.join("logs");
     fs::create_dir(&logs).unwrap();
-    simulate(&logs, "in.mcap", &WORLD);
+    simulate(&logs, "in.mcap", &[&SMALL_BUILDING[..], &SEED].concat());
     fs::copy(logs.join("in.mcap"), logs.join("no_truth.mcap")).unwrap();
     let args = ["methods", "--seeds", "1", "--repetitions", "1", "--logs", "logs", "--out", "results"];
     let ended = start_program(Path::new(env!("CARGO_BIN_EXE_experiments")), folder, &args, &[]).wait();

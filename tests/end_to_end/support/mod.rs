@@ -18,6 +18,24 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+/// What `simulate` is told for a small building, mapped with exact poses, in which two robots share most of what they see.
+pub(crate) const SMALL_BUILDING: [&str; 14] = [
+    "--robots",
+    "2",
+    "--set",
+    "width=12",
+    "--set",
+    "height=10",
+    "--set",
+    "drift=0",
+    "--set",
+    "overlap=0.9",
+    "--set",
+    "tags=24",
+    "--set",
+    "beams=180",
+];
+
 /// A command that runs for longer hangs.
 const WATCHDOG: Duration = Duration::from_secs(240);
 

@@ -1,10 +1,10 @@
 use super::definition::{translate, type_name};
 use crate::dynamic::{FieldPath, Schema};
-use crate::reader::{ChunkFault, Damage, LogFile, LogReader, ReadError};
+use crate::reader::tests::read_file;
+use crate::reader::{ChunkFault, Damage, LogFile};
 use crate::test_log::Folder;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, PoseStamped, RosMessage, decode};
-use std::path::Path;
 
 const POSE: &str = "\
 # A pose.
@@ -120,23 +120,6 @@ fn pose(x: f64) -> Vec<u8> {
     bytes
 }
 
-/// The topic, the time and the bytes of a message.
-type Seen = (String, u64, Vec<u8>);
-
-fn read(path: &Path) -> Result<(Vec<Seen>, Vec<Damage>), ReadError> {
-    let file = LogFile::open(path)?;
-    let mut damage = file.damage().to_vec();
-    let mut reader = LogReader::new(vec![file]);
-    let files = reader.files().clone();
-    let mut messages = Vec::new();
-    while let Some(message) = reader.next_message() {
-        let topic = files[0].channel(message.channel).map(|channel| channel.topic).unwrap_or_default();
-        messages.push((topic, message.log_time.0, message.data.to_vec()));
-    }
-    damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
-    Ok((messages, damage))
-}
-
 fn expected(x: f64) -> PoseStamped {
     let mut pose = PoseStamped { header: Header::new(LogTime(3_000_000_005), "map"), ..Default::default() };
     (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) = (x, 2.0, 3.0);
@@ -153,7 +136,7 @@ fn messages_come_by_time_as_those_of_ros_2() {
         let bag = Bag::new(true).chunk(compression, &late, &[2_000_000_009, 1_000_000_000]);
         let bag = bag.chunk(compression, &message(0, 1_500_000_000, &pose(5.0)), &[1_500_000_000]);
         let path = folder.write("a.bag", &bag.end(std::slice::from_ref(&told)));
-        let (messages, damage) = read(&path).unwrap();
+        let (messages, damage) = read_file(&path).unwrap();
         assert_eq!(damage, []);
         let times: Vec<u64> = messages.iter().map(|(_, time, _)| *time).collect();
         assert_eq!(times, [1_000_000_000, 1_500_000_000, 2_000_000_009]);
@@ -200,11 +183,11 @@ fn a_bag_that_is_cut_or_was_not_closed_is_read_as_far_as_it_goes() {
     let first = [told.clone(), message(0, 1, &pose(1.0))].concat();
     let bag = Bag::new(false).chunk("none", &first, &[1]).chunk("none", &message(0, 2, &pose(2.0)), &[2]);
     let bytes = bag.end(&[]);
-    let (messages, damage) = read(&folder.write("open.bag", &bytes)).unwrap();
+    let (messages, damage) = read_file(&folder.write("open.bag", &bytes)).unwrap();
     assert_eq!(messages.len(), 2);
     assert!(matches!(damage[..], [Damage::NoEnd { .. }]), "{damage:?}");
     for length in 0..bytes.len() {
-        if let Ok((messages, damage)) = read(&folder.write("cut.bag", &bytes[..length])) {
+        if let Ok((messages, damage)) = read_file(&folder.write("cut.bag", &bytes[..length])) {
             assert!(
                 messages.len() <= 2 && damage.iter().any(|damage| matches!(damage, Damage::NoEnd { .. })),
                 "{length}"
@@ -222,7 +205,7 @@ fn what_does_not_fit_is_told_and_the_rest_is_read() {
         [message(0, 1, b"short"), message(0, 2, &pose(1.0)), message(1, 3, b"raw"), message(9, 4, b"?")].concat();
     let bag = Bag::new(true).chunk("none", &contents, &[1, 2, 3, 4]).chunk("bz2", b"", &[5]);
     let path = folder.write("a.bag", &bag.end(&[told, unknown]));
-    let (messages, damage) = read(&path).unwrap();
+    let (messages, damage) = read_file(&path).unwrap();
     let found: Vec<(&str, u64)> = messages.iter().map(|(topic, time, _)| (topic.as_str(), *time)).collect();
     assert_eq!(found, [("/p", 2), ("/q", 3), ("", 4)]);
     assert_eq!(messages[1].2, b"raw");

@@ -1,10 +1,11 @@
-use crate::reader::{Damage, LogFile, LogReader, ReadError, open};
+use crate::reader::tests::read_file;
+use crate::reader::{Damage, LogFile, ReadError, open};
 use crate::schemas::schema_text;
 use crate::test_log::Folder;
 use gridweave_runtime::ros::{PoseStamped, RosMessage, encode};
 use rusqlite::Connection;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The tables as rosbag2 makes them up to Humble.
 const TABLES: &str = "
@@ -34,24 +35,6 @@ fn bag(folder: &Folder, name: &str, messages: &[(i64, u64, Vec<u8>)]) -> PathBuf
     path
 }
 
-/// The topic, the time and the bytes of a message.
-type Seen = (String, u64, Vec<u8>);
-
-/// What a reader gives: topic, time and bytes of each message; and the damage.
-fn read(path: &Path) -> Result<(Vec<Seen>, Vec<Damage>), ReadError> {
-    let file = LogFile::open(path)?;
-    let mut damage = file.damage().to_vec();
-    let mut reader = LogReader::new(vec![file]);
-    let files = reader.files().clone();
-    let mut messages = Vec::new();
-    while let Some(message) = reader.next_message() {
-        let topic = files[0].channel(message.channel).map(|channel| channel.topic).unwrap_or_default();
-        messages.push((topic, message.log_time.0, message.data.to_vec()));
-    }
-    damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
-    Ok((messages, damage))
-}
-
 /// Rows whose messages differ in length and order.
 fn many(count: u64) -> Vec<(i64, u64, Vec<u8>)> {
     let row = |number: u64| {
@@ -70,7 +53,7 @@ fn messages_come_by_time_with_what_is_known_of_their_types() {
         "a.db3",
         &[(7, 30, b"late".to_vec()), (1, 10, pose.clone()), (7, 20, b"x".to_vec()), (9, 20, vec![1])],
     );
-    let (messages, damage) = read(&path).unwrap();
+    let (messages, damage) = read_file(&path).unwrap();
     let expected =
         [("/robot1/pose", 10, pose), ("/x", 20, b"x".to_vec()), ("", 20, vec![1]), ("/x", 30, b"late".to_vec())];
     assert_eq!(messages, expected.map(|(topic, time, data)| (topic.to_owned(), time, data)));
@@ -113,7 +96,7 @@ fn long_bags_come_in_runs_and_nothing_is_written_beside_them() {
     let rows = many(3000);
     let path = bag(&folder, "a#b?c%.db3", &rows);
     let before = fs::read(&path).unwrap();
-    let (messages, damage) = read(&path).unwrap();
+    let (messages, damage) = read_file(&path).unwrap();
     assert!(messages.len() == rows.len() && messages.is_sorted_by_key(|(_, time, _)| *time));
     let mut expected: Vec<_> = rows.iter().map(|(_, time, data)| (*time, data.clone())).collect();
     expected.sort();
@@ -135,7 +118,7 @@ fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
     let mut most = 0;
     for part in 1..40 {
         let path = folder.write("cut.db3", &whole[..whole.len() * part / 40]);
-        match read(&path) {
+        match read_file(&path) {
             Ok((messages, damage)) => {
                 assert!(damage.iter().any(|damage| matches!(damage, Damage::NoEnd { .. })), "{part}: {damage:?}");
                 assert_eq!(is_of_bag(&messages), messages.len(), "{part}");
@@ -152,7 +135,7 @@ fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
     for page in 10..60 {
         let mut bytes = whole.clone();
         bytes[page * 4096..][..4096].fill(0xa5);
-        let (messages, damage) = read(&folder.write("bad.db3", &bytes)).unwrap();
+        let (messages, damage) = read_file(&folder.write("bad.db3", &bytes)).unwrap();
         let right = is_of_bag(&messages);
         assert!(right > 150 && messages.len() - right < 10, "{page}: {right} of {}", messages.len());
         all += right;
@@ -170,14 +153,14 @@ fn what_is_no_bag_is_told_and_nothing_that_it_brings_along_is_run() {
         path
     };
     let other = made("other.db3", "CREATE TABLE people(name TEXT)");
-    assert!(read(&other).unwrap_err().to_string().contains("no table `topics`"));
+    assert!(read_file(&other).unwrap_err().to_string().contains("no table `topics`"));
     let endless = "CREATE TABLE topics(id, name, type);
         CREATE VIEW messages AS WITH RECURSIVE r(id) AS (SELECT 1 UNION ALL SELECT 1 FROM r) SELECT id FROM r;";
-    assert!(read(&made("view.db3", endless)).unwrap_err().to_string().contains("no table `messages`"));
+    assert!(read_file(&made("view.db3", endless)).unwrap_err().to_string().contains("no table `messages`"));
     let empty = bag(&folder, "empty.db3", &[]);
-    assert_eq!(read(&empty).unwrap(), (Vec::new(), Vec::new()));
+    assert_eq!(read_file(&empty).unwrap(), (Vec::new(), Vec::new()));
     let short = folder.write("short.db3", b"SQLite form");
-    assert!(matches!(read(&short), Err(ReadError::NothingLeft { .. })));
+    assert!(matches!(read_file(&short), Err(ReadError::NothingLeft { .. })));
 }
 
 #[test]
@@ -185,7 +168,7 @@ fn what_a_killed_recorder_has_left_beside_a_database_is_told() {
     let folder = Folder::new();
     let path = bag(&folder, "a.db3", &many(3));
     folder.write("a.db3-wal", b"more");
-    let (messages, damage) = read(&path).unwrap();
+    let (messages, damage) = read_file(&path).unwrap();
     assert_eq!(messages.len(), 3);
     assert!(matches!(&damage[..], [Damage::NotClosed { rest }] if rest.ends_with("a.db3-wal")));
 }
@@ -196,20 +179,20 @@ fn files_and_messages_that_are_packed_are_unpacked() {
     let pack = |bytes: &[u8]| zstd::bulk::compress(bytes, 1).unwrap();
     let rows = many(50);
     let packed: Vec<_> = rows.iter().map(|(topic, time, data)| (*topic, *time, pack(data))).collect();
-    let expected = read(&bag(&folder, "plain.db3", &rows)).unwrap();
-    assert_eq!(read(&bag(&folder, "messages.db3", &packed)).unwrap(), expected);
+    let expected = read_file(&bag(&folder, "plain.db3", &rows)).unwrap();
+    assert_eq!(read_file(&bag(&folder, "messages.db3", &packed)).unwrap(), expected);
     let whole = pack(&fs::read(folder.path().join("plain.db3")).unwrap());
     let path = folder.write("plain.db3.zstd", &whole);
-    assert_eq!(read(&path).unwrap(), expected);
+    assert_eq!(read_file(&path).unwrap(), expected);
     assert_eq!(LogFile::open(&path).unwrap().container(), "SQLite, packed with zstd");
     let cut = folder.write("cut.db3.zstd", &whole[..whole.len() / 2]);
-    match read(&cut) {
+    match read_file(&cut) {
         Ok((_, damage)) => assert!(damage.contains(&Damage::CutPack)),
         Err(error) => assert!(matches!(error, ReadError::Database { .. } | ReadError::Empty { .. }), "{error}"),
     }
     // A message that begins as a packed one and is none stays as it is.
     let odd = [crate::reader::packed::ZSTD_MAGIC, b"odd"].concat();
-    let (messages, _) = read(&bag(&folder, "odd.db3", &[(7, 1, odd.clone())])).unwrap();
+    let (messages, _) = read_file(&bag(&folder, "odd.db3", &[(7, 1, odd.clone())])).unwrap();
     assert_eq!(messages[0].2, odd);
 }
 

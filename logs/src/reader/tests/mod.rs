@@ -7,6 +7,7 @@ mod order;
 
 use super::*;
 use crate::test_log::{Folder, TestLog, layouts};
+use std::path::Path;
 
 /// A message as the reader gave it: file, channel's topic, log time and bytes.
 type Seen = (usize, String, u64, Vec<u8>);
@@ -22,6 +23,15 @@ fn read_all(mut reader: LogReader) -> (Vec<Seen>, Vec<Damage>) {
     }
     damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
     (seen, damage)
+}
+
+/// A message as the reader gave it of one file: channel's topic, log time and bytes.
+type SeenInFile = (String, u64, Vec<u8>);
+
+/// All messages of a file, and all damage that was told.
+pub(super) fn read_file(path: &Path) -> Result<(Vec<SeenInFile>, Vec<Damage>), ReadError> {
+    let (seen, damage) = read_all(LogReader::new(vec![LogFile::open(path)?]));
+    Ok((seen.into_iter().map(|(_, topic, time, data)| (topic, time, data)).collect(), damage))
 }
 
 /// Three chunks of a few messages each.
