@@ -36,7 +36,7 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "path_placer",
         "Where each placed robot drove, in the merged frame: its poses carried through its map's bend and frame. Sent when \
-         frames come, and at the end if any robot has moved since.",
+         frames or bends change, and at the end if any robot has moved since.",
         |parameters: PathPlacerParameters, _: &Context| Ok(PathPlacer { parameters, ..PathPlacer::default() }),
     )
     .input("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
@@ -62,8 +62,10 @@ struct PathPlacer {
     parameters: PathPlacerParameters,
     drives: BTreeMap<String, Drive>,
     placement: Placement,
-    /// Whether anything has come that is in no path that was sent.
-    has_news: bool,
+    /// Whether a bend has come that is in no path that was sent.
+    has_new_bends: bool,
+    /// Whether a pose has.
+    has_new_poses: bool,
 }
 
 impl PathPlacer {
@@ -77,7 +79,7 @@ impl PathPlacer {
         }
         if let Some(drive) = self.drives.get_mut(pose.robot()) {
             drive.add(pose.header.stamp, pose.pose.pose.planar(), self.parameters.spacing);
-            self.has_news = true;
+            self.has_new_poses = true;
         }
         Ok(())
     }
@@ -88,21 +90,25 @@ impl PathPlacer {
         deformation: Received<'_, MapDeformation>,
         output: &Output<Paths>,
     ) -> Result<(), StageError> {
-        self.has_news |= self.placement.keep_bend(&deformation, output);
+        self.has_new_bends |= self.placement.keep_bend(&deformation, output);
         Ok(())
     }
 
     fn receive_frames(&mut self, frames: Received<'_, RobotFrames>, output: &Output<Paths>) -> Result<(), StageError> {
-        self.placement.frames = frames.into_content();
-        self.send(output)
+        let frames = frames.into_content();
+        let is_same = frames.reference == self.placement.frames.reference
+            && frames.frames == self.placement.frames.frames
+            && !self.has_new_bends;
+        self.placement.frames = frames;
+        if is_same { Ok(()) } else { self.send(output) }
     }
 
     fn finish(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
-        if self.has_news { self.send(output) } else { Ok(()) }
+        if self.has_new_bends || self.has_new_poses { self.send(output) } else { Ok(()) }
     }
 
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
-        self.has_news = false;
+        (self.has_new_bends, self.has_new_poses) = (false, false);
         for (robot, placed) in self.placement.placed() {
             let Some(drive) = self.drives.get(robot) else { continue };
             let stamped = |(stamp, in_map)| PoseStamped {
