@@ -22,6 +22,7 @@ pub mod map_aligner;
 pub mod map_cleaner;
 pub mod map_placer;
 pub mod map_selector;
+pub mod marker_maker;
 pub mod merge_verifier;
 pub mod pair_aligner;
 pub mod path_placer;
@@ -61,6 +62,7 @@ pub fn kinds() -> Vec<StageKind> {
         map_cleaner::kind(),
         map_placer::kind(),
         map_selector::kind(),
+        marker_maker::kind(),
         merge_verifier::kind(),
         path_placer::kind(),
         pgvd_extractor::kind(),

@@ -5,5 +5,7 @@
 
 mod log_builder;
 pub mod run_files;
+mod tag_drives;
 
 pub use log_builder::{LogBuilder, TestMap, header};
+pub use tag_drives::{Sense, TagDrive};

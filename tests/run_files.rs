@@ -105,6 +105,7 @@ pub fn outcome(log: &Path) -> (String, usize) {
     let bytes = fs::read(log).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
-    let record = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
+    let index = summary.metadata_indexes.iter().find(|index| index.name == "gridweave").unwrap();
+    let record = mcap::read::metadata(&bytes, index).unwrap();
     (record.metadata.get("reason").cloned().unwrap_or_default(), messages)
 }

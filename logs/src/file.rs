@@ -28,12 +28,12 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// The file system fails.
-    #[error("cannot write {}: {source}; see that its folder exists, may be written and has room", path.display())]
+    #[error("cannot write {}: {error}; see that its folder exists, may be written and has room", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: io::Error,
+        error: io::Error,
     },
 }
 
@@ -64,7 +64,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
         left.keep(false);
     }
     let folder = resolve(path).and_then(|place| Ok(access(folder_of(&place), Access::WRITE_OK | Access::EXEC_OK)?));
-    folder.map_err(|source| WriteError::Io { path: path.to_owned(), source })
+    folder.map_err(|error| WriteError::Io { path: path.to_owned(), error })
 }
 
 /// Writes files that belong together. All are written beside before the first is put in its place, in the given order, so
@@ -75,7 +75,7 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 pub fn replace(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     let write = |(path, bytes): &(&Path, &[u8])| {
         let output = OutputFile::create(path)?;
-        (&output.file).write_all(bytes).map_err(|source| output.error(source))?;
+        (&output.file).write_all(bytes).map_err(|error| output.error(error))?;
         Ok(output)
     };
     let outputs = files.iter().map(write).collect::<Result<Vec<_>, _>>()?;
@@ -100,7 +100,7 @@ pub(crate) struct OutputFile {
 impl OutputFile {
     /// Starts a file. What a killed writer has left of it is taken away.
     pub(crate) fn create(path: &Path) -> Result<Self, WriteError> {
-        let of_path = |source| WriteError::Io { path: path.to_owned(), source };
+        let of_path = |error| WriteError::Io { path: path.to_owned(), error };
         let (place, part) = places(path)?;
         loop {
             // Not emptied but made anew: a program that reads what was left keeps what it reads.
@@ -126,7 +126,7 @@ impl OutputFile {
         let (place, part) = places(path)?;
         let file = match options().open(&part) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            file => file.map_err(|source| WriteError::Io { path: path.to_owned(), source })?,
+            file => file.map_err(|error| WriteError::Io { path: path.to_owned(), error })?,
         };
         lock(&file, path, &part, false)?;
         let path = path.to_owned();
@@ -158,7 +158,7 @@ impl OutputFile {
             fs::rename(&self.part, &self.place)?;
             self.file.try_clone()
         };
-        let file = put().map_err(|source| self.error(source))?;
+        let file = put().map_err(|error| self.error(error))?;
         self.is_kept = true;
         Ok(file)
     }
@@ -173,8 +173,8 @@ impl OutputFile {
         self.put_in_place().map(|_| path)
     }
 
-    pub(crate) fn error(&self, source: io::Error) -> WriteError {
-        WriteError::Io { path: self.path.clone(), source }
+    pub(crate) fn error(&self, error: io::Error) -> WriteError {
+        WriteError::Io { path: self.path.clone(), error }
     }
 }
 
@@ -195,7 +195,7 @@ fn options() -> OpenOptions {
 
 /// The place of the file that is called `path`, and where it is written until it is whole.
 fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
-    let of_path = |source| WriteError::Io { path: path.to_owned(), source };
+    let of_path = |error| WriteError::Io { path: path.to_owned(), error };
     let place = resolve(path).map_err(of_path)?;
     match fs::symlink_metadata(&place) {
         Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
@@ -216,7 +216,7 @@ fn lock(file: &File, path: &Path, part: &Path, is_made: bool) -> Result<(), Writ
     match file.metadata() {
         Ok(metadata) if metadata.is_file() => {}
         Ok(_) => return Err(WriteError::NotRegular { path: part.to_owned() }),
-        Err(source) => return Err(WriteError::Io { path, source }),
+        Err(error) => return Err(WriteError::Io { path, error }),
     }
     match file.try_lock() {
         Ok(()) => Ok(()),

@@ -1,6 +1,8 @@
 //! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, what a log holds, maps of
 //! nav2's map server, pictures of maps, and summaries of merges.
 
+pub mod bag;
+pub mod drawing;
 pub mod dynamic;
 pub mod file;
 pub mod info;
@@ -13,6 +15,7 @@ pub mod schemas;
 pub mod sink;
 pub mod source;
 pub mod summary;
+mod supplement;
 pub mod tf;
 pub mod truth;
 

@@ -1,6 +1,11 @@
 //! The quality of service that a log states for a topic, in the form of rosbag2.
 
-use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, RosMessage};
+use crate::schemas::full_type_name;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{
+    MapAgreement, MapDeformation, MarkerArray, OccupancyGrid, Path, RobotFrames, RosMessage, SimulationTruth,
+    TopologicalMap, Verdicts,
+};
 use std::collections::BTreeMap;
 
 /// The key of a channel's metadata under which rosbag2 keeps it.
@@ -29,11 +34,35 @@ pub(crate) const LATCHED: &str = "\
   avoid_ros_namespace_conventions: false
 ";
 
-/// The metadata of the channel of a result. Maps, static transforms and the poses of the robots' maps are latched; of
+/// What is sent when it changes, and holds until it is sent again.
+const STATES: [&str; 9] = [
+    MapAgreement::NAME,
+    MapDeformation::NAME,
+    MarkerArray::NAME,
+    OccupancyGrid::NAME,
+    Path::NAME,
+    RobotFrames::NAME,
+    SimulationTruth::NAME,
+    TopologicalMap::NAME,
+    Verdicts::NAME,
+];
+
+/// The metadata of the channel of a result. What holds until it is sent again is latched, static transforms among it; of
 /// the others nothing is said, and a player takes its default.
 pub(crate) fn metadata(topic: &str, ros_type: &str) -> BTreeMap<String, String> {
-    let latched = [OccupancyGrid::NAME, RobotFrames::NAME].contains(&ros_type) || topic.ends_with("/tf_static");
+    let latched = STATES.contains(&ros_type) || topic.ends_with("/tf_static");
     BTreeMap::from([(KEY.to_owned(), if latched { LATCHED.to_owned() } else { String::new() })])
+}
+
+/// A channel of the input, of which nothing may be said: without it, maps and static transforms that are played reach nobody
+/// who asks for them as map servers and tf send them.
+pub(crate) fn completed(mut channel: Channel) -> Channel {
+    let is_needed = channel.message_encoding == "cdr"
+        && (full_type_name(&channel.schema_name) == OccupancyGrid::NAME || channel.topic.ends_with("/tf_static"));
+    if is_needed && channel.metadata.get(KEY).is_none_or(|offered| offered.trim().is_empty()) {
+        channel.metadata.insert(KEY.to_owned(), LATCHED.to_owned());
+    }
+    channel
 }
 
 /// Whether the metadata of a channel says that its last message is kept for those who come later.
@@ -41,6 +70,19 @@ pub(crate) fn is_transient_local(metadata: &BTreeMap<String, String>) -> bool {
     let offered = metadata.get(KEY).map_or("", String::as_str);
     // ROS 2 writes the durability as a number up to Iron, and as a word since.
     offered.lines().any(|line| matches!(line.trim(), "durability: 1" | "durability: transient_local"))
+}
+
+/// What the metadata of a channel says, in a word or two; nothing if it says nothing.
+pub(crate) fn word(metadata: &BTreeMap<String, String>) -> &'static str {
+    let offered = metadata.get(KEY).map_or("", String::as_str);
+    let is_best_effort =
+        offered.lines().any(|line| matches!(line.trim(), "reliability: 2" | "reliability: best_effort"));
+    match (is_transient_local(metadata), is_best_effort, offered.trim().is_empty()) {
+        (true, ..) => "latched",
+        (false, true, _) => "best effort",
+        (false, false, false) => "reliable",
+        (false, false, true) => "",
+    }
 }
 
 #[cfg(test)]
@@ -53,10 +95,27 @@ mod tests {
         assert_eq!(of("/map", "nav_msgs/msg/OccupancyGrid"), LATCHED);
         assert_eq!(of("/frame_solver/frames", "gridweave_msgs/msg/RobotFrames"), LATCHED);
         assert_eq!(of("/tf_static", "tf2_msgs/msg/TFMessage"), LATCHED);
+        assert_eq!(of("/robot1/merged_path", "nav_msgs/msg/Path"), LATCHED);
         assert_eq!(of("/tf", "tf2_msgs/msg/TFMessage"), "");
         assert_eq!(of("/robot1/lines/segments", "gridweave_msgs/msg/Segments"), "");
         assert!(is_transient_local(&metadata("/map", "nav_msgs/msg/OccupancyGrid")));
         assert!(!is_transient_local(&metadata("/tf", "tf2_msgs/msg/TFMessage")));
+    }
+
+    #[test]
+    fn maps_and_static_transforms_of_the_input_are_latched_where_nothing_is_said_of_them() {
+        let of = |topic: &str, schema_name: &str, offered: Option<&str>| {
+            let metadata = offered.map(|offered| (KEY.to_owned(), offered.to_owned())).into_iter().collect();
+            let (topic, schema_name) = (topic.to_owned(), schema_name.to_owned());
+            let channel =
+                Channel { topic, schema_name, message_encoding: "cdr".into(), metadata, ..Default::default() };
+            completed(channel).metadata.get(KEY).cloned()
+        };
+        assert_eq!(of("/map", "nav_msgs/OccupancyGrid", None).as_deref(), Some(LATCHED));
+        assert_eq!(of("/map", OccupancyGrid::NAME, Some("")).as_deref(), Some(LATCHED));
+        assert_eq!(of("/map", OccupancyGrid::NAME, Some("theirs")).as_deref(), Some("theirs"));
+        assert_eq!(of("/robot1/tf_static", "tf2_msgs/msg/TFMessage", None).as_deref(), Some(LATCHED));
+        assert_eq!(of("/scan", "sensor_msgs/msg/LaserScan", None), None);
     }
 
     #[test]

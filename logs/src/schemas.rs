@@ -7,9 +7,14 @@ use std::borrow::Cow;
 const SEPARATOR: &str = "================================================================================";
 
 macro_rules! definitions {
-    ($($name:literal),* $(,)?) => {
+    ($($before:literal,)* gridweave_msgs: [$($ours:literal,)*], $($after:literal,)*) => {
         /// Name (`package/Type`) and text of every definition, by name.
-        const DEFINITIONS: &[(&str, &str)] = &[$(($name, include_str!(concat!("../msg/", $name, ".msg")))),*];
+        const DEFINITIONS: &[(&str, &str)] = &[
+            $(($before, include_str!(concat!("../msg/", $before, ".msg"))),)*
+            // A package for ROS, and so with a folder of its own for messages.
+            $((concat!("gridweave_msgs/", $ours), include_str!(concat!("../msg/gridweave_msgs/msg/", $ours, ".msg"))),)*
+            $(($after, include_str!(concat!("../msg/", $after, ".msg"))),)*
+        ];
     };
 }
 
@@ -40,33 +45,37 @@ definitions![
     "geometry_msgs/Vector3Stamped",
     "geometry_msgs/Wrench",
     "geometry_msgs/WrenchStamped",
-    "gridweave_msgs/Alignment",
-    "gridweave_msgs/CommonPlace",
-    "gridweave_msgs/CommonTag",
-    "gridweave_msgs/CommonTags",
-    "gridweave_msgs/DeformationNode",
-    "gridweave_msgs/Evidence",
-    "gridweave_msgs/MapAgreement",
-    "gridweave_msgs/MapDeformation",
-    "gridweave_msgs/MapDirection",
-    "gridweave_msgs/RobotFrame",
-    "gridweave_msgs/RobotFrames",
-    "gridweave_msgs/RobotGroup",
-    "gridweave_msgs/Segment",
-    "gridweave_msgs/Segments",
-    "gridweave_msgs/Sharpness",
-    "gridweave_msgs/SimulationTruth",
-    "gridweave_msgs/TagEstimate",
-    "gridweave_msgs/TagEstimates",
-    "gridweave_msgs/TagRange",
-    "gridweave_msgs/TopologicalMap",
-    "gridweave_msgs/TopologicalNode",
-    "gridweave_msgs/TopologicalPath",
-    "gridweave_msgs/TrueFrame",
-    "gridweave_msgs/TrueTag",
-    "gridweave_msgs/UnmergedRobot",
-    "gridweave_msgs/Verdict",
-    "gridweave_msgs/Verdicts",
+    gridweave_msgs: [
+        "Alignment",
+        "CommonPlace",
+        "CommonTag",
+        "CommonTags",
+        "DeformationNode",
+        "Evidence",
+        "MapAgreement",
+        "MapDeformation",
+        "MapDirection",
+        "RobotFrame",
+        "RobotFrames",
+        "RobotGroup",
+        "Segment",
+        "Segments",
+        "Sharpness",
+        "SimulationTruth",
+        "TagEstimate",
+        "TagEstimates",
+        "TagPosition",
+        "TagRange",
+        "TopologicalMap",
+        "TopologicalNode",
+        "TopologicalPath",
+        "TrueFrame",
+        "TrueTag",
+        "UnmergedRobot",
+        "Verdict",
+        "Verdicts",
+    ],
+    "map_msgs/OccupancyGridUpdate",
     "nav_msgs/GridCells",
     "nav_msgs/MapMetaData",
     "nav_msgs/OccupancyGrid",
@@ -97,6 +106,10 @@ definitions![
     "std_msgs/Int32",
     "std_msgs/String",
     "tf2_msgs/TFMessage",
+    "visualization_msgs/Marker",
+    "visualization_msgs/MarkerArray",
+    "visualization_msgs/MeshFile",
+    "visualization_msgs/UVCoordinate",
 ];
 
 /// The schema of a ROS 2 type as a log holds it (encoding `ros2msg`): the definition of the type, and then that of
@@ -146,3 +159,6 @@ fn append_used_types<'a>(text: &'a str, used: &mut Vec<&'a str>, schema: &mut St
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod ros_package;

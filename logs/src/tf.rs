@@ -123,18 +123,33 @@ fn pose(isometry: &Isometry3<f64>) -> Pose {
 /// A base moves in a frame of odometry, and a SLAM system corrects how that lies in the map. A correction by itself gives
 /// no pose: joined to a movement of before it would be a pose of no time, and many systems date their corrections into
 /// the future.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct TfPoses {
-    frames: TfFrames,
+    /// What the frames of robots are called that are not known yet.
+    frames: Option<TfFrames>,
     tree: FrameTree,
-    /// The robots of which one of the two frames was seen: their map frame and their base frame.
-    robots: BTreeMap<String, (String, String)>,
+    /// The robots that are known: with `frames`, those of which one of the two was seen.
+    robots: BTreeMap<String, Ends>,
+}
+
+/// The frames of one robot between which its pose is looked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ends {
+    /// The frame of its map.
+    pub map: String,
+    /// The frames that may be that of its base. The first that is tied to the map is, from then on.
+    pub bases: Vec<String>,
 }
 
 impl TfPoses {
     /// Poses between the two frames, in which `{robot}` stands for the robot's name.
     pub fn new(frames: TfFrames) -> Self {
-        Self { frames, tree: FrameTree::default(), robots: BTreeMap::new() }
+        Self { frames: Some(frames), ..Self::default() }
+    }
+
+    /// Poses of these robots.
+    pub fn of_robots(robots: BTreeMap<String, Ends>) -> Self {
+        Self { robots, ..Self::default() }
     }
 
     /// Takes up a tf message in which the frames lack the given prefix (empty: none), and which may hold for good. Gives
@@ -162,30 +177,72 @@ impl TfPoses {
     }
 
     fn recognise(&mut self, frame: &str) {
-        for pattern in [&self.frames.map_frame, &self.frames.base_frame] {
+        let Some(frames) = &self.frames else { return };
+        for pattern in [&frames.map_frame, &frames.base_frame] {
             if let Some(robot) = match_robot(pattern, frame)
                 && !self.robots.contains_key(robot)
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);
-                let frames = (named(&self.frames.map_frame), named(&self.frames.base_frame));
-                self.robots.insert(robot.to_owned(), frames);
+                let ends = Ends { map: named(&frames.map_frame), bases: vec![named(&frames.base_frame)] };
+                self.robots.insert(robot.to_owned(), ends);
             }
         }
     }
 
-    fn poses(&self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
-        let pose_of = |(robot, (map, base)): (&String, &(String, String))| {
-            let chain = self.tree.chain(map, base)?;
-            let stamp = changed.get(self.tree.moving(&chain)?)?;
-            let header = Header { stamp: *stamp, frame_id: map.clone() };
+    fn poses(&mut self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
+        let tree = &self.tree;
+        let pose_of = |(robot, ends): (&String, &mut Ends)| {
+            if ends.bases.len() > 1 {
+                let tied = ends.bases.iter().find(|base| tree.chain(&ends.map, base).is_some())?;
+                ends.bases = vec![tied.clone()];
+            }
+            let chain = tree.chain(&ends.map, ends.bases.first()?)?;
+            let stamp = changed.get(tree.moving(&chain)?)?;
+            let header = Header { stamp: *stamp, frame_id: ends.map.clone() };
             Some((robot.clone(), PoseStamped { header, pose: pose(&chain.transform_target_source) }))
         };
-        self.robots.iter().filter_map(pose_of).collect()
+        self.robots.iter_mut().filter_map(pose_of).collect()
+    }
+
+    /// The robots that are known, by name.
+    pub fn robots(&self) -> impl Iterator<Item = &str> {
+        self.robots.keys().map(String::as_str)
+    }
+
+    /// Whether a robot is known.
+    pub fn knows(&self, robot: &str) -> bool {
+        self.robots.contains_key(robot)
+    }
+
+    /// The frame of a robot's map.
+    pub fn map_frame(&self, robot: &str) -> Option<&str> {
+        self.robots.get(robot).map(|ends| ends.map.as_str())
+    }
+
+    /// Says what the frame of a robot's map is called.
+    pub fn set_map_frame(&mut self, robot: &str, frame: &str) {
+        if let Some(ends) = self.robots.get_mut(robot) {
+            frame.clone_into(&mut ends.map);
+        }
+    }
+
+    /// The frame of a robot's base, once it is known which of several it is.
+    pub fn base_of(&self, robot: &str) -> Option<&str> {
+        match &self.robots.get(robot)?.bases[..] {
+            [base] => Some(base),
+            _ => None,
+        }
+    }
+
+    /// Whether any transform has come.
+    pub fn has_frames(&self) -> bool {
+        !self.tree.edges.is_empty()
     }
 
     /// The robots of which a frame was seen and whose base was never tied to their map.
     pub fn robots_without_pose(&self) -> BTreeSet<&str> {
-        let untied = |(_, (map, base)): &(&String, &(String, String))| self.tree.chain(map, base).is_none();
+        let untied =
+            |(_, ends): &(&String, &Ends)| ends.bases.iter().all(|base| self.tree.chain(&ends.map, base).is_none());
         self.robots.iter().filter(untied).map(|(robot, _)| robot.as_str()).collect()
     }
 }

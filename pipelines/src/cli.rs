@@ -1,16 +1,15 @@
 //! What the command line may say, and who does it.
 
 use crate::commands::{
-    check, compare, convert, demo, evaluate, golden, graph, info, kinds, live, merge, processes, run, simulate,
+    cat, check, compare, convert, demo, evaluate, golden, graph, info, kinds, live, merge, pipelines, processes,
+    recover, render, report, run, shell, simulate,
 };
 use crate::interrupt;
 use crate::status::Status;
+use crate::telling::TellingArgs;
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
-use std::io::IsTerminal;
-use tracing_subscriber::EnvFilter;
-use tracing_subscriber::prelude::*;
 
 /// Merges the maps of several robots that explore one building, each with a map frame of its own.
 ///
@@ -18,9 +17,8 @@ use tracing_subscriber::prelude::*;
 #[derive(Debug, Parser)]
 #[command(name = "gridweave", version, max_term_width = 110)]
 pub(crate) struct Cli {
-    /// Say more on standard error.
-    #[arg(short, long, global = true)]
-    verbose: bool,
+    #[command(flatten)]
+    telling: TellingArgs,
     #[command(subcommand)]
     command: Command,
 }
@@ -35,12 +33,23 @@ enum Command {
     Check(check::CheckArgs),
     /// Show which stages a pipeline has and how they are wired.
     Graph(graph::GraphArgs),
+    /// List the pipelines that ship, or print one of them.
+    Pipelines(pipelines::PipelinesArgs),
     /// List the stage kinds with their ports and parameters.
     Kinds(kinds::KindsArgs),
     /// Show what is in logs (topics, types, counts, times, robots) or in map files.
     Info(info::InfoArgs),
-    /// Write logs of any kind that is read as one MCAP file.
+    /// Write logs of any kind that is read, or some topics, robots or seconds of them, as one MCAP file or rosbag2 folder.
+    #[command(visible_alias = "filter")]
     Convert(convert::ConvertArgs),
+    /// Write all that can be read of a log that is cut or damaged, and tell what cannot.
+    Recover(recover::RecoverArgs),
+    /// Print messages of logs as lines of JSON.
+    Cat(cat::CatArgs),
+    /// Draw the maps of a log, or map files, as a picture (PNG, SVG or PDF).
+    Render(render::RenderArgs),
+    /// Show what a merge has found and how, as one page for a browser.
+    Report(report::ReportArgs),
     /// Compare a summary with the truth.
     Evaluate(evaluate::EvaluateArgs),
     /// Run several pipelines on the same logs, and compare how right, how fast and how large they are.
@@ -61,6 +70,8 @@ enum Command {
     Top(live::TopArgs),
     /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
     Clean,
+    /// Print the completions of a shell, or write the manual pages.
+    Shell(shell::ShellArgs),
     /// Run one process of a pipeline on the engine `processes`, which starts it.
     #[command(hide = true)]
     Stage(processes::StageArgs),
@@ -92,7 +103,7 @@ impl Command {
 impl Cli {
     /// Does what the command line says, with the given stage kinds.
     pub(crate) fn execute(self, registry: &Registry) -> Result<Status> {
-        start_log(self.verbose);
+        let _trace = self.telling.start()?;
         if self.command.has_something_to_put_in_order() {
             interrupt::hold_back();
         }
@@ -101,9 +112,14 @@ impl Cli {
             Command::Merge(args) => merge::merge(&args, registry),
             Command::Check(args) => check::check(&args, registry),
             Command::Graph(args) => graph::graph(&args, registry),
+            Command::Pipelines(args) => pipelines::pipelines(&args),
             Command::Kinds(args) => kinds::kinds(&args, registry),
             Command::Info(args) => info::info(&args, registry),
             Command::Convert(args) => convert::convert(&args, registry),
+            Command::Recover(args) => recover::recover(&args),
+            Command::Cat(args) => cat::cat(&args),
+            Command::Render(args) => render::render(&args),
+            Command::Report(args) => report::report(&args),
             Command::Evaluate(args) => evaluate::command(&args),
             Command::Compare(args) => compare::compare(&args, registry),
             Command::Simulate(args) => simulate::simulate(&args, registry),
@@ -114,22 +130,9 @@ impl Cli {
             Command::Tap(args) => live::tap(&args, registry),
             Command::Top(args) => live::top(&args, registry),
             Command::Clean => processes::clean(),
+            Command::Shell(args) => shell::shell(&args, &Self::command()),
             Command::Stage(args) => processes::stage(&args, registry),
             Command::Measure(args) => compare::measure::measure(&args),
         }
     }
-}
-
-/// Sends what the libraries log to standard error: warnings, or all that `RUST_LOG` asks for.
-fn start_log(verbose: bool) {
-    let filter = EnvFilter::try_from_default_env();
-    let filter = filter.unwrap_or_else(|_| EnvFilter::new(if verbose { "info" } else { "warn" }));
-    let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .with_target(false)
-        // It would say on standard error that standard error cannot be written to.
-        .log_internal_errors(false);
-    tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }

@@ -17,11 +17,13 @@ pub mod common_places;
 pub mod evaluate;
 mod interrupt;
 mod job;
+mod merge_log;
 mod merge_text;
 pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
+mod telling;
 mod terminal;
 
 use clap::Parser;

@@ -1,6 +1,6 @@
 //! What ships: the stage kinds of all crates, and the pipeline files.
 
-use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors};
+use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::Path;
 
@@ -9,33 +9,82 @@ pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
     Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()).chain(kinds))
 }
 
+/// A pipeline that ships.
+pub struct Shipped {
+    /// Its name.
+    pub name: &'static str,
+    /// What it does, in a line.
+    pub what: &'static str,
+    /// Its file.
+    pub text: &'static str,
+}
+
+macro_rules! shipped {
+    ($name:literal, $what:literal) => {
+        Shipped { name: $name, what: $what, text: include_str!(concat!("../", $name, ".toml")) }
+    };
+}
+
 /// The pipelines that ship, by name.
-const SHIPPED: [(&str, &str); 15] = [
-    ("auto_merge", include_str!("../auto_merge.toml")),
-    ("cut", include_str!("../cut.toml")),
-    ("group_mapping", include_str!("../group_mapping.toml")),
-    ("hough_spectrum", include_str!("../hough_spectrum.toml")),
-    ("live", include_str!("../live.toml")),
-    ("live_merge", include_str!("../live_merge.toml")),
-    ("map_file_merge", include_str!("../map_file_merge.toml")),
-    ("map_files_to_log", include_str!("../map_files_to_log.toml")),
-    ("map_merge", include_str!("../map_merge.toml")),
-    ("random_walk", include_str!("../random_walk.toml")),
-    ("simulate", include_str!("../simulate.toml")),
-    ("tag_direction", include_str!("../tag_direction.toml")),
-    ("tag_merge", include_str!("../tag_merge.toml")),
-    ("tag_only", include_str!("../tag_only.toml")),
-    ("topological", include_str!("../topological.toml")),
+pub const PIPELINES: &[Shipped] = &[
+    shipped!(
+        "auto_merge",
+        "merge by tags and by the maps: whatever the maps confirm (what `gridweave merge` runs on logs)"
+    ),
+    shipped!("cut", "cut a piece out of logs: a stretch of time, some topics, or both"),
+    shipped!(
+        "group_mapping",
+        "merge as Saeedi et al. 2014: Radon transforms, Voronoi edges, entropy filter (to compare)"
+    ),
+    shipped!("hough_spectrum", "merge as Carpin 2008: Hough spectra (to compare)"),
+    shipped!("live", "merge by tags while the robots explore"),
+    shipped!("live_merge", "merge by tags and by the maps while the robots explore"),
+    shipped!("map_file_merge", "merge map files (what `gridweave merge` runs on these)"),
+    shipped!("map_files_to_log", "write map files as a log that the other pipelines read"),
+    shipped!("map_merge", "merge by the maps alone"),
+    shipped!("random_walk", "merge as Birk and Carpin 2006: random walks (to compare)"),
+    shipped!("simulate", "simulate robots in a building (what `gridweave simulate` runs)"),
+    shipped!("tag_direction", "merge as Tsardoulias et al., method 2: tags and the direction of walls (to compare)"),
+    shipped!(
+        "tag_frames",
+        "place the frames of robots by tags, without maps (what `gridweave merge` runs where there are none)"
+    ),
+    shipped!("tag_merge", "merge by tags, directions and ICP, confirmed by the maps: Tsardoulias et al., method 3"),
+    shipped!("tag_only", "merge as Tsardoulias et al., method 1: tags alone (to compare)"),
+    shipped!("topological", "merge as Wang et al.: topological maps (to compare)"),
 ];
+
+/// The pipeline that ships under a name.
+///
+/// # Errors
+/// There is none: a text that says so, and which was probably meant.
+pub fn find(name: &str) -> Result<&'static Shipped, String> {
+    let names: Vec<&str> = PIPELINES.iter().map(|shipped| shipped.name).collect();
+    let meant = || suggest(name, &names, "there are").unwrap_or_default();
+    let found = PIPELINES.iter().find(|shipped| shipped.name == name);
+    found.ok_or_else(|| format!("no pipeline `{name}` ships: {}", meant()))
+}
 
 /// Loads a pipeline file, or the shipped pipeline of that name.
 ///
 /// # Errors
 /// The file cannot be read, or the pipeline is wrong: the error shows everything that is.
 pub fn load(pipeline: &Path, overrides: &Overrides, registry: &Registry) -> Result<Pipeline, PipelineErrors> {
-    let shipped = SHIPPED.iter().find(|(name, _)| Path::new(name) == pipeline && !pipeline.exists());
-    match shipped {
-        Some((name, text)) => Pipeline::parse(&format!("pipelines/{name}.toml"), text, registry, overrides),
+    // A file that is there comes before a pipeline of that name.
+    let name = pipeline.to_str().filter(|name| is_name(name) && !pipeline.exists());
+    match name.map(find) {
+        Some(Ok(Shipped { name, text, .. })) => {
+            Pipeline::parse(&format!("pipelines/{name}.toml"), text, registry, overrides)
+        }
+        Some(Err(error)) => {
+            let name = pipeline.display().to_string();
+            Err(PipelineErrors::of_whole(&name, format!("there is no file `{name}`, and {error}")))
+        }
         None => Pipeline::load(pipeline, registry, overrides),
     }
+}
+
+/// Whether this can be the name of a pipeline that ships, and not only the path of a file.
+fn is_name(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
 }

@@ -13,6 +13,8 @@ use std::fmt::Write;
 /// What a run has found and done: the form that `--summary` writes.
 #[derive(Debug, serde::Serialize)]
 pub struct RunSummary {
+    /// The version of Gridweave.
+    pub version: &'static str,
     /// What was merged; none if the pipeline merges nothing.
     #[serde(flatten)]
     pub merge: Option<Summary>,
@@ -81,7 +83,7 @@ impl RunSummary {
     pub fn new(mut merge: Option<Summary>, report: &RunReport) -> Self {
         let mut areas = merge.as_mut().map(|merge| std::mem::take(&mut merge.areas)).unwrap_or_default();
         let stages = report.stages.iter().map(|stage| StageSummary::new(stage, areas.remove(&stage.name))).collect();
-        Self { merge, stages }
+        Self { version: env!("CARGO_PKG_VERSION"), merge, stages }
     }
 
     /// The JSON text.

@@ -7,10 +7,12 @@
 //!
 //! This crate knows no file format and no algorithm.
 
+pub mod covariance_ellipse;
 pub mod engine;
 pub mod input_file;
 pub mod link;
 pub mod message;
 pub mod pipeline;
+pub mod robot_colour;
 pub mod ros;
 pub mod stage;

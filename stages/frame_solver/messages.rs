@@ -4,9 +4,7 @@ use super::UncertainPose;
 use super::solution::{Alignments, Group, Solution};
 use crate::geometry::row_by_row;
 use crate::robot_pair::RobotPair;
-use gridweave_runtime::ros::{
-    Alignment, Header, RobotFrame, RobotFrames, RobotGroup, TFMessage, TransformStamped, UnmergedRobot, Verdict,
-};
+use gridweave_runtime::ros::{Alignment, Header, RobotFrame, RobotFrames, RobotGroup, UnmergedRobot, Verdict};
 use gridweave_runtime::stage::frame_of_robot;
 use std::collections::BTreeMap;
 
@@ -82,17 +80,4 @@ pub(super) fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
 pub(super) fn prefixed(robot: &str, frame_id: &str) -> String {
     let frame_id = if frame_id.trim_start_matches('/').is_empty() { "map" } else { frame_id };
     frame_of_robot(robot, frame_id).into_owned()
-}
-
-/// The frames of the message as transforms from `world`, and those of groups from the groups' own frames.
-pub(super) fn transforms(message: &RobotFrames) -> TFMessage {
-    let main = (&message.header.frame_id, &message.frames);
-    let all = std::iter::once(main).chain(message.groups.iter().map(|group| (&group.frame_id, &group.frames)));
-    let transform = |parent: &str, frame: &RobotFrame| TransformStamped {
-        header: Header { stamp: message.header.stamp, frame_id: parent.to_owned() },
-        child_frame_id: frame.frame_id.clone(),
-        transform: frame.transform_reference_robot().into(),
-    };
-    let transforms = all.flat_map(|(parent, frames)| frames.iter().map(move |frame| transform(parent, frame)));
-    TFMessage { transforms: transforms.collect() }
 }

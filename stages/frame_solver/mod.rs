@@ -33,6 +33,7 @@ mod stage;
 mod team;
 #[cfg(test)]
 mod tests;
+mod tree;
 pub mod uncertain;
 
 pub use parameters::FrameSolverParameters;

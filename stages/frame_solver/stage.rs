@@ -1,12 +1,11 @@
 //! The frame solver as a stage.
 
 use super::FrameSolverParameters;
-use super::messages::{hold, prefixed, robot_frames, says_the_same, transforms, verdicts};
+use super::messages::{hold, prefixed, robot_frames, says_the_same, verdicts};
 use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
-use gridweave_runtime::ros::{
-    Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, TransformStamped, Verdict, Verdicts,
-};
+use super::tree::Tree;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, Verdict, Verdicts};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -50,8 +49,9 @@ impl Outputs for Placement {
             tf: ports.output_on(
                 "/tf_static",
                 "tf",
-                "the same poses as static transforms from `world`, and of robots tied to each other only from a frame of \
-                 their own, `world/ROBOT`, with the name of the robot in whose map frame they are placed",
+                "the same poses as static transforms from `world`, once it is certain which robot is the reference; at the \
+                 end also those of robots tied to each other only, from a frame of their own, `world/ROBOT`, with the \
+                 name of the robot in whose map frame they are placed. No frame ever changes its parent",
             ),
             verdicts: ports.output_on(
                 "/verdicts",
@@ -76,7 +76,7 @@ struct FrameSolver {
     is_settled: bool,
     solution: Solution,
     sent: Option<RobotFrames>,
-    sent_tf: TFMessage,
+    tree: Tree,
     sent_verdicts: Vec<Verdict>,
 }
 
@@ -92,7 +92,7 @@ impl FrameSolver {
             is_settled: false,
             solution: Solution::default(),
             sent: None,
-            sent_tf: TFMessage::default(),
+            tree: Tree::default(),
             sent_verdicts: Vec::new(),
         }
     }
@@ -181,17 +181,32 @@ impl FrameSolver {
             true => RobotFrames { header: sent.header.clone(), ..message.clone() } == *sent,
             false => says_the_same(sent, &message),
         }) {
+            if last {
+                self.send_transforms(&message, last, output)?;
+            }
             return Ok(false);
         }
         output.frames.send("", &message)?;
-        let tf = transforms(&message);
-        let place = |one: &TransformStamped| (one.header.frame_id.clone(), one.child_frame_id.clone(), one.transform);
-        if !tf.transforms.iter().map(place).eq(self.sent_tf.transforms.iter().map(place)) {
-            output.tf.send("", &tf)?;
-            self.sent_tf = tf;
-        }
+        self.send_transforms(&message, last, output)?;
         self.sent = Some(message);
         Ok(true)
+    }
+
+    /// As long as the reference may still become another robot, nothing can be told to lie in the world.
+    fn send_transforms(
+        &mut self,
+        frames: &RobotFrames,
+        last: bool,
+        output: &Output<Placement>,
+    ) -> Result<(), StageError> {
+        let is_certain = self.wanted.is_some() || self.is_settled || frames.frames.len() > 1;
+        if !(last || is_certain) {
+            return Ok(());
+        }
+        match self.tree.update(frames, last) {
+            Some(transforms) => output.tf.send("", &transforms),
+            None => Ok(()),
+        }
     }
 
     /// Sends what became of the alignments if it differs from what was sent last.

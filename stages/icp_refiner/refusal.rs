@@ -1,10 +1,8 @@
 //! Why a refined alignment may not be used.
 
 use super::{IcpParameters, Registration};
-use nalgebra::{Matrix2, SymmetricEigen};
-
-/// More steps than the main axes of two numbers ever take.
-const MOST_SWEEPS: usize = 100;
+use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
+use nalgebra::Matrix2;
 
 /// Why a refined alignment may not be used. The texts are for the people who run the robots.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -80,11 +78,6 @@ impl IcpRefusal {
 
 /// The greatest standard deviation of a position, metres, and its direction, radians from -pi/2 to pi/2.
 fn widest_deviation(covariance: &Matrix2<f64>) -> (f64, f64) {
-    let Some(eigen) = SymmetricEigen::try_new(*covariance, f64::EPSILON, MOST_SWEEPS) else {
-        return (f64::INFINITY, 0.0);
-    };
-    let widest = usize::from(eigen.eigenvalues[1] > eigen.eigenvalues[0]);
-    let axis = eigen.eigenvectors.column(widest);
-    let direction = if axis.x == 0.0 { std::f64::consts::FRAC_PI_2 } else { (axis.y / axis.x).atan() };
-    (eigen.eigenvalues[widest].max(0.0).sqrt(), direction)
+    let ellipse = CovarianceEllipse::new(covariance, 1.0);
+    ellipse.map_or((f64::INFINITY, 0.0), |ellipse| (ellipse.half_axes[0], ellipse.direction))
 }

@@ -1,8 +1,7 @@
 //! The map placer as a stage.
 
-use crate::grid_fuser::evidence::EvidenceTable;
-use crate::grid_fuser::layout::{Lattice, lay_out};
-use crate::grid_fuser::{Fused, GridFuserParameters, KnownArea, PlacedGrid, inverse};
+use super::PlacedMap;
+use crate::grid_fuser::KnownArea;
 use crate::placement::{Placed, Placement};
 use crate::robot_maps::{RobotMap, RobotMaps};
 use gridweave_runtime::ros::{Header, MapDeformation, OccupancyGrid, RobotFrames};
@@ -76,27 +75,18 @@ impl MapPlacer {
     }
 }
 
-/// Sends a map as it lies in the world, on cells of its own size. One that lies too far away for numbers, of which the grid
-/// fuser warns, is left out.
+/// Sends a map as it lies in the world. One that lies too far away for numbers, of which the grid fuser warns, is left out.
 fn draw(
     robot: &str,
     map: &RobotMap<KnownArea>,
     placed: &Placed<'_>,
     output: &Output<PlacedMaps>,
 ) -> Result<(), StageError> {
-    let Placed { transform_world_map, bend } = *placed;
-    let one = [(PlacedGrid { grid: map.grid(), transform_world_map, bend }, &map.own)];
-    let GridFuserParameters { max_extent, max_cells, min_probability, max_probability, .. } = Default::default();
-    let anchor = one[0].0.transform_world_grid().translation.vector.into();
-    let lattice = Lattice { anchor, resolution: one[0].0.grid.geometry.resolution, max_extent, max_cells };
-    let Some(geometry) = lay_out(&one, &lattice).geometry else { return Ok(()) };
-    let table = EvidenceTable::new(min_probability, max_probability);
-    let prefix = geometry.prefix(Header::new(output.log_time(), RobotFrames::WORLD));
-    // Nothing contradicts a map that is alone.
-    let mut conflicts = vec![0; geometry.cell_count()];
+    let Some(map) = PlacedMap::new(map.grid(), &map.own, placed) else { return Ok(()) };
+    let prefix = map.geometry().prefix(Header::new(output.log_time(), RobotFrames::WORLD));
     output.map.send_grid(robot, &prefix, |blank| {
         let mut filled = blank.fill_with(0);
-        inverse::fuse(&one, &geometry, &table, Fused { cells: filled.cells_mut(), conflicts: &mut conflicts });
+        map.draw(filled.cells_mut());
         Ok(filled)
     })
 }

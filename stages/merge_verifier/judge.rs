@@ -107,8 +107,8 @@ fn best_of<'a>(
     best
 }
 
-/// A hypothesis with map b bent, if that lays more wall on wall. As it takes long, only where more speaks for the hypothesis than
-/// against it, and where something does speak against it.
+/// A hypothesis with map b bent, if that lays more wall on wall, and with what a bend leaves uncertain if it does not. As it
+/// takes long, only where more speaks for the hypothesis than against it, and where something does speak against it.
 fn bent<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
@@ -118,9 +118,11 @@ fn bent<'a>(
     let Agreement { evidence, .. } = rigid.agreement;
     let is_worth_it = rigid.alignment.accepted && evidence > 0.0 && rigid.agreement.wall_agreement() < CLEAR_AGREEMENT;
     let bent = is_worth_it.then(|| BentPlace::new(a, b, &rigid.alignment.transform_a_b(), parameters)).flatten();
-    match bent.filter(|bent| bent.agreement.evidence - bent.cost > evidence) {
-        Some(place) => Candidate { agreement: place.agreement, bent: Some(place), ..*rigid },
-        None => *rigid,
+    let Some(place) = bent else { return *rigid };
+    let left_by_bend = Some(place.covariance);
+    match place.agreement.evidence - place.cost > evidence {
+        true => Candidate { agreement: place.agreement, bent: Some(place), left_by_bend, ..*rigid },
+        false => Candidate { left_by_bend, ..*rigid },
     }
 }
 
@@ -157,7 +159,7 @@ fn judge_one<'a>(
     may_be_bent: bool,
     parameters: &MergeVerifierParameters,
 ) -> Verdict<'a> {
-    let Candidate { alignment, agreement, bent } = candidate;
+    let Candidate { alignment, agreement, bent, .. } = candidate;
     let transform_a_b = candidate.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
         Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)
@@ -196,6 +198,7 @@ fn judge_one<'a>(
         is_expected,
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
+        wall_seen: agreement.wall_seen(),
         overlap: agreement.overlap,
         bend_cost: bent.map(|bent| bent.cost),
         evidence_elsewhere,

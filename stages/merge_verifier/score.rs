@@ -9,7 +9,8 @@
 //!   do not depend on each other counts against it.
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
-//!   search over all places has come to this one, agreement must clearly be more than half, and where the maps share no more
+//!   search over all places has come to this one, agreement must clearly be more than half; of much wall, three quarters, as parts
+//!   of one building that are alike agree on much and contradict each other on as much; and where the maps share no more
 //!   than a room, nearly all: rooms of other buildings have the same corners and sizes, while a map is right in every room,
 //!   however it is bent as a whole. Where one map was bent onto the other they must agree in more: a bend lays what is of one
 //!   place on each other, and changes little elsewhere. Tags have not looked at walls, and ask for more of them.
@@ -45,6 +46,10 @@ const WORSE_AGREEMENT: (f64, f64) = (0.1, 0.25);
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same where much wall was seen: what was moved and drawn roughly has evened out, and what is left speaks against it.
+const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.7;
+/// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
+const MUCH_WALL: (f64, f64) = (60.0, 80.0);
 /// The same where one map is bent onto the other: what was only bent agrees in nearly all then, and unrelated maps agree in
 /// little more than before.
 pub(super) const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
@@ -99,6 +104,8 @@ pub struct Grounds {
     pub evidence: f64,
     /// The share of the walls that agree, 0 to 1.
     pub wall_agreement: f64,
+    /// Length of wall of one map of which the other knows what is there, metres.
+    pub wall_seen: f64,
     /// The area that both maps know, square metres.
     pub overlap: f64,
     /// If the maps agree as they are bent: how unlikely such a bend is, see [`BentPlace`](super::BentPlace).
@@ -129,6 +136,7 @@ impl Odds {
             is_expected,
             evidence,
             wall_agreement,
+            wall_seen,
             overlap,
             bend_cost,
             evidence_elsewhere,
@@ -142,8 +150,12 @@ impl Odds {
         let halves = match origin {
             Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
             Origin::Search { .. } => {
-                let share_of_room = ((ROOM.1 - overlap) / (ROOM.1 - ROOM.0)).clamp(0.0, 1.0);
-                let in_rooms = if bend_cost.is_some() { AGREEMENT_OF_HALVES_IF_BENT } else { AGREEMENT_OF_HALVES };
+                let share_of_room = 1.0 - share_of_way(overlap, ROOM);
+                let of_much = share_of_way(wall_seen, MUCH_WALL);
+                let in_rooms = match bend_cost {
+                    Some(_) => AGREEMENT_OF_HALVES_IF_BENT,
+                    None => AGREEMENT_OF_HALVES + of_much * (AGREEMENT_OF_HALVES_OF_MUCH_WALL - AGREEMENT_OF_HALVES),
+                };
                 in_rooms + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - in_rooms)
             }
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
@@ -163,6 +175,11 @@ impl Odds {
     }
 }
 
+/// How far a value has come from the first of two to the second, 0 to 1.
+fn share_of_way(value: f64, (from, to): (f64, f64)) -> f64 {
+    ((value - from) / (to - from)).clamp(0.0, 1.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,6 +191,7 @@ mod tests {
         is_expected: false,
         evidence: 300.0,
         wall_agreement: 0.9,
+        wall_seen: 50.0,
         overlap: 200.0,
         bend_cost: None,
         evidence_elsewhere: 0.0,
@@ -223,6 +241,16 @@ mod tests {
         let searched = Origin::Search { lead: 20.0 };
         assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
+    }
+
+    #[test]
+    fn of_much_wall_three_quarters_must_agree() {
+        let with = |wall_agreement: f64, wall_seen: f64| {
+            let origin = Origin::Search { lead: 20.0 };
+            Odds::new(&Grounds { origin, wall_agreement, wall_seen, ..GROUNDS }).probability()
+        };
+        assert!(with(0.7, 100.0) < 0.6 && with(0.76, 100.0) > 0.999);
+        assert!(with(0.6, 60.0) > 0.999 && with(0.6, 80.0) < 0.01);
     }
 
     #[test]

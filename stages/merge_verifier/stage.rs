@@ -187,8 +187,10 @@ fn evidence(verdict: &Verdict<'_>, pair: &RobotPair, hypotheses: usize) -> Evide
 fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Alignment {
     let accepted = verdict.refusal.is_none();
     let mut alignment = verdict.candidate.alignment.clone();
-    if let Some(BentPlace { transform_a_b, covariance, .. }) = &verdict.candidate.bent {
+    if let Some(BentPlace { transform_a_b, .. }) = &verdict.candidate.bent {
         alignment.set_transform_a_b(transform_a_b);
+    }
+    if let Some(covariance) = &verdict.candidate.left_by_bend {
         alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
     }
     Alignment {

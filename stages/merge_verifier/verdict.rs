@@ -4,6 +4,7 @@ use super::refusal::Hypotheses;
 use super::{Agreement, BentPlace, Refusal, Rival};
 use crate::geometry::Pose2;
 use gridweave_runtime::ros::Alignment;
+use nalgebra::Matrix3;
 use std::fmt::Write;
 
 /// A hypothesis, and what the maps say of each other there.
@@ -15,12 +16,15 @@ pub struct Candidate<'a> {
     pub agreement: Agreement,
     /// Where map b lies if it is bent; none if it is rigid.
     pub bent: Option<BentPlace>,
+    /// How far the place of a part of the map may be from where this one has it: the covariance of (x, y, yaw) that the bend of
+    /// the maps leaves, whether it is worth its cost or not; none if it was not looked at.
+    pub left_by_bend: Option<Matrix3<f64>>,
 }
 
 impl<'a> Candidate<'a> {
     /// A hypothesis with map b as it came.
     pub(super) fn rigid(alignment: &'a Alignment, agreement: Agreement) -> Self {
-        Self { alignment, agreement, bent: None }
+        Self { alignment, agreement, bent: None, left_by_bend: None }
     }
 
     /// Where map b lies: `T_a_b`.

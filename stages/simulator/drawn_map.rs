@@ -100,6 +100,7 @@ impl DrawnMapSettings {
             width: self.building_width,
             height: self.building_height,
             room_width: 4.0,
+            room_depth: 6.1,
             corridor_width: 1.8,
             clutter: self.clutter,
         }

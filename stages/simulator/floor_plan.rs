@@ -4,16 +4,15 @@
 //! corridors along y join them. Every room has a door to its corridor, so that every room can be reached. Coordinates
 //! are those of the building: x from 0 to its width, y from 0 to its height, metres.
 
-use super::furniture::{furnish_corridor, furnish_room};
+use super::furniture::{furnish_corridor, furnish_room, shelve_room};
 use super::room::{Door, Room, WALL};
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::Point2;
 use rand::{Rng, RngExt};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
-/// About how deep a band is: a corridor and two rows of rooms, metres.
-const BAND: f64 = 14.0;
 /// A building wider than this has two corridors along y, metres.
 const WIDE: f64 = 30.0;
 
@@ -28,6 +27,15 @@ pub enum Layout {
     Symmetric,
     /// All rooms are alike, but for the furniture.
     Repeated,
+    /// Rooms as in `random`, with rows of shelves all through them instead of furniture, as in a warehouse or a library.
+    Shelves,
+}
+
+impl Layout {
+    /// Whether no two rooms are alike.
+    fn is_random(self) -> bool {
+        matches!(self, Self::Random | Self::Shelves)
+    }
 }
 
 /// What a building is asked to be, metres.
@@ -39,6 +47,8 @@ pub(super) struct BuildingSize {
     pub(super) height: f64,
     /// The mean size of a room along its corridor.
     pub(super) room_width: f64,
+    /// The mean size of a room across it.
+    pub(super) room_depth: f64,
     /// Between the walls of a corridor, centre to centre.
     pub(super) corridor_width: f64,
     /// Pieces of furniture a square metre.
@@ -60,6 +70,8 @@ pub struct FloorPlan {
     pub solids: Vec<Solid>,
     /// How many of the solids, from the first on, are walls.
     pub wall_count: usize,
+    /// Which of the solids are the furniture of each room.
+    pub furniture: Vec<Range<usize>>,
 }
 
 /// A row of rooms on one side of a corridor.
@@ -73,22 +85,24 @@ struct Row {
 impl FloorPlan {
     /// A random building. The limits of [`SimulatorParameters`](super::SimulatorParameters) leave every room about 1.5 m wide and deep, or more.
     pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
-        let BuildingSize { width, height, corridor_width, .. } = *size;
+        let BuildingSize { width, height, room_depth, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);
-        let mut plan = Self { bounds, rooms: Vec::new(), corridors: Vec::new(), solids: Vec::new(), wall_count: 0 };
+        let (rooms, corridors, solids, furniture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut plan = Self { bounds, rooms, corridors, solids, wall_count: 0, furniture };
         for y in [0.0, height] {
             plan.wall_along_x(y, (0.0, width), &[]);
         }
         for x in [0.0, width] {
             plan.wall_along_y(x, (0.0, height), &[]);
         }
-        let bands = (height / BAND).round().max(1.0);
+        // A band is a corridor and two rows of rooms.
+        let bands = (height / (2.0 * room_depth + corridor_width)).round().max(1.0);
         let crossings = crossings(bands as usize, size, random);
         let spans = spans(width, &crossings);
         for band in 0..bands as usize {
             let bottom = height / bands * band as f64;
             let top = height / bands * (band + 1) as f64;
-            let below = if size.layout == Layout::Random { between(random, 0.42, 0.58) } else { 0.5 };
+            let below = if size.layout.is_random() { between(random, 0.42, 0.58) } else { 0.5 };
             let low = bottom + (top - bottom - corridor_width) * below;
             let high = low + corridor_width;
             plan.corridors.push(Rectangle::new(0.0, low, width, high).expanded(-WALL / 2.0));
@@ -115,7 +129,7 @@ impl FloorPlan {
             plan.corridors.push(Rectangle::new(low, 0.0, high, height).expanded(-WALL / 2.0));
         }
         plan.wall_count = plan.solids.len();
-        plan.furnish(size.clutter, random);
+        plan.furnish(size, random);
         plan
     }
 
@@ -135,11 +149,14 @@ impl FloorPlan {
         }
     }
 
-    /// Puts `clutter` pieces of furniture a square metre into the rooms, and pilasters into the corridors.
-    fn furnish(&mut self, clutter: f64, random: &mut impl Rng) {
+    /// Puts furniture into the rooms, and pilasters into the corridors.
+    fn furnish(&mut self, size: &BuildingSize, random: &mut impl Rng) {
         for room in &self.rooms {
-            self.solids.extend(furnish_room(room, clutter, random));
+            let first = self.solids.len();
+            self.solids.extend(furniture_of(room, size, random));
+            self.furniture.push(first..self.solids.len());
         }
+        let clutter = size.clutter;
         let doors: Vec<Door> = self.rooms.iter().flat_map(|room| room.doors.iter().copied()).collect();
         let mut pillars = Vec::new();
         for (index, corridor) in self.corridors.iter().enumerate() {
@@ -152,6 +169,22 @@ impl FloorPlan {
             pillars.extend(furnish_corridor(corridor, &clear, clutter, random));
         }
         self.solids.extend(pillars);
+    }
+
+    /// The same building, with other furniture in a share of its rooms.
+    pub(super) fn rearranged(&self, share: f64, size: &BuildingSize, random: &mut impl Rng) -> Self {
+        let mut plan = Self { solids: self.solids[..self.wall_count].to_vec(), furniture: Vec::new(), ..self.clone() };
+        for (room, furniture) in self.rooms.iter().zip(&self.furniture) {
+            let first = plan.solids.len();
+            match random.random_bool(share) {
+                true => plan.solids.extend(furniture_of(room, size, random)),
+                false => plan.solids.extend_from_slice(&self.solids[furniture.clone()]),
+            }
+            plan.furniture.push(first..plan.solids.len());
+        }
+        let pilasters = self.furniture.last().map_or(self.wall_count, |last| last.end);
+        plan.solids.extend_from_slice(&self.solids[pilasters..]);
+        plan
     }
 
     /// Divides the part of a row between two corridors along y into rooms.
@@ -211,6 +244,14 @@ impl FloorPlan {
     }
 }
 
+/// What stands in a room.
+fn furniture_of(room: &Room, size: &BuildingSize, random: &mut impl Rng) -> Vec<Solid> {
+    match size.layout {
+        Layout::Shelves => shelve_room(room, random),
+        _ => furnish_room(room, size.clutter, random),
+    }
+}
+
 /// What is left of a wall when the gaps of doors are taken out. Its ends reach half a wall further, to close corners.
 fn between_gaps(from: f64, to: f64, doors: &[Door]) -> Vec<(f64, f64)> {
     let mut gaps: Vec<(f64, f64)> = doors.iter().map(Door::gap).collect();
@@ -225,8 +266,8 @@ fn crossings(bands: usize, size: &BuildingSize, random: &mut impl Rng) -> Vec<(f
     let BuildingSize { width, corridor_width, layout, .. } = *size;
     let places: &[(f64, f64)] = match (bands, width > WIDE) {
         (0 | 1, _) => &[],
-        (_, false) if layout != Layout::Random => &[(0.5, 0.5)],
-        (_, true) if layout != Layout::Random => &[(0.3, 0.3), (0.7, 0.7)],
+        (_, false) if !layout.is_random() => &[(0.5, 0.5)],
+        (_, true) if !layout.is_random() => &[(0.3, 0.3), (0.7, 0.7)],
         (_, false) => &[(0.35, 0.65)],
         (_, true) => &[(0.2, 0.35), (0.65, 0.8)],
     };
@@ -266,82 +307,4 @@ fn corridor_door((left, right): (f64, f64), y: f64, random: &mut impl Rng) -> Do
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::PointIndex;
-    use crate::simulator::free_space::FreeSpace;
-    use proptest::prelude::*;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
-    fn size() -> impl Strategy<Value = BuildingSize> {
-        let layout = prop_oneof![Just(Layout::Random), Just(Layout::Symmetric), Just(Layout::Repeated)];
-        (10.0..45.0, 9.0..45.0, 2.5..8.0, 1.4..3.0, 0.0..0.5, layout).prop_map(
-            |(width, height, room_width, corridor_width, clutter, layout)| BuildingSize {
-                width,
-                height,
-                room_width,
-                corridor_width,
-                clutter,
-                layout,
-            },
-        )
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
-        #[test]
-        fn every_room_and_corridor_can_be_reached(size in size(), seed: u64) {
-            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
-            prop_assert!(plan.rooms.len() >= 2);
-            let space = FreeSpace::new(&plan.bounds, &plan.solids, &plan.corridors[0].centre());
-            for area in plan.rooms.iter().map(|room| &room.bounds).chain(&plan.corridors) {
-                let places = space.places_in(area).len();
-                let cells = area.expanded(-0.3).width() * area.expanded(-0.3).height() / 0.01;
-                prop_assert!(places as f64 > 0.15 * cells, "{places} of {cells} cells of {area:?}");
-            }
-        }
-
-        #[test]
-        fn the_building_is_closed_and_its_rooms_do_not_overlap(size in size(), seed: u64) {
-            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
-            let space = FreeSpace::new(&plan.bounds.expanded(1.0), &plan.solids, &plan.corridors[0].centre());
-            for place in space.places_in(&plan.bounds.expanded(2.0)) {
-                prop_assert!(plan.bounds.contains(&place), "{place} is outside");
-            }
-            for (index, room) in plan.rooms.iter().enumerate() {
-                prop_assert!(plan.rooms[..index].iter().all(|other| !other.bounds.overlaps(&room.bounds)));
-                prop_assert!(plan.corridors.iter().all(|corridor| !corridor.overlaps(&room.bounds)));
-                prop_assert!(room.bounds.width() > 1.3 && room.bounds.height() > 1.3, "{:?}", room.bounds);
-            }
-        }
-    }
-
-    #[test]
-    fn a_symmetric_building_is_the_same_after_half_a_turn() {
-        let size = BuildingSize {
-            width: 20.0,
-            height: 15.0,
-            room_width: 4.5,
-            corridor_width: 2.0,
-            clutter: 0.0,
-            layout: Layout::Symmetric,
-        };
-        for seed in 0..5 {
-            let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
-            let space = FreeSpace::new(&plan.bounds, &plan.solids, &plan.corridors[0].centre());
-            let places = space.places_in(&plan.bounds);
-            let turned: Vec<Point2> = places.iter().map(|place| Point2::new(20.0 - place.x, 15.0 - place.y)).collect();
-            let (turned, _) = PointIndex::new(&turned, 0.2);
-            let same = places.iter().filter(|place| turned.nearest(place, 0.11).is_some()).count();
-            assert!(same as f64 > 0.98 * places.len() as f64, "{same} of {}", places.len());
-        }
-    }
-
-    #[test]
-    fn doors_are_gaps_in_walls() {
-        let doors = [3.0, 1.0].map(|x| Door { centre: Point2::new(x, 0.0), width: 1.0, along_x: true });
-        let parts = between_gaps(0.0, 5.0, &doors);
-        assert_eq!(parts, [(-WALL / 2.0, 0.5), (1.5, 2.5), (3.5, 5.0 + WALL / 2.0)]);
-    }
-}
+mod tests;

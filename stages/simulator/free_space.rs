@@ -1,5 +1,6 @@
 //! Where a robot can stand: the distance from the nearest obstacle, on a raster over the building.
 
+use super::floor_plan::FloorPlan;
 use super::shape::{Rectangle, Solid};
 use crate::geometry::Point2;
 use std::collections::VecDeque;
@@ -22,7 +23,13 @@ pub(super) struct FreeSpace {
 }
 
 impl FreeSpace {
-    /// The free space of a building. What can be driven to from near `start` is reachable.
+    /// The free space of a building, as far as it can be driven to from its first corridor.
+    pub(super) fn of(plan: &FloorPlan) -> Self {
+        let entrance = plan.corridors.first().map_or(plan.bounds.centre(), Rectangle::centre);
+        Self::new(&plan.bounds, &plan.solids, &entrance)
+    }
+
+    /// The free space between solids. What can be driven to from near `start` is reachable.
     pub(super) fn new(bounds: &Rectangle, solids: &[Solid], start: &Point2) -> Self {
         let columns = (bounds.width() / CELL).ceil().max(1.0) as usize;
         let rows = (bounds.height() / CELL).ceil().max(1.0) as usize;

@@ -11,6 +11,8 @@ use std::f64::consts::FRAC_PI_2;
 
 /// What a robot passes with ease, metres.
 const PASSAGE: f64 = 0.95;
+/// The least width of the way between shelves and the walls of their room, where doors stay clear, metres.
+const SHELVES_FROM_WALLS: f64 = 1.3;
 /// How often a place is looked for before a piece is given up.
 const TRIES: usize = 8;
 /// Metres of corridor for each pilaster when there is one piece of furniture in 10 square metres.
@@ -36,6 +38,26 @@ pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> 
         }
     }
     pieces.into_iter().map(|(_, solid)| solid).collect()
+}
+
+/// Rows of shelves along the longer side of a room, with aisles between them, ways across, and a way all round. None in a room that
+/// is too small.
+pub(super) fn shelve_room(room: &Room, random: &mut impl Rng) -> Vec<Solid> {
+    let (deep, aisle) = (between(random, 0.4, 1.0), between(random, 1.2, 2.2));
+    let long = between(random, 3.0, 8.0);
+    let inner = room.bounds.expanded(-aisle.max(SHELVES_FROM_WALLS));
+    let is_wide = room.bounds.width() > room.bounds.height();
+    let (along, across) = if is_wide { (inner.width(), inner.height()) } else { (inner.height(), inner.width()) };
+    let (first, side) = (inner.min, |along: f64, across: f64| if is_wide { (along, across) } else { (across, along) });
+    let mut shelves = Vec::new();
+    for row in (0..).map(|row| f64::from(row) * (deep + aisle)).take_while(|row| row + deep <= across) {
+        for start in (0..).map(|shelf| f64::from(shelf) * (long + aisle)).take_while(|start| start + 1.0 <= along) {
+            let (low, high) = (side(start, row), side((start + long).min(along), row + deep));
+            let shelf = Rectangle::new(first.x + low.0, first.y + low.1, first.x + high.0, first.y + high.1);
+            shelves.push(shelf.into());
+        }
+    }
+    shelves
 }
 
 /// Pilasters along the walls of a corridor, outside of what must stay clear.

@@ -1,6 +1,6 @@
 //! A lidar that scans in the plane.
 //!
-//! The model: beams are spread evenly over the full circle, the first one straight ahead. A beam meets the first solid
+//! The model: beams are spread evenly over the field of view, a full circle from straight ahead on, or a sector about it. A beam meets the first solid
 //! in its direction; its range has Gaussian noise of constant deviation. A beam that meets nothing within the lidar's
 //! reach, and one in so many at random, returns nothing. The robot does not move during a scan.
 
@@ -15,6 +15,8 @@ use std::f64::consts::TAU;
 pub(super) struct Lidar {
     /// Beams of one scan.
     pub(super) beams: usize,
+    /// The angle over which they are spread, radians.
+    pub(super) field_of_view: f64,
     /// The longest range, metres.
     pub(super) reach: f64,
     /// Standard deviation of a range, metres.
@@ -38,11 +40,15 @@ impl Lidar {
         beams.clear();
         let origin = Point2::from(pose.translation.vector);
         let heading = pose.rotation.angle();
+        let first = match self.field_of_view < TAU {
+            true => 0.5 * self.field_of_view * (1.0 / self.beams as f64 - 1.0),
+            false => 0.0,
+        };
         for beam in 0..self.beams {
             // Both draws are made for every beam, so that what one beam meets does not change the noise of the others.
             let dropped = random.random::<f64>() < self.dropped;
             let noise: f64 = random.sample(StandardNormal);
-            let angle = TAU * beam as f64 / self.beams as f64;
+            let angle = first + self.field_of_view * beam as f64 / self.beams as f64;
             if let Some(range) = world.cast(&origin, heading + angle, self.reach)
                 && !dropped
             {
@@ -71,7 +77,7 @@ mod tests {
 
     #[test]
     fn beams_meet_the_wall_within_the_noise_and_none_beyond_the_reach() {
-        let beams = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.02, dropped: 0.0 });
+        let beams = scan(&Lidar { beams: 3600, field_of_view: TAU, reach: 10.0, noise: 0.02, dropped: 0.0 });
         let errors: Vec<f64> = beams
             .iter()
             .map(|beam| (beam, (0.5 + beam.angle).cos()))
@@ -84,9 +90,18 @@ mod tests {
     }
 
     #[test]
+    fn the_beams_of_a_sector_lie_evenly_about_straight_ahead() {
+        let beams = scan(&Lidar { beams: 100, field_of_view: 1.0, reach: 30.0, noise: 0.0, dropped: 0.0 });
+        let angles: Vec<f64> = beams.iter().map(|beam| beam.angle).collect();
+        assert_eq!(angles.len(), 100);
+        assert!((angles[0] + 0.495).abs() < 1e-9 && (angles[99] - 0.495).abs() < 1e-9, "{angles:?}");
+    }
+
+    #[test]
     fn as_many_beams_are_dropped_as_asked() {
-        let all = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.0 }).len() as f64;
-        let some = scan(&Lidar { beams: 3600, reach: 10.0, noise: 0.0, dropped: 0.25 }).len() as f64;
+        let all = scan(&Lidar { beams: 3600, field_of_view: TAU, reach: 10.0, noise: 0.0, dropped: 0.0 }).len() as f64;
+        let some =
+            scan(&Lidar { beams: 3600, field_of_view: TAU, reach: 10.0, noise: 0.0, dropped: 0.25 }).len() as f64;
         assert!((some / all - 0.75).abs() < 0.03);
     }
 }

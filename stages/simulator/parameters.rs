@@ -6,7 +6,7 @@ use super::tags::TagReader;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// A map has at most this many cells while it is made.
 const MOST_CELLS: f64 = 6e7;
@@ -20,25 +20,33 @@ pub struct SimulatorParameters {
     /// Size of the building along its corridors, metres, 10 to 300. In a building of the default size three robots
     /// drive for about two minutes; it grows with the floor area that each of them covers.
     pub width: f64,
-    /// Size of the building across its corridors, metres, 9 to 300. There is one corridor in about 14 m.
+    /// Size of the building across its corridors, metres, 9 to 300. There is one corridor for every two rows of rooms.
     pub height: f64,
     /// Mean width of a room, metres, 2.5 to 30.
     pub room_width: f64,
+    /// Mean depth of a room, from its corridor, metres, 4 to 40.
+    pub room_depth: f64,
     /// Width of the corridors, metres, 1.4 to 3.
     pub corridor_width: f64,
     /// Pieces of furniture a square metre of a room, 0 to 1. Where pieces would block a way there are fewer.
     pub clutter: f64,
-    /// How the rooms are laid out: `random`, `symmetric` (a corridor and its rooms look the same after half a turn), or
-    /// `repeated` (all rooms are alike). Furniture is placed at random in all of them.
+    /// How the rooms are laid out: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
+    /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at random in
+    /// all but the last.
     pub layout: Layout,
+    /// Share of the rooms whose furniture stands elsewhere for each robot, 0 to 1.
+    pub moved: f64,
     /// Share of its rooms that a robot has in common with the next one, 0 to 1.
     pub overlap: f64,
     /// Top speed of the robots, metres a second.
     pub speed: f64,
     /// A drive that takes longer is cut off, seconds, up to 7200.
     pub duration: f64,
-    /// Beams of one lidar scan, over a full circle.
+    /// Beams of one lidar scan.
     pub beams: u32,
+    /// The angle about straight ahead over which they are spread, radians, 0.1 to 2 pi: a lidar's full circle, or what a depth
+    /// camera sees.
+    pub field_of_view: f64,
     /// The longest range of the lidar, metres. A beam that meets nothing within it returns nothing.
     pub lidar_range: f64,
     /// Standard deviation of a lidar range, metres.
@@ -53,6 +61,8 @@ pub struct SimulatorParameters {
     pub correction_length: f64,
     /// Metres a cell of the maps. Several values are given to the robots in turn.
     pub resolution: Vec<f64>,
+    /// Share of a map's free cells that are drawn occupied, as people's legs, dust and glass leave them, 0 to 0.1.
+    pub specks: f64,
     /// How many maps each robot sends, growing, at the ends of equal parts of its drive.
     pub snapshots: u32,
     /// The robots' map frames are turned against the walls by at most this, radians. 0 lays all maps along the walls.
@@ -79,19 +89,23 @@ impl Default for SimulatorParameters {
             width: 20.0,
             height: 15.0,
             room_width: 4.5,
+            room_depth: 6.0,
             corridor_width: 2.0,
             clutter: 0.12,
             layout: Layout::Random,
+            moved: 0.0,
             overlap: 0.65,
             speed: 0.7,
             duration: 600.0,
             beams: 360,
+            field_of_view: TAU,
             lidar_range: 12.0,
             lidar_noise: 0.015,
             dropped_beams: 0.02,
             drift: 0.002,
             correction_length: 10.0,
             resolution: vec![0.05],
+            specks: 0.0,
             snapshots: 3,
             map_yaw: PI,
             map_offset: 5.0,
@@ -106,13 +120,14 @@ impl Default for SimulatorParameters {
 
 impl SimulatorParameters {
     pub(super) fn building(&self) -> BuildingSize {
-        let Self { width, height, room_width, corridor_width, clutter, layout, .. } = *self;
-        BuildingSize { width, height, room_width, corridor_width, clutter, layout }
+        let Self { width, height, room_width, room_depth, corridor_width, clutter, layout, .. } = *self;
+        BuildingSize { width, height, room_width, room_depth, corridor_width, clutter, layout }
     }
 
     pub(super) fn lidar(&self) -> Lidar {
         Lidar {
             beams: self.beams as usize,
+            field_of_view: self.field_of_view,
             reach: self.lidar_range,
             noise: self.lidar_noise,
             dropped: self.dropped_beams,
@@ -146,17 +161,21 @@ impl Parameters for SimulatorParameters {
             ("width", self.width, 10.0, 300.0),
             ("height", self.height, 9.0, 300.0),
             ("room_width", self.room_width, 2.5, 30.0),
+            ("room_depth", self.room_depth, 4.0, 40.0),
             ("corridor_width", self.corridor_width, 1.4, 3.0),
             ("clutter", self.clutter, 0.0, 1.0),
+            ("moved", self.moved, 0.0, 1.0),
             ("overlap", self.overlap, 0.0, 1.0),
             ("speed", self.speed, 0.05, 5.0),
             ("duration", self.duration, 1.0, 7200.0),
             ("beams", f64::from(self.beams), 1.0, 10_000.0),
+            ("field_of_view", self.field_of_view, 0.1, TAU),
             ("lidar_range", self.lidar_range, 0.5, 300.0),
             ("lidar_noise", self.lidar_noise, 0.0, 1.0),
             ("dropped_beams", self.dropped_beams, 0.0, 0.99),
             ("drift", self.drift, 0.0, 1.0),
             ("correction_length", self.correction_length, 0.0, 1e6),
+            ("specks", self.specks, 0.0, 0.1),
             ("snapshots", f64::from(self.snapshots), 1.0, 1000.0),
             ("map_yaw", self.map_yaw, 0.0, PI),
             ("map_offset", self.map_offset, 0.0, 1e5),

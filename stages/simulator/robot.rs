@@ -8,13 +8,17 @@ use super::route::plan_route;
 use super::shape::{Rectangle, between};
 use super::tags::TagReading;
 use super::world::{SimulationError, Stream, World};
-use crate::geometry::{Point2, Pose2, pose};
+use crate::geometry::{Point2, Pose2, is_free, pose};
+use rand::{Rng, RngExt};
 use std::ops::Range;
 
 /// Metres a second squared.
 const ACCELERATION: f64 = 0.6;
 /// Radians a second.
 const TURN_RATE: f64 = 1.2;
+
+/// The value of a cell that is drawn occupied by chance, per cent.
+const SPECK: i8 = 100;
 
 /// What one robot has logged, by ticks of [`TICK_SECONDS`](super::TICK_SECONDS) from the start.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +45,8 @@ pub(super) fn simulate_robot(
     parameters: &SimulatorParameters,
 ) -> Result<RobotLog, SimulationError> {
     let name = format!("robot{}", robot + 1);
+    let own_world = (parameters.moved > 0.0).then(|| world.rearranged(robot, parameters));
+    let world = own_world.as_ref().unwrap_or(world);
     let route = plan_route(&world.plan, &world.space, rooms, &mut world.random(Stream::Route(robot)));
     let limits = DriveLimits {
         speed: parameters.speed,
@@ -81,7 +87,7 @@ fn map_building(
     parameters: &SimulatorParameters,
 ) -> Vec<(usize, SnapshotMap)> {
     let lidar = parameters.lidar();
-    let mut random = world.random(Stream::Lidar(robot));
+    let (mut random, mut specks) = (world.random(Stream::Lidar(robot)), world.random(Stream::Specks(robot)));
     let places: Vec<Point2> = poses.iter().map(|pose| Point2::from(pose.translation.vector)).collect();
     let Some(driven) = Rectangle::bounding(&places) else { return Vec::new() };
     let in_sight = lidar.reach.min(world.plan.bounds.width().hypot(world.plan.bounds.height())) + 0.5;
@@ -94,11 +100,23 @@ fn map_building(
         mapper.add_scan(pose, &beams);
         // The last scan of each of the equal parts of the drive; a very short drive sends some maps twice.
         while maps.len() < snapshots && (tick + 1) * snapshots >= true_poses.len() * (maps.len() + 1) {
-            let Some(map) = mapper.snapshot() else { return maps };
+            let Some(mut map) = mapper.snapshot() else { return maps };
+            add_specks(&mut map, parameters.specks, &mut specks);
             maps.push((tick, map));
         }
     }
     maps
+}
+
+/// Draws a share of the free cells occupied.
+fn add_specks(map: &mut SnapshotMap, share: f64, random: &mut impl Rng) {
+    if share > 0.0 {
+        for cell in map.cells.iter_mut().filter(|cell| is_free(**cell)) {
+            if random.random_bool(share) {
+                *cell = SPECK;
+            }
+        }
+    }
 }
 
 fn read_tags(

@@ -5,7 +5,6 @@ use super::free_space::FreeSpace;
 use super::lidar::Lidar;
 use super::mapper::{Mapper, SnapshotMap};
 use super::ray_caster::RayCaster;
-use super::shape::Rectangle;
 use crate::geometry::{GridGeometry, Pose2, pose};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -53,11 +52,10 @@ pub(super) fn scan_building(
     settings: &ScanSettings,
     random: &mut impl Rng,
 ) -> SnapshotMap {
-    let entrance = plan.corridors.first().map_or(plan.bounds.centre(), Rectangle::centre);
-    let places = FreeSpace::new(&plan.bounds, &plan.solids, &entrance).places_in(&plan.bounds);
+    let places = FreeSpace::of(plan).places_in(&plan.bounds);
     let caster = RayCaster::new(&plan.solids);
-    let lidar =
-        Lidar { beams: settings.beams, reach: settings.reach, noise: settings.noise, dropped: settings.dropped };
+    let ScanSettings { beams, reach, noise, dropped, .. } = *settings;
+    let lidar = Lidar { beams, field_of_view: TAU, reach, noise, dropped };
     let mut mapper = Mapper::over(geometry);
     let mut beams = Vec::new();
     let scans = if places.is_empty() { 0 } else { settings.count };

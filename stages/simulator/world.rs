@@ -48,17 +48,31 @@ pub(super) enum Stream {
     Drift(usize),
     Lidar(usize),
     Tags(usize),
+    Specks(usize),
+    Furniture(usize),
 }
 
 impl World {
     pub(super) fn new(parameters: &SimulatorParameters, seed: u64) -> Self {
         let plan = FloorPlan::random(&parameters.building(), &mut random(seed, Stream::Building));
-        let entrance = plan.corridors.first().map_or(plan.bounds.centre(), |corridor| corridor.centre());
-        let space = FreeSpace::new(&plan.bounds, &plan.solids, &entrance);
+        let space = FreeSpace::of(&plan);
         let caster = RayCaster::new(&plan.solids);
         let count = parameters.tags as usize;
         let tags = place_tags(&plan, &space, &caster, count, &mut random(seed, Stream::TagPlaces));
         Self { plan, space, caster, tags, seed }
+    }
+
+    /// The world as it is for one robot, for which furniture of some rooms stands elsewhere; tags are on the walls.
+    pub(super) fn rearranged(&self, robot: usize, parameters: &SimulatorParameters) -> Self {
+        let mut random = self.random(Stream::Furniture(robot));
+        let plan = self.plan.rearranged(parameters.moved, &parameters.building(), &mut random);
+        Self {
+            space: FreeSpace::of(&plan),
+            caster: RayCaster::new(&plan.solids),
+            plan,
+            tags: self.tags.clone(),
+            ..*self
+        }
     }
 
     pub(super) fn random(&self, stream: Stream) -> ChaCha8Rng {
@@ -75,6 +89,9 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
         Stream::Drift(robot) => (4, robot),
         Stream::Lidar(robot) => (5, robot),
         Stream::Tags(robot) => (6, robot),
+        Stream::Specks(robot) => (7, robot),
+        // Behind the streams of the most robots that there are.
+        Stream::Furniture(robot) => (0, 64 + robot),
     };
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(robot as u64 * 8 + purpose);

@@ -6,6 +6,10 @@ use rayon::prelude::*;
 
 /// Rows that one thread takes at a time.
 const ROWS: usize = 32;
+/// Cells of a row whose distances are found together.
+const CHUNK: usize = 32;
+/// So many steps along the row are made before it is asked whether more are needed.
+const TOGETHER: usize = 4;
 
 /// The distance from the centre of each free cell to the centre of the nearest cell that is not free. What lies beyond the
 /// grid is not free.
@@ -17,16 +21,18 @@ pub struct DistanceMap {
 }
 
 impl DistanceMap {
-    /// The exact distances, in a time that grows with the number of cells: along columns first, and from these along rows by
-    /// the lower envelope of parabolas (Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", 2012).
+    /// The exact distances: along columns first, and from these along rows. That is the separation of Felzenszwalb and
+    /// Huttenlocher ("Distance transforms of sampled functions", 2012); but the least along a row is found by looking, as far as
+    /// the distance goes and many cells at a time, which for the distances of buildings is several times as fast as the envelope
+    /// of parabolas.
     pub fn of(space: FreeSpace) -> Self {
         let FreeSpace { window, cells } = space;
         let along_columns = distances_along_columns(&cells, window.stride);
         let mut distances = vec![0.0; cells.len()];
         let rows = distances.par_chunks_mut(window.stride * ROWS).zip(along_columns.par_chunks(window.stride * ROWS));
-        rows.for_each_init(Vec::new, |envelope, (into, from)| {
+        rows.for_each_init(Squares::default, |squares, (into, from)| {
             for (into, from) in into.chunks_exact_mut(window.stride).zip(from.chunks_exact(window.stride)) {
-                distances_of_row(from, into, envelope);
+                distances_of_row(from, into, squares);
             }
         });
         Self { window, distances }
@@ -61,56 +67,62 @@ fn distances_along_columns(cells: &[u8], stride: usize) -> Vec<u16> {
     distances
 }
 
-/// A parabola of the lower envelope: the distances, squared, that one cell of the row stands for.
-#[derive(Clone, Copy)]
-struct Parabola {
-    column: f64,
-    /// Its value at its own column.
-    least: f64,
-    /// From where on it is the lowest.
-    from: f64,
+/// Squared distances along columns of one row, as they are read while distances along the row are found.
+#[derive(Default)]
+struct Squares {
+    /// With as many cells that are not free before the row and behind it as the row has, and [`CHUNK`] more behind it: beyond the
+    /// cells that bound a stretch of free ones, nothing is nearer than they.
+    padded: Vec<f32>,
 }
 
-/// Distances in the plane for a row, from those along columns. Beyond the cells that bound a stretch of free ones, nothing is
-/// nearer than they.
-fn distances_of_row(along_columns: &[u16], distances: &mut [f32], envelope: &mut Vec<Parabola>) {
-    let mut column = 1;
-    while let Some(start) = along_columns[column.min(along_columns.len())..].iter().position(|distance| *distance > 0) {
-        let start = column + start;
-        let length = along_columns[start..].iter().position(|distance| *distance == 0);
-        let end = start + length.unwrap_or(along_columns.len() - start);
-        envelope.clear();
-        for (column, distance) in (start - 1..).zip(&along_columns[start - 1..(end + 1).min(along_columns.len())]) {
-            let distance = f64::from(*distance);
-            append_parabola(envelope, column as f64, distance * distance);
+impl Squares {
+    fn fill(&mut self, along_columns: &[u16]) {
+        let stride = along_columns.len();
+        self.padded.clear();
+        self.padded.resize(3 * stride + CHUNK, 0.0);
+        for (square, distance) in self.padded[stride..].iter_mut().zip(along_columns) {
+            *square = f32::from(*distance) * f32::from(*distance);
         }
-        read_envelope(envelope, start, &mut distances[start..end]);
-        column = end + 1;
     }
 }
 
-fn append_parabola(envelope: &mut Vec<Parabola>, column: f64, least: f64) {
-    let mut from = f64::NEG_INFINITY;
-    while let Some(last) = envelope.last() {
-        let apart = column - last.column;
-        from = 0.5 * (column + last.column) + 0.5 * (least - last.least) / apart;
-        if from > last.from {
-            break;
+/// Distances in the plane for a row, from those along columns: for each cell the least over all cells of the row. Farther cells
+/// are looked at only as long as they can be nearer than what was found, for some cells at a time.
+fn distances_of_row(along_columns: &[u16], distances: &mut [f32], squares: &mut Squares) {
+    let stride = along_columns.len();
+    squares.fill(along_columns);
+    let padded = &squares.padded;
+    for (number, (into, along)) in distances.chunks_mut(CHUNK).zip(along_columns.chunks(CHUNK)).enumerate() {
+        if along.iter().all(|distance| *distance == 0) {
+            continue;
         }
-        envelope.pop();
-        from = f64::NEG_INFINITY;
+        let first = stride + number * CHUNK;
+        let mut least = [0.0; CHUNK];
+        least.copy_from_slice(&padded[first..first + CHUNK]);
+        let mut most = greatest(&least);
+        let mut apart = 1;
+        while apart <= stride && ((apart * apart) as f32) < most {
+            for apart in apart..(apart + TOGETHER).min(stride + 1) {
+                let square = (apart * apart) as f32;
+                let (before, behind) = (&padded[first - apart..][..CHUNK], &padded[first + apart..][..CHUNK]);
+                for ((least, before), behind) in least.iter_mut().zip(before).zip(behind) {
+                    *least = lesser(*least, square + lesser(*before, *behind));
+                }
+            }
+            most = greatest(&least);
+            apart += TOGETHER;
+        }
+        for (distance, least) in into.iter_mut().zip(&least) {
+            *distance = least.sqrt();
+        }
     }
-    envelope.push(Parabola { column, least, from });
 }
 
-fn read_envelope(envelope: &[Parabola], start: usize, distances: &mut [f32]) {
-    let mut number = 0;
-    for (column, distance) in (start..).zip(distances) {
-        let column = column as f64;
-        while envelope.get(number + 1).is_some_and(|next| next.from < column) {
-            number += 1;
-        }
-        let Parabola { column: of, least, .. } = envelope[number];
-        *distance = ((column - of) * (column - of) + least).sqrt() as f32;
-    }
+/// The lesser of two numbers, of which none is not a number: one instruction, many at a time.
+fn lesser(one: f32, other: f32) -> f32 {
+    if one < other { one } else { other }
+}
+
+fn greatest(squares: &[f32; CHUNK]) -> f32 {
+    squares.iter().fold(0.0, |most, square| if *square > most { *square } else { most })
 }

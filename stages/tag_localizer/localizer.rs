@@ -1,11 +1,12 @@
 //! The tags of one robot.
 
 use super::{
-    GridSize, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups, RingProduct, TagLocalizerParameters,
+    GridSize, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups, RingProduct, Sighting, SightingGroups,
+    TagLocalizerParameters, TagMode, largest_variance, read_out,
 };
-use super::{TagMode, read_out};
 use crate::geometry::Point2;
 use gridweave_runtime::message::LogTime;
+use nalgebra::{Matrix2, Rotation2, Vector2};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -14,6 +15,10 @@ const REACH_TOLERANCE: f64 = 4.0;
 /// A tag that was read so lately is not out of reach, seconds: where poses jump to and fro, all tags would else be read
 /// out at every jump, which takes far longer than the drive.
 const LEAST_ABSENCE: f64 = 1.0;
+/// No camera tells where a tag is more exactly, metres: a covariance that says so knows nothing of how the camera is mounted.
+const LEAST_SIGHTING_STDDEV: f64 = 0.01;
+/// No camera sees a tag farther off, metres.
+const FARTHEST: f64 = 1000.0;
 
 /// Localizes all tags of one robot as its poses and readings come in.
 #[derive(Clone, Debug)]
@@ -22,27 +27,38 @@ pub struct TagLocalizer {
     track: PoseTrack,
     tags: BTreeMap<String, Tag>,
     /// Readings that are later than the last pose, by time and then as they came.
-    pending: BTreeMap<(LogTime, u64), RangeReading>,
+    pending: BTreeMap<(LogTime, u64), TagReading>,
     /// How many readings have waited.
     waited: u64,
 }
 
-/// A reading as it comes: when, which tag, how far.
+/// A reading as it comes: when, which tag, and what it says of it.
 #[derive(Clone, Debug, PartialEq)]
-struct RangeReading {
+struct TagReading {
     time: LogTime,
     tag_id: String,
-    range: f64,
+    says: Says,
+    /// Metres.
     stddev: f64,
+}
+
+/// What a reading says of a tag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Says {
+    /// How far it is, metres.
+    Range(f64),
+    /// Where it is from the robot: metres ahead, and to the left.
+    Place(Vector2<f64>),
 }
 
 /// What is known of one tag.
 #[derive(Clone, Debug)]
 struct Tag {
-    /// Where the robot was at the first reading: the middle of the grid.
+    /// Where the robot was when it heard the tag first, or saw it: the middle of the grid.
     first_place: Point2,
     groups: ReadingGroups,
-    /// When, where and how far off the tag was heard last.
+    sightings: SightingGroups,
+    /// When, where and how far off the tag was heard or seen last.
     last: (LogTime, Point2, f64),
     /// Standard deviation of the most exact reading, metres.
     least_stddev: f64,
@@ -58,6 +74,8 @@ pub enum ReadingProblem {
     NoId,
     /// The range is not a positive number.
     NoRange,
+    /// The position is not finite.
+    NoPlace,
     /// The range is beyond the reach of a tag.
     TooFar,
     /// It is older than all poses that are known.
@@ -71,6 +89,7 @@ impl fmt::Display for ReadingProblem {
         f.write_str(match self {
             Self::NoId => "tag readings without a tag id are left out",
             Self::NoRange => "tag readings whose range is no positive number are left out",
+            Self::NoPlace => "tag readings whose position is no finite number are left out",
             Self::TooFar => "tag readings with a range beyond `reach` are left out",
             Self::NoPoseBefore => "tag readings before the robot's first pose are left out",
             Self::PoseTooOld => "tag readings whose last pose is older than `max_pose_age` are left out",
@@ -112,7 +131,35 @@ impl TagLocalizer {
         if range > reach + REACH_TOLERANCE * stddev {
             return Err(ReadingProblem::TooFar);
         }
-        let reading = RangeReading { time, tag_id: tag_id.to_owned(), range, stddev };
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Range(range), stddev })
+    }
+
+    /// Adds where a tag was seen from the robot, metres ahead of it and to its left, with its covariance (zeros if it is not
+    /// known). It waits for the next pose as a range does.
+    pub fn add_sighting(
+        &mut self,
+        time: LogTime,
+        tag_id: &str,
+        place: Vector2<f64>,
+        covariance: &Matrix2<f64>,
+    ) -> Result<(), ReadingProblem> {
+        if tag_id.is_empty() {
+            return Err(ReadingProblem::NoId);
+        }
+        let distance = place.norm();
+        if !(distance.is_finite() && distance < FARTHEST) {
+            return Err(ReadingProblem::NoPlace);
+        }
+        let known = largest_variance(covariance).sqrt();
+        let stddev = match known.is_finite() && known > 0.0 {
+            true => known.max(LEAST_SIGHTING_STDDEV),
+            false => self.parameters.sighting_stddev * distance.max(1.0),
+        };
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Place(place), stddev })
+    }
+
+    fn place_or_wait(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
+        let time = reading.time;
         match self.track.latest_time().is_some_and(|latest| time <= latest) {
             true => self.place(reading),
             false => {
@@ -130,21 +177,35 @@ impl TagLocalizer {
         }
     }
 
-    fn place(&mut self, reading: RangeReading) -> Result<(), ReadingProblem> {
-        let RangeReading { time, tag_id, range, stddev } = reading;
+    fn place(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
+        let TagReading { time, tag_id, says, stddev } = reading;
         let position = self.track.position(time, self.parameters.max_pose_age).map_err(|problem| match problem {
             NoPose::Before => ReadingProblem::NoPoseBefore,
             NoPose::TooOld => ReadingProblem::PoseTooOld,
         })?;
+        let seen = |place| position.place + Rotation2::new(position.yaw) * place;
+        let (first_place, range) = match says {
+            Says::Range(range) => (position.place, range),
+            Says::Place(place) => (seen(place), place.norm()),
+        };
+        // A pose whose rotation is none says nothing of where the robot looks.
+        if !first_place.iter().all(|value| value.is_finite()) {
+            return Err(ReadingProblem::NoPlace);
+        }
         let tag = self.tags.entry(tag_id).or_insert_with(|| Tag {
-            first_place: position.place,
+            first_place,
             groups: ReadingGroups::default(),
+            sightings: SightingGroups::default(),
             last: (time, position.place, range),
             least_stddev: stddev,
             changed: false,
             mode: None,
         });
-        tag.groups.add(&Reading { position, range, stddev }, self.parameters.min_travel);
+        let min_travel = self.parameters.min_travel;
+        match says {
+            Says::Range(range) => tag.groups.add(&Reading { position, range, stddev }, min_travel),
+            Says::Place(place) => tag.sightings.add(&Sighting { position, seen: seen(place), stddev }, min_travel),
+        }
         tag.last = (time, position.place, range);
         tag.least_stddev = tag.least_stddev.min(stddev);
         tag.changed = true;
@@ -174,7 +235,7 @@ impl TagLocalizer {
         let parameters = &self.parameters;
         let mut any = false;
         for tag in self.tags.values_mut() {
-            if tag.changed && tag.groups.readings() >= parameters.min_readings && due(&tag.last) {
+            if tag.changed && tag.readings() >= parameters.min_readings && due(&tag.last) {
                 tag.changed = false;
                 tag.mode = tag.locate(parameters);
                 any = true;
@@ -185,22 +246,39 @@ impl TagLocalizer {
 
     /// The tags that have been read out with the number of their readings, by id.
     pub fn modes(&self) -> impl Iterator<Item = (&str, &TagMode, u32)> {
-        self.tags.iter().filter_map(|(id, tag)| Some((id.as_str(), tag.mode.as_ref()?, tag.groups.readings())))
+        self.tags.iter().filter_map(|(id, tag)| Some((id.as_str(), tag.mode.as_ref()?, tag.readings())))
     }
 }
 
 impl Tag {
+    fn readings(&self) -> u32 {
+        self.groups.readings().saturating_add(self.sightings.sightings())
+    }
+
     fn locate(&self, parameters: &TagLocalizerParameters) -> Option<TagMode> {
         let TagLocalizerParameters { pose_stddev, outlier_share, reach, resolution, readout, position_stddev, .. } =
             *parameters;
-        let product = RingProduct::new(self.groups.rings(pose_stddev), outlier_share, reach);
+        let heading_stddev = parameters.heading_stddev;
+        let rings = self.groups.rings(pose_stddev).chain(self.sightings.rings(pose_stddev, heading_stddev));
+        let product = RingProduct::new(rings, outlier_share, reach);
         let grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
         let mut mode = read_out(&Posterior::new(&product, grid)?, readout, parameters.window_cells(self.least_stddev))?;
-        mode.covariance += self.groups.shared_covariance(pose_stddev);
+        mode.covariance += self.shared_covariance(pose_stddev, heading_stddev);
         for axis in 0..2 {
             mode.covariance[(axis, axis)] += position_stddev * position_stddev;
         }
         Some(mode)
+    }
+
+    /// The error that the poses of all readings may have in common.
+    fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
+        let of_ranges = self.groups.shared_covariance(pose_stddev);
+        let of_sightings = self.sightings.shared_covariance(pose_stddev, heading_stddev);
+        match (self.groups.readings(), self.sightings.sightings()) {
+            (_, 0) => of_ranges,
+            (0, _) => of_sightings,
+            _ => 0.5 * (of_ranges + of_sightings),
+        }
     }
 }
 
@@ -300,6 +378,60 @@ mod tests {
         localizer.add_pose(at(0.5), position(1.0, 0.0), ignore);
         assert_eq!(localizer.tags["tag"].first_place, Point2::new(0.5, 0.0));
         assert!(localizer.read_out_all());
+    }
+
+    /// Drives past the tag, and sees it with noise in the frame of the robot, which turns; hears it as well if `ranges`.
+    fn look(ranges: bool, wrong: usize) -> TagMode {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let noise = Normal::new(0.0, 0.1).unwrap();
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+        for step in 0..30 {
+            let (time, yaw) = (at(0.1 * f64::from(step)), 0.3 * f64::from(step));
+            let place = Point2::new(0.1 * f64::from(step), 0.0);
+            localizer.add_pose(time, Position { yaw, ..Position::new(place) }, |problem| panic!("{problem}"));
+            let mut seen = Rotation2::new(-yaw) * (TAG - place);
+            seen += Vector2::new(noise.sample(&mut random), noise.sample(&mut random));
+            if (step as usize) < wrong {
+                seen = Vector2::new(2.0, -2.0);
+            }
+            localizer.add_sighting(time, "tag", seen, &Matrix2::zeros()).unwrap();
+            if ranges {
+                localizer.add_reading(time, "tag", (TAG - place).norm() + noise.sample(&mut random), 0.1).unwrap();
+            }
+        }
+        assert!(localizer.read_out_all());
+        let (_, mode, readings) = localizer.modes().next().unwrap();
+        assert_eq!(readings, if ranges { 60 } else { 30 });
+        *mode
+    }
+
+    #[test]
+    fn a_tag_that_is_seen_is_where_it_is_and_a_straight_drive_leaves_no_mirror_image() {
+        let (seen, both) = (look(false, 0), look(true, 0));
+        for mode in [&seen, &both] {
+            let error = mode.position - TAG;
+            let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
+            assert!(mode.certainty > 0.8 && squared < 9.0, "{mode:?}");
+        }
+        assert!(both.covariance.trace() < seen.covariance.trace(), "what is heard adds to what is seen");
+    }
+
+    #[test]
+    fn sightings_that_are_wrong_do_not_lead_astray() {
+        let mode = look(false, 5);
+        assert!((mode.position - TAG).norm() < 0.1, "{mode:?}");
+    }
+
+    #[test]
+    fn a_sighting_that_is_none_is_told() {
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+        let mut add = |id: &str, x: f64| localizer.add_sighting(at(0.0), id, Vector2::new(x, 0.0), &Matrix2::zeros());
+        assert_eq!(add("", 1.0), Err(ReadingProblem::NoId));
+        for x in [f64::NAN, f64::INFINITY, 1e200] {
+            assert_eq!(add("tag", x), Err(ReadingProblem::NoPlace));
+        }
+        let odd = Matrix2::new(f64::NAN, 0.0, 0.0, -1.0);
+        assert_eq!(localizer.add_sighting(at(0.0), "tag", Vector2::zeros(), &odd), Ok(()));
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! Where the radio tags are that a robot has heard, told from ranges alone (Tsardoulias et al., section 3).
+//! Where the radio tags are that a robot has heard, told from ranges alone (Tsardoulias et al., section 3), or where it
+//! has seen them.
 //!
 //! Every reading says that the tag lies on a ring round the robot. The rings of all readings of one tag are multiplied
 //! on a grid; what is left after a while is one spot or, after a straight drive, two that mirror each other. The share
 //! of the probability in a small window is the **certainty**: near 1 for one spot, about one half for two.
 //!
 //! - [`ReadingGroups`] joins the readings of one place into one ring, for they share the error of the pose.
+//! - [`SightingGroups`] does the same with positions at which a camera has seen the tag: rings of radius 0.
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
 //! - [`Posterior`] holds the product on the grid. It looks at cells from coarse to fine and drops what cannot matter.
 //! - [`read_out`] finds the window, and the mode that it lies in.
@@ -18,6 +20,7 @@ mod posterior;
 mod read_out;
 mod reading_groups;
 mod ring_product;
+mod sighting_groups;
 mod stage;
 #[cfg(test)]
 mod stage_tests;
@@ -30,4 +33,5 @@ pub use posterior::{GridSize, Leaf, Posterior};
 pub use read_out::{TagMode, read_out};
 pub use reading_groups::{Reading, ReadingGroups};
 pub use ring_product::{Ring, RingProduct};
+pub use sighting_groups::{Sighting, SightingGroups};
 pub use stage::kind;

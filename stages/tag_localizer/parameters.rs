@@ -50,6 +50,11 @@ pub struct TagLocalizerParameters {
     /// an equal chance for every range up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can lead
     /// astray.
     pub outlier_share: f64,
+    /// Standard deviation of a position at which a tag is seen and that brings none, metres at a distance of up to one metre,
+    /// and as much more as the tag is farther off.
+    pub sighting_stddev: f64,
+    /// Standard deviation of the robot's heading, radians: the farther off a tag is seen, the more it moves it.
+    pub heading_stddev: f64,
     /// Least standard deviation of a tag's position, metres: what the grid cannot know, such as the bends of the map.
     pub position_stddev: f64,
     /// A tag of which nothing was heard for so long is out of reach, seconds.
@@ -73,6 +78,8 @@ impl Default for TagLocalizerParameters {
             pose_stddev: 0.02,
             min_travel: 0.1,
             outlier_share: 0.02,
+            sighting_stddev: 0.05,
+            heading_stddev: 0.02,
             position_stddev: 0.02,
             timeout: 2.0,
             max_pose_age: 0.5,
@@ -129,6 +136,8 @@ impl Parameters for TagLocalizerParameters {
         expect(not_negative(self.pose_stddev), "pose_stddev", "must not be below 0 m");
         expect(not_negative(self.min_travel), "min_travel", "must not be below 0 m");
         expect((0.0..=0.5).contains(&self.outlier_share), "outlier_share", "must lie between 0 and 0.5");
+        expect(positive(self.sighting_stddev), "sighting_stddev", "must be above 0 m");
+        expect(not_negative(self.heading_stddev), "heading_stddev", "must not be below 0 radians");
         expect(not_negative(self.position_stddev), "position_stddev", "must not be below 0 m");
         expect(positive(self.timeout), "timeout", "must be above 0 s");
         expect(not_negative(self.max_pose_age), "max_pose_age", "must not be below 0 s");
@@ -165,6 +174,8 @@ mod tests {
             pose_stddev: -0.1,
             min_travel: f64::NAN,
             outlier_share: 0.6,
+            sighting_stddev: 0.0,
+            heading_stddev: f64::NAN,
             position_stddev: -1.0,
             timeout: 0.0,
             max_pose_age: -1.0,
@@ -181,6 +192,8 @@ mod tests {
             "pose_stddev",
             "min_travel",
             "outlier_share",
+            "sighting_stddev",
+            "heading_stddev",
             "position_stddev",
             "timeout",
             "max_pose_age",

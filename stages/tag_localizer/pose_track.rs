@@ -1,6 +1,6 @@
 //! Where a robot was at a time.
 
-use crate::geometry::Point2;
+use crate::geometry::{Point2, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use nalgebra::Matrix2;
 use std::collections::VecDeque;
@@ -15,12 +15,14 @@ pub struct Position {
     pub place: Point2,
     /// Covariance of the place, square metres; zeros if it is not known.
     pub covariance: Matrix2<f64>,
+    /// Its heading, radians, map frame.
+    pub yaw: f64,
 }
 
 impl Position {
     /// A place of which nothing else is known.
     pub fn new(place: Point2) -> Self {
-        Self { place, covariance: Matrix2::zeros() }
+        Self { place, covariance: Matrix2::zeros(), yaw: 0.0 }
     }
 
     /// The position a share of the way from this one to another.
@@ -31,6 +33,7 @@ impl Position {
         Self {
             place: self.place + (other.place - self.place) * share,
             covariance: self.covariance + (other.covariance - self.covariance) * share,
+            yaw: self.yaw + wrap_angle(other.yaw - self.yaw) * share,
         }
     }
 }
@@ -132,6 +135,16 @@ mod tests {
         }
         let between = track.position(at(1.25), 0.5).unwrap().covariance;
         assert!((between - Matrix2::new(0.02, 0.001, 0.001, 0.04)).norm() < 1e-9, "{between}");
+    }
+
+    #[test]
+    fn between_two_poses_the_heading_turns_the_shorter_way() {
+        let mut track = PoseTrack::default();
+        for (seconds, yaw) in [(1.0, 3.0), (2.0, -3.0)] {
+            track.add(at(seconds), Position { yaw, ..position(0.0, 0.0) });
+        }
+        let between = track.position(at(1.5), 0.5).unwrap().yaw;
+        assert!((between - std::f64::consts::PI).abs() < 1e-9, "{between}");
     }
 
     #[test]

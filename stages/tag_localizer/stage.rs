@@ -3,15 +3,19 @@
 use super::{CovarianceProblem, Position, TagLocalizer, TagLocalizerParameters, position_covariance};
 use crate::geometry::Point2;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Header, PoseWithCovarianceStamped, TagEstimate, TagEstimates, TagRange, Time};
+use gridweave_runtime::ros::{
+    Header, PoseWithCovarianceStamped, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
+};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
 /// The stage kind `tag_localizer`.
 pub fn kind() -> StageKind {
     StageKind::stage(
         "tag_localizer",
-        "Locates radio tags in each robot's map from range readings (Tsardoulias et al., section 3). Sends all tags of a \
+        "Locates tags in each robot's map from range readings of radio tags (Tsardoulias et al., section 3), and from \
+         positions at which a camera sees visual ones. Sends all tags of a \
          robot whenever one of them gets out of reach, and at the end.",
         |parameters, _| Ok(TagLocalizerStage { parameters, robots: BTreeMap::new() }),
     )
@@ -21,6 +25,11 @@ pub fn kind() -> StageKind {
         TagLocalizerStage::receive_pose,
     )
     .input("tags", "range readings of tags", TagLocalizerStage::receive_reading)
+    .optional_input(
+        "positions",
+        "positions at which tags are seen from the robots",
+        TagLocalizerStage::receive_position,
+    )
     .finish(TagLocalizerStage::finish)
     .build()
 }
@@ -67,6 +76,17 @@ impl TagLocalizerStage {
     ) -> Result<(), StageError> {
         if let Some(robot) = self.robot(reading.robot(), output) {
             robot.add_reading(&reading, output);
+        }
+        Ok(())
+    }
+
+    fn receive_position(
+        &mut self,
+        position: Received<'_, TagPosition>,
+        output: &Output<Estimates>,
+    ) -> Result<(), StageError> {
+        if let Some(robot) = self.robot(position.robot(), output) {
+            robot.add_position(&position, output);
         }
         Ok(())
     }
@@ -129,7 +149,8 @@ impl Robot {
             )),
             None => {}
         }
-        let position = Position { place, covariance };
+        let yaw = pose.pose.pose.planar().rotation.angle();
+        let position = Position { place, covariance, yaw };
         let time = time_of(header.stamp, pose.log_time());
         if !self.localizer.add_pose(time, position, |problem| output.warn(problem.to_string())) {
             output.warn("poses that are older than the one before are left out");
@@ -143,6 +164,15 @@ impl Robot {
     fn add_reading(&mut self, reading: &Received<'_, TagRange>, output: &Output<Estimates>) {
         let time = time_of(reading.header.stamp, reading.log_time());
         if let Err(problem) = self.localizer.add_reading(time, &reading.tag_id, reading.range, reading.range_stddev) {
+            output.warn(problem.to_string());
+        }
+    }
+
+    fn add_position(&mut self, seen: &Received<'_, TagPosition>, output: &Output<Estimates>) {
+        let time = time_of(seen.header.stamp, seen.log_time());
+        let [xx, xy, yx, yy] = seen.covariance;
+        let (place, covariance) = (Vector2::new(seen.x, seen.y), Matrix2::new(xx, xy, yx, yy));
+        if let Err(problem) = self.localizer.add_sighting(time, &seen.tag_id, place, &covariance) {
             output.warn(problem.to_string());
         }
     }

@@ -50,7 +50,11 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
         assert!(written > 0, "{engine}");
         let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
         assert_eq!(summary.stats.unwrap().message_count, written as u64);
-        let record = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
+        let record = mcap::read::metadata(
+            &bytes,
+            summary.metadata_indexes.iter().find(|index| index.name == "gridweave").unwrap(),
+        )
+        .unwrap();
         assert_eq!(record.metadata["complete"], "false");
         assert_eq!(record.metadata["reason"], "the run was interrupted");
         let info = gridweave(folder.path(), &["info", output.to_str().unwrap()]);

@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod bad_input;
+mod changing_maps;
 mod closed_output;
 mod compare;
 mod containers;
@@ -19,6 +20,8 @@ mod group_mapping;
 mod interrupted;
 mod live;
 mod live_restarts;
+mod log_output;
+mod log_tools;
 mod looking_on;
 mod map_merge;
 mod merge_map_files;
@@ -28,8 +31,13 @@ mod mirrored_tag;
 mod names;
 mod output_files;
 mod processes;
+mod python_libraries;
 mod real_logs;
+mod render;
+mod report;
 mod support;
+mod tags_as_they_come;
+mod telling;
 mod torture;
 mod two_tags;
 mod user_knowledge;

@@ -73,7 +73,9 @@ impl World {
                     let to_base = names.transform(time, "odom", "base_link", pose.pose.planar().into());
                     out.message(seconds, &format!("{}/tf", names.tf), &to_base);
                     let pose = PoseStamped { header: header("map"), ..pose };
-                    out.message(seconds, names.pose, &PoseWithCovarianceStamped::from(pose));
+                    if !names.pose.is_empty() {
+                        out.message(seconds, names.pose, &PoseWithCovarianceStamped::from(pose));
+                    }
                 }
                 TagRange::NAME => {
                     let reading: TagRange = decode(message.data).unwrap();
@@ -179,6 +181,19 @@ fn a_log_for_each_robot_without_names_is_put_under_those_that_are_given() {
     world.run(&["info", "robot1=a.mcap", "robot2=b.mcap"]).assert(0, &["/robot1/map (logged as /map)", "of robot2"]);
     let args = ["merge", "robot1=a.mcap", "robot2=b.mcap", "-o", "a.mcap"];
     world.run(&args).assert(2, &["a.mcap is an input"]);
+}
+
+#[test]
+fn poses_that_are_in_tf_alone_are_found_there() {
+    let world = World::new();
+    let only_tf = Convention { pose: "", ..ALONE };
+    world.write("a.mcap", &[("robot1", &only_tf)]);
+    world.write("b.mcap", &[("robot2", &only_tf)]);
+    world.merge(&["robot1=a.mcap", "robot2=b.mcap"], ["robot1", "robot2"]);
+    let summary = std::fs::read_to_string(world.folder.path().join("summary.json")).unwrap();
+    assert!(summary.contains("tags"), "tags are located by poses of tf: {summary}");
+    let from = "tf (robot1/map to robot1/base_link)";
+    world.run(&["info", "robot1=a.mcap", "robot2=b.mcap"]).assert(0, &[from]);
 }
 
 #[test]

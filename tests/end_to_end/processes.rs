@@ -2,8 +2,8 @@
 //! dies and however.
 
 use crate::support::{
-    DIAMOND, Ended, Running, gridweave_program, left_over, outcome, part, processes, signal, start, start_program,
-    wait_until,
+    DIAMOND, Ended, Running, gridweave_program, left_over, outcome, part, processes, read, signal, start,
+    start_program, wait_until,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -127,7 +127,8 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     let folder = folder();
     let expected = run_diamond(folder.path(), "single", &["source.count=20000", "source.pause=0"]).wait();
     assert_eq!(expected.status, 0, "{expected:#?}");
-    let expected = fs::read(folder.path().join(OUTPUT)).unwrap();
+    // The logs tell of different parameters.
+    let expected = read(&folder.path().join(OUTPUT));
     fs::remove_file(folder.path().join(OUTPUT)).unwrap();
     let run = run_diamond(folder.path(), "processes", &["source.count=20000"]);
     wait_for_output(folder.path());
@@ -139,7 +140,7 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     }
     let ended = run.wait();
     assert_eq!(ended.status, 0, "{ended:#?}");
-    assert!(fs::read(folder.path().join(OUTPUT)).unwrap() == expected);
+    assert!(read(&folder.path().join(OUTPUT)) == expected);
 }
 
 #[test]
@@ -217,7 +218,8 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
     let output = |engine: &str, settings: &[&str]| {
         let ended = run_diamond(folder.path(), engine, settings).wait();
         assert_eq!(ended.status, 0, "{ended:#?}");
-        fs::read(folder.path().join(OUTPUT)).unwrap()
+        // All messages: beside them the logs tell of different parameters.
+        read(&folder.path().join(OUTPUT))
     };
     let base = ["source.count=3000", "source.pause=0", "middle.what=nothing_passes"];
     let expected = output("single", &base);

@@ -13,6 +13,8 @@ const BIG_ENDIAN: [u8; 4] = [0, 0, 0, 0];
 /// The type that has a field more in ROS 1: `uint32 seq`, before all others.
 const HEADER: &str = "std_msgs/Header";
 const SEQ_SIZE: usize = 4;
+const TIME: &str = "builtin_interfaces/Time";
+const SECOND: u64 = 1_000_000_000;
 
 /// Copies messages of one type, field by field.
 #[derive(Clone, Debug)]
@@ -33,8 +35,14 @@ impl Recoder {
         self.schema.types.iter().flat_map(|of| &of.fields).any(is_frame)
     }
 
-    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames. `false`, and nothing is appended, if
-    /// it keeps them all.
+    /// Whether messages say when they were made: in headers.
+    pub fn has_stamps(&self) -> bool {
+        self.schema.types.iter().any(|of| of.name == HEADER)
+    }
+
+    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames, and the stamps of headers later by so many
+    /// nanoseconds (earlier where these are negative). `false`, and nothing is appended, if it keeps them all. A stamp of zero
+    /// stands for no time, and stays.
     ///
     /// # Errors
     /// The message does not fit its schema. What was appended by then is taken back.
@@ -42,14 +50,15 @@ impl Recoder {
         &self,
         message: &[u8],
         rename: &dyn Fn(&str) -> Cow<'_, str>,
+        later: i64,
         copy: &mut Vec<u8>,
     ) -> Result<bool, DecodeError> {
         let reader = || CdrReader::new(message).ok_or(DecodeError::Encapsulation);
         // Most messages name few frames, and are long.
-        if !self.walk(reader()?, rename, None)? {
+        if !self.walk(reader()?, rename, later, None)? {
             return Ok(false);
         }
-        self.walk(reader()?, rename, Some(copy))
+        self.walk(reader()?, rename, later, Some(copy))
     }
 
     /// Appends a message that is encoded as in ROS 1 to `copy`, as little-endian CDR. The schema is that of ROS 2, in which a
@@ -58,7 +67,7 @@ impl Recoder {
     /// # Errors
     /// The message does not fit its schema. What was appended by then is taken back.
     pub fn append_ros1(&self, message: &[u8], copy: &mut Vec<u8>) -> Result<(), DecodeError> {
-        self.walk(CdrReader::ros1(message), &|frame| Cow::Borrowed(frame), Some(copy)).map(|_| ())
+        self.walk(CdrReader::ros1(message), &|frame| Cow::Borrowed(frame), 0, Some(copy)).map(|_| ())
     }
 
     /// Walks over the fields, and appends them to `copy` if there is one. Whether a frame got another name.
@@ -66,6 +75,7 @@ impl Recoder {
         &self,
         mut reader: CdrReader<'_>,
         rename: &dyn Fn(&str) -> Cow<'_, str>,
+        later: i64,
         mut copy: Option<&mut Vec<u8>>,
     ) -> Result<bool, DecodeError> {
         let big_endian = reader.is_big_endian();
@@ -75,7 +85,7 @@ impl Recoder {
             copy.extend_from_slice(if big_endian { &BIG_ENDIAN } else { &LITTLE_ENDIAN });
         }
         let body = copy.as_ref().map_or(0, |copy| copy.len());
-        let mut walk = Walk { schema: &self.schema, rename, is_renamed: false };
+        let mut walk = Walk { schema: &self.schema, rename, later, is_renamed: false };
         let mut writer = Writer { bytes: copy, body, big_endian };
         let Some(root) = self.schema.root() else { return Ok(false) };
         walk.message(root, &mut reader, &mut writer).map_err(|(path, fault)| {
@@ -98,6 +108,7 @@ type Fault = (String, DecodeFault);
 struct Walk<'a> {
     schema: &'a Schema,
     rename: &'a dyn Fn(&str) -> Cow<'_, str>,
+    later: i64,
     is_renamed: bool,
 }
 
@@ -137,6 +148,9 @@ impl Walk<'_> {
             Element::Message(index) => {
                 let schema = self.schema;
                 let of = schema.types.get(index).ok_or_else(|| own(DecodeFault::End))?;
+                if self.later != 0 && field.name == "stamp" && of.name == TIME && field.count == Count::One {
+                    return self.stamp(reader, writer).map_err(own);
+                }
                 (0..count).try_for_each(|_| self.message(of, reader, writer))
             }
             Element::Primitive(Primitive::Text) if is_frame(field) => (0..count).try_for_each(|_| {
@@ -162,6 +176,24 @@ impl Walk<'_> {
                 Ok(())
             }
         }
+    }
+
+    /// Copies a stamp, moved.
+    fn stamp(&mut self, reader: &mut CdrReader<'_>, writer: &mut Writer<'_>) -> Result<(), DecodeFault> {
+        let (seconds, nanoseconds) = (reader.number::<4, u32>()?, reader.number::<4, u32>()?);
+        let moved = match (seconds, nanoseconds) {
+            (0, 0) => (0, 0),
+            // Seconds are signed, but no log is from before 1970.
+            _ => {
+                let time = u64::from(seconds) * SECOND + u64::from(nanoseconds);
+                let moved = time.saturating_add_signed(self.later);
+                (u32::try_from(moved / SECOND).unwrap_or(u32::MAX), (moved % SECOND) as u32)
+            }
+        };
+        self.is_renamed |= moved != (seconds, nanoseconds);
+        writer.u32(moved.0);
+        writer.u32(moved.1);
+        Ok(())
     }
 }
 

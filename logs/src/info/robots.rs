@@ -2,7 +2,7 @@
 
 use super::LogInfo;
 use crate::schemas::full_type_name;
-use crate::source::{Classified, RobotChannels, Role};
+use crate::source::{Classified, InferredPoses, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance};
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
@@ -17,8 +17,13 @@ pub struct RobotInfo {
     pub topics: BTreeSet<String>,
     /// How many maps there are.
     pub maps: u64,
+    /// How many updates of parts of maps there are.
+    pub map_updates: u64,
     /// How many poses there are, or can be made from other messages.
     pub poses: u64,
+    /// What they are taken from: a topic, or frames of tf; `None` if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poses_from: Option<String>,
     /// How many range readings of tags there are.
     pub readings: u64,
     /// The tags that were read, and how often.
@@ -42,6 +47,9 @@ pub(super) struct RobotSurvey {
     other_maps: BTreeSet<String>,
     robots: BTreeMap<String, RobotInfo>,
     tf: Option<TfPoses>,
+    inferred: InferredPoses,
+    /// By topic.
+    tag_readers: BTreeMap<String, TagReader>,
     /// Messages that do not fit their type, by topic.
     unreadable: BTreeMap<String, u64>,
 }
@@ -49,8 +57,11 @@ pub(super) struct RobotSurvey {
 impl RobotSurvey {
     /// For logs with these channels.
     pub(super) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
+        let roles = RobotChannels::new(topics.clone(), channels);
         Self {
-            roles: RobotChannels::new(topics.clone(), channels),
+            inferred: InferredPoses::new(&roles),
+            tag_readers: BTreeMap::new(),
+            roles,
             tf: topics.tf.clone().map(TfPoses::new),
             topics,
             mismatches: BTreeSet::new(),
@@ -64,6 +75,10 @@ impl RobotSurvey {
     pub(super) fn classify(&mut self, channel: &Channel) -> (Role, String) {
         let Classified { role, robot, mismatch } = self.roles.classify(channel);
         self.mismatches.extend(mismatch);
+        if role == Role::TagMessage {
+            let reader = self.roles.tag_reader(channel);
+            self.tag_readers.extend(reader.map(|reader| (channel.topic.clone(), reader)));
+        }
         match role {
             Role::Other if full_type_name(&channel.schema_name) == OccupancyGrid::NAME => {
                 self.other_maps.insert(channel.topic.clone());
@@ -76,6 +91,15 @@ impl RobotSurvey {
         (role, robot.to_owned())
     }
 
+    /// Whether it matters what the frames in a message of this role and robot are called.
+    pub(super) fn looks_at_frames(&self, role: Role, robot: &str) -> bool {
+        match role {
+            Role::Tf | Role::Odometry => true,
+            Role::Map => self.inferred.asks_for_map(robot),
+            _ => false,
+        }
+    }
+
     /// Takes up a message on a channel with the given role, robot and topic.
     pub(super) fn take(&mut self, role: Role, robot: &str, topic: &str, data: &[u8]) {
         if role == Role::Tf {
@@ -83,8 +107,26 @@ impl RobotSurvey {
         }
         let Some(info) = self.robots.get_mut(robot) else { return };
         match role {
-            Role::Map => info.maps += 1,
-            Role::Pose(_) => info.poses += 1,
+            Role::Map => {
+                info.maps += 1;
+                if self.inferred.asks_for_map(robot)
+                    && let Ok(map) = decode::<OccupancyGrid<'_>>(data)
+                {
+                    self.inferred.set_map_frame(robot, &map.header.frame_id);
+                }
+            }
+            Role::MapUpdate => info.map_updates += 1,
+            Role::Pose(_) => {
+                info.poses += 1;
+                info.poses_from.get_or_insert_with(|| topic.to_owned());
+            }
+            Role::Odometry => {
+                match pose_with_covariance(PoseSource::Odometry, data).map(|pose| decode::<Header>(&pose)) {
+                    Ok(Ok(header)) if self.inferred.takes_odometry(robot, topic, &header.frame_id) => info.poses += 1,
+                    Ok(_) => {}
+                    Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
+                }
+            }
             Role::Tags => {
                 info.readings += 1;
                 match decode::<TagRangeStart>(data) {
@@ -92,19 +134,50 @@ impl RobotSurvey {
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
                 }
             }
+            Role::TagMessage => match self.tag_readers.get(topic).map(|reader| reader.read(robot, data)) {
+                Some(Ok(message)) => {
+                    info.readings += message.readings.len() as u64;
+                    for reading in message.readings {
+                        *info.tags.entry(reading.tag_id).or_default() += 1;
+                    }
+                }
+                Some(Err(_)) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
+                None => {}
+            },
             Role::Topology | Role::Tf | Role::Other => {}
         }
     }
 
+    /// Counts messages with the given role, robot and topic that were not looked into.
+    pub(super) fn add(&mut self, role: Role, robot: &str, topic: &str, messages: u64) {
+        let Some(info) = self.robots.get_mut(robot) else { return };
+        match role {
+            Role::Map => info.maps += messages,
+            Role::MapUpdate => info.map_updates += messages,
+            Role::Pose(_) => info.poses += messages,
+            Role::Odometry if info.poses_from.as_deref() == Some(topic) => info.poses += messages,
+            // A message of tags holds one reading or more.
+            Role::Tags | Role::TagMessage => info.readings += messages,
+            _ => {}
+        }
+    }
+
     fn take_tf(&mut self, prefix: &str, topic: &str, data: &[u8]) {
-        let Some(tf) = &mut self.tf else { return };
         let Ok(message) = decode::<TFMessage>(data) else {
             *self.unreadable.entry(topic.to_owned()).or_default() += 1;
             return;
         };
-        for (robot, _) in tf.update(prefix, is_static(topic), &message).0 {
-            let info = self.robots.entry(robot).or_default();
+        let (poses, _) = match &mut self.tf {
+            Some(tf) => tf.update(prefix, is_static(topic), &message),
+            None => self.inferred.transforms(prefix, is_static(topic), &message),
+        };
+        for (robot, _) in poses {
+            let info = self.robots.entry(robot.clone()).or_default();
             info.poses += 1;
+            if let (None, Some(frames)) = (&info.poses_from, &self.topics.tf) {
+                let [map, base] = [&frames.map_frame, &frames.base_frame].map(|frame| frame.replace("{robot}", &robot));
+                info.poses_from = Some(format!("tf ({map} to {base})"));
+            }
             if !info.topics.contains(topic) {
                 info.topics.insert(topic.to_owned());
             }
@@ -143,8 +216,12 @@ impl RobotSurvey {
         if let [robot] = robots.keys().collect::<Vec<_>>()[..] {
             problems.push(format!("there is one robot only, {robot}: nothing to merge"));
         }
-        let lacking = |what: fn(&RobotInfo) -> u64| {
-            let names = robots.iter().filter(|(_, robot)| what(robot) == 0).map(|(name, _)| name.as_str());
+        let told = self.inferred.missing();
+        let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {
+            let lacks = |(name, robot): &(&String, &RobotInfo)| {
+                what(robot) == 0 && !(kind == "pose" && told.contains_key(name.as_str()))
+            };
+            let names = robots.iter().filter(lacks).map(|(name, _)| name.as_str());
             names.collect::<Vec<_>>().join(", ")
         };
         type Lacking = (&'static str, fn(&RobotInfo) -> u64);
@@ -154,16 +231,20 @@ impl RobotSurvey {
             ("tag reading", |robot: &RobotInfo| robot.readings),
         ];
         for (what, count) in kinds {
-            let names = lacking(count);
+            let names = lacking(what, count);
             let already_told = what == "map" && robots.values().all(|robot| robot.maps == 0);
             if !names.is_empty() && !already_told {
                 problems.push(format!("there is no {what} of {names}"));
             }
         }
+        problems.extend(told.into_values());
         problems
     }
 
-    pub(super) fn into_robots(self) -> BTreeMap<String, RobotInfo> {
+    pub(super) fn into_robots(mut self) -> BTreeMap<String, RobotInfo> {
+        for (robot, info) in &mut self.robots {
+            info.poses_from = info.poses_from.take().or_else(|| self.inferred.origin(robot));
+        }
         self.robots
     }
 }

@@ -81,3 +81,91 @@ fn a_log_whose_run_ended_early_says_so() {
         assert_eq!(said, expected.is_some(), "{:?}", info.problems);
     }
 }
+
+#[test]
+fn where_poses_come_from_is_told() {
+    use gridweave_runtime::message::LogTime;
+    use gridweave_runtime::ros::{Header, Odometry, PoseWithCovariance, TFMessage, TransformStamped};
+    let mut log = TestLog::new(layouts()[3].clone());
+    let header = |frame: &str| Header::new(LogTime(1), frame);
+    for robot in ["robot1", "robot2", "robot3"] {
+        let map = OccupancyGrid { header: header("map"), ..Default::default() };
+        log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, 1, &map);
+    }
+    let child_frame_id = "base_link".to_owned();
+    let transforms = vec![TransformStamped { header: header("map"), child_frame_id, ..Default::default() }];
+    log.add("/robot1/tf", TFMessage::NAME, 2, &TFMessage { transforms });
+    for (robot, frame) in [("robot2", "map"), ("robot3", "odom")] {
+        let pose = PoseWithCovariance::default();
+        let odometry = Odometry { header: header(frame), pose, ..Default::default() };
+        log.add(&format!("/{robot}/odom"), Odometry::NAME, 3, &odometry);
+    }
+    let info = inspect_bytes(&log.finish());
+    let from =
+        ["robot1", "robot2", "robot3"].map(|robot| (info.robots[robot].poses, info.robots[robot].poses_from.clone()));
+    let said = |text: &str| Some(text.to_owned());
+    assert_eq!(from, [(1, said("tf (robot1/map to robot1/base_link)")), (1, said("/robot2/odom")), (0, None)]);
+    let problem = "`/robot3/odom` is in the frame `robot3/odom`, which is not that of the map, `robot3/map`";
+    assert!(info.problems.iter().any(|said| said.contains(problem)), "{:?}", info.problems);
+    assert_eq!(inspect_bytes(&two_robots().finish()).robots["robot1"].poses_from, said("/robot1/pose"));
+}
+
+#[test]
+fn a_log_of_tags_without_maps_is_told_from_others() {
+    let folder = Folder::new();
+    let alone = |name: &str, fill: &dyn Fn(&mut TestLog)| {
+        let mut log = TestLog::new(layouts()[3].clone());
+        fill(&mut log);
+        let input = Input { robot: None, path: folder.write(name, &log.finish()) };
+        holds_tags_alone(&[input], &NameRules::default(), &RobotTopics::default()).unwrap()
+    };
+    let add_tags = |log: &mut TestLog| {
+        log.add("/robot1/tag_ranges", TagRange::NAME, 1, &reading("a"));
+    };
+    let add_map = |log: &mut TestLog| {
+        log.add("/robot2/map", OccupancyGrid::NAME, 1, &OccupancyGrid::default());
+    };
+    assert!(alone("tags.mcap", &add_tags));
+    assert!(!alone("map.mcap", &add_map));
+    assert!(!alone("both.mcap", &|log| {
+        add_tags(log);
+        add_map(log);
+    }));
+    assert!(!alone("nothing.mcap", &|_| ()));
+    let nowhere = Input { robot: None, path: "/nowhere/a.mcap".into() };
+    assert!(holds_tags_alone(&[nowhere], &NameRules::default(), &RobotTopics::default()).is_err());
+}
+
+#[test]
+fn at_a_glance_a_log_with_an_index_tells_the_same_as_when_it_is_read_through() {
+    let folder = Folder::new();
+    let mut log = TestLog::new(mcap::WriteOptions::new().chunk_size(Some(2000)));
+    for number in 0..400_u64 {
+        let at = LogTime(1_000_000_000 * (10 + number + number / 200));
+        let header = gridweave_runtime::ros::Header::new(at, "robot1/map");
+        log.add("/robot1/pose", PoseStamped::NAME, at.0, &PoseStamped { header, ..Default::default() });
+        if number % 100 == 50 {
+            log.add("/robot2/map", OccupancyGrid::NAME, at.0, &OccupancyGrid::default());
+        }
+    }
+    let path = folder.write("a.mcap", &log.finish());
+    let inputs = [Input { robot: None, path: path.clone() }];
+    let read = |large: u64| look(&inputs, &NameRules::default(), &RobotTopics::default(), large).unwrap();
+    let (through, glance) = (read(u64::MAX), read(0));
+    assert!(glance.is_sampled && !through.is_sampled);
+    assert_eq!(glance.robots, through.robots);
+    assert_eq!((glance.messages, glance.start, glance.end), (through.messages, through.start, through.end));
+    let [map, pose] = [1, 0].map(|topic| (&glance.topics[topic], &through.topics[topic]));
+    let nearly = |bytes: u64| (bytes + 5) / 10;
+    for (glance, through) in [map, pose] {
+        assert_eq!(nearly(glance.bytes), nearly(through.bytes));
+        assert_eq!(&TopicInfo { bytes: through.bytes, clock: through.clock, ..glance.clone() }, through);
+    }
+    assert_eq!(pose.0.largest_gap, 2.0);
+
+    // One that is cut has no index to go by.
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes.truncate(bytes.len() - 20);
+    std::fs::write(&path, bytes).unwrap();
+    assert!(!read(0).is_sampled);
+}

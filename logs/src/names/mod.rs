@@ -10,6 +10,7 @@
 
 mod alike;
 mod channel;
+mod clock;
 mod error;
 mod input;
 mod naming;
@@ -26,9 +27,11 @@ pub use rename::TopicRename;
 pub use rules::{Convention, NameRules};
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};
+use crate::source::map_file::robot_names;
 use channel::NamedChannel;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -49,15 +52,28 @@ pub struct Names {
 pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<(LogReader, Names), NameError> {
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
     let (input_of, files): (Vec<usize>, Vec<PathBuf>) = log_files(&paths)?.into_iter().unzip();
-    let files: Vec<LogFile> = files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?;
-    let names = naming::name(&files, &input_of, inputs, rules, robots)?;
+    let mut files: Vec<LogFile> = files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?;
+    clock::align(&mut files, &input_of, rules.align_start);
+    let inputs = name_maps(&files, &input_of, inputs)?;
+    let names = naming::name(&files, &input_of, &inputs, rules, robots)?;
     Ok((LogReader::new(files), names))
+}
+
+/// The inputs, and with map files the robots that are called as they are, where nothing else was said.
+fn name_maps(files: &[LogFile], input_of: &[usize], inputs: &[Input]) -> Result<Vec<Input>, NameError> {
+    let mut named = inputs.to_vec();
+    for (_, &input) in files.iter().zip(input_of).filter(|(file, _)| file.is_map()) {
+        if let Some(input) = named.get_mut(input).filter(|input| input.robot.is_none()) {
+            input.robot = robot_names(std::slice::from_ref(&input.path))?.pop();
+        }
+    }
+    Ok(named)
 }
 
 impl Names {
     /// The channel with the given number in a file, as it is called here; none if its file does not describe it.
     pub fn channel(&self, file: usize, number: u16) -> Option<&Channel> {
-        self.named(file, number).map(|named| &named.channel)
+        self.of_number(file, number).map(|named| &named.channel)
     }
 
     /// All channels, as they are called here.
@@ -67,7 +83,7 @@ impl Names {
 
     /// Whether the rules ask for the messages of a channel.
     pub fn wants(&self, file: usize, number: u16) -> bool {
-        self.named(file, number).is_none_or(|named| named.is_wanted)
+        self.of_number(file, number).is_none_or(|named| named.is_wanted)
     }
 
     /// The robot that all of a file was put under.
@@ -82,18 +98,31 @@ impl Names {
 
     /// Why the frames in the messages of a channel stay as they were logged, although others get their robot's name.
     pub fn frames_left(&self, file: usize, number: u16) -> Option<String> {
-        self.named(file, number)?.frames_left()
+        self.of_number(file, number)?.frames_left()
+    }
+
+    /// What a frame is called here that messages of a channel name.
+    pub fn frame<'a>(&self, file: usize, number: u16, frame: &'a str) -> Cow<'a, str> {
+        self.of_number(file, number).map_or(Cow::Borrowed(frame), |named| named.frame(frame))
     }
 
     /// Puts the frames in a message under its robot. Where that changes anything, the message is in `copy`.
     pub(crate) fn rename_frames(&self, message: &LogMessage<'_>, copy: &mut Vec<u8>) -> Renamed {
-        match self.named(message.file, message.channel) {
+        match self.of_number(message.file, message.channel) {
             Some(named) => named.rename_frames(message.data, copy),
             None => Renamed::AsLogged,
         }
     }
 
-    fn named(&self, file: usize, number: u16) -> Option<&NamedChannel> {
+    /// A message with the names that its frames have here; where these are others than in the log, in `copy`.
+    pub fn named<'a>(&self, message: &LogMessage<'a>, copy: &'a mut Vec<u8>) -> &'a [u8] {
+        match self.rename_frames(message, copy) {
+            Renamed::Copied => copy,
+            Renamed::AsLogged | Renamed::Unreadable => message.data,
+        }
+    }
+
+    fn of_number(&self, file: usize, number: u16) -> Option<&NamedChannel> {
         self.channels.get(file)?.get(&number)
     }
 }

@@ -39,6 +39,8 @@ pub(super) fn name(
         Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
         Convention::ByRobot => alike::name(inputs, &of_inputs, robots)?,
     };
+    let remark = [remark, named_already(inputs, &of_inputs, rules, robots)];
+    let remark = remark.into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
     let robot_of_file: Vec<Option<String>> =
         input_of.iter().map(|&input| of_input.get(input).cloned().flatten()).collect();
     put_under_robots(&mut drafts, &robot_of_file, rules);
@@ -51,17 +53,40 @@ pub(super) fn name(
     let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
     for Draft { file, number, channel, robot, .. } in drafts {
         let classified = roles.classify(&channel);
-        let is_map = classified.role == Role::Map;
+        let is_map = matches!(classified.role, Role::Map | Role::MapUpdate);
         // The frame of a robot's map, and of its poses in it, is the robot's in any case.
-        let is_robots = is_map || matches!(classified.role, Role::Pose(_));
+        let is_robots = is_map || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage);
         let by_role = is_robots && rules.convention == Convention::ByRobot;
         let robot = robot.or(by_role.then(|| classified.robot.to_owned())).unwrap_or_default();
         let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));
         if let Some(of_file) = channels.get_mut(file) {
-            of_file.insert(number, NamedChannel::new(channel, robot, is_map, is_wanted));
+            let later = files.get(file).map_or(0, LogFile::later);
+            of_file.insert(number, NamedChannel::new(channel, robot, is_map, later, is_wanted));
         }
     }
     Ok(Names { channels, robots: robot_of_file, remark })
+}
+
+/// What is wrong where a log was said to be one robot's, and names other robots itself: under one more name its maps are nobody's.
+fn named_already(
+    inputs: &[Input],
+    of_inputs: &[Vec<&Channel>],
+    rules: &NameRules,
+    robots: &RobotTopics,
+) -> Option<String> {
+    let of_input = |(input, channels): (&Input, &Vec<&Channel>)| {
+        let robot = input.robot.as_ref().filter(|_| rules.convention == Convention::ByRobot)?;
+        let roles = RobotChannels::new(robots.clone(), channels.iter().copied());
+        let maps = || channels.iter().map(|channel| roles.classify(channel)).filter(|found| found.role == Role::Map);
+        let named: BTreeSet<&str> = maps().map(|found| found.robot).filter(|named| named != robot).collect();
+        let (path, first) = (input.path.display(), named.first()?);
+        Some(format!(
+            "the topics of {path} bear the names of their robots already ({}), and get `{robot}` before them: give it without \
+             `{robot}=`, or say `--rename /{first}/map=/map` to make one of them {robot}'s",
+            named.iter().copied().collect::<Vec<_>>().join(", ")
+        ))
+    };
+    inputs.iter().zip(of_inputs).find_map(of_input)
 }
 
 /// The channels of all files, with the topics that the user wants them to have.

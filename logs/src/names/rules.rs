@@ -29,6 +29,8 @@ pub struct NameRules {
     pub robots: Vec<String>,
     /// The topics that are read, `{robot}` standing for any one part; all if there are none.
     pub topics: Vec<String>,
+    /// Whether the clocks of all logs are set so that they begin together.
+    pub align_start: bool,
 }
 
 impl NameRules {

@@ -1,6 +1,7 @@
 //! The colours of a picture.
 
 use super::layer::Coverage;
+use crate::drawing::Colour;
 use image::Rgb;
 
 pub(super) const UNKNOWN: Rgb<u8> = Rgb([205, 205, 205]);
@@ -9,25 +10,10 @@ pub(super) const OCCUPIED: Rgb<u8> = Rgb([0, 0, 0]);
 /// What lies behind the maps of an overlay: lighter, so that the tints stand out.
 const BACKGROUND: Rgb<u8> = Rgb([218, 218, 218]);
 
-/// Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008), those that are dark enough
-/// for lines on white first.
-const PALETTE: [Rgb<u8>; 6] = [
-    Rgb([0, 114, 178]),
-    Rgb([213, 94, 0]),
-    Rgb([0, 158, 115]),
-    Rgb([204, 121, 167]),
-    Rgb([230, 159, 0]),
-    Rgb([86, 180, 233]),
-];
 /// How much of a map's colour its free space has.
 const TINT: f64 = 0.2;
 /// How much darker walls are that two maps have in common.
 const SHADOW: f64 = 0.45;
-
-/// The colour (red, green, blue) of the map at a place in the list; after six they start again.
-pub fn robot_colour(index: usize) -> [u8; 3] {
-    PALETTE[index % PALETTE.len()].0
-}
 
 /// `share`, 0 to 1, of the way from one colour to another.
 pub(super) fn mix(from: Rgb<u8>, to: Rgb<u8>, share: f64) -> Rgb<u8> {
@@ -36,10 +22,9 @@ pub(super) fn mix(from: Rgb<u8>, to: Rgb<u8>, share: f64) -> Rgb<u8> {
 }
 
 /// The mean of the maps' colours, each with its weight, and the sum of the weights.
-fn weighted_mean(weights: impl Iterator<Item = f64>) -> Option<(Rgb<u8>, f64)> {
+fn weighted_mean(weights: impl Iterator<Item = (Colour, f64)>) -> Option<(Rgb<u8>, f64)> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
-    for (index, weight) in weights.enumerate() {
-        let colour = robot_colour(index);
+    for (colour, weight) in weights {
         sum.iter_mut().zip(colour).for_each(|(sum, channel)| *sum += weight * f64::from(channel));
         total += weight;
     }
@@ -47,13 +32,14 @@ fn weighted_mean(weights: impl Iterator<Item = f64>) -> Option<(Rgb<u8>, f64)> {
 }
 
 /// The colour of a pixel of an overlay.
-pub(super) fn overlay(shares: &[Coverage]) -> Rgb<u8> {
+pub(super) fn overlay(shares: &[Coverage], colours: &[Colour]) -> Rgb<u8> {
     let mut colour = BACKGROUND;
-    if let Some((tint, total)) = weighted_mean(shares.iter().map(|share| share.free)) {
+    let with_colours = |part: fn(&Coverage) -> f64| colours.iter().copied().zip(shares.iter().map(part));
+    if let Some((tint, total)) = weighted_mean(with_colours(|share| share.free)) {
         // What one map knows has its colour; what several know is nearly white, so that the overlap shows.
         colour = mix(colour, mix(FREE, tint, TINT / total.max(1.0).powi(3)), total);
     }
-    if let Some((walls, total)) = weighted_mean(shares.iter().map(|share| share.wall)) {
+    if let Some((walls, total)) = weighted_mean(with_colours(|share| share.wall)) {
         let strongest = shares.iter().map(|share| share.wall).fold(0.0, f64::max);
         let common = total - strongest;
         colour = mix(colour, mix(walls, OCCUPIED, SHADOW * common.min(1.0)), strongest);

@@ -1,51 +1,82 @@
-//! Axes, margin and scale bar.
+//! Axes, marks, margin, scale bar and legend.
 
-use super::colour::{OCCUPIED, mix};
+use super::grid_lines::grid_lines;
+use super::legend::{Entry, Legend};
+use super::marks::text_size;
 use super::view::View;
-use image::{Rgb, RgbImage};
+use super::{Cells, Picture, PictureError, Scene};
+use crate::drawing::{Colour, Drawing, Group, Path, text, text_width};
+use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 
-const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
-const X_AXIS: Rgb<u8> = Rgb([200, 30, 30]);
-const Y_AXIS: Rgb<u8> = Rgb([30, 150, 30]);
+const INK: Colour = [0, 0, 0];
+const X_AXIS: Colour = [200, 30, 30];
+const Y_AXIS: Colour = [30, 150, 30];
 
 /// A length for lines and gaps that suits the size of the picture, pixels.
 pub(super) fn unit(view: &View) -> f64 {
     (f64::from(view.width.max(view.height)) / 500.0).max(1.0)
 }
 
-/// Draws the axes of the world at its origin, x red and y green.
-pub(super) fn draw_axes(image: &mut RgbImage, view: &View) {
+/// The maps with all that is drawn on them and beside them.
+pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<Picture, PictureError> {
+    let unit = unit(view).round();
+    let (margin, size) = (8.0 * unit, text_size(unit));
+    let corner = Vector2::new(margin, margin);
+    let lines = scene.grid.map(|metres| grid_lines(view, metres)).transpose()?;
+
+    let mut groups: Vec<Group> = lines.iter().map(|lines| lines.draw(view, corner)).collect();
+    groups.extend(axes(view, corner));
+    groups.extend(scene.marks.iter().map(|marks| marks.draw(view, corner)));
+
+    let maps = scene.maps.iter().filter(|map| scene.cells == Cells::Coloured && !map.name.is_empty());
+    let mut entries: Vec<Entry<'_>> = maps.map(|map| Entry { words: map.name, colour: map.colour }).collect();
+    for marks in scene.marks.iter().chain(&lines) {
+        if let Some(colour) = marks.legend {
+            let entry = Entry { words: &marks.name, colour };
+            // Marks of one sort may come in several groups.
+            if !entries.iter().any(|other| other.words == entry.words) {
+                entries.push(entry);
+            }
+        }
+    }
+
+    let bar = ScaleBar::new(f64::from(map.width()), view.metres_per_pixel);
+    let longest = entries.iter().map(|entry| Legend::length(entry.words, size)).fold(0.0, f64::max);
+    let inner = f64::from(map.width()).max(longest).max(bar.width(size)).ceil();
+    let top = 2.0 * margin + f64::from(map.height());
+    let line = top + size;
+    let left = margin + bar.width(size) + 2.0 * size;
+    let right = margin + inner + 0.5 * size;
+    let mut legend = Legend { size, next: Point2::new(left, line), left: margin, right, paths: Vec::new() };
+    entries.iter().for_each(|entry| legend.add(entry));
+    groups.push(Group { name: "scale".into(), is_on_image: false, paths: bar.draw(margin, line, size, unit) });
+    let bottom = legend.next.y;
+    groups.push(Group { name: "legend".into(), is_on_image: false, paths: legend.paths });
+
+    let (width, height) = ((inner + 2.0 * margin) as u32, (bottom + margin).ceil() as u32);
+    let image_at = (margin as u32, margin as u32);
+    let drawing = Drawing { width, height, image: map, image_at, groups };
+    Ok(Picture { drawing, metres_per_pixel: view.metres_per_pixel, scale_bar: bar.metres })
+}
+
+/// The axes of the world at its origin, x red and y green; none if it lies far beyond the picture.
+fn axes(view: &View, corner: Vector2<f64>) -> Option<Group> {
     let unit = unit(view);
     let origin = view.pixel(Point2::origin());
-    if !(origin.x.abs() < 1e6 && origin.y.abs() < 1e6) {
-        return;
+    if !(origin.x.abs() < 1e5 && origin.y.abs() < 1e5) {
+        return None;
     }
-    for (direction, colour) in [(Vector2::x(), X_AXIS), (-Vector2::y(), Y_AXIS)] {
+    let origin = origin + corner;
+    let axis = |direction: Vector2<f64>, colour: Colour| {
         let tip = origin + direction * 22.0 * unit;
         let side = Vector2::new(direction.y, direction.x) * 3.5 * unit;
         let barb = tip - direction * 6.0 * unit;
-        for (from, to) in [(origin, tip), (barb + side, tip), (barb - side, tip)] {
-            draw_line(image, from, to, 2.0 * unit, colour);
-        }
-    }
-}
-
-/// A line with round ends, its edges smoothed.
-pub(super) fn draw_line(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, thickness: f64, colour: Rgb<u8>) {
-    let reach = thickness / 2.0 + 1.0;
-    let low = |a: f64, b: f64| (a.min(b) - reach).max(0.0) as u32;
-    let high = |a: f64, b: f64, limit: u32| ((a.max(b) + reach).max(0.0) as u32).min(limit);
-    let along = to - from;
-    for v in low(from.y, to.y)..high(from.y, to.y, image.height()) {
-        for u in low(from.x, to.x)..high(from.x, to.x, image.width()) {
-            let offset = Point2::new(f64::from(u) + 0.5, f64::from(v) + 0.5) - from;
-            let share = (offset.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let distance = (offset - along * share).norm();
-            let pixel = image.get_pixel_mut(u, v);
-            *pixel = mix(*pixel, colour, thickness / 2.0 + 0.5 - distance);
-        }
-    }
+        [[origin, tip], [barb + side, tip], [barb - side, tip]]
+            .map(|ends| Path::lines(ends).stroked(colour, 2.0 * unit))
+    };
+    let paths = [axis(Vector2::x(), X_AXIS), axis(-Vector2::y(), Y_AXIS)].concat();
+    Some(Group { name: "axes of the world".into(), is_on_image: true, paths })
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is not above `limit`, and into how many parts it is divided.
@@ -58,30 +89,45 @@ fn round_length(limit: f64) -> (f64, u32) {
     }
 }
 
-/// The picture in a white margin with a scale bar below it, and the length of the bar in metres.
-///
-/// The bar's parts are black and white in turn.
-pub(super) fn frame_with_scale_bar(map: &RgbImage, view: &View) -> (RgbImage, f64) {
-    let unit = unit(view).round();
-    let (margin, thickness) = ((8.0 * unit) as u32, (4.0 * unit) as u32);
-    let foot = 2 * margin + thickness;
-    let (width, height) = (map.width() + 2 * margin, map.height() + margin + foot);
-    let mut image = RgbImage::from_pixel(width, height, PAPER);
-    image::imageops::replace(&mut image, map, i64::from(margin), i64::from(margin));
+/// A length for people, as in `2.5 m`.
+pub(super) fn length_text(metres: f64) -> String {
+    // Without the last digits of what is no round number to the machine.
+    format!("{} m", (metres * 1e6).round() / 1e6 + 0.0)
+}
 
-    let (length, parts) = round_length(f64::from(map.width()) * view.metres_per_pixel / 3.0);
-    let (left, top) = (margin, margin + map.height() + margin);
-    let pixels = length / view.metres_per_pixel;
-    let border = (unit as u32).max(1);
-    for u in 0..(pixels.round() as u32).min(map.width()) {
-        let part = (f64::from(u) / pixels * f64::from(parts)) as u32;
-        for v in 0..thickness {
-            let on_border = v < border || v + border >= thickness || u + border >= pixels.round() as u32;
-            let colour = if part.is_multiple_of(2) || on_border { OCCUPIED } else { PAPER };
-            image.put_pixel(left + u, top + v, colour);
-        }
+/// A bar of a round length, its parts black and white in turn, and that length beside it.
+struct ScaleBar {
+    metres: f64,
+    pixels: f64,
+    parts: u32,
+    words: String,
+}
+
+impl ScaleBar {
+    fn new(map_width: f64, metres_per_pixel: f64) -> Self {
+        let (metres, parts) = round_length(map_width * metres_per_pixel / 3.0);
+        Self { metres, pixels: metres / metres_per_pixel, parts, words: length_text(metres) }
     }
-    (image, length)
+
+    /// With the words, pixels.
+    fn width(&self, size: f64) -> f64 {
+        self.pixels + 0.6 * size + text_width(&self.words, size)
+    }
+
+    /// At the left of a line that words stand on.
+    fn draw(&self, left: f64, line: f64, size: f64, unit: f64) -> Vec<Path> {
+        let (top, bottom) = (line - 0.6 * size, line - 0.6 * size + 4.0 * unit);
+        let part = |from: f64, to: f64| {
+            Path::area([(from, top), (to, top), (to, bottom), (from, bottom)].map(|(x, y)| Point2::new(left + x, y)))
+        };
+        let ends = |index: u32| self.pixels * f64::from(index) / f64::from(self.parts);
+        let black = (0..self.parts).step_by(2).map(|index| part(ends(index), ends(index + 1)).filled(INK));
+        let mut paths: Vec<Path> = black.collect();
+        paths.push(part(0.0, self.pixels).stroked(INK, unit * 0.6));
+        let start = Point2::new(left + self.pixels + 0.6 * size, line);
+        paths.push(text(&self.words, start, size).filled(INK));
+        paths
+    }
 }
 
 #[cfg(test)]
@@ -95,5 +141,10 @@ mod tests {
         for (length, expected) in lengths.into_iter().zip(expected) {
             assert!((length - expected).abs() < 1e-9 * expected, "{length} instead of {expected}");
         }
+    }
+
+    #[test]
+    fn lengths_are_told_without_needless_digits() {
+        assert_eq!([20.0, 0.1 + 0.2, 0.05, -0.0].map(length_text), ["20 m", "0.3 m", "0.05 m", "0 m"]);
     }
 }

@@ -1,6 +1,7 @@
 //! A map in a picture.
 
 use super::view::View;
+use crate::drawing::Colour;
 use gridweave_runtime::ros::MapMetaData;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -8,6 +9,10 @@ use nalgebra::{Isometry2, Point2, Vector2};
 /// A map, and where it lies.
 #[derive(Clone, Copy, Debug)]
 pub struct MapLayer<'a> {
+    /// What the legend calls it, if anything: the name of its robot.
+    pub name: &'a str,
+    /// Of its walls, where maps are told apart by colour; see [`robot_colour`](super::robot_colour).
+    pub colour: Colour,
     /// Size, resolution and origin.
     pub info: MapMetaData,
     /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied.

@@ -1,81 +1,121 @@
 //! Pictures of maps for people: one map in grey, or the maps of several robots laid over each other, each in a colour
-//! of its own.
+//! of its own, with whatever else there is to show on them.
 //!
 //! North of a picture is the y axis of the world. A picture shows the axes of the world at its origin (x red, y green)
-//! and, below the map, a scale bar of a round length.
+//! and, below the map, a scale bar of a round length with that length, and what the colours stand for. It is written as PNG, SVG
+//! or PDF.
 
 mod colour;
 mod decoration;
 mod difference;
 mod error;
+mod grid_lines;
 mod layer;
+mod legend;
+mod marks;
 mod sink;
 mod view;
 mod ways;
 
-pub use colour::robot_colour;
 pub use difference::render_difference;
 pub use error::PictureError;
+pub use gridweave_runtime::robot_colour::robot_colour;
 pub use layer::MapLayer;
-pub use sink::kind;
-pub use ways::Ways;
+pub use marks::{Mark, Marks, Shape};
+pub use sink::{check_format, kind};
+pub use ways::ways;
 
+use crate::drawing::Drawing;
 use crate::file::replace;
 use colour::{FREE, OCCUPIED, UNKNOWN};
-use image::{ImageFormat, Rgb, RgbImage};
+use image::RgbImage;
 use layer::{Coverage, PlacedLayer};
 use rayon::prelude::*;
-use std::io::Cursor;
 use std::path::Path;
 use view::View;
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scene<'a> {
+    /// The maps.
+    pub maps: &'a [MapLayer<'a>],
+    /// How their cells are drawn.
+    pub cells: Cells,
+    /// What is drawn on them, one upon the other.
+    pub marks: &'a [Marks],
+    /// Draws a line every so many metres.
+    pub grid: Option<f64>,
+}
+
+/// How the cells of maps are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cells {
+    /// Unknown cells grey, free ones white, occupied ones black; of the first map only.
+    #[default]
+    Grey,
+    /// Walls in the colour of their map, free space in a light tint of it. Where walls of two maps meet, the colour is darker.
+    Coloured,
+}
 
 /// A picture, and what it takes to read it.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// The pixels. No side is longer than 2400 but for the margin.
-    pub image: RgbImage,
+    /// The maps, and all that is drawn on them and beside them. No side of the maps is longer than 2400 pixels.
+    pub drawing: Drawing,
     /// Metres a pixel.
     pub metres_per_pixel: f64,
     /// The length of the scale bar, metres.
     pub scale_bar: f64,
 }
 
+/// The formats of a picture, by the endings of file names.
+pub const FORMATS: [&str; 3] = ["png", "svg", "pdf"];
+
 impl Picture {
-    /// The picture as a PNG file.
-    pub fn png(&self) -> Result<Vec<u8>, PictureError> {
-        let mut bytes = Cursor::new(Vec::new());
-        self.image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| PictureError::Png(error.to_string()))?;
-        Ok(bytes.into_inner())
+    /// Draws a scene.
+    ///
+    /// # Errors
+    /// A map is none, nothing is known, or the lines of the grid would be too many.
+    pub fn of(scene: &Scene<'_>) -> Result<Self, PictureError> {
+        let colours: Vec<_> = scene.maps.iter().map(|map| map.colour).collect();
+        let (image, view) = match scene.cells {
+            Cells::Grey => render(&scene.maps[..scene.maps.len().min(1)], |shares| {
+                let Coverage { wall, free } = shares.first().copied().unwrap_or_default();
+                colour::mix(colour::mix(UNKNOWN, FREE, free), OCCUPIED, wall)
+            })?,
+            Cells::Coloured => render(scene.maps, |shares| colour::overlay(shares, &colours))?,
+        };
+        decoration::decorate(image, &view, scene)
     }
 
-    /// Writes the picture as a PNG file.
-    pub fn save_png(&self, path: &Path) -> Result<(), PictureError> {
-        let png = self.png()?;
-        Ok(replace(&[(path, &png)])?)
+    /// The picture as a file, in the format that the ending of its name says: see [`FORMATS`].
+    ///
+    /// # Errors
+    /// The ending is none of these, or the picture is too large.
+    pub fn encode(&self, path: &Path) -> Result<Vec<u8>, PictureError> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        Ok(match ending.as_str() {
+            "png" => self.drawing.png()?,
+            "svg" => self.drawing.svg()?.into_bytes(),
+            "pdf" => self.drawing.pdf()?,
+            _ => return Err(PictureError::Format(path.to_owned())),
+        })
     }
-}
 
-/// One map: unknown cells grey, free ones white, occupied ones black.
-pub fn render_map(map: &MapLayer<'_>) -> Result<Picture, PictureError> {
-    render(std::slice::from_ref(map), &[], |shares| {
-        let Coverage { wall, free } = shares.first().copied().unwrap_or_default();
-        colour::mix(colour::mix(UNKNOWN, FREE, free), OCCUPIED, wall)
-    })
-}
-
-/// The maps of several robots, each where its pose puts it: walls in the colour that [`robot_colour`] gives the map by
-/// its place in the list, free space in a light tint of it. Where walls of two maps meet, the colour is darker.
-/// Topological maps are drawn on top.
-pub fn render_overlay(maps: &[MapLayer<'_>], ways: &[Ways<'_>]) -> Result<Picture, PictureError> {
-    render(maps, ways, colour::overlay)
+    /// Writes the picture to a file, in the format that the ending of its name says: see [`FORMATS`].
+    ///
+    /// # Errors
+    /// The ending is none of these, the picture is too large, or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), PictureError> {
+        Ok(replace(&[(path, &self.encode(path)?)])?)
+    }
 }
 
 /// Draws the maps; `paint` gives the colour of a pixel from the share of walls and free space that each map has in it.
 fn render(
     maps: &[MapLayer<'_>],
-    ways: &[Ways<'_>],
-    paint: impl Fn(&[Coverage]) -> Rgb<u8> + Sync,
-) -> Result<Picture, PictureError> {
+    paint: impl Fn(&[Coverage]) -> image::Rgb<u8> + Sync,
+) -> Result<(RgbImage, View), PictureError> {
     let layers: Vec<PlacedLayer<'_>> = maps
         .iter()
         .enumerate()
@@ -96,10 +136,7 @@ fn render(
             pixel.copy_from_slice(&paint(&shares).0);
         }
     });
-    ways.iter().for_each(|ways| ways.draw(&mut image, &view));
-    decoration::draw_axes(&mut image, &view);
-    let (image, scale_bar) = decoration::frame_with_scale_bar(&image, &view);
-    Ok(Picture { image, metres_per_pixel: view.metres_per_pixel, scale_bar })
+    Ok((image, view))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The stage `picture_sink`.
 
-use super::{MapLayer, Picture, PictureError, Ways, render_map, render_overlay};
+use super::{Cells, FORMATS, MapLayer, Marks, Picture, PictureError, Scene, robot_colour, ways};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, TopologicalMap};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
@@ -8,13 +8,14 @@ use nalgebra::Isometry2;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 /// The parameters of `picture_sink`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PictureParameters {
-    /// The PNG file to write. A file that has this name is replaced.
+    /// The file to write: PNG, SVG or PDF by its ending. A file that has this name is replaced.
     file: PathBuf,
 }
 
@@ -48,10 +49,10 @@ impl PictureSink {
     fn new(PictureParameters { file }: PictureParameters, context: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
             let doing = format!("draw the picture of stage `{}`", context.stage);
-            return Err(
-                StageError::new(doing, "it has no file").with_help("give --picture FILE.png or file = \"FILE.png\"")
-            );
+            return Err(StageError::new(doing, "it has no file")
+                .with_help("give --picture FILE.png (or .svg, .pdf) or file = \"FILE.png\""));
         }
+        check_format(&file).map_err(|error| StageError::new("draw the merged map", error))?;
         Ok(Self { file, maps: BTreeMap::new(), frames: RobotFrames::default(), topologies: BTreeMap::new() })
     }
 
@@ -72,7 +73,7 @@ impl PictureSink {
 
     fn write(&mut self, output: &Output<()>) -> Result<(), StageError> {
         if self.maps.contains_key("") {
-            let written = self.draw().and_then(|picture| picture.save_png(&self.file));
+            let written = self.draw().and_then(|picture| picture.save(&self.file));
             written.map_err(|error| StageError::new("draw the merged map", error))?;
             output.count("files", 1);
         }
@@ -80,25 +81,42 @@ impl PictureSink {
     }
 
     fn draw(&self) -> Result<Picture, PictureError> {
-        let robots: Vec<MapLayer<'_>> =
-            self.maps.iter().filter(|(robot, _)| !robot.is_empty()).filter_map(|(_, map)| layer(map)).collect();
-        match self.maps.get("").and_then(layer) {
-            Some(merged) if robots.is_empty() => render_map(&merged),
-            _ => render_overlay(&robots, &self.ways()),
+        let of_robots = self.maps.iter().filter(|(robot, _)| !robot.is_empty());
+        let robots: Vec<MapLayer<'_>> = of_robots
+            .enumerate()
+            .filter_map(|(index, (robot, map))| Some(MapLayer { colour: robot_colour(index), ..layer(robot, map)? }))
+            .collect();
+        let merged = self.maps.get("").and_then(|map| layer("", map));
+        match merged {
+            Some(merged) if robots.is_empty() => Picture::of(&Scene { maps: &[merged], ..Scene::default() }),
+            _ => {
+                let marks = self.ways();
+                Picture::of(&Scene { maps: &robots, cells: Cells::Coloured, marks: &marks, grid: None })
+            }
         }
     }
 
-    fn ways(&self) -> Vec<Ways<'_>> {
+    fn ways(&self) -> Vec<Marks> {
         let placed = self.frames.frames.iter().filter_map(|frame| {
             let map = self.topologies.get(&frame.robot)?;
-            Some(Ways { map, transform_world_map: frame.transform_reference_robot() })
+            Some(ways(map, &frame.transform_reference_robot()))
         });
         placed.collect()
     }
 }
 
+/// An error, at the start of a run and not at its end, if the ending of a picture's name says no format that is written.
+///
+/// # Errors
+/// It does.
+pub fn check_format(path: &Path) -> Result<(), PictureError> {
+    let is_known = |ending: &OsStr| FORMATS.iter().any(|format| ending.eq_ignore_ascii_case(format));
+    if path.extension().is_some_and(is_known) { Ok(()) } else { Err(PictureError::Format(path.to_owned())) }
+}
+
 /// None for a map that cannot be read, which was warned of when it came.
-fn layer(message: &Message) -> Option<MapLayer<'_>> {
+fn layer<'a>(name: &'a str, message: &'a Message) -> Option<MapLayer<'a>> {
     let grid: OccupancyGrid<'_> = message.decode().ok()?;
-    Some(MapLayer { info: grid.info, cells: grid.cells(), transform_world_map: Isometry2::identity() })
+    let (colour, transform_world_map) = (robot_colour(0), Isometry2::identity());
+    Some(MapLayer { name, colour, info: grid.info, cells: grid.cells(), transform_world_map })
 }

@@ -1,49 +1,29 @@
 //! Topological maps in a picture.
 
-use super::decoration::{draw_line, unit};
-use super::view::View;
+use super::marks::{Mark, Marks, Shape};
+use crate::drawing::Colour;
 use gridweave_runtime::ros::TopologicalMap;
-use image::{Rgb, RgbImage};
 use nalgebra::{Isometry2, Point2};
 
-const WAY: Rgb<u8> = Rgb([40, 40, 160]);
-const DOOR: Rgb<u8> = Rgb([220, 120, 0]);
-const JUNCTION: Rgb<u8> = Rgb([200, 30, 30]);
-const PLACE: Rgb<u8> = Rgb([20, 20, 20]);
+const WAY: Colour = [40, 40, 160];
+const DOOR: Colour = [220, 120, 0];
+const JUNCTION: Colour = [200, 30, 30];
+const PLACE: Colour = [20, 20, 20];
 
-/// A topological map, and where it lies: ways blue, doors orange, junctions red and other places black.
-#[derive(Clone, Copy, Debug)]
-pub struct Ways<'a> {
-    /// The places and the ways between them.
-    pub map: &'a TopologicalMap,
-    /// The pose of the map's frame in the world of the picture.
-    pub transform_world_map: Isometry2<f64>,
-}
-
-impl Ways<'_> {
-    pub(super) fn draw(&self, image: &mut RgbImage, view: &View) {
-        let unit = unit(view);
-        // What is no number, or lies far beyond the picture, is not drawn.
-        let pixel = |x: f64, y: f64| {
-            let pixel = view.pixel(self.transform_world_map * Point2::new(x, y));
-            (pixel.x.abs() < 1e5 && pixel.y.abs() < 1e5).then_some(pixel)
+/// A topological map by the pose of its frame in the world: ways blue, doors orange, junctions red and other places black.
+pub fn ways(map: &TopologicalMap, transform_world_map: &Isometry2<f64>) -> Marks {
+    let world = |x: f64, y: f64| transform_world_map * Point2::new(x, y);
+    let paths = map.paths.iter().map(|path| {
+        let places = path.points.iter().map(|point| world(point.x, point.y)).collect();
+        Mark { shape: Shape::Line { places, width: 1.2 }, paint: WAY.into() }
+    });
+    let nodes = map.nodes.iter().map(|node| {
+        let colour = match node.kind.as_str() {
+            "door" => DOOR,
+            "junction" => JUNCTION,
+            _ => PLACE,
         };
-        for path in &self.map.paths {
-            for pair in path.points.windows(2) {
-                if let (Some(from), Some(to)) = (pixel(pair[0].x, pair[0].y), pixel(pair[1].x, pair[1].y)) {
-                    draw_line(image, from, to, 1.2 * unit, WAY);
-                }
-            }
-        }
-        for node in &self.map.nodes {
-            let colour = match node.kind.as_str() {
-                "door" => DOOR,
-                "junction" => JUNCTION,
-                _ => PLACE,
-            };
-            if let Some(at) = pixel(node.x, node.y) {
-                draw_line(image, at, at, 4.0 * unit, colour);
-            }
-        }
-    }
+        Mark { shape: Shape::Dot { at: world(node.x, node.y), width: 4.0 }, paint: colour.into() }
+    });
+    Marks { name: "ways and places".into(), legend: Some(WAY), marks: paths.chain(nodes).collect() }
 }

@@ -57,6 +57,17 @@ impl Ahead {
         Self { files, order, next: 0, begun: VecDeque::new(), begun_bytes: 0, depth: threads + 1 }
     }
 
+    /// Leaves all blocks out but the first and the last `count` of each file, and those in which a channel begins.
+    pub(crate) fn sample(&mut self, count: usize) {
+        let files = Arc::clone(&self.files);
+        let is_taken = |id: &BlockId| {
+            let Some(layout) = files.get(id.file).map(|file| &file.layout) else { return false };
+            let begins = || layout.index.values().any(|channel| channel.block == id.block);
+            id.block < count || id.block + count >= layout.blocks.len() || begins()
+        };
+        self.order.retain(is_taken);
+    }
+
     /// The least log time in the block that [`take`](Self::take) gives next.
     pub(crate) fn next_time(&self) -> Option<u64> {
         let id = self.begun.front().map(|begun| begun.id).or_else(|| self.order.get(self.next).copied())?;

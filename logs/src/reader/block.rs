@@ -78,11 +78,11 @@ impl Block {
         };
         let index = Index::of(&records, self.may_be_cut())?;
         if !index.may_be_packed {
-            return Ok(LoadedBlock { records, messages: index.messages, lost });
+            return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0 });
         }
         let records = unpack_messages(&records, definitions)?;
         let messages = Index::of(&records, self.may_be_cut())?.messages;
-        Ok(LoadedBlock { records, messages, lost })
+        Ok(LoadedBlock { records, messages, lost, later: 0 })
     }
 
     /// Reads the block through for what its header does not say, or does not say reliably.
@@ -123,6 +123,8 @@ pub(crate) struct LoadedBlock {
     messages: Vec<MessagePlace>,
     /// How many messages of the block could not be read.
     pub(crate) lost: u64,
+    /// By how much its clock is set later, nanoseconds.
+    later: i64,
 }
 
 /// Where a message lies in its block.
@@ -163,13 +165,23 @@ impl Index {
 }
 
 impl LoadedBlock {
+    /// Sets the times of its messages later, or earlier where `later` is negative.
+    pub(crate) fn set_later(&mut self, later: i64) {
+        self.later = later;
+    }
+
     /// The log time of the message with the given index.
     pub(crate) fn time(&self, index: usize) -> Option<u64> {
-        self.messages.get(index).map(|place| place.log_time)
+        self.messages.get(index).map(|place| place.log_time.saturating_add_signed(self.later))
     }
 
     /// The message with the given index.
     pub(crate) fn message(&self, index: usize) -> Option<MessageRecord<'_>> {
-        MessageRecord::parse(record_at(&self.records, self.messages.get(index)?.position)?.body)
+        let message = MessageRecord::parse(record_at(&self.records, self.messages.get(index)?.position)?.body)?;
+        Some(MessageRecord {
+            log_time: message.log_time.saturating_add_signed(self.later),
+            publish_time: message.publish_time.saturating_add_signed(self.later),
+            ..message
+        })
     }
 }

@@ -136,6 +136,14 @@ pub(crate) fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFau
     Ok(buffer)
 }
 
+/// The contents of one or more streams of bzip2, at most `size` bytes and one more.
+pub(crate) fn decompress_bz2(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = reserve(size, data)?;
+    let decoder = bzip2::read::MultiBzDecoder::new(data);
+    decoder.take(size.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
+    Ok(buffer)
+}
+
 /// What a reader gives until it fails, its input ends, or it has given `most` bytes.
 fn read_cut(decoder: std::io::Result<impl Read>, most: u64) -> Vec<u8> {
     let mut buffer = Vec::new();

@@ -75,6 +75,9 @@ pub enum Damage {
         /// The other file.
         rest: String,
     },
+    /// An attachment was left out.
+    #[error("an attachment was skipped: it is not whole, or its checksum is wrong")]
+    BadAttachment,
     /// A chunk holds messages that are older than its header and its index both say.
     #[error("a message was found out of order, because the index of its chunk is wrong; it was given a later log time")]
     LateMessage,
@@ -96,7 +99,7 @@ pub enum ChunkFault {
     #[error("it cannot be decompressed")]
     Decompression,
     /// It is compressed in a way that this program does not know.
-    #[error("its compression `{0}` is not known (none, lz4 and zstd are; `rosbag decompress` unpacks a ROS 1 bag)")]
+    #[error("its compression `{0}` is not known (none, lz4 and zstd are, and bz2 in a ROS 1 bag)")]
     UnknownCompression(String),
     /// It does not consist of whole records.
     #[error("it does not consist of whole records")]

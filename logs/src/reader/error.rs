@@ -53,6 +53,14 @@ pub enum ReadError {
         /// What the operating system says.
         cause: std::io::Error,
     },
+    /// A map file cannot be read.
+    #[error("{cause}")]
+    Map {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
+    },
     /// A database is none of rosbag2, or too damaged.
     #[error("{}: the database cannot be read: {cause}", .path.display())]
     Database {

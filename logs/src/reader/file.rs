@@ -4,14 +4,18 @@ use super::bytes::FileBytes;
 use super::damage::Damage;
 use super::error::ReadError;
 use super::guess::looks_like;
-use super::layout::Layout;
+use super::layout::{IndexedChannel, Layout};
+use super::map;
 use super::packed::{Unpacked, ZSTD_MAGIC, unpack_file};
 use super::ros1::{self, Bag};
 use super::sqlite::{self, Database};
 use super::storage::Storage;
+use super::summary::Statistics;
+use crate::supplement::SupplementKind;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// As much of a file is looked at to see what it is.
@@ -23,6 +27,10 @@ pub struct LogFile {
     path: PathBuf,
     size: u64,
     is_packed: bool,
+    /// Whether it is a map, and no log.
+    is_map: bool,
+    /// By how much its clock is set later, nanoseconds.
+    later: i64,
     pub(crate) storage: Storage,
     pub(crate) layout: Layout,
 }
@@ -34,7 +42,12 @@ impl LogFile {
         let packed = FileBytes::open(&path).map_err(|error| ReadError::io(&path, error))?;
         let size = packed.len() as u64;
         let is_packed = head(&packed).starts_with(ZSTD_MAGIC);
+        let is_map = map::is_called_so(&path);
         let (storage, layout) = match is_packed {
+            false if is_map => {
+                let log = map::as_log(&path).map_err(|cause| ReadError::Map { path: path.clone(), cause })?;
+                open_storage(&path, None, log)?
+            }
             false => open_storage(&path, None, packed)?,
             true => {
                 let unpacked = unpack_file(&packed);
@@ -48,12 +61,35 @@ impl LogFile {
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
             Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
-            _ => Ok(Self { path, size, is_packed, storage, layout }),
+            _ => Ok(Self { path, size, is_packed, is_map, later: 0, storage, layout }),
         }
+    }
+
+    /// Sets the clock of the whole file later by so many nanoseconds, or earlier where these are negative. Stamps in messages
+    /// stay.
+    pub(crate) fn set_later(&mut self, later: i64) {
+        self.later = later;
+        for block in &mut self.layout.blocks {
+            block.first_time = block.first_time.saturating_add_signed(later);
+            block.last_time = block.last_time.saturating_add_signed(later);
+        }
+    }
+
+    /// By how much the clock of the file was set later, nanoseconds.
+    pub(crate) fn later(&self) -> i64 {
+        self.later
+    }
+
+    /// Whether the file is a map that is read as a log of one message.
+    pub(crate) fn is_map(&self) -> bool {
+        self.is_map
     }
 
     /// What the file is: `MCAP`, `SQLite` or `ROS 1 bag`, and whether it is packed.
     pub fn container(&self) -> String {
+        if self.is_map {
+            return "map file".to_owned();
+        }
         let packed = if self.is_packed { ", packed with zstd" } else { "" };
         format!("{}{packed}", self.storage.name())
     }
@@ -82,6 +118,41 @@ impl LogFile {
     /// The entries of the file's metadata record of the given name.
     pub fn metadata(&self, name: &str) -> Option<&BTreeMap<String, String>> {
         self.layout.metadata.get(name)
+    }
+
+    /// What an MCAP file says of its messages at its end; nothing if it has none, or is damaged.
+    pub fn statistics(&self) -> Option<&Statistics> {
+        let is_whole = self.layout.damage.iter().all(|damage| matches!(damage, Damage::Incomplete { .. }));
+        self.layout.statistics.as_ref().filter(|_| is_whole)
+    }
+
+    /// What the index of an MCAP file says of every channel with messages; nothing unless it tells of all messages.
+    pub(crate) fn index(&self) -> Option<&BTreeMap<u16, IndexedChannel>> {
+        let told = &self.statistics()?.by_channel;
+        let counted = self.layout.index.iter().map(|(number, channel)| (*number, channel.messages));
+        let is_told = |(number, count): (u16, u64)| told.get(&number) == Some(&count);
+        let messages: u64 = self.layout.index.values().map(|channel| channel.messages).sum();
+        (counted.into_iter().all(is_told) && self.statistics()?.messages == messages).then_some(&self.layout.index)
+    }
+
+    /// The names of the file's metadata records.
+    pub fn metadata_names(&self) -> impl Iterator<Item = &str> {
+        self.layout.metadata.keys().map(String::as_str)
+    }
+
+    /// How many attachments the file has.
+    pub fn attachments(&self) -> usize {
+        self.layout.supplements.iter().filter(|(kind, _)| *kind == SupplementKind::Attachment).count()
+    }
+
+    /// The attachments and metadata records of an MCAP file, in its order, each as the body of its record (MCAP
+    /// specification). None of one whose body cannot be read.
+    pub fn supplements(&self) -> impl Iterator<Item = (SupplementKind, Option<Vec<u8>>)> + '_ {
+        let body = |range: &Range<usize>| match &self.storage {
+            Storage::Mcap(bytes) => bytes.read(range.clone()),
+            Storage::Sqlite(_) | Storage::Ros1(_) => None,
+        };
+        self.layout.supplements.iter().map(move |(kind, range)| (*kind, body(range)))
     }
 
     /// What was found wrong when the file was opened. Bad chunks may show only when they are read.

@@ -6,12 +6,14 @@ use super::chunk::Chunk;
 use super::damage::{ChunkFault, Damage};
 use super::definitions::Definitions;
 use super::outcome;
-use super::record::{Fields, MessageRecord, Record};
-use super::summary::SummarySection;
+use super::record::{Fields, HEAD, MessageRecord, Record};
+use super::summary::{Statistics, SummarySection};
+use crate::supplement::{SupplementKind, read_metadata};
 use mcap::MAGIC;
 use mcap::records::op;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// Records without a chunk are read in runs of about this many bytes.
 const RUN_LENGTH: usize = 1 << 20;
@@ -25,6 +27,12 @@ pub(crate) struct Layout {
     pub(crate) damage: Vec<Damage>,
     /// The entries of the metadata records, by name; of two with one name the last.
     pub(crate) metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// Where the bodies of the attachments and of the metadata records lie, in the order of the file.
+    pub(crate) supplements: Vec<(SupplementKind, Range<usize>)>,
+    /// What the index behind each chunk says of the channels.
+    pub(crate) index: BTreeMap<u16, IndexedChannel>,
+    /// What the file says of its messages, if it was closed.
+    pub(crate) statistics: Option<Statistics>,
     /// How many chunks there are, the bad ones among them.
     pub(crate) chunks: usize,
     /// The compressions of the chunks; empty text for none.
@@ -46,6 +54,7 @@ impl Layout {
             unsure = layout.blocks.iter().map(|block| matches!(block.records, Records::Chunk(_))).collect();
         }
         layout.definitions.merge(summary.definitions);
+        layout.statistics = summary.statistics;
         layout.survey(file, &unsure);
         layout.damage.extend(std::iter::repeat_n(Damage::Redefined, layout.definitions.redefined));
         layout
@@ -114,6 +123,9 @@ impl Walk {
 
     /// Takes up one record; `false` if it cannot be one, and nothing if it is one where another follows.
     fn take(&mut self, record: &Record<'_>, index: &mut ChunkTimes) -> Option<bool> {
+        if let Some(kind) = SupplementKind::of_opcode(record.opcode) {
+            self.layout.supplements.push((kind, record.position + HEAD..record.end()));
+        }
         match record.opcode {
             0 => return Some(false),
             op::MESSAGE => match MessageRecord::parse(record.body) {
@@ -133,9 +145,11 @@ impl Walk {
                     }
                 }
             }
-            op::MESSAGE_INDEX => index.read(record.body),
+            op::MESSAGE_INDEX => {
+                index.read(record.body, self.layout.blocks.len().saturating_sub(1), &mut self.layout.index)
+            }
             op::METADATA => {
-                if let Some((name, metadata)) = outcome::read_metadata(record) {
+                if let Some((name, metadata)) = read_metadata(record.body) {
                     self.layout.damage.extend(outcome::damage_of(&name, &metadata));
                     self.layout.metadata.insert(name, metadata);
                 }
@@ -201,15 +215,45 @@ fn is_record(file: &mut Window<'_>, position: usize) -> bool {
     file.record(position).is_some_and(|record| record.opcode != 0)
 }
 
+/// What the index records of a file say of one of its channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct IndexedChannel {
+    /// The first block that it has messages in.
+    pub(crate) block: usize,
+    /// How many messages it has.
+    pub(crate) messages: u64,
+    /// The log time of the first, nanoseconds.
+    pub(crate) first: u64,
+    /// The log time of the last, nanoseconds.
+    pub(crate) last: u64,
+    /// The longest time between two that follow each other, nanoseconds.
+    pub(crate) largest_gap: u64,
+}
+
+impl IndexedChannel {
+    fn add(&mut self, time: u64) {
+        if self.messages == 0 {
+            (self.first, self.last) = (time, time);
+        }
+        self.messages += 1;
+        self.largest_gap = self.largest_gap.max(time.saturating_sub(self.last));
+        (self.first, self.last) = (self.first.min(time), self.last.max(time));
+    }
+}
+
 /// The least and the greatest log time that the index records behind a chunk list.
 #[derive(Default)]
 struct ChunkTimes(Option<(u64, u64)>);
 
 impl ChunkTimes {
-    fn read(&mut self, body: &[u8]) {
+    fn read(&mut self, body: &[u8], block: usize, channels: &mut BTreeMap<u16, IndexedChannel>) {
         let mut fields = Fields(body);
-        let Some(mut entries) = fields.u16().and_then(|_| fields.block()) else { return };
+        let Some((number, mut entries)) = fields.u16().and_then(|number| Some((number, fields.block()?))) else {
+            return;
+        };
+        let channel = channels.entry(number).or_insert(IndexedChannel { block, ..Default::default() });
         while let (Some(time), Some(_)) = (entries.u64(), entries.u64()) {
+            channel.add(time);
             let (first, last) = self.0.unwrap_or((time, time));
             self.0 = Some((first.min(time), last.max(time)));
         }

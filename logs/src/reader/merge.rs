@@ -100,6 +100,12 @@ impl LogReader {
         }
     }
 
+    /// Reads no more than the messages in the first and in the last `count` blocks of each file, and in those in which a channel
+    /// begins. Before any was read.
+    pub(crate) fn sample(&mut self, count: usize) {
+        self.ahead.sample(count);
+    }
+
     /// The files, in the order in which they break ties.
     pub fn files(&self) -> &Arc<[LogFile]> {
         &self.files
@@ -152,7 +158,8 @@ impl LogReader {
             self.bytes_taken = self.bytes_taken.saturating_add(size);
             match load {
                 _ if self.changed.contains(&id.file) => {}
-                Ok(block) => {
+                Ok(mut block) => {
+                    block.set_later(self.files.get(id.file).map_or(0, LogFile::later));
                     if block.lost > 0 {
                         self.damage.push((id.file, Damage::LostMessages { count: block.lost }));
                     }

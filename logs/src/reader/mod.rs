@@ -29,6 +29,7 @@ mod error;
 mod file;
 mod guess;
 mod layout;
+mod map;
 mod merge;
 mod outcome;
 mod packed;
@@ -42,11 +43,14 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
+pub use crate::supplement::SupplementKind;
 pub use damage::{ChunkFault, Damage};
 pub use error::ReadError;
 pub use file::LogFile;
 pub use merge::{LogMessage, LogReader};
 pub use paths::log_files;
+pub(crate) use record::Fields;
+pub use summary::Statistics;
 
 use std::path::PathBuf;
 

@@ -5,6 +5,7 @@ use super::definitions::Definitions;
 use super::record::{Fields, HEAD, record_at};
 use mcap::MAGIC;
 use mcap::records::op;
+use std::collections::BTreeMap;
 
 /// The footer's body: two offsets and a checksum.
 const FOOTER: usize = 20;
@@ -24,6 +25,20 @@ pub(crate) struct SummarySection {
     pub(crate) definitions_complete: bool,
     /// Where the chunks begin, rising.
     pub(crate) chunk_starts: Vec<usize>,
+    pub(crate) statistics: Option<Statistics>,
+}
+
+/// What a file says of its messages.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// How many there are.
+    pub messages: u64,
+    /// The log time of the first, nanoseconds.
+    pub first: u64,
+    /// The log time of the last, nanoseconds.
+    pub last: u64,
+    /// How many there are on each channel, by its number.
+    pub by_channel: BTreeMap<u16, u64>,
 }
 
 impl SummarySection {
@@ -63,7 +78,10 @@ impl SummarySection {
             position = record.end();
             match record.opcode {
                 op::SCHEMA | op::CHANNEL => self.definitions.read(&record),
-                op::STATISTICS => channel_count = read_channel_count(record.body),
+                op::STATISTICS => {
+                    channel_count = read_channel_count(record.body);
+                    self.statistics = read_statistics(record.body);
+                }
                 op::CHUNK_INDEX => self.chunk_starts.extend(read_chunk_start(record.body)),
                 _ => {}
             }
@@ -79,6 +97,19 @@ fn read_channel_count(body: &[u8]) -> Option<usize> {
     let mut fields = Fields(body);
     fields.bytes(8 + 2)?;
     usize::try_from(fields.u32()?).ok()
+}
+
+fn read_statistics(body: &[u8]) -> Option<Statistics> {
+    let mut fields = Fields(body);
+    let messages = fields.u64()?;
+    // The numbers of schemas, channels, attachments, metadata records and chunks.
+    fields.bytes(2 + 4 * 4)?;
+    let (first, last) = (fields.u64()?, fields.u64()?);
+    let (mut counts, mut by_channel) = (fields.block()?, BTreeMap::new());
+    while let (Some(channel), Some(count)) = (counts.u16(), counts.u64()) {
+        by_channel.insert(channel, count);
+    }
+    Some(Statistics { messages, first, last, by_channel })
 }
 
 /// Where the chunk of an index record begins: behind its two times.

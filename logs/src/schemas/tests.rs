@@ -31,6 +31,8 @@ fn pose() -> Pose {
 #[test]
 fn tag_messages_agree_with_their_definitions() {
     assert_agrees(&TagRange { header: header(), tag_id: "t".into(), range: 2.5, range_stddev: 0.05, rssi: -61.5 });
+    let covariance = [3.0, 4.0, 5.0, 6.0];
+    assert_agrees(&TagPosition { header: header(), tag_id: "tag36h11:5".into(), x: 1.0, y: -2.0, covariance });
     let estimate = |tag_id: &str| TagEstimate {
         tag_id: tag_id.into(),
         x: 1.0,
@@ -59,6 +61,33 @@ fn tag_messages_agree_with_their_definitions() {
         provisional: true,
         reason: "three tags".into(),
     });
+}
+
+#[test]
+fn markers_agree_with_their_definitions() {
+    let color = ColorRGBA { r: 0.25, g: 0.5, b: 0.75, a: 1.0 };
+    let marker = |text: &str| Marker {
+        header: header(),
+        ns: "walls".into(),
+        id: 3,
+        shape: Marker::LINE_LIST,
+        action: Marker::DELETE_ALL,
+        pose: pose(),
+        scale: Vector3 { x: 1.0, y: 2.0, z: 3.0 },
+        color,
+        lifetime: Duration { sec: 1, nanosec: 2 },
+        frame_locked: true,
+        points: vec![Point { x: 1.0, y: 2.0, z: 3.0 }; 3],
+        colors: vec![color; 3],
+        texture_resource: "a".into(),
+        texture: CompressedImage { header: header(), format: "png".into(), data: vec![] },
+        uv_coordinates: vec![UVCoordinate { u: 0.5, v: 0.25 }],
+        text: text.into(),
+        mesh_resource: "b".into(),
+        mesh_file: MeshFile { filename: "c".into(), data: vec![] },
+        mesh_use_embedded_materials: true,
+    };
+    assert_agrees(&MarkerArray { markers: vec![marker("tag00"), marker(""), marker("t")] });
 }
 
 #[test]
@@ -187,6 +216,13 @@ fn a_grid_agrees_with_its_definition() {
     assert_eq!(read_by_schema(OccupancyGrid::NAME, &message), expected);
 }
 
+#[test]
+fn a_part_of_a_grid_agrees_with_its_definition() {
+    let update = OccupancyGridUpdate { header: header(), x: -1, y: 2, width: 3, height: 1, data: &[0xff, 0, 100] };
+    let expected = json!({ "header": header(), "x": -1, "y": 2, "width": 3, "height": 1, "data": [-1, 0, 100] });
+    assert_eq!(read_by_schema(OccupancyGridUpdate::NAME, &encode(&update).unwrap()), expected);
+}
+
 /// The Rust types hold covariances as rows, and the twist in parts, so that names differ; the values must come in the same
 /// order.
 #[test]
@@ -238,6 +274,6 @@ fn a_schema_is_laid_out_as_in_a_bag() {
     assert_eq!(titles[4..], ["MSG: geometry_msgs/Quaternion"]);
     assert_eq!(schema.lines().filter(|line| *line == "=".repeat(80)).count(), 5);
     assert_eq!(schema_text("geometry_msgs/PoseStamped").unwrap(), schema);
-    assert_eq!(schema_text("visualization_msgs/msg/Marker"), None);
+    assert_eq!(schema_text("visualization_msgs/msg/MenuEntry"), None);
     assert_eq!(schema_text(""), None);
 }

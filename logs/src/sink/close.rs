@@ -1,12 +1,12 @@
 //! Closing a log whose writer was killed.
 
 use super::log_writer::OUTCOME_RECORD;
+use super::rewrite::rewrite;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::file::OutputFile;
 use crate::reader::{Damage, LogFile, LogReader, ReadError};
 use mcap::MAGIC;
-use mcap::records::{MessageHeader, op};
-use std::collections::BTreeMap;
+use mcap::records::op;
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -100,27 +100,7 @@ fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<File, LogWri
     let mut log = LogWriter::create(path, LogOptions::default())?;
     // Half of it is of no use, and it may be a full disk that is in the way.
     log.keep(false);
-    let mut reader = LogReader::new(file.into_iter().collect());
-    let files = std::sync::Arc::clone(reader.files());
-    let mut numbers: BTreeMap<u16, u16> = BTreeMap::new();
-    while let Some(message) = reader.next_message() {
-        let channel_id = match numbers.get(&message.channel) {
-            Some(number) => *number,
-            None => {
-                let Some(channel) = files.first().and_then(|file| file.channel(message.channel)) else { continue };
-                let number = log.channel(&channel)?;
-                numbers.insert(message.channel, number);
-                number
-            }
-        };
-        let header = MessageHeader {
-            channel_id,
-            sequence: message.sequence,
-            log_time: message.log_time.0,
-            publish_time: message.publish_time,
-        };
-        log.write(&header, message.data)?;
-    }
+    rewrite(&mut LogReader::new(file.into_iter().collect()), &mut log)?;
     Ok(log.end(Outcome::Incomplete(reason))?.put_in_place()?)
 }
 
@@ -128,6 +108,7 @@ fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<File, LogWri
 mod tests {
     use super::*;
     use gridweave_runtime::message::Channel;
+    use mcap::records::MessageHeader;
 
     fn write(path: &Path, messages: u32) {
         let mut log = LogWriter::create(path, LogOptions { chunk_size: 1000, ..Default::default() }).unwrap();

@@ -44,7 +44,7 @@ pub enum LogWriteError {
 impl From<WriteError> for LogWriteError {
     fn from(error: WriteError) -> Self {
         match error {
-            WriteError::Io { path, source } => Self::from_io(&path, source),
+            WriteError::Io { path, error } => Self::from_io(&path, error),
             other => Self::Output(other),
         }
     }

@@ -4,7 +4,7 @@ use super::{Compression, LogWriteError};
 use crate::file::OutputFile;
 use gridweave_runtime::message::Channel;
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{WriteOptions, Writer};
+use mcap::{Attachment, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -106,6 +106,12 @@ impl LogWriter {
         self.close_chunk()?;
         let record = Metadata { name: name.to_owned(), metadata };
         self.writer.write_metadata(&record).map_err(|error| LogWriteError::from_mcap(&self.path, error))
+    }
+
+    /// Writes an attachment.
+    pub fn attachment(&mut self, attachment: &Attachment<'_>) -> Result<(), LogWriteError> {
+        self.close_chunk()?;
+        self.writer.attach(attachment).map_err(|error| LogWriteError::from_mcap(&self.path, error))
     }
 
     /// Ends the log, says in it how the run ended, and gives where it lies. One that is complete takes the place of a file

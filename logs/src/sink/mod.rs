@@ -7,10 +7,17 @@
 //! A log that its run has finished holds the metadata record `gridweave` with `complete` = `true`. If the run has
 //! failed, `complete` is `false` and `reason` says why. If the program was killed, there is no such record, and all
 //! chunks but the last can be read.
+//!
+//! The records `gridweave_run` and `gridweave_inputs` explain the results: the version, the pipeline with all its parameters and
+//! its seed as the text of a pipeline file, and the names, sizes and SHA-256 of the files that were read. Those that the logs of
+//! the input bear are passed on under names that begin with `earlier_`, and so are all their other metadata records and their
+//! attachments, as they are; but not the records `rosbag2`, which describe the file that they are in.
 
 mod close;
 mod error;
 mod log_writer;
+mod provenance;
+mod rewrite;
 mod routing;
 mod stage;
 
@@ -18,6 +25,9 @@ pub use close::{CloseError, close_log};
 pub use error::LogWriteError;
 pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
+pub use provenance::InputFile;
+pub(crate) use provenance::{INPUTS_RECORD, RUN_RECORD};
+pub use rewrite::{RecoverError, Recovery, recover};
 pub use routing::result_channel;
 
 use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
@@ -45,7 +55,7 @@ pub enum Compression {
 pub struct SinkParameters {
     /// The log to write. A file that has this name is replaced. Set by `--output`.
     pub file: PathBuf,
-    /// Whether the messages of the input logs are written too, beside the results.
+    /// Whether what is in the input logs is written too, beside the results: messages, attachments and metadata records.
     pub pass_input: bool,
     /// The topics to write, `{robot}` standing for any one part of the path: `["/{robot}/map", "/tf"]`. All if none are
     /// given.
@@ -55,12 +65,24 @@ pub struct SinkParameters {
     /// A chunk is closed when it holds this many bytes before compression. If the program is killed, the open chunk is
     /// lost. 1 KiB to 512 MiB.
     pub chunk_size: u64,
+    /// The pipeline as the text of a pipeline file, to be recorded in the log. Set by the command.
+    pub recorded_pipeline: String,
+    /// The files that the run reads, of which names, sizes and hashes are recorded in the log. Set by the command.
+    pub recorded_files: Vec<PathBuf>,
 }
 
 impl Default for SinkParameters {
     fn default() -> Self {
         let LogOptions { compression, chunk_size } = LogOptions::default();
-        Self { file: PathBuf::new(), pass_input: true, only_topics: Vec::new(), compression, chunk_size }
+        Self {
+            file: PathBuf::new(),
+            pass_input: true,
+            only_topics: Vec::new(),
+            compression,
+            chunk_size,
+            recorded_pipeline: String::new(),
+            recorded_files: Vec::new(),
+        }
     }
 }
 

@@ -39,7 +39,7 @@ impl ResultTopics {
     pub(super) fn route(&self, channel: &Channel) -> Route {
         let topic = &channel.topic;
         match self.type_on(topic) {
-            None => Route::Write(channel.clone()),
+            None => Route::Write(qos::completed(channel.clone())),
             Some(TFMessage::NAME) if is_tf(channel) => Route::Write(result_channel(topic, TFMessage::NAME)),
             Some(_) => Route::LeaveOut(format!(
                 "the input's messages on {topic} were left out: a result of this run has that topic"
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn the_input_keeps_its_channels_where_no_result_has_the_topic() {
         for topic in ["/robot1/map", "/tf", "/maps", "/a/b/lines/segments", "/robot1/lines", ""] {
-            let channel = channel(topic, "nav_msgs/msg/OccupancyGrid");
+            let channel = channel(topic, "nav_msgs/msg/Odometry");
             assert_eq!(results().route(&channel), Route::Write(channel));
         }
     }

@@ -1,7 +1,9 @@
 //! The stage around [`LogWriter`].
 
+use super::provenance::{INPUTS_RECORD, InputHashes, RUN_RECORD, run_record};
 use super::routing::{ResultTopics, Route, result_channel};
 use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
+use crate::supplement::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::stage::{Context, Output, StageError, match_robot};
 use std::collections::BTreeMap;
@@ -18,9 +20,15 @@ struct Lane {
 /// Where the messages of an announced channel go.
 enum Target {
     Lane(usize),
+    /// They are no messages, but what a log holds beside them.
+    Supplement(SupplementKind),
     /// They are of no topic that is to be written.
     Unwanted,
     LeaveOut(String),
+}
+
+fn closed() -> StageError {
+    StageError::new("write the log", "it is closed already")
 }
 
 fn failure(error: LogWriteError) -> StageError {
@@ -40,6 +48,9 @@ pub(super) struct McapSink {
     log: Option<LogWriter>,
     /// Whether anything was written: there is no log of a run that could not begin.
     begun: bool,
+    /// The pipeline, if it is to be recorded and has not been yet.
+    recorded_pipeline: Option<String>,
+    recorded_files: Option<InputHashes>,
     lanes: Vec<Lane>,
     /// By wire and number: numbers are given by each source for itself.
     announced: BTreeMap<(usize, u32), Target>,
@@ -49,7 +60,15 @@ pub(super) struct McapSink {
 
 impl McapSink {
     pub(super) fn new(parameters: SinkParameters, context: &Context) -> Result<Self, StageError> {
-        let SinkParameters { file, pass_input, only_topics, compression, chunk_size } = parameters;
+        let SinkParameters {
+            file,
+            pass_input,
+            only_topics,
+            compression,
+            chunk_size,
+            recorded_pipeline,
+            recorded_files,
+        } = parameters;
         if file.as_os_str().is_empty() {
             let doing = format!("write the log of stage `{}`", context.stage);
             return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
@@ -62,6 +81,8 @@ impl McapSink {
             input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
             log: Some(log),
             begun: false,
+            recorded_pipeline: Some(recorded_pipeline).filter(|text| !text.is_empty()),
+            recorded_files: (!recorded_files.is_empty()).then(|| InputHashes::start(recorded_files)),
             lanes: Vec::new(),
             announced: BTreeMap::new(),
             results: BTreeMap::new(),
@@ -105,8 +126,8 @@ impl McapSink {
     }
 
     fn write(&mut self, lane: usize, message: &Message) -> Result<(), StageError> {
-        self.begun = true;
-        let log = self.log.as_mut().ok_or_else(|| StageError::new("write the log", "it is closed already"))?;
+        self.begin()?;
+        let log = self.log.as_mut().ok_or_else(closed)?;
         let lane = &mut self.lanes[lane];
         let channel_id = match lane.id {
             Some(id) => id,
@@ -126,8 +147,46 @@ impl McapSink {
         Ok(())
     }
 
+    /// Says at the beginning of the log what writes it.
+    fn begin(&mut self) -> Result<(), StageError> {
+        self.begun = true;
+        let log = self.log.as_mut().ok_or_else(closed)?;
+        match self.recorded_pipeline.take() {
+            Some(pipeline) => log.metadata(RUN_RECORD, run_record(&pipeline)).map_err(failure),
+            None => Ok(()),
+        }
+    }
+
+    /// Writes what a log of the input holds beside its messages.
+    fn write_supplement(&mut self, kind: SupplementKind, body: &[u8]) -> Result<(), StageError> {
+        self.begin()?;
+        let log = self.log.as_mut().ok_or_else(closed)?;
+        match kind {
+            SupplementKind::Attachment => {
+                read_attachment(body).map_or(Ok(()), |attachment| log.attachment(&attachment))
+            }
+            SupplementKind::Metadata => match read_metadata(body) {
+                Some((name, metadata)) => match [RUN_RECORD, INPUTS_RECORD].contains(&name.as_str()) {
+                    true => log.metadata(&format!("earlier_{name}"), metadata),
+                    false => log.metadata(&name, metadata),
+                },
+                None => Ok(()),
+            },
+        }
+        .map_err(failure)
+    }
+
     pub(super) fn end(&mut self, outcome: Outcome<'_>) -> Result<(), StageError> {
-        let Some(log) = self.log.take() else { return Ok(()) };
+        if self.log.is_none() {
+            return Ok(());
+        }
+        self.begin()?;
+        let Some(mut log) = self.log.take() else { return Ok(()) };
+        match (self.recorded_files.take(), outcome) {
+            (Some(files), Outcome::Complete) => log.metadata(INPUTS_RECORD, files.record()).map_err(failure)?,
+            (Some(files), Outcome::Incomplete(_)) => files.stop(),
+            (None, _) => {}
+        }
         log.finish(outcome).map(drop).map_err(failure)
     }
 }
@@ -135,6 +194,7 @@ impl McapSink {
 impl McapSink {
     pub(super) fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
         let target = match self.result_topics.route(channel) {
+            _ if let Some(kind) = SupplementKind::of_channel(channel) => Target::Supplement(kind),
             _ if !self.is_wanted(&channel.topic) => Target::Unwanted,
             Route::Write(channel) => Target::Lane(self.lane(channel)),
             Route::LeaveOut(reason) => Target::LeaveOut(reason),
@@ -144,6 +204,15 @@ impl McapSink {
     }
 
     pub(super) fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        let written = self.take(message, output);
+        if written.is_err() {
+            // Nothing more can be written, not even that the log is not complete.
+            self.log = None;
+        }
+        written
+    }
+
+    fn take(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let number = message.header().channel;
         let lane = match number {
             0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
@@ -151,6 +220,7 @@ impl McapSink {
             _ if !self.pass_input => return Ok(()),
             _ => match self.announced.get(&(message.wire(), number)) {
                 Some(Target::Lane(lane)) => *lane,
+                Some(Target::Supplement(kind)) => return self.write_supplement(*kind, message.bytes()),
                 Some(Target::Unwanted) => return Ok(()),
                 Some(Target::LeaveOut(reason)) => {
                     output.warn(reason.as_str());
@@ -162,15 +232,14 @@ impl McapSink {
                 }
             },
         };
-        let written = self.write(lane, message);
-        if written.is_err() {
-            // Nothing more can be written, not even that the log is not complete.
-            self.log = None;
-        }
-        written
+        output.count("messages", 1);
+        self.write(lane, message)
     }
 
     pub(super) fn abort(&mut self, reason: &str) {
+        if let Some(files) = self.recorded_files.take() {
+            files.stop();
+        }
         let Some(mut log) = self.log.take() else { return };
         match self.begun {
             true => match log.finish(Outcome::Incomplete(reason)) {

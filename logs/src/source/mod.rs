@@ -2,21 +2,30 @@
 //! [`map_file`] gives the maps of map files, and [`topology_file`] topological maps that were drawn by hand.
 
 mod carry;
+mod channel;
+mod derived;
+mod inferred_poses;
 pub mod map_file;
 mod pose;
 mod route;
 mod router;
 mod stage;
+mod tag_positions;
+mod tag_reader;
 pub mod topology_file;
+mod updated_maps;
 
 #[cfg(test)]
 mod tests;
 
-pub(crate) use route::{Classified, RobotChannels, Role};
+pub(crate) use inferred_poses::InferredPoses;
+pub(crate) use pose::pose_with_covariance;
+pub(crate) use route::{Classified, PoseSource, RobotChannels, Role};
 pub use stage::McapSource;
+pub(crate) use tag_reader::TagReader;
 
 use crate::names::{Convention, Input, NameRules};
-use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagRange, TopologicalMap};
+use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagPosition, TagRange, TopologicalMap};
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -38,6 +47,9 @@ pub struct SourceParameters {
     pub only_robots: Vec<String>,
     /// The topics to read, `{robot}` standing for any one part: `["/{robot}/map", "/tf"]`. All if none are given.
     pub only_topics: Vec<String>,
+    /// Whether the clocks of all logs, and the stamps in their messages, are set so that they begin when the first one does: for
+    /// robots whose clocks have nothing in common.
+    pub align_start: bool,
     /// Seconds from the first message of the logs at which to begin. The last map of each robot before that, and other
     /// latched messages, are sent at the beginning.
     pub start: f64,
@@ -58,7 +70,7 @@ impl SourceParameters {
     fn rules(&self) -> Result<NameRules, String> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let (robots, topics) = (self.only_robots.clone(), self.only_topics.clone());
-        Ok(NameRules { convention: self.names, renames, robots, topics })
+        Ok(NameRules { convention: self.names, renames, robots, topics, align_start: self.align_start })
     }
 }
 
@@ -101,6 +113,7 @@ pub struct RobotMessages {
     pub(crate) map: Out<OccupancyGrid<'static>>,
     pub(crate) pose: Out<PoseWithCovarianceStamped>,
     pub(crate) tags: Out<TagRange>,
+    pub(crate) positions: Out<TagPosition>,
     pub(crate) topology: Out<TopologicalMap>,
     pub(crate) other: Out<AnyMessage>,
 }
@@ -108,13 +121,23 @@ pub struct RobotMessages {
 impl Outputs for RobotMessages {
     fn declare(ports: &mut OutputPorts) -> Self {
         Self {
-            map: ports.output("map", "the robots' maps, as they were logged or sent"),
+            map: ports.output(
+                "map",
+                "the robots' maps, as they were logged or sent; and, out of a log, whole maps made of their updates",
+            ),
             pose: ports.output(
                 "pose",
                 "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
                  covariance, odometry, or tf",
             ),
-            tags: ports.output("tags", "range readings of tags, as they were logged or sent"),
+            tags: ports.output(
+                "tags",
+                "range readings of tags, as they were logged or sent, or made from messages of other types",
+            ),
+            positions: ports.output(
+                "positions",
+                "positions at which cameras see tags, in the frames of their robots: made from the messages of detectors, or tf",
+            ),
             topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
             other: ports.any_output(
                 "other",

@@ -2,44 +2,18 @@
 
 use super::RobotMessages;
 use super::carry::{Carried, Carry, Latch};
-use super::pose::{NoPose, pose_with_covariance};
-use super::route::{PoseSource, RobotChannels, Role};
+use super::channel::{Route, Stamp};
+use super::derived::Derived;
+use super::route::{RobotChannels, Role};
 use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::schemas::full_type_name;
-use crate::tf::{TfPoses, is_static};
-use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
-use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TFMessage, decode};
-use gridweave_runtime::stage::{Out, Output, RobotTopics, StageError};
-use std::collections::BTreeMap;
+use crate::supplement::{SupplementKind, describes_its_file, read_attachment, read_metadata};
+use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-
-/// What is known of one channel. Channels of several files that are the same share it.
-struct Route {
-    channel: Channel,
-    role: Role,
-    robot: String,
-    /// What all headers of the channel's messages have in common.
-    header: MessageHeader,
-    latch: Latch,
-    announced: bool,
-    messages: u64,
-    /// How many of the messages hold no pose although their type has one.
-    unreadable: u64,
-}
-
-impl Route {
-    /// Sends a message of this channel, which is announced before the first of them.
-    fn send<T>(&mut self, stamp: Stamp, data: &[u8], out: &Out<T>, log_time: LogTime) -> Result<(), StageError> {
-        if !self.announced {
-            self.announced = true;
-            out.announce(self.header.channel, &self.channel)?;
-        }
-        self.messages += 1;
-        let Stamp { sequence: log_sequence, publish_time } = stamp;
-        out.send_encoded(MessageHeader { log_time, publish_time, log_sequence, ..self.header }, data)
-    }
-}
 
 /// What becomes of the messages of a channel.
 #[derive(Clone, Copy)]
@@ -48,13 +22,6 @@ enum Target {
     Route(usize),
     /// Nobody asked for them, or they cannot be passed on.
     Nothing,
-}
-
-/// What a message is, besides its bytes.
-#[derive(Clone, Copy)]
-struct Stamp {
-    sequence: u32,
-    publish_time: u64,
 }
 
 /// Sends messages to the ports that their channels call for.
@@ -69,16 +36,17 @@ pub(crate) struct Router {
     /// For every file and channel number: what becomes of its messages, once it is known.
     by_number: Vec<Vec<Option<Target>>>,
     by_channel: BTreeMap<Channel, usize>,
-    tf: Option<TfPoses>,
-    /// Whether poses were made from transforms.
-    has_tf_poses: bool,
+    derived: Derived,
+    has_sent_supplements: bool,
 }
 
 impl Router {
-    pub(crate) fn new(robots: RobotTopics, names: Names, files: Arc<[LogFile]>) -> Self {
+    /// Sends the messages of `files`, from which whole maps are made of updates if `updates_maps`.
+    pub(crate) fn new(robots: RobotTopics, names: Names, files: Arc<[LogFile]>, updates_maps: bool) -> Self {
+        let roles = RobotChannels::new(robots.clone(), names.channels());
         Self {
-            tf: robots.tf.clone().map(TfPoses::new),
-            roles: RobotChannels::new(robots.clone(), names.channels()),
+            derived: Derived::new(&robots, &roles, updates_maps),
+            roles,
             names,
             renamed: Vec::new(),
             robots,
@@ -86,7 +54,7 @@ impl Router {
             files,
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
-            has_tf_poses: false,
+            has_sent_supplements: false,
         }
     }
 
@@ -96,9 +64,57 @@ impl Router {
         let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
         let mut renamed = std::mem::take(&mut self.renamed);
         let data = self.named_data(message, &mut renamed, output);
-        let sent = self.send_on(route, stamp, data, output);
+        let sent = self.send_on(route, stamp, data, output).and_then(|()| match self.routes.get(route) {
+            Some(route) => self.derived.send_map_if_due(route, &self.roles, data, output),
+            None => Ok(()),
+        });
         self.renamed = renamed;
         sent
+    }
+
+    /// Sends the attachments and metadata records of all logs, if that has not been done yet.
+    pub(crate) fn send_supplements(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        if std::mem::replace(&mut self.has_sent_supplements, true) {
+            return Ok(());
+        }
+        let files = Arc::clone(&self.files);
+        let mut sent = BTreeSet::new();
+        for file in files.iter() {
+            for (kind, body) in file.supplements() {
+                let is_whole = match (kind, body.as_deref()) {
+                    (_, None) => false,
+                    (SupplementKind::Attachment, Some(body)) => read_attachment(body).is_some(),
+                    (SupplementKind::Metadata, Some(body)) => match read_metadata(body) {
+                        Some((name, _)) if describes_its_file(&name) => continue,
+                        _ => true,
+                    },
+                };
+                let Some(body) = body.filter(|_| is_whole) else {
+                    output.warn(format!("{}: {}", file.path().display(), Damage::BadAttachment));
+                    continue;
+                };
+                // The files of a split bag, and robots of one fleet, have some records in common.
+                if kind == SupplementKind::Attachment || sent.insert(body.clone()) {
+                    self.send_supplement(kind, &body, output)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn send_supplement(
+        &mut self,
+        kind: SupplementKind,
+        body: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let channel = kind.channel();
+        let index = match self.by_channel.get(&channel) {
+            Some(&index) => Some(index),
+            None => self.add_route(channel, output)?,
+        };
+        let Some(route) = index.and_then(|index| self.routes.get_mut(index)) else { return Ok(()) };
+        route.send(Stamp { sequence: 0, publish_time: 0 }, body, &output.other, output.log_time())
     }
 
     /// How topics and frames are called.
@@ -134,19 +150,20 @@ impl Router {
     ) -> Result<(), StageError> {
         let Some(index) = self.route(message, output)? else { return Ok(()) };
         let Some(route) = self.routes.get(index) else { return Ok(()) };
-        if route.latch == Latch::No && route.role != Role::Tf {
+        if route.latch == Latch::No && !matches!(route.role, Role::Tf | Role::MapUpdate) {
             return Ok(());
         }
         let mut renamed = std::mem::take(&mut self.renamed);
         let message = LogMessage { data: self.named_data(message, &mut renamed, output), ..*message };
         carry.keep(index, route.latch, &message);
-        if let (Role::Tf, Some(tf)) = (route.role, &mut self.tf)
-            && let Ok(transforms) = decode::<TFMessage>(message.data)
-        {
-            tf.update(&route.robot, is_static(&route.channel.topic), &transforms);
-        }
+        self.derived.learn(route, &self.roles, message.data, output);
         self.renamed = renamed;
         Ok(())
+    }
+
+    /// Sends the maps of which updates have come since they were last sent.
+    pub(crate) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.derived.send_updated_maps(output)
     }
 
     /// Sends a message that was kept.
@@ -168,55 +185,16 @@ impl Router {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        self.derived.learn_map_frame(route, data);
         match route.role {
             Role::Map => route.send(stamp, data, &output.map, output.log_time()),
             Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
             Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
-            Role::Pose(_) | Role::Tf | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
-        }?;
-        match route.role {
-            Role::Pose(source) => self.send_pose(index, source, data, output),
-            Role::Tf => self.send_tf_poses(index, data, output),
-            _ => Ok(()),
-        }
-    }
-
-    fn send_pose(
-        &mut self,
-        route: usize,
-        source: PoseSource,
-        data: &[u8],
-        output: &Output<RobotMessages>,
-    ) -> Result<(), StageError> {
-        let Some(route) = self.routes.get_mut(route).filter(|_| output.pose.is_read()) else { return Ok(()) };
-        match pose_with_covariance(source, data) {
-            Ok(pose) => output.pose.send_bytes(&route.robot, &pose),
-            Err(NoPose) => {
-                route.unreadable += 1;
-                output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
-                Ok(())
+            Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Tf | Role::Other => {
+                route.send(stamp, data, &output.other, output.log_time())
             }
-        }
-    }
-
-    fn send_tf_poses(&mut self, route: usize, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
-        let (Some(route), Some(tf)) = (self.routes.get(route), &mut self.tf) else { return Ok(()) };
-        if !output.pose.is_read() {
-            return Ok(());
-        }
-        let Ok(message) = decode::<TFMessage>(data) else {
-            output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
-            return Ok(());
-        };
-        let (poses, unusable) = tf.update(&route.robot, is_static(&route.channel.topic), &message);
-        for _ in 0..unusable {
-            output.warn("transforms with values that are not finite, or between a frame and itself");
-        }
-        for (robot, pose) in poses {
-            self.has_tf_poses = true;
-            output.pose.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
-        }
-        Ok(())
+        }?;
+        self.derived.send(route, data, output)
     }
 
     /// The index of the message's route; `None` if nobody asked for it, if the log does not describe its channel, or if it
@@ -290,7 +268,18 @@ impl Router {
         let (role, robot) = (classified.role, classified.robot.to_owned());
         self.by_channel.insert(channel.clone(), index);
         let latch = Latch::of(&channel, role == Role::Map);
-        self.routes.push(Route { channel, role, robot, header, latch, announced: false, messages: 0, unreadable: 0 });
+        let tag_reader = self.roles.tag_reader(&channel).filter(|_| role == Role::TagMessage);
+        self.routes.push(Route {
+            channel,
+            role,
+            robot,
+            tag_reader,
+            header,
+            latch,
+            announced: false,
+            messages: 0,
+            unreadable: 0,
+        });
         Ok(Some(index))
     }
 
@@ -306,7 +295,8 @@ impl Router {
                 if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
         }
-        if output.pose.is_read() && !routed(|role| matches!(role, Role::Pose(_))) && !self.has_tf_poses {
+        if output.pose.is_read() && !routed(|role| matches!(role, Role::Pose(_))) && !self.derived.has_inferred_poses()
+        {
             match &self.robots.tf {
                 Some(frames) => output.warn(format!(
                     "no pose was found: tf never ties `{}` to `{}`",
@@ -315,13 +305,11 @@ impl Router {
                 None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
             }
         }
-        if output.tags.is_read() && !routed(|role| role == Role::Tags) {
+        if output.tags.is_read() && !routed(|role| role == Role::Tags) && !self.derived.has_made_readings() {
             output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
         }
-        if let Some(tf) = self.tf.as_ref().filter(|_| output.pose.is_read()) {
-            for robot in tf.robots_without_pose() {
-                output.warn(format!("tf does not tie the base of {robot} to its map"));
-            }
+        if output.pose.is_read() {
+            self.derived.warn_of_missing_poses(output);
         }
     }
 }

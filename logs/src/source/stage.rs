@@ -43,13 +43,14 @@ impl McapSource {
         let opened = names::open(&parameters.inputs(), &rules, &context.robots);
         let (reader, names) = opened.map_err(|error| StageError::new(doing(), error))?;
         let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
+        let names_robots = rules.convention == Convention::ByRobot;
         Ok(Self {
-            router: Router::new(context.robots.clone(), names, reader.files().clone()),
+            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots),
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
             carry: Some(Carry::default()),
             begun: false,
-            names_robots: rules.convention == Convention::ByRobot,
+            names_robots,
         })
     }
 
@@ -74,6 +75,8 @@ impl McapSource {
 
     fn end(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
+        self.router.send_updated_maps(output)?;
+        self.router.send_supplements(output)?;
         self.warn_of_damage(output);
         if self.names_robots {
             self.router.warn_of_missing(output);
@@ -99,6 +102,7 @@ impl Source for McapSource {
             }
             send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
             output.set_log_time(message.log_time);
+            self.router.send_supplements(output)?;
             self.router.send(&message, output)?;
         }
         self.warn_of_damage(output);
@@ -117,9 +121,11 @@ fn send_carried(
     router: &mut Router,
     output: &Output<RobotMessages>,
 ) -> Result<(), StageError> {
-    for (route, carried) in carry.take().map(|mut carry| carry.take()).unwrap_or_default() {
+    let Some(mut carry) = carry.take() else { return Ok(()) };
+    let carried = carry.take();
+    if !carried.is_empty() {
         output.set_log_time(start);
-        router.send_carried(route, &carried, output)?;
     }
-    Ok(())
+    carried.iter().try_for_each(|(route, carried)| router.send_carried(*route, carried, output))?;
+    router.send_updated_maps(output)
 }

@@ -13,6 +13,9 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+mod inferred_poses;
+mod map_updates;
+
 const ODOMETRY: &str = Odometry::NAME;
 const POSE_WITH_COVARIANCE: &str = PoseWithCovarianceStamped::NAME;
 

@@ -66,6 +66,22 @@ fn a_correction_that_is_dated_into_the_future_gives_no_pose_and_no_later_stamp()
 }
 
 #[test]
+fn of_several_frames_the_first_that_is_tied_is_the_base_for_good() {
+    let ends = Ends { map: "map".into(), bases: ["r1/base_link", "r1/base_footprint"].map(str::to_owned).to_vec() };
+    let mut tf = TfPoses::of_robots(BTreeMap::from([("r1".to_owned(), ends)]));
+    tf.set_map_frame("r1", "r1/slam_map");
+    assert!(tf.update("", false, &message([edge("r1/map", "r1/base_link", 1.0, 0.0, 0.0)])).0.is_empty());
+    assert_eq!((tf.base_of("r1"), tf.robots_without_pose().len()), (None, 1));
+    let (poses, _) = tf.update("", false, &message([edge("r1/slam_map", "r1/base_footprint", 2.0, 0.0, 0.0)]));
+    assert_eq!((poses[0].1.header.frame_id.as_str(), poses[0].1.pose.position.x), ("r1/slam_map", 2.0));
+    // From here on the other is looked at no more, though it is tied.
+    let (poses, _) = tf.update("", false, &message([edge("r1/slam_map", "r1/base_link", 5.0, 0.0, 0.0)]));
+    assert!(poses.is_empty());
+    assert_eq!((tf.base_of("r1"), tf.map_frame("r1")), (Some("r1/base_footprint"), Some("r1/slam_map")));
+    assert!(tf.knows("r1") && !tf.knows("r2"), "robots that nobody asked for stay unknown");
+}
+
+#[test]
 fn a_base_that_never_moves_has_a_pose() {
     let mut tf = robots();
     assert_eq!(tf.update("", true, &message([edge("r1/map", "r1/base_link", 1.0, 0.0, 0.0)])).0.len(), 1);

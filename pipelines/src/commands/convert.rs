@@ -18,8 +18,8 @@ pub(crate) struct ConvertArgs {
     /// and frames of a log under the name of its robot.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The MCAP file to write.
-    #[arg(short, long, value_name = "OUT.mcap")]
+    /// What to write: an MCAP file, or a rosbag2 folder with one: a folder that is there, or FOLDER/ with a slash behind it.
+    #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,
@@ -37,8 +37,7 @@ pub(crate) fn convert(args: &ConvertArgs, registry: &Registry) -> Result<Status>
     for line in summary.warning_lines() {
         say(line);
     }
-    // It only passes on, and the last stage takes all.
-    let messages = summary.stages.last().map_or(0, |stage| stage.messages_in);
+    let messages: u64 = summary.stages.iter().filter_map(|stage| stage.counts.get("messages")).sum();
     print_line(format_args!("wrote {messages} messages to {}", args.output.display()))?;
     Ok(Status::Done)
 }

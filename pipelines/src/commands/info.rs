@@ -8,8 +8,9 @@ use crate::table::Table;
 use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
-use gridweave_logs::info::{self, LogInfo, TopicInfo};
+use gridweave_logs::info::{self, FileInfo, LogInfo, TopicInfo};
 use gridweave_logs::names::{Convention, Input};
+use gridweave_logs::sink::InputFile;
 use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use gridweave_runtime::stage::RobotTopics;
@@ -27,6 +28,9 @@ pub(crate) struct InfoArgs {
     pub(crate) pipeline: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) names: NamingOptions,
+    /// Read large logs through, where otherwise their index and a few messages are enough.
+    #[arg(long)]
+    pub(crate) all: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -47,7 +51,8 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
         Some(path) => shipped::load(path, &Overrides::default(), registry)?.robots,
     };
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
-    let found = info::inspect(&inputs, &args.names.rules(Convention::ByRobot)?, &robots)?;
+    let inspect = if args.all { info::inspect } else { info::glance };
+    let found = inspect(&inputs, &args.names.rules(Convention::ByRobot)?, &robots)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&found)?),
         false => print(to_text(&found)),
@@ -70,20 +75,32 @@ fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
         };
         let robot = file.robot.as_ref().map(|robot| format!(", of {robot}")).unwrap_or_default();
         writeln!(text, "{}  {}, {packed}{robot}", file.path.display(), size(file.size))?;
+        write_beside(file, text)?;
     }
     if let Some(remark) = &found.remark {
         writeln!(text, "{remark}")?;
     }
     let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
     writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;
+    if found.is_sampled {
+        writeln!(
+            text,
+            "by the index and a few messages: sizes are estimates, and frames, clocks and tags those of these (--all)"
+        )?;
+    }
     if !found.topics.is_empty() {
         write!(text, "\n{}", topic_table(&found.topics, found.start.unwrap_or(0.0)))?;
     }
     if !found.robots.is_empty() {
-        let mut table = Table::new(["robot", "maps", "poses", "readings", "tags"]);
+        let mut table = Table::new(["robot", "maps", "poses", "readings", "tags", "poses from"]);
         for (name, robot) in &found.robots {
-            let counts = [robot.maps, robot.poses, robot.readings, robot.tags.len() as u64];
-            table.row(std::iter::once(name.clone()).chain(counts.map(|count| count.to_string())));
+            let maps = match robot.map_updates {
+                0 => robot.maps.to_string(),
+                updates => format!("{} + {updates} updates", robot.maps),
+            };
+            let counts = [robot.poses, robot.readings, robot.tags.len() as u64].map(|count| count.to_string());
+            let poses_from = robot.poses_from.clone().unwrap_or_default();
+            table.row([name.clone(), maps].into_iter().chain(counts).chain([poses_from]));
         }
         write!(text, "\n{table}")?;
     }
@@ -93,9 +110,34 @@ fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
     found.problems.iter().try_for_each(|problem| writeln!(text, "  - {problem}"))
 }
 
-/// The topics; their times are seconds from `origin` on.
+/// What a file holds beside messages: what is said of the run that wrote it, metadata records and attachments.
+fn write_beside(file: &FileInfo, text: &mut String) -> std::fmt::Result {
+    if let Some(run) = &file.run {
+        let pipeline: toml::Table = run.pipeline.parse().unwrap_or_default();
+        let of_pipeline = |key: &str| pipeline.get("pipeline").and_then(|section| section.get(key));
+        let name = of_pipeline("name").and_then(|name| name.as_str()).unwrap_or("of no name");
+        let seed = of_pipeline("seed").map_or_else(String::new, |seed| format!(", seed {seed}"));
+        write!(text, "  written by gridweave {}, pipeline {name}{seed} (--json shows its parameters)", run.version)?;
+        writeln!(text, "{}", if run.inputs.is_empty() { "" } else { ", from" })?;
+        for InputFile { name, bytes, sha256 } in &run.inputs {
+            writeln!(text, "    {name}  {}, sha256 {sha256}", size(*bytes))?;
+        }
+    }
+    let metadata: Vec<&str> = file.metadata.iter().map(String::as_str).collect();
+    if !metadata.is_empty() {
+        writeln!(text, "  metadata records: {}", metadata.join(", "))?;
+    }
+    match file.attachments {
+        0 => Ok(()),
+        count => writeln!(text, "  attachments: {count}"),
+    }
+}
+
+/// The topics; their times are seconds from `origin` on. Of each: how many messages in a second, the longest time between two,
+/// what the log says of their quality of service, and the frames that they name.
 fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
-    let mut table = Table::new(["topic", "type", "messages", "size", "first s", "last s"]);
+    let mut table =
+        Table::new(["topic", "type", "messages", "size", "first s", "last s", "Hz", "gap s", "QoS", "frame"]);
     for topic in topics {
         table.row([
             topic_text(topic),
@@ -104,9 +146,18 @@ fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
             size(topic.bytes),
             format!("{:.1}", topic.first - origin),
             format!("{:.1}", topic.last - origin),
+            topic.rate.map(rate_text).unwrap_or_default(),
+            if topic.messages > 1 { format!("{:.1}", topic.largest_gap) } else { String::new() },
+            topic.qos.clone(),
+            topic.frames.iter().map(String::as_str).collect::<Vec<_>>().join(" "),
         ]);
     }
     table
+}
+
+/// A rate, with enough digits for one of a map in a minute.
+fn rate_text(rate: f64) -> String {
+    if rate < 1.0 { format!("{rate:.3}") } else { format!("{rate:.1}") }
 }
 
 /// The topic, and what the logs call it if that is something else.
@@ -141,28 +192,34 @@ mod tests {
             bytes: 1_234_567,
             first: 10.0,
             last: 12.5,
+            rate: Some(0.8),
+            largest_gap: 2.0,
+            qos: "latched".into(),
+            frames: ["robot1/map".into()].into(),
             ..Default::default()
         };
+        let poses_from = Some("/robot1/pose".to_owned());
+        let robot = info::RobotInfo { maps: 3, poses: 12, poses_from, ..Default::default() };
         let found = LogInfo {
             messages: 3,
             start: Some(10.0),
             duration: 2.5,
             topics: vec![topic],
-            robots: BTreeMap::from([("robot1".into(), info::RobotInfo { maps: 3, ..Default::default() })]),
-            problems: vec!["there is no pose of robot1".into()],
+            robots: BTreeMap::from([("robot1".into(), robot)]),
+            problems: vec!["there is no tag reading of robot1".into()],
             ..Default::default()
         };
         let expected = "\
 3 messages over 2.5 s, from 10.000 s
 
-  topic        type         messages    size  first s  last s
-  /robot1/map  (no schema)         3  1.2 MB      0.0     2.5
+  topic        type         messages    size  first s  last s     Hz  gap s  QoS      frame
+  /robot1/map  (no schema)         3  1.2 MB      0.0     2.5  0.800    2.0  latched  robot1/map
 
-  robot   maps  poses  readings  tags
-  robot1     3      0         0     0
+  robot   maps  poses  readings  tags  poses from
+  robot1     3     12         0     0  /robot1/pose
 
 problems
-  - there is no pose of robot1
+  - there is no tag reading of robot1
 ";
         assert_eq!(to_text(&found), expected);
         assert_eq!(to_text(&LogInfo::default()), "0 messages over 0.0 s\n");

@@ -4,7 +4,7 @@ use crate::status::{BadUse, Status};
 use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
-use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text};
+use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text, suggest};
 use gridweave_runtime::stage::Registry;
 
 /// What `gridweave kinds` is told.
@@ -24,7 +24,8 @@ pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Status> {
         Some(name) => {
             let kind = registry.get(name).cloned().ok_or_else(|| {
                 let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
-                BadUse(format!("there is no stage kind `{name}`; the kinds are {}", names.join(", ")))
+                let meant = suggest(name, &names, "the kinds are").unwrap_or_default();
+                BadUse(format!("there is no stage kind `{name}`: {meant}"))
             })?;
             Registry::new([kind])
         }

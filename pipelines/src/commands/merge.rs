@@ -6,7 +6,9 @@ use crate::job::{Inputs, Output, is_yaml};
 use crate::status::{BadUse, Status};
 use anyhow::Result;
 use clap::Args;
-use gridweave_runtime::stage::Registry;
+use gridweave_logs::info;
+use gridweave_logs::names::{Convention, Input};
+use gridweave_runtime::stage::{Registry, RobotTopics};
 use std::path::{Path, PathBuf};
 
 /// What `gridweave merge` is told.
@@ -16,7 +18,7 @@ pub(crate) struct MergeArgs {
     /// files (map_server YAML), each the map of a robot that is called as the file.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// What to write: a log or, when it is called FILE.yaml, the merged map alone (map_server YAML, with the image beside
+    /// What to write: a log (FOLDER/, with a slash behind it, is a rosbag2 folder) or, when it is called FILE.yaml, the merged map alone (map_server YAML, with the image beside
     /// it).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
@@ -27,6 +29,7 @@ pub(crate) struct MergeArgs {
 /// Merges the maps of logs or of map files.
 pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
     let pipeline = match Inputs::of(&args.inputs)? {
+        Inputs::Logs if holds_tags_alone(args)? => "tag_frames",
         Inputs::Logs => "auto_merge",
         Inputs::MapFiles => "map_file_merge",
     };
@@ -35,6 +38,17 @@ pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
         false => (Output::Log(&args.output), args.options.clone()),
     };
     Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output, options: &options, registry }.run_and_print()
+}
+
+/// Whether logs hold tags and no map, so that frames are all that can come out, and no map is asked for. Logs that cannot be
+/// read are told of by the run.
+fn holds_tags_alone(args: &MergeArgs) -> Result<bool, BadUse> {
+    if args.options.map.is_some() || args.options.picture.is_some() || is_yaml(&args.output) {
+        return Ok(false);
+    }
+    let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
+    let rules = args.options.reading.names.rules(Convention::ByRobot)?;
+    Ok(info::holds_tags_alone(&inputs, &rules, &RobotTopics::default()).unwrap_or(false))
 }
 
 /// The options of a merge whose output is the map. An error if they speak of a log, which there is none of.

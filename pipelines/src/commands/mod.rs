@@ -1,5 +1,6 @@
 //! The commands of `gridweave`: a file or a folder each, with what it is told and what it does.
 
+pub(crate) mod cat;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod convert;
@@ -12,6 +13,11 @@ pub(crate) mod kinds;
 pub(crate) mod live;
 mod map_file_info;
 pub(crate) mod merge;
+pub(crate) mod pipelines;
 pub(crate) mod processes;
+pub(crate) mod recover;
+pub(crate) mod render;
+pub(crate) mod report;
 pub(crate) mod run;
+pub(crate) mod shell;
 pub(crate) mod simulate;

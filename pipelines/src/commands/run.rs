@@ -16,7 +16,7 @@ pub(crate) struct RunArgs {
     /// the name of its robot. Or, for a pipeline that reads map files, the map of a robot (map_server YAML).
     #[arg(short, long, value_name = "LOG")]
     pub(crate) input: Vec<PathBuf>,
-    /// The log to write.
+    /// The log to write; FOLDER/, with a slash behind it, is a rosbag2 folder.
     #[arg(short, long, value_name = "LOG")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]

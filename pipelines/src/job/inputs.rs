@@ -1,19 +1,20 @@
 //! What the files on a command line are: logs, or map files.
 
 use crate::status::BadUse;
+use gridweave_logs::names::Input;
 use std::path::{Path, PathBuf};
 
 /// What the inputs of a run are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Inputs {
-    /// MCAP files and rosbag2 folders.
+    /// Logs of all kinds, and maps of robots that have none.
     Logs,
     /// YAML files of nav2's map server.
     MapFiles,
 }
 
 impl Inputs {
-    /// Tells by the names of the files. An error if there are some of both, or images of maps.
+    /// Tells by the names of the files. An error if there are images of maps.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
         if let Some(image) =
             paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm", "bmp", "jpg", "jpeg"]))
@@ -21,15 +22,14 @@ impl Inputs {
             let text = format!("{} is an image: give the YAML file that describes the map", image.display());
             return Err(BadUse(text));
         }
-        // A rosbag2 folder may have any name.
-        let is_map_file = |path: &&PathBuf| is_yaml(path) && !path.is_dir();
-        match (paths.iter().find(is_map_file), paths.iter().find(|path| !is_map_file(path))) {
-            (Some(map), Some(log)) => {
-                let (map, log) = (map.display(), log.display());
-                Err(BadUse(format!("{map} is a map file and {log} is a log: give files of one sort only")))
-            }
-            (Some(_), None) => Ok(Self::MapFiles),
-            (None, _) => Ok(Self::Logs),
+        // A rosbag2 folder may have any name; and a map that is said to be a robot's is read as a log of it.
+        let is_map_file = |typed: &PathBuf| {
+            let Input { robot, path } = Input::new(typed);
+            robot.is_none() && is_yaml(&path) && !path.is_dir()
+        };
+        match paths.iter().all(is_map_file) && !paths.is_empty() {
+            true => Ok(Self::MapFiles),
+            false => Ok(Self::Logs),
         }
     }
 
@@ -70,9 +70,9 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_together_is_refused() {
-        let error = of(&["a.yaml", "b.mcap"]).unwrap_err();
-        assert!(error.contains("a.yaml is a map file") && error.contains("b.mcap is a log"), "{error}");
+    fn a_map_beside_a_log_or_said_to_be_a_robots_is_read_as_a_log() {
+        assert_eq!(of(&["a.yaml", "b.mcap"]), Ok(Inputs::Logs));
+        assert_eq!(of(&["robot1=a.yaml", "robot2=b.yaml"]), Ok(Inputs::Logs));
         assert!(of(&["a.yaml", "b.pgm"]).unwrap_err().contains("b.pgm is an image"));
     }
 }

@@ -4,12 +4,14 @@ mod inputs;
 mod options;
 mod outputs;
 pub(crate) mod progress;
+mod provenance;
 mod reading;
 mod results;
 
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
+pub(crate) use outputs::is_or_holds as is_input;
 pub(crate) use reading::{NamingOptions, ReadingOptions};
 
 use crate::shipped;
@@ -17,6 +19,7 @@ use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
 use crate::terminal::{print, print_line};
 use anyhow::Result;
+use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
 use gridweave_logs::source::map_file::robot_names;
@@ -80,11 +83,13 @@ impl Job<'_> {
 
     /// Runs the pipeline and writes all that was asked for.
     pub(crate) fn run(&self) -> Result<RunSummary> {
-        let mut pipeline = shipped::load(self.pipeline, &self.overrides()?, self.registry)?;
+        let bag = self.bag()?;
+        let mut pipeline = shipped::load(self.pipeline, &self.overrides(bag.as_ref())?, self.registry)?;
         if self.output == Output::MapOnly {
             pipeline.take_out(LOG_SINK);
         }
         outputs::check(&pipeline, self.options)?;
+        provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         let progress = Progress::new(pipeline.mode);
         let by_mode = match pipeline.mode {
@@ -96,6 +101,9 @@ impl Job<'_> {
         if let Err(error) = &report {
             close_outputs(&pipeline, &error.to_string());
         }
+        if let Some(bag) = bag.filter(|bag| report.is_ok() || bag.log().exists()) {
+            bag.describe()?;
+        }
         let report = report?;
         let summary = RunSummary::new(sinks.summary()?, &report);
         if let Some(path) = &self.options.summary {
@@ -106,6 +114,14 @@ impl Job<'_> {
         }
         sinks.check_written(&report)?;
         Ok(summary)
+    }
+
+    /// The bag that the log is to lie in, if a folder was named.
+    fn bag(&self) -> Result<Option<Bag>> {
+        match self.output {
+            Output::Log(path) if Bag::is_meant(path) => Ok(Some(Bag::create(path)?)),
+            _ => Ok(None),
+        }
     }
 
     /// A robot: its name, or its map file as it was typed among the inputs.
@@ -139,7 +155,8 @@ impl Job<'_> {
         self.options.accept.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
     }
 
-    fn overrides(&self) -> Result<Overrides> {
+    /// What the pipeline is told, whose log lies in a bag if there is one.
+    fn overrides(&self, bag: Option<&Bag>) -> Result<Overrides> {
         let mut overrides = Overrides::default();
         overrides.reference = self.options.reference.as_deref().map(|typed| self.robot(typed));
         overrides.seed = self.options.seed;
@@ -152,7 +169,8 @@ impl Job<'_> {
             overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);
         }
         if let Output::Log(output) = self.output {
-            overrides.set_for_kind(LOG_SINK, "file", text_of(output)?);
+            let file = bag.map_or_else(|| output.to_owned(), Bag::log);
+            overrides.set_for_kind(LOG_SINK, "file", text_of(&file)?);
         }
         if self.options.literal_thresholds {
             overrides.set_for_kind(Inputs::MapFiles.source_kind(), "literal_thresholds", true);

@@ -14,7 +14,7 @@ pub(crate) struct RunOptions {
     /// Write the merged map as a map file (map_server YAML, with the image beside it).
     #[arg(long, value_name = "FILE.yaml")]
     pub(crate) map: Option<PathBuf>,
-    /// Draw the merged maps, each robot's walls in a colour of its own.
+    /// Draw the merged maps, each robot's walls in a colour of its own, as FILE.png, .svg or .pdf; `gridweave render` draws more.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
     /// What runs the stages: single, threads (the default for a replay), threads-ipc, or processes (for a live pipeline).

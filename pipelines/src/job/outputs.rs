@@ -44,7 +44,7 @@ pub(crate) fn logs(pipeline: &Pipeline) -> Vec<PathBuf> {
 }
 
 /// All that the sources read.
-fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
+pub(super) fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     let logs = files_of(pipeline, "mcap_source", "files");
     let mut inputs: Vec<PathBuf> = logs.iter().map(|log| Input::new(log).path).collect();
     inputs.extend(files_of(pipeline, "topology_file_source", "files"));
@@ -82,7 +82,7 @@ fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
 }
 
 /// Whether two paths lead to the same file, or the first to a folder that holds the second, through links as well.
-fn is_or_holds(input: &Path, output: &Path) -> bool {
+pub(crate) fn is_or_holds(input: &Path, output: &Path) -> bool {
     let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
     output.starts_with(&input) || same_file(&input, &output)
 }

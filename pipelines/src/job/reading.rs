@@ -18,8 +18,12 @@ pub(crate) struct NamingOptions {
     #[arg(long, value_name = "ROBOT", value_delimiter = ',')]
     pub(crate) robots: Vec<String>,
     /// Read these topics alone; `{robot}` stands for any one part.
-    #[arg(long, value_name = "TOPIC", value_delimiter = ',')]
+    #[arg(long, visible_alias = "topic", value_name = "TOPIC", value_delimiter = ',')]
     pub(crate) topics: Vec<String>,
+    /// Set the clocks of all logs, and the stamps in their messages, so that they begin together, when the first one does: for
+    /// robots whose clocks have nothing in common.
+    #[arg(long)]
+    pub(crate) align_start: bool,
 }
 
 /// What is read of logs, and under which names.
@@ -38,7 +42,10 @@ pub(crate) struct ReadingOptions {
 impl ReadingOptions {
     /// Tells the source of a pipeline.
     pub(crate) fn set(&self, overrides: &mut Overrides) {
-        let NamingOptions { rename, robots, topics } = &self.names;
+        let NamingOptions { rename, robots, topics, align_start } = &self.names;
+        if *align_start {
+            overrides.set_for_kind(LOG_SOURCE, "align_start", true);
+        }
         for (parameter, texts) in [("rename", rename), ("only_robots", robots), ("only_topics", topics)] {
             if !texts.is_empty() {
                 overrides.set_for_kind(LOG_SOURCE, parameter, texts.clone());
@@ -59,6 +66,7 @@ impl NamingOptions {
     /// An entry of `--rename` is none.
     pub(crate) fn rules(&self, convention: Convention) -> Result<NameRules, BadUse> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>().map_err(BadUse)?;
-        Ok(NameRules { convention, renames, robots: self.robots.clone(), topics: self.topics.clone() })
+        let (robots, topics) = (self.robots.clone(), self.topics.clone());
+        Ok(NameRules { convention, renames, robots, topics, align_start: self.align_start })
     }
 }

@@ -39,7 +39,8 @@ impl ResultSinks {
         let file = folder.path().join("summary.json");
         let is_attached = attach(pipeline, &summary::kind(), &file, |_, _, _| true)?;
         let mut files = 0;
-        if options.picture.is_some() {
+        if let Some(picture) = &options.picture {
+            picture::check_format(picture).map_err(|error| BadUse(error.to_string()))?;
             // A picture shows what came from each robot, which nothing else of the run needs.
             pipeline.attach(&map_placer::kind(), toml::Table::new(), PROCESS, |input, from, _| {
                 input.name != "map" || from.kind.inputs.is_empty()

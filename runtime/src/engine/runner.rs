@@ -1,9 +1,12 @@
 //! One running stage, whatever its links are.
+//!
+//! What it does is told by `tracing`: as information when it starts and ends; each message that it works on as a span, with
+//! details for debugging.
 
 use super::{Failure, StageReport};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, Wire};
 use crate::stage::{Node, OutputEnd, OutputSink, StageError};
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -15,6 +18,8 @@ pub(super) struct Runner {
     node: Node,
     /// For each wire, the input port it leads to.
     ports: Vec<usize>,
+    /// For each wire, the output that it comes from: STAGE.PORT.
+    origins: Vec<String>,
     report: StageReport,
 }
 
@@ -32,7 +37,17 @@ impl Runner {
         let ends = ends.collect();
         let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context, ends))?;
         let report = StageReport { name: spec.name.clone(), kind: spec.kind.name.to_owned(), ..Default::default() };
-        Ok(Self { node, ports: spec.inputs.iter().map(|wire| wire.port).collect(), report })
+        let origin = |wire: &Wire| {
+            let from = &pipeline.stages[wire.from_stage];
+            format!("{}.{}", from.name, from.kind.outputs[wire.from_port].name)
+        };
+        tracing::info!("stage {} ({}) starts", report.name, report.kind);
+        Ok(Self {
+            node,
+            ports: spec.inputs.iter().map(|wire| wire.port).collect(),
+            origins: spec.inputs.iter().map(origin).collect(),
+            report,
+        })
     }
 
     /// Whether the stage is a source.
@@ -47,6 +62,7 @@ impl Runner {
 
     /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
     pub(super) fn advance(&mut self) -> Result<bool, Failure> {
+        let _span = tracing::debug_span!("advance", stage = self.report.name).entered();
         let start = Instant::now();
         let more = guarded(|| self.node.advance());
         self.report.busy += start.elapsed();
@@ -91,12 +107,16 @@ impl Runner {
             });
         }
         self.report.messages_in += 1;
+        let (from, log_time) = (&self.origins[wire], header.log_time.0);
+        let _span = tracing::debug_span!("receive", stage = self.report.name, from, log_time).entered();
+        tracing::debug!("{} receives {} bytes of {from}", self.report.name, message.bytes().len());
         guarded(|| self.node.receive(self.ports[wire], message))
     }
 
     /// Tells the stage that all its inputs have ended, having come to the log time `time`.
     pub(super) fn finish(&mut self, time: LogTime) -> Result<(), Failure> {
         self.node.set_log_time(self.node.log_time().max(time));
+        let _span = tracing::debug_span!("finish", stage = self.report.name).entered();
         let start = Instant::now();
         let result = guarded(|| self.node.finish());
         self.report.busy += start.elapsed();
@@ -119,6 +139,9 @@ impl Runner {
             drop(self.node);
             Ok(())
         })?;
+        let StageReport { name, messages_in, messages_out, busy, .. } = &self.report;
+        let seconds = busy.as_secs_f64();
+        tracing::info!("stage {name} ends: {messages_in} messages in, {messages_out} out, {seconds:.3} s of work");
         Ok(self.report)
     }
 }

@@ -1,7 +1,7 @@
 //! The engine `threads`: a thread a stage, with links over shared memory.
 
 use super::links::{Links, board_shape};
-use super::stage_thread::{Event, StageThread};
+use super::stage_thread::{Event, StageThread, tell};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{Board, StageState};
 use crate::link::{Control, LinkError, RunNames};
@@ -30,7 +30,11 @@ pub(super) fn run<S: Service + 'static>(
         for stage in 0..pipeline.stages.len() {
             let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
             let control = Arc::clone(&control);
-            scope.spawn(move || StageThread::<S>::start(links, stage, control, stop_reason, &sender));
+            let (name, events) = (pipeline.stages[stage].name.clone(), sender.clone());
+            let work = move || StageThread::<S>::start(links, stage, control, stop_reason, &sender);
+            if let Err(error) = thread::Builder::new().name(name).spawn_scoped(scope, work) {
+                tell(&events, Event::Stop { reason: format!("cannot start a thread: {error}") });
+            }
         }
         drop(sender);
         let stop = |error: &RunError| {

@@ -119,6 +119,13 @@ pub struct PipelineErrors {
 }
 
 impl PipelineErrors {
+    /// One error of a pipeline as a whole, which is called `name`.
+    pub fn of_whole(name: &str, problem: impl Into<String>) -> Self {
+        let mut problems = Problems::new(name, "");
+        problems.push(Diagnostic::new(problem.into()));
+        problems.into_errors()
+    }
+
     /// How many errors there are.
     pub fn count(&self) -> usize {
         self.list.len()

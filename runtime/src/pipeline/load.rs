@@ -24,13 +24,10 @@ impl Pipeline {
     /// Everything that is wrong with it, or that it cannot be read.
     pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
         let name = path.display().to_string();
-        let problem = match input_file::read_text(path) {
-            Ok(text) => return Self::parse(&name, &text, registry, overrides),
-            Err(error) => format!("cannot read the pipeline `{name}`: {error}"),
-        };
-        let mut problems = Problems::new(name, "");
-        problems.push(Diagnostic::new(problem));
-        Err(problems.into_errors())
+        match input_file::read_text(path) {
+            Ok(text) => Self::parse(&name, &text, registry, overrides),
+            Err(error) => Err(PipelineErrors::of_whole(&name, format!("cannot read the pipeline `{name}`: {error}"))),
+        }
     }
 
     /// Checks the text of a pipeline file; errors call it `source_name`.

@@ -69,6 +69,7 @@ mod reference;
 mod settings;
 mod single_stage;
 mod stage_section;
+mod tag_fields;
 #[cfg(test)]
 mod test_kinds;
 #[cfg(test)]

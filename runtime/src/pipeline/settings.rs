@@ -5,6 +5,7 @@ use super::document::{Entry, Item, Value};
 use super::initial_poses::{complete, read_robot, read_typed};
 use super::live::{Mode, read_word};
 use super::overrides::Overrides;
+use super::tag_fields::read_tag_fields;
 use super::values::{entries, text, unknown_key, wrong_type};
 use crate::message::{FixedText, LONGEST_ROBOT_NAME};
 use crate::stage::{InitialPoses, RobotTopics, TfFrames};
@@ -97,6 +98,13 @@ impl Settings {
     pub(super) fn read_robots(&mut self, section: &Item, problems: &mut Problems) {
         const KEYS: [&str; 5] = ["map", "pose", "tags", "topology", "tf"];
         for Entry { key, key_at, item } in entries(section, "[robots]", problems) {
+            let mut item = item;
+            if key == "tags" && matches!(item.value, Value::Table(_)) {
+                let (topic, fields) = read_tag_fields(item, key_at, problems);
+                self.robots.tag_fields = Some(fields);
+                let Some(topic) = topic else { continue };
+                item = topic;
+            }
             let topic = match key.as_str() {
                 "map" => &mut self.robots.map,
                 "pose" => &mut self.robots.pose,

@@ -2,7 +2,7 @@
 
 use super::live::Word;
 use super::{Mode, Pipeline};
-use crate::stage::{InitialPose, InitialPoses, RobotTopics};
+use crate::stage::{InitialPose, InitialPoses, RobotTopics, TagFields};
 use toml::{Table, Value};
 
 impl Pipeline {
@@ -67,7 +67,7 @@ impl Pipeline {
 }
 
 fn robots_table(robots: &RobotTopics, initial_poses: &InitialPoses) -> Table {
-    let RobotTopics { map, pose, tags, topology, tf } = robots;
+    let RobotTopics { map, pose, tags, tag_fields, topology, tf } = robots;
     let topics = [("map", map), ("pose", pose), ("tags", tags), ("topology", topology)];
     let mut table = Table::from_iter(topics.map(|(key, topic)| (key.to_owned(), topic.as_str().into())));
     if let Some(tf) = tf {
@@ -75,10 +75,37 @@ fn robots_table(robots: &RobotTopics, initial_poses: &InitialPoses) -> Table {
         let frames = Table::from_iter(frames.map(|(key, frame)| (key.to_owned(), frame.as_str().into())));
         table.insert("tf".into(), frames.into());
     }
+    if let Some(fields) = tag_fields {
+        table.insert("tags".into(), tag_fields_table(tags, fields).into());
+    }
     for (robot, initial) in initial_poses.iter().filter(|(_, initial)| **initial != InitialPose::ORIGIN) {
         let values = InitialPose::FIELDS.into_iter().zip(initial.values());
         let initial = Table::from_iter(values.map(|(key, value)| (key.to_owned(), value.into())));
         table.insert(robot.clone(), Table::from_iter([("initial".to_owned(), initial.into())]).into());
     }
     table
+}
+
+fn tag_fields_table(topic: &str, fields: &TagFields) -> Table {
+    let TagFields { each, id_field, range_field, range_unit, rssi_field, path_loss, stddev_field, stddev, pose_field } =
+        fields;
+    let texts = [
+        ("topic", Some(topic)),
+        ("each", each.as_deref()),
+        ("id_field", Some(id_field.as_str())),
+        ("range_field", range_field.as_deref()),
+        ("rssi_field", rssi_field.as_deref()),
+        ("stddev_field", stddev_field.as_deref()),
+        ("pose_field", pose_field.as_deref()),
+    ];
+    let numbers = [
+        ("range_unit", *range_unit),
+        ("stddev", *stddev),
+        ("rssi_at_1m", path_loss.map(|model| model.rssi_at_1m)),
+        ("path_loss_exponent", path_loss.map(|model| model.exponent)),
+        ("rssi_stddev", path_loss.map(|model| model.stddev)),
+    ];
+    let texts = texts.into_iter().filter_map(|(key, text)| Some((key.to_owned(), text?.into())));
+    let numbers = numbers.into_iter().filter_map(|(key, number)| Some((key.to_owned(), number?.into())));
+    Table::from_iter(texts.chain(numbers))
 }

@@ -21,6 +21,21 @@ pub struct TagRange {
     pub rssi: f32,
 }
 
+/// Where a robot sees one tag, as a camera does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagPosition {
+    /// Time, and the frame of the robot's base.
+    pub header: Header,
+    /// Which tag.
+    pub tag_id: String,
+    /// Metres ahead of the base.
+    pub x: f64,
+    /// Metres to its left.
+    pub y: f64,
+    /// Covariance of x and y, by rows, square metres; zeros if it is not known.
+    pub covariance: [f64; 4],
+}
+
 /// Where a robot believes one tag to be.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TagEstimate {
@@ -376,5 +391,5 @@ impl RobotFrames {
 ros_messages!(
     "gridweave_msgs":
     TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement,
-    SimulationTruth
+    SimulationTruth, TagPosition
 );

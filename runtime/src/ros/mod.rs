@@ -8,9 +8,11 @@ mod codec;
 mod deformation;
 mod geometry;
 mod gridweave;
+mod map_msgs;
 mod nav;
 mod std_msgs;
 mod topological;
+mod visualization;
 
 pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
 pub use deformation::{DeformationNode, MapDeformation, Sharpness};
@@ -20,12 +22,14 @@ pub use geometry::{
 };
 pub use gridweave::{
     Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RobotFrame, RobotFrames,
-    RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagRange, TrueFrame, TrueTag,
-    UnmergedRobot, Verdict, Verdicts,
+    RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagPosition, TagRange, TrueFrame,
+    TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
+pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use std_msgs::{Header, Time};
 pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};
+pub use visualization::{ColorRGBA, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UVCoordinate};
 
 use serde::{Deserialize, Serialize};
 

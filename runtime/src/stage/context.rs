@@ -1,6 +1,6 @@
 //! What a stage is told when it is made.
 
-use super::InitialPoses;
+use super::{InitialPoses, TagFields};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -43,7 +43,7 @@ pub struct InputWire {
 }
 
 /// How the topics of a log are told apart: patterns in which `{robot}` stands for any one part of a path.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotTopics {
     /// Occupancy grids.
@@ -52,6 +52,8 @@ pub struct RobotTopics {
     pub pose: String,
     /// Range readings of tags.
     pub tags: String,
+    /// Where the readings are in messages of a type that is not known to hold some.
+    pub tag_fields: Option<TagFields>,
     /// Topological maps.
     pub topology: String,
     /// Poses from tf instead of from a pose topic.
@@ -74,6 +76,7 @@ impl Default for RobotTopics {
             map: "/{robot}/map".into(),
             pose: "/{robot}/pose".into(),
             tags: "/{robot}/tag_ranges".into(),
+            tag_fields: None,
             topology: "/{robot}/topology".into(),
             tf: None,
         }

@@ -54,6 +54,7 @@ mod parameters;
 mod ports;
 mod received;
 mod registry;
+mod tag_fields;
 
 pub use builder::StageBuilder;
 pub use context::{Context, InputWire, RobotTopics, TfFrames, frame_of_robot, match_robot};
@@ -67,3 +68,4 @@ pub use parameters::{ParameterError, Parameters};
 pub use ports::{InputPort, OutputPort, PortType};
 pub use received::Received;
 pub use registry::Registry;
+pub use tag_fields::{PathLoss, TagFields};

@@ -2,6 +2,7 @@
 
 mod messages;
 mod solutions;
+mod tree;
 
 use super::kind;
 use crate::geometry::{Pose2, pose, wrap_angle};

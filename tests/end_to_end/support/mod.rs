@@ -2,6 +2,7 @@
 
 pub(crate) mod golden_cases;
 mod live_run;
+mod merged_log;
 mod readings;
 
 pub(crate) use gridweave_tests::run_files::{
@@ -9,6 +10,7 @@ pub(crate) use gridweave_tests::run_files::{
 };
 pub(crate) use gridweave_tests::{LogBuilder, TestMap};
 pub(crate) use live_run::{LOG, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, read};
+pub(crate) use merged_log::{MARKUP, merged_log};
 pub(crate) use readings::{change_log, change_readings, moved_reading, place_in_map_2};
 use std::io::Read;
 use std::path::{Path, PathBuf};

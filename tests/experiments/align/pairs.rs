@@ -1,5 +1,6 @@
 //! Tables and curves of pairs.
 
+use super::kinds::Kind;
 use super::trial::PairTrial;
 use crate::plot::{Axis, Plot, Series, Shape};
 use crate::results::Results;
@@ -63,6 +64,15 @@ pub(super) fn totals(sets: &[(&str, &Vec<PairTrial>)]) -> Table {
         }
     }
     table
+}
+
+/// Trials of worlds of many kinds, by kind.
+pub(super) fn by_kind(trials: &[PairTrial]) -> Vec<(&'static str, Vec<PairTrial>)> {
+    let of_kind = |kind: &Kind| {
+        let is_of_kind = |trial: &&PairTrial| trial.kind == Some(*kind);
+        (kind.name(), trials.iter().filter(is_of_kind).cloned().collect())
+    };
+    Kind::ALL.iter().map(of_kind).collect()
 }
 
 /// The random pairs by their overlap and by the drift of the poses.

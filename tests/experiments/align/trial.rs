@@ -1,5 +1,6 @@
 //! What became of one pair of robots.
 
+use super::kinds::Kind;
 use super::worlds::PairWorld;
 use crate::log::{last_maps, read_messages};
 use anyhow::{Context, Result};
@@ -23,7 +24,7 @@ pub(super) struct Judged {
     pub(super) wall_on_free: f64,
     /// The most evidence elsewhere, as a share of that here.
     pub(super) evidence_elsewhere: f64,
-    /// Whether it lies within 0.5 m and 1 degree of the truth, accepted or not.
+    /// Whether its place is right, accepted or not.
     pub(super) is_right: bool,
 }
 
@@ -38,6 +39,8 @@ pub(super) struct PairTrial {
     /// Share of the smaller map's known area that the other map knows, too; none if the truth does not tell.
     pub(super) overlap: Option<f64>,
     pub(super) drift: Option<f64>,
+    /// The kind of building, where there are many.
+    pub(super) kind: Option<Kind>,
     /// None if no place was proposed.
     pub(super) judged: Option<Judged>,
 }
@@ -86,18 +89,33 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
     let is_pair = merge.evaluation.robots.len() == 1;
     let judged = if is_pair { judged(pair, &merge.summary)? } else { None };
     let overlap = if is_pair && merge.evaluation.related { overlap(pair)? } else { None };
+    let outcome = match merge.evaluation.robots.first().map(|robot| robot.outcome) {
+        Some(RobotOutcome::Right | RobotOutcome::Wrong) if is_place_right(&merge.evaluation) => RobotOutcome::Right,
+        Some(RobotOutcome::Right) => RobotOutcome::Wrong,
+        other => other.unwrap_or(RobotOutcome::NoTruth),
+    };
     let Evaluation { robots, .. } = merge.evaluation;
     let trial = |robot: gridweave::evaluate::RobotResult| PairTrial {
         name: format!("{}, {}", pair.name, robot.robot),
-        outcome: robot.outcome,
+        outcome: if is_pair { outcome } else { robot.outcome },
         error_m: robot.error_m,
         error_deg: robot.error_deg,
         reason: robot.reason.unwrap_or_default(),
         overlap,
         drift: pair.drift,
+        kind: pair.kind,
         judged,
     };
     Ok(robots.into_iter().map(trial).collect())
+}
+
+/// Whether two robots lie to each other as they should: places that both have seen lie within 0.5 m of each other in the median,
+/// and nine of ten within 1 m. Where the truth knows none, the second robot lies within 0.5 m and 1 degree of its place.
+fn is_place_right(evaluation: &Evaluation) -> bool {
+    match &evaluation.common {
+        Some(common) => evaluation.related && common.rigid.median_m < 0.5 && common.rigid.p90_m < 1.0,
+        None => evaluation.related && evaluation.right == 1,
+    }
 }
 
 /// What the verifier has said of the only pair, and whether its best hypothesis is right, even where it was refused.
@@ -114,7 +132,7 @@ fn judged(pair: &PairWorld, summary: &Summary) -> Result<Option<Judged>> {
         wall_on_wall: evidence.wall_on_wall,
         wall_on_free: evidence.wall_on_free,
         evidence_elsewhere: evidence.evidence_elsewhere,
-        is_right: evaluation.related && evaluation.right == 1,
+        is_right: is_place_right(&evaluation),
     }))
 }
 

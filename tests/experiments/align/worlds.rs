@@ -1,5 +1,6 @@
 //! The worlds of the experiment, each from a seed.
 
+use super::kinds::Kind;
 use crate::cut::{self, Member};
 use crate::trial::World;
 use anyhow::{Context, Result, bail};
@@ -35,6 +36,8 @@ const RANDOM: u64 = 0;
 const FIRST_BUILDING: u64 = 1;
 const SECOND_BUILDING: u64 = 2;
 const ALIKE: u64 = 3;
+/// Kind of the worlds of many kinds.
+const VARIED: u64 = 5;
 /// Kind of the worlds of teams.
 pub(super) const TEAM: u64 = 4;
 
@@ -47,6 +50,8 @@ pub(super) struct PairWorld {
     pub(super) world: World,
     /// Standard deviation of the poses' drift after one metre, if it is known.
     pub(super) drift: Option<f64>,
+    /// The kind of building, where there are many.
+    pub(super) kind: Option<Kind>,
     /// Holds logs that were put together.
     _folder: Option<TempDir>,
 }
@@ -79,12 +84,11 @@ pub(super) fn random(seeds: Seeds, number: u64, registry: &Registry) -> Result<P
     let (mut settings, drift) = settings(&mut random);
     settings.push(format!("overlap={:.3}", random.random::<f64>()));
     let world = World::simulate(&settings, seed, registry)?;
-    Ok(PairWorld { name: format!("seed {seed}"), world, drift: Some(drift), _folder: None })
+    Ok(PairWorld { name: format!("seed {seed}"), world, drift: Some(drift), kind: None, _folder: None })
 }
 
 /// A robot of one building, and one of another.
 pub(super) fn unrelated(seeds: Seeds, number: u64, registry: &Registry) -> Result<PairWorld> {
-    let folder = TempDir::new().context("cannot make a folder for a log of two robots")?;
     let simulate = |kind: u64| {
         let seed = seeds.seed(kind, number);
         let (mut settings, _) = settings(&mut ChaCha8Rng::seed_from_u64(seed));
@@ -92,14 +96,33 @@ pub(super) fn unrelated(seeds: Seeds, number: u64, registry: &Registry) -> Resul
         World::simulate(&settings, seed, registry)
     };
     let (first, second) = (simulate(FIRST_BUILDING)?, simulate(SECOND_BUILDING)?);
-    let member = |world: &World, robot: &'static str| (world.log.clone(), robot);
-    let members = [member(&first, ROBOTS[0]), member(&second, ROBOTS[1])];
-    let members: Vec<Member<'_>> =
-        members.iter().map(|(log, robot)| Member { log, robot, tags: BTreeMap::new() }).collect();
+    let name = format!("seed {} and {}", seeds.seed(FIRST_BUILDING, number), seeds.seed(SECOND_BUILDING, number));
+    of_two(&first, &second, name)
+}
+
+/// The first robot of one world, and the second of another.
+fn of_two(first: &World, second: &World, name: String) -> Result<PairWorld> {
+    let folder = TempDir::new().context("cannot make a folder for a log of two robots")?;
+    let members = [(first, ROBOTS[0]), (second, ROBOTS[1])];
+    let members = members.map(|(world, robot)| Member { log: &world.log, robot, tags: BTreeMap::new() });
     let log = folder.path().join("two.mcap");
     cut::write(&members, &log)?;
-    let name = format!("seed {} and {}", seeds.seed(FIRST_BUILDING, number), seeds.seed(SECOND_BUILDING, number));
-    Ok(PairWorld { name, world: World::unrelated(&log)?, drift: None, _folder: Some(folder) })
+    Ok(PairWorld { name, world: World::unrelated(&log)?, drift: None, kind: None, _folder: Some(folder) })
+}
+
+/// Two robots in a building of any kind. `None` if the robots find no way or see nothing there.
+pub(super) fn varied(seeds: Seeds, number: u64, registry: &Registry) -> Option<PairWorld> {
+    let seed = seeds.seed(VARIED, number);
+    let kind = Kind::of(number);
+    let settings = kind.settings(&mut ChaCha8Rng::seed_from_u64(seed));
+    let world = World::simulate(&settings, seed, registry).ok()?;
+    let name = format!("seed {seed}, {}", kind.name());
+    Some(PairWorld { name, world, drift: None, kind: Some(kind), _folder: None })
+}
+
+/// The first robot of one of these worlds, and the second of another.
+pub(super) fn varied_unrelated(first: &PairWorld, second: &PairWorld) -> Result<PairWorld> {
+    of_two(&first.world, &second.world, format!("{} and {}", first.name, second.name))
 }
 
 /// Two robots in a building whose parts are alike: half of them symmetric, half of them with one room again and again, and
@@ -117,7 +140,7 @@ pub(super) fn alike(seeds: Seeds, number: u64, registry: &Registry) -> Result<Pa
         format!("overlap={:.3}", random.random::<f64>()),
     ]);
     let world = World::simulate(&settings, seed, registry)?;
-    Ok(PairWorld { name: format!("seed {seed}, {layout}"), world, drift: Some(drift), _folder: None })
+    Ok(PairWorld { name: format!("seed {seed}, {layout}"), world, drift: Some(drift), kind: None, _folder: None })
 }
 
 /// The logs of a folder.
@@ -133,7 +156,7 @@ pub(super) fn recorded(folder: &Path) -> Result<Vec<PairWorld>> {
         let truth = log.with_extension("truth.json");
         let world = if truth.exists() { World::recorded(log, &truth)? } else { World::unrelated(log)? };
         let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(PairWorld { name, world, drift: None, _folder: None })
+        Ok(PairWorld { name, world, drift: None, kind: None, _folder: None })
     };
     logs.iter().map(world).collect()
 }

@@ -163,6 +163,7 @@ impl Recording {
             let position = Position {
                 place: place + error * conditions.pose_stddev,
                 covariance: Matrix2::from_diagonal_element(told),
+                yaw: 0.0,
             };
             let is_reflected = random.random::<f64>() < conditions.reflections;
             let detour = random.random_range(DETOUR);

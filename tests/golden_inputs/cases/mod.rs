@@ -13,6 +13,7 @@ mod line_extractor;
 mod logs;
 mod map_aligner;
 mod map_cleaner;
+mod marker_maker;
 mod merge_verifier;
 mod placers;
 mod quadrant_classifier;
@@ -62,6 +63,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         logs::cases(),
         map_aligner::cases(),
         map_cleaner::cases(),
+        marker_maker::cases(),
         merge_verifier::cases(),
         placers::cases(),
         quadrant_classifier::cases(),

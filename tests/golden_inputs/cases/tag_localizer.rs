@@ -1,9 +1,10 @@
 //! Inputs of `tag_localizer`: drives past tags.
 
 use super::Case;
-use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagRange};
+use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagPosition, TagRange};
 use gridweave_stages::geometry::{Point2, pose};
 use gridweave_tests::{LogBuilder, header};
+use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -43,6 +44,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("poses_missing", poses_missing),
         case("few_readings", |log| Drive::past("tag", TAG).along(log, "robot1", circle(100).take(4))),
         case("no_readings", no_readings),
+        case("seen_by_a_camera", seen_by_a_camera),
     ]
 }
 
@@ -160,4 +162,23 @@ fn no_readings(log: &mut LogBuilder) {
         log.message(seconds, readings, &reading(seconds, "tag", (TAG.coords).norm(), stddev));
     }
     log.uncertain_pose(7.8, "robot1", 0.0, 0.0, 0.0);
+}
+
+/// A straight drive past a tag that a camera sees, with an error that goes round; the tag is heard as well at the end.
+fn seen_by_a_camera(log: &mut LogBuilder) {
+    for (step, place) in line(60).enumerate() {
+        let seconds = 0.1 * step as f64;
+        log.uncertain_pose(seconds, "robot1", place.x, place.y, 0.0);
+        let error = Vector2::new((0.7 * step as f64).cos(), (0.7 * step as f64).sin()) * 0.05;
+        let seen = TAG - place + error;
+        let header = header(seconds, "robot1/base_link");
+        let position = TagPosition { header, tag_id: "tag".into(), x: seen.x, y: seen.y, covariance: [0.0; 4] };
+        log.message(seconds, "/robot1/tag_positions", &position);
+        if step >= 40 {
+            log.reading(seconds, "robot1", "tag", (TAG - place).norm());
+        }
+    }
+    let header = header(6.0, "robot1/base_link");
+    let nowhere = TagPosition { header, tag_id: "tag".into(), x: f64::NAN, y: 0.0, covariance: [0.0; 4] };
+    log.message(6.0, "/robot1/tag_positions", &nowhere);
 }

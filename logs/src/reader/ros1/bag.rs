@@ -7,7 +7,7 @@ use crate::dynamic::{Recoder, Schema};
 use crate::qos;
 use crate::reader::block::{Block, Records};
 use crate::reader::bytes::{FileBytes, Window};
-use crate::reader::chunk::{LARGEST, decompress_lz4};
+use crate::reader::chunk::{LARGEST, decompress_bz2, decompress_lz4};
 use crate::reader::damage::{ChunkFault, Damage};
 use crate::reader::layout::Layout;
 use crate::reader::record::{Fields, push_message};
@@ -197,6 +197,7 @@ impl BagChunk {
         let contents = match self.compression.as_str() {
             "none" => data,
             "lz4" => decompress_lz4(&data, self.size)?,
+            "bz2" => decompress_bz2(&data, self.size)?,
             other => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };
         match contents.len() as u64 == self.size {

@@ -382,3 +382,53 @@ fn an_empty_run_leaves_an_empty_log() {
     let log = run.log();
     assert_eq!((log.messages.len(), log.outcome["complete"].as_str()), (0, "true"));
 }
+
+#[test]
+fn a_log_says_at_its_beginning_what_writes_it_and_at_its_end_from_what() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.mcap");
+    fs::write(&input, "abc").unwrap();
+    let mut run = Run::new(&format!("recorded_pipeline = '[pipeline]'\nrecorded_files = [{input:?}]"));
+    run.announce(0, 1, "/a", GRID);
+    run.input(0, 1, 5, b"x").unwrap();
+    run.finish();
+    let file = crate::reader::LogFile::open(run.file()).unwrap();
+    let names: Vec<String> = file.supplements().map(|(_, body)| read_metadata(&body.unwrap()).unwrap().0).collect();
+    assert_eq!(names, [RUN_RECORD, INPUTS_RECORD, crate::sink::OUTCOME_RECORD]);
+    assert_eq!(file.metadata(RUN_RECORD).unwrap()["pipeline"], "[pipeline]");
+    assert_eq!(file.metadata(RUN_RECORD).unwrap()["version"], env!("CARGO_PKG_VERSION"));
+    let input = &file.metadata(INPUTS_RECORD).unwrap()["1"];
+    assert!(input.starts_with(r#"{"name":"in.mcap","bytes":3,"sha256":"ba7816bf"#), "{input}");
+}
+
+#[test]
+fn a_run_that_fails_says_what_it_was_and_does_not_wait_for_hashes() {
+    let mut run = Run::new("recorded_pipeline = '[pipeline]'\nrecorded_files = ['/dev/null']");
+    run.announce(0, 1, "/a", GRID);
+    run.input(0, 1, 5, b"x").unwrap();
+    run.sink.node().abort("it failed");
+    let file = crate::reader::LogFile::open(run.file()).unwrap();
+    assert!(file.metadata(RUN_RECORD).is_some() && file.metadata(INPUTS_RECORD).is_none());
+}
+
+#[test]
+fn what_a_log_holds_beside_messages_is_passed_on_and_what_explained_it_is_not_what_explains_this_one() {
+    let metadata = |name: &str| {
+        let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+        let pairs = [text("key"), text("value")].concat();
+        [text(name), (pairs.len() as u32).to_le_bytes().to_vec(), pairs].concat()
+    };
+    for (more, expected) in
+        [("", vec!["theirs", "earlier_gridweave_run", "gridweave"]), ("pass_input = false", vec!["gridweave"])]
+    {
+        let mut run = Run::new(more);
+        run.sink.node().announce(0, 1, &SupplementKind::Metadata.channel()).unwrap();
+        for name in ["theirs", RUN_RECORD] {
+            run.input(0, 1, 5, &metadata(name)).unwrap();
+        }
+        run.finish();
+        let file = crate::reader::LogFile::open(run.file()).unwrap();
+        let names: Vec<String> = file.supplements().map(|(_, body)| read_metadata(&body.unwrap()).unwrap().0).collect();
+        assert_eq!(names, expected);
+    }
+}

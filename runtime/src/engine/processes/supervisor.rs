@@ -15,13 +15,17 @@ use crate::link::{StageBoard, StageNumber, StageState, WireNumber};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
+use std::env;
 use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
+use tracing::{Level, event_enabled};
 
+/// The variable of the environment that says what is told.
+const LOG_FILTER: &str = "RUST_LOG";
 /// At least so often the observer is asked whether the run should stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 /// So long may a process take to close its outputs before it is killed.
@@ -129,7 +133,12 @@ impl Supervisor<'_> {
 
     /// Starts the process called `name`, whose number is `process`, and listens to it.
     fn start(&mut self, name: &str, process: usize) -> Result<(Child, Option<ChildStdin>), Failure> {
-        let mut child = Command::new(&self.launch.program)
+        let mut command = Command::new(&self.launch.program);
+        // What this process tells beyond warnings, others are to tell as well.
+        if let Some(level) = told_beyond_warnings().filter(|_| env::var_os(LOG_FILTER).is_none()) {
+            command.env(LOG_FILTER, level);
+        }
+        let mut child = command
             .args(&self.launch.arguments)
             .arg(self.folder.path())
             .arg(name)
@@ -376,4 +385,14 @@ fn remove_dead_nodes(names: &RunNames) {
     if let Ok(node) = names.node::<ipc::Service>() {
         node.try_cleanup_dead_nodes();
     }
+}
+
+/// The finest level of events that somebody listens to, if it is finer than that of warnings.
+fn told_beyond_warnings() -> Option<&'static str> {
+    let levels = [
+        ("trace", event_enabled!(Level::TRACE)),
+        ("debug", event_enabled!(Level::DEBUG)),
+        ("info", event_enabled!(Level::INFO)),
+    ];
+    levels.into_iter().find_map(|(level, is_told)| is_told.then_some(level))
 }

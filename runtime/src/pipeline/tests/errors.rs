@@ -313,6 +313,29 @@ fn a_pattern_tells_robots_apart() {
 }
 
 #[test]
+fn the_fields_of_tag_readings_are_checked() {
+    let topic = "\"/{robot}/map\"\n";
+    let tags = |fields: &str| format!("{topic}tags = {{ {fields} }}\n");
+    let whole = "topic = \"/{robot}/uwb\", id_field = \"id\"";
+    assert_error(
+        (topic, &tags("topic = \"/{robot}/uwb\", range_field = \"r\"")),
+        "9:1",
+        "tags",
+        &["has no `id_field`"],
+    );
+    assert_error((topic, &tags("id_field = \"id\", range_field = \"r\"")), "9:1", "tags", &["has no `topic`"]);
+    assert_error((topic, &tags(whole)), "9:1", "tags", &["has no `range_field`", "or a pose (`pose_field`)"]);
+    let strength = format!("{whole}, rssi_field = \"dbm\"");
+    assert_error((topic, &tags(&strength)), "9:1", "tags", &["has no `rssi_at_1m`"]);
+    let unknown = format!("{whole}, range_feild = \"r\", range_field = \"r\"");
+    assert_error((topic, &tags(&unknown)), "9:51", "range_feild", &["unknown key", "did you mean `range_field`?"]);
+    let negative = format!("{whole}, range_field = \"r\", range_unit = -1");
+    assert_error((topic, &tags(&negative)), "9:83", "-1", &["a number above 0"]);
+    let pattern = "topic = \"/uwb\", id_field = \"id\", range_field = \"r\"";
+    assert_error((topic, &tags(pattern)), "9:18", "\"/uwb\"", &["expected `{robot}` once"]);
+}
+
+#[test]
 fn a_file_that_cannot_be_read_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let load = |path: &Path| Pipeline::load(path, &registry(), &Overrides::default());

@@ -89,8 +89,16 @@ fn a_pipeline_written_out_is_the_same_when_read_again() {
     overrides.set("lines.starts=[0.5, 1]").unwrap();
     overrides.initial_poses.push("robot2=1,-2.5,0.5".into());
     let frames = "[robots]\ntf = { map_frame = \"{robot}/map\", base_frame = \"{robot}/base_link\" }";
-    let text = changed("[robots]", frames);
+    let fields = "tags = { topic = \"/{robot}/uwb\", each = \"all\", id_field = \"a.id\", range_field = \"mm\", range_unit = 0.001, \
+         rssi_field = \"dbm\", rssi_at_1m = -40, path_loss_exponent = 2.5, rssi_stddev = 3, stddev_field = \"s\", \
+         stddev = 0.1, pose_field = \"pose\" }";
+    let text = changed("[robots]", &format!("{frames}\n{fields}"));
     let first = Pipeline::parse("walls.toml", &text, &registry(), &overrides).unwrap();
     let second = Pipeline::parse("other.toml", &first.to_toml(), &registry(), &Overrides::default()).unwrap();
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
+    let read = second.robots.tag_fields.unwrap();
+    assert_eq!(
+        (read.range_unit, read.path_loss.unwrap().exponent, second.robots.tags.as_str()),
+        (Some(0.001), 2.5, "/{robot}/uwb")
+    );
 }

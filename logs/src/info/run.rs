@@ -1,0 +1,35 @@
+//! What a log says of the run that wrote it.
+
+use crate::reader::LogFile;
+use crate::sink::{INPUTS_RECORD, InputFile, OUTCOME_RECORD, RUN_RECORD};
+use serde::Serialize;
+
+/// The run that wrote a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct RunInfo {
+    /// The version of Gridweave.
+    pub version: String,
+    /// The pipeline with all its parameters and its seed, as the text of a pipeline file.
+    pub pipeline: String,
+    /// The files that were read; none if the run has not come to its end.
+    pub inputs: Vec<InputFile>,
+}
+
+impl RunInfo {
+    /// What a log says; nothing if it is not of Gridweave.
+    pub(super) fn of(file: &LogFile) -> Option<Self> {
+        let run = file.metadata(RUN_RECORD)?;
+        let text = |key: &str| run.get(key).cloned().unwrap_or_default();
+        let inputs = file.metadata(INPUTS_RECORD).into_iter().flat_map(|inputs| inputs.values());
+        Some(Self {
+            version: text("version"),
+            pipeline: text("pipeline"),
+            inputs: inputs.filter_map(|input| serde_json::from_str(input).ok()).collect(),
+        })
+    }
+}
+
+/// Whether a metadata record is one that a run of Gridweave writes of itself.
+pub(super) fn is_of_run(name: &str) -> bool {
+    [RUN_RECORD, INPUTS_RECORD, OUTCOME_RECORD].contains(&name)
+}

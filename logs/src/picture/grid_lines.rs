@@ -1,0 +1,41 @@
+//! Lines every so many metres.
+
+use super::PictureError;
+use super::marks::{Mark, Marks, Shape};
+use super::view::View;
+use crate::drawing::{Colour, Paint};
+use nalgebra::Point2;
+
+/// A picture with more lines would be grey.
+const MOST_LINES: f64 = 400.0;
+const LINE: Paint = Paint { colour: [60, 60, 60], opacity: 0.3 };
+const NUMBER: Colour = [70, 70, 70];
+
+/// Lines along the axes of the world every `metres`, with their coordinates where they begin.
+pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError> {
+    let low = view.world(0.0, f64::from(view.height));
+    let high = view.world(f64::from(view.width), 0.0);
+    let most = (high.x - low.x).max(high.y - low.y) / metres;
+    if !(metres > 0.0 && metres.is_finite() && most <= MOST_LINES) {
+        return Err(PictureError::Grid { metres });
+    }
+    let multiples = |low: f64, high: f64| ((low / metres).ceil() as i64)..=((high / metres).floor() as i64);
+    let mut marks = Vec::new();
+    let mut add = |from: Point2<f64>, to: Point2<f64>, value: f64| {
+        marks.push(Mark { shape: Shape::Line { places: vec![from, to], width: 0.5 }, paint: LINE });
+        // Where the next line's number still has room.
+        let words = super::decoration::length_text(value);
+        marks.push(Mark { shape: Shape::Label { at: from, words }, paint: NUMBER.into() });
+    };
+    for x in multiples(low.x, high.x).map(|multiple| multiple as f64 * metres) {
+        add(Point2::new(x, low.y), Point2::new(x, high.y), x);
+    }
+    for y in multiples(low.y, high.y).map(|multiple| multiple as f64 * metres) {
+        add(Point2::new(low.x, y), Point2::new(high.x, y), y);
+    }
+    Ok(Marks {
+        name: format!("a line every {}", super::decoration::length_text(metres)),
+        legend: Some(LINE.colour),
+        marks,
+    })
+}

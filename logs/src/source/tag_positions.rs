@@ -1,0 +1,135 @@
+//! From where a camera sees tags to where they are from the robot.
+
+use super::inferred_poses::BASES;
+use super::tag_reader::tag_of_frame;
+use crate::tf::FrameTree;
+use gridweave_runtime::ros::{Header, TFMessage, TagPosition, Time};
+use gridweave_runtime::stage::frame_of_robot;
+use nalgebra::{Isometry3, Point3};
+use std::collections::BTreeSet;
+
+/// Knows how cameras are mounted on their robots, by tf.
+#[derive(Debug)]
+pub(super) struct TagPositions {
+    tree: FrameTree,
+    /// What the base of a robot is called, `{robot}` standing for its name. The first that is tied to a camera counts.
+    bases: Vec<String>,
+    /// The robots whose tags are frames in tf.
+    in_tf: BTreeSet<String>,
+}
+
+/// The frame of a camera is not tied to its robot.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Untied;
+
+impl TagPositions {
+    /// For robots whose base is called `base`, or as most are; tags of the robots `in_tf` are frames there.
+    pub(super) fn new(base: Option<&str>, in_tf: BTreeSet<String>) -> Self {
+        let usual = || BASES.map(|base| format!("{{robot}}{base}")).to_vec();
+        Self { tree: FrameTree::default(), bases: base.map_or_else(usual, |base| vec![base.to_owned()]), in_tf }
+    }
+
+    /// Takes up transforms whose frames lack a prefix. Gives the tags that are seen in them: the robot, and where it sees the
+    /// tag, or that this cannot be told.
+    pub(super) fn transforms(
+        &mut self,
+        prefix: &str,
+        is_static: bool,
+        message: &TFMessage,
+    ) -> Vec<(String, Result<TagPosition, Untied>)> {
+        let mut tags = Vec::new();
+        for edge in &message.transforms {
+            let parent = frame_of_robot(prefix, &edge.header.frame_id);
+            let child = frame_of_robot(prefix, &edge.child_frame_id);
+            match tag_of_frame(&child).zip(self.robot_of(&parent)) {
+                Some((tag, robot)) => {
+                    let at = edge.transform.translation;
+                    let found = self.position(&robot, tag, edge.header.stamp, &parent, &Point3::new(at.x, at.y, at.z));
+                    tags.push((robot, found));
+                }
+                None => {
+                    self.tree.insert(&parent, &child, &edge.transform, is_static);
+                }
+            }
+        }
+        tags
+    }
+
+    /// The robot whose tags are in tf that a frame belongs to.
+    fn robot_of(&self, frame: &str) -> Option<String> {
+        let bears =
+            |robot: &&String| frame.strip_prefix(robot.as_str()).is_some_and(|rest| rest.starts_with(['/', '_']));
+        self.in_tf.iter().find(bears).cloned()
+    }
+
+    /// Where a robot sees a tag that is at a point in a frame.
+    pub(super) fn position(
+        &self,
+        robot: &str,
+        tag_id: &str,
+        stamp: Time,
+        frame: &str,
+        point: &Point3<f64>,
+    ) -> Result<TagPosition, Untied> {
+        let tied = |base: &String| {
+            let base = base.replace("{robot}", robot);
+            let transform: Isometry3<f64> = self.tree.lookup(&base, frame)?;
+            Some((base, transform))
+        };
+        let (base, transform_base_frame) = self.bases.iter().find_map(tied).ok_or(Untied)?;
+        let place = transform_base_frame * point;
+        let header = Header { stamp, frame_id: base };
+        Ok(TagPosition { header, tag_id: tag_id.to_owned(), x: place.x, y: place.y, covariance: [0.0; 4] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::{Transform, TransformStamped, Vector3};
+    use nalgebra::UnitQuaternion;
+
+    fn edge(parent: &str, child: &str, at: [f64; 3], rotation: UnitQuaternion<f64>) -> TransformStamped {
+        let [x, y, z] = at;
+        let mut transform = Transform { translation: Vector3 { x, y, z }, ..Default::default() };
+        let r = rotation;
+        transform.rotation = gridweave_runtime::ros::Quaternion { x: r.i, y: r.j, z: r.k, w: r.w };
+        let header = Header { stamp: Time { sec: 7, nanosec: 0 }, frame_id: parent.into() };
+        TransformStamped { header, child_frame_id: child.into(), transform }
+    }
+
+    /// An optical frame: z ahead, x to the right.
+    fn optical() -> UnitQuaternion<f64> {
+        UnitQuaternion::from_euler_angles(-std::f64::consts::FRAC_PI_2, 0.0, -std::f64::consts::FRAC_PI_2)
+    }
+
+    #[test]
+    fn a_tag_ahead_of_a_camera_is_ahead_of_its_robot() {
+        let mut positions = TagPositions::new(None, BTreeSet::from(["r1".to_owned()]));
+        let mount = edge("base_footprint", "camera", [0.2, 0.1, 0.5], optical());
+        assert!(positions.transforms("r1", true, &TFMessage { transforms: vec![mount] }).is_empty());
+        // Two metres ahead of the camera, and half a metre to its right.
+        let tag = edge("camera", "tag36h11:5", [0.5, 0.3, 2.0], UnitQuaternion::identity());
+        let found = positions.transforms("r1", false, &TFMessage { transforms: vec![tag] });
+        let [(robot, Ok(seen))] = &found[..] else { panic!("{found:?}") };
+        assert_eq!(
+            (robot.as_str(), seen.tag_id.as_str(), seen.header.frame_id.as_str()),
+            ("r1", "tag36h11:5", "r1/base_footprint")
+        );
+        assert!((seen.x - 2.2).abs() < 1e-9 && (seen.y + 0.4).abs() < 1e-9 && seen.header.stamp.sec == 7, "{seen:?}");
+    }
+
+    #[test]
+    fn a_camera_that_nothing_ties_to_its_robot_sees_no_position() {
+        let mut positions = TagPositions::new(Some("{robot}/body"), BTreeSet::from(["r1".to_owned()]));
+        let point = Point3::new(1.0, 0.0, 0.0);
+        let seen = |positions: &TagPositions| positions.position("r1", "a", Time::default(), "r1/camera", &point);
+        assert_eq!(seen(&positions), Err(Untied));
+        let mount = edge("r1/body", "r1/camera", [1.0, 0.0, 0.0], UnitQuaternion::identity());
+        positions.transforms("", true, &TFMessage { transforms: vec![mount] });
+        assert_eq!(seen(&positions).unwrap().x, 2.0);
+        // Frames of robots whose tags are not in tf are frames as any other.
+        let other = edge("r2/camera", "r2/tag:1", [1.0, 0.0, 0.0], UnitQuaternion::identity());
+        assert!(positions.transforms("", false, &TFMessage { transforms: vec![other] }).is_empty());
+    }
+}

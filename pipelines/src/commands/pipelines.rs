@@ -1,0 +1,28 @@
+//! `gridweave pipelines`: the pipelines that ship.
+
+use crate::shipped;
+use crate::status::{BadUse, Status};
+use crate::table::Table;
+use crate::terminal::print;
+use anyhow::Result;
+use clap::Args;
+
+/// What `gridweave pipelines` is told.
+#[derive(Debug, Args)]
+pub(crate) struct PipelinesArgs {
+    /// Print the file of this pipeline, to be changed: `gridweave pipelines auto_merge > my_merge.toml`.
+    name: Option<String>,
+}
+
+/// Lists the pipelines that ship with a line each, or prints one.
+pub(crate) fn pipelines(args: &PipelinesArgs) -> Result<Status> {
+    match &args.name {
+        Some(name) => print(shipped::find(name).map_err(BadUse)?.text)?,
+        None => {
+            let mut table = Table::new(["pipeline", "what it does"]);
+            shipped::PIPELINES.iter().for_each(|shipped| table.row([shipped.name, shipped.what].map(str::to_owned)));
+            print(table)?
+        }
+    };
+    Ok(Status::Done)
+}

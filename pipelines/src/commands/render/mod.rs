@@ -1,0 +1,169 @@
+//! `gridweave render`: pictures of what a log or map files hold.
+
+mod overlays;
+
+use crate::job::{Inputs, NamingOptions};
+use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, map_files};
+use crate::status::{BadUse, Status};
+use crate::terminal::{print_line, say};
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use gridweave_logs::map_file::GridMap;
+use gridweave_logs::picture::{Cells, MapLayer, Marks, Picture, PictureError, Scene, check_format, robot_colour};
+use gridweave_runtime::pipeline::suggest;
+use nalgebra::Isometry2;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+/// What `gridweave render` is told.
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// Logs, each as LOG or ROBOT=LOG, or map files (map_server YAML). Of a log that a merge has written, the maps lie as they
+    /// were merged; otherwise they lie beside each other.
+    #[arg(required = true, value_name = "INPUT")]
+    inputs: Vec<PathBuf>,
+    /// What to write; the ending says the format: .png, .svg or .pdf.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// The merged map in grey, instead of the robots' maps each in a colour of its own.
+    #[arg(long, conflicts_with_all = ["robot", "apart"])]
+    merged: bool,
+    /// Draw the maps of these robots only.
+    #[arg(long, value_name = "ROBOT", value_delimiter = ',')]
+    robot: Vec<String>,
+    /// Lay the maps beside each other, as they came.
+    #[arg(long)]
+    apart: bool,
+    /// What to draw upon the maps.
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    show: Vec<Overlay>,
+    /// Draw a line every so many metres.
+    #[arg(long, value_name = "METRES")]
+    grid: Option<f64>,
+    /// Draw what was known so many seconds after the first message, and not at the end.
+    #[arg(long, value_name = "SECONDS")]
+    at: Option<f64>,
+    #[command(flatten)]
+    names: NamingOptions,
+}
+
+/// What can be drawn upon maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+enum Overlay {
+    /// Names, where the robots' map frames have their origin.
+    Names,
+    /// Where the maps contradict each other.
+    Conflicts,
+    /// The straight walls that were found, paler the less reliable they are.
+    Segments,
+    /// The direction of each map's walls.
+    Directions,
+    /// Tags, with ellipses of two standard deviations, paler the less certain they are.
+    Tags,
+    /// Where the robots drove.
+    Trajectories,
+    /// How the maps are bent, as arrows that are drawn longer than they are.
+    Bends,
+    /// Places and the ways between them.
+    Ways,
+    /// All of these.
+    All,
+}
+
+/// Draws a picture.
+pub(crate) fn render(args: &RenderArgs) -> Result<Status> {
+    check_format(&args.output).map_err(|error| BadUse(error.to_string()))?;
+    if let Some(input) = args.inputs.iter().find(|input| **input == args.output) {
+        return Err(BadUse(format!("{} is an input, and would be overwritten", input.display())).into());
+    }
+    if args.at.is_some_and(|at| at.is_nan() || at < 0.0) {
+        return Err(BadUse("--at must be 0 seconds or above".to_owned()).into());
+    }
+    let state = read(args)?;
+    check_robots(&args.robot, &state)?;
+    let placing = Placing::of(&state, &args.robot.iter().map(String::as_str).collect(), args.apart);
+    let picture = draw(args, &state, &placing).map_err(|error| explain(error, &state))?;
+    picture.save(&args.output)?;
+    print_line(format_args!("wrote {}: {}", args.output.display(), what(&placing, args.merged)))?;
+    Ok(Status::Done)
+}
+
+fn read(args: &RenderArgs) -> Result<MergeState> {
+    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+        return map_files(&args.inputs);
+    }
+    let mut opened = Opened::new(&args.inputs, &args.names)?;
+    opened.read_until(args.at, |_, _| {});
+    opened.problems.iter().for_each(|problem| say(format_args!("warning: {problem}")));
+    Ok(opened.state)
+}
+
+fn check_robots(wanted: &[String], state: &MergeState) -> Result<()> {
+    let known: Vec<&str> = state.robots_with_maps().map(|(robot, _)| robot).collect();
+    match wanted.iter().find(|robot| !known.contains(&robot.as_str())) {
+        Some(robot) => {
+            let nearest = suggest(robot, &known, "the robots").unwrap_or_default();
+            Err(BadUse(format!("there is no map of a robot `{robot}`: {nearest}")).into())
+        }
+        None => Ok(()),
+    }
+}
+
+fn draw(args: &RenderArgs, state: &MergeState, placing: &Placing) -> Result<Picture, PictureError> {
+    let shown: BTreeSet<Overlay> = match args.show.contains(&Overlay::All) {
+        true => Overlay::value_variants().iter().copied().collect(),
+        false => args.show.iter().copied().collect(),
+    };
+    let marks: Vec<Marks> = shown.iter().flat_map(|overlay| overlays::marks(*overlay, state, placing)).collect();
+    let merged = state.merged().map(|map| GridMap::from_message(&map));
+    let conflicts = state.conflicts().filter(|_| shown.contains(&Overlay::Conflicts) && !args.apart);
+    let conflicts = conflicts.map(|map| overlays::conflicts(&map));
+
+    let robots = placing.robots.iter().filter_map(|robot| Some((robot, robot.map.as_ref()?)));
+    let mut maps: Vec<MapLayer<'_>> =
+        robots.map(|(robot, map)| layer(&robot.name, robot_colour(robot.index), map)).collect();
+    let is_grey = args.merged || maps.is_empty();
+    if is_grey {
+        maps = merged.iter().map(|map| layer("", robot_colour(0), map)).collect();
+    } else {
+        maps.extend(conflicts.iter().map(|map| layer("contradictions", overlays::CONFLICT, map)));
+    }
+    let cells = if is_grey { Cells::Grey } else { Cells::Coloured };
+    Picture::of(&Scene { maps: &maps, cells, marks: &marks, grid: args.grid })
+}
+
+fn layer<'a>(name: &'a str, colour: [u8; 3], map: &'a GridMap) -> MapLayer<'a> {
+    MapLayer { name, colour, info: map.info, cells: &map.cells, transform_world_map: Isometry2::identity() }
+}
+
+/// Says what is missing, where nothing can be drawn.
+fn explain(error: PictureError, state: &MergeState) -> anyhow::Error {
+    match error {
+        PictureError::Empty if state.robots_with_maps().next().is_none() && state.merged().is_none() => {
+            anyhow::anyhow!(
+                "there is no map to draw: a nav_msgs/msg/OccupancyGrid is needed on /map or on /ROBOT/map; `gridweave info LOG` \
+             shows what there is, and --rename gives a topic another name"
+            )
+        }
+        PictureError::Empty if state.merged().is_none() => {
+            anyhow::anyhow!(
+                "there is no merged map to draw, or nothing of it is known: leave --merged out for the robots' maps"
+            )
+        }
+        PictureError::Grid { .. } => BadUse(format!("--grid: {error}")).into(),
+        error => error.into(),
+    }
+}
+
+fn what(placing: &Placing, is_merged_map: bool) -> String {
+    if is_merged_map || placing.robots.is_empty() {
+        return "the merged map".to_owned();
+    }
+    let (merged, others): (Vec<_>, Vec<_>) = placing.robots.iter().partition(|robot| robot.is_merged);
+    let names = |robots: &[&PlacedRobot]| robots.iter().map(|robot| robot.name.as_str()).collect::<Vec<_>>().join(", ");
+    match (merged.is_empty(), others.is_empty()) {
+        (true, _) => format!("{} beside each other", names(&others)),
+        (_, true) => format!("{} as they were merged", names(&merged)),
+        _ => format!("{} as they were merged, and {} beside them", names(&merged), names(&others)),
+    }
+}

@@ -1,0 +1,248 @@
+//! Reads what the page shows out of logs, moment by moment.
+
+use super::grids::grid;
+use super::model::{Findings, Frame, Hypothesis, Pair, Report, Robot, Tag};
+use crate::job::NamingOptions;
+use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, RobotState};
+use anyhow::Result;
+use gridweave_logs::picture::robot_colour;
+use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
+use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames, RosMessage};
+use nalgebra::{Matrix2, Point2, Vector2};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+/// How large a page may become.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// How many moments it shows.
+    pub(super) steps: usize,
+    /// How many cells its maps have along a side.
+    pub(super) side: usize,
+}
+
+/// A drive has no more points than this.
+const MOST_POINTS: usize = 4000;
+const DEVIATIONS: f64 = 2.0;
+
+/// The moments at which something became known that a page shows: seconds from the first message on, rising.
+pub(super) fn moments(logs: &[PathBuf], naming: &NamingOptions) -> Result<Vec<f64>> {
+    let mut times = Vec::new();
+    let mut opened = Opened::new(logs, naming)?;
+    opened.read_until(None, |seconds, channel| {
+        let is_shown = [OccupancyGrid::NAME, RobotFrames::NAME].contains(&channel.schema_name.as_str());
+        if is_shown && times.last() != Some(&seconds) {
+            times.push(seconds);
+        }
+    });
+    Ok(times)
+}
+
+/// Some of the moments, evenly, the last among them.
+fn some_of(times: &[f64], most: usize) -> Vec<f64> {
+    let count = times.len().min(most.max(1));
+    let nth = |n: usize| times[(n + 1) * times.len() / count - 1];
+    (0..count).map(nth).collect()
+}
+
+/// Reads what the page shows at some of the moments.
+pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], limits: Limits) -> Result<Report> {
+    let mut opened = Opened::new(logs, naming)?;
+    let times = some_of(times, limits.steps);
+    let mut report = Report { logs: logs.iter().map(|log| log.display().to_string()).collect(), ..Report::default() };
+    report.metadata = opened.metadata();
+    let mut robots: BTreeMap<String, Robot> = BTreeMap::new();
+    for (step, time) in times.iter().enumerate() {
+        // What is sent at the very end belongs to the last moment.
+        let is_last = step + 1 == times.len();
+        opened.read_until((!is_last).then_some(*time), |_, _| {});
+        let state = &opened.state;
+        let side = limits.side;
+        let of_message = |map: Option<OccupancyGrid<'_>>| match map {
+            Some(map) => grid(&map.info, map.cells(), side),
+            None => Ok(None),
+        };
+        report.merged.add(step, of_message(state.merged())?);
+        report.conflicts.add(step, of_message(state.conflicts())?);
+        for placed in &Placing::of(state, &BTreeSet::new(), false).robots {
+            let robot = robots.entry(placed.name.clone()).or_default();
+            let map = placed.map.as_ref().map(|map| grid(&map.info, &map.cells, side)).transpose()?;
+            robot.map.add(step, map.flatten());
+            robot.findings.add(step, findings(placed, &state.robots[&placed.name]));
+            if is_last {
+                robot.colour = hex(robot_colour(placed.index));
+                robot.own = of_message(state.robots[&placed.name].map())?;
+                let pose = &placed.transform_world_map;
+                robot.pose = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
+            }
+        }
+    }
+    report.times = times;
+    report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
+    tell_end(&mut report, &opened.state);
+    report.problems = opened.problems.into_iter().collect();
+    Ok(report)
+}
+
+fn hex([red, green, blue]: [u8; 3]) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// To a tenth of a millimetre, which keeps the page small.
+fn round(value: f64) -> f64 {
+    // JSON has no other numbers.
+    if value.is_finite() { (value * 1e4).round() / 1e4 } else { 0.0 }
+}
+
+fn rounded(place: Point2<f64>) -> [f64; 2] {
+    [round(place.x), round(place.y)]
+}
+
+/// What was found in a robot's map, as it lies on the page.
+fn findings(robot: &PlacedRobot, known: &RobotState) -> Findings {
+    let place = |x: f64, y: f64| rounded(robot.place(&Point2::new(x, y)));
+    let rigid = |x: f64, y: f64| rounded(robot.transform_world_map * Point2::new(x, y));
+    let turn = robot.transform_world_map.rotation.angle();
+    let segments = known.segments.iter().flat_map(|found| &found.segments).map(|segment| {
+        let ([x1, y1], [x2, y2]) = (place(segment.x1, segment.y1), place(segment.x2, segment.y2));
+        [x1, y1, x2, y2, round(segment.reliability), f64::from(segment.inliers)]
+    });
+    let direction = known.direction.as_ref().filter(|direction| direction.valid).map(|direction| {
+        let [x, y] = place(0.0, 0.0);
+        [x, y, round(direction.direction + turn), round(direction.deviation), round(direction.agreement)]
+    });
+    let tags = known.tags.iter().flat_map(|found| &found.tags).map(|tag| {
+        let [x, y] = place(tag.x, tag.y);
+        let ellipse = ellipse(&tag.covariance, turn);
+        Tag { id: tag.tag_id.clone(), x, y, ellipse, certainty: round(tag.certainty), readings: tag.readings }
+    });
+    let carried = known.path.as_ref().filter(|_| robot.is_merged);
+    let path: Vec<[f64; 2]> = match carried {
+        Some(path) => path.poses.iter().map(|pose| rounded(pose.pose.planar().translation.vector.into())).collect(),
+        None => known.trail.iter().map(|point| place(point.x, point.y)).collect(),
+    };
+    let every = path.len().div_ceil(MOST_POINTS).max(1);
+    let bent = robot.bend.as_ref().and(known.bend.as_ref());
+    let bends = bent.iter().flat_map(|bend| &bend.nodes).map(|node| {
+        let ([x, y], by) = (rigid(node.x, node.y), robot.transform_world_map.rotation * Vector2::new(node.dx, node.dy));
+        [x, y, round(by.x), round(by.y), round(node.dyaw)]
+    });
+    let topology = known.topology.iter();
+    let places = topology.clone().flat_map(|map| &map.nodes).map(|node| {
+        let [x, y] = rigid(node.x, node.y);
+        (x, y, node.kind.clone())
+    });
+    let ways = topology.flat_map(|map| &map.paths);
+    Findings {
+        segments: segments.collect(),
+        direction,
+        tags: tags.collect(),
+        path: path.into_iter().step_by(every).collect(),
+        bends: bends.collect(),
+        places: places.collect(),
+        ways: ways.map(|way| way.points.iter().map(|point| rigid(point.x, point.y)).collect()).collect(),
+    }
+}
+
+/// The half axes of two standard deviations and the direction of the first, in a map that is turned.
+fn ellipse(covariance: &[f64; 4], turn: f64) -> [f64; 3] {
+    let ellipse = CovarianceEllipse::new(&Matrix2::from_row_slice(covariance), DEVIATIONS);
+    ellipse.map_or([0.0; 3], |CovarianceEllipse { half_axes: [first, second], direction }| {
+        [round(first), round(second), round(direction + turn)]
+    })
+}
+
+/// Tables of how it ended.
+fn tell_end(report: &mut Report, state: &MergeState) {
+    if let Some(frames) = &state.frames {
+        let of = |reference: &str, frames: &[RobotFrame]| -> Vec<Frame> {
+            frames.iter().map(|frame| frame_row(frame, reference)).collect()
+        };
+        report.frames = of(&frames.reference, &frames.frames);
+        report.frames.extend(frames.groups.iter().flat_map(|group| of(&group.reference, &group.frames)));
+        report.unmerged = frames.unmerged.iter().map(|robot| (robot.robot.clone(), robot.reason.clone())).collect();
+    }
+    report.pairs = state.verdicts.iter().flat_map(|verdicts| &verdicts.verdicts).map(pair_row).collect();
+    report.agreement = state
+        .agreement
+        .as_ref()
+        .map(|agreement| [agreement.known_to_one, agreement.known_to_several, agreement.in_conflict]);
+    let with_place = state.hypotheses.iter().flat_map(|((topic, ..), hypotheses)| {
+        hypotheses.iter().filter(|hypothesis| hypothesis.has_transform).map(move |hypothesis| (topic, hypothesis))
+    });
+    let rows = with_place.map(|(topic, hypothesis)| Hypothesis {
+        topic: topic.clone(),
+        a: hypothesis.a.clone(),
+        b: hypothesis.b.clone(),
+        x: round(hypothesis.x),
+        y: round(hypothesis.y),
+        yaw: if hypothesis.yaw.is_finite() { hypothesis.yaw } else { 0.0 },
+        yaw_degrees: format!("{:.2}", hypothesis.yaw.to_degrees()),
+        rank: hypothesis.rank,
+        score: score(hypothesis.score),
+        accepted: hypothesis.accepted,
+        method: hypothesis.method.clone(),
+        reason: hypothesis.reason.clone(),
+    });
+    report.hypotheses = rows.collect();
+}
+
+fn score(score: f64) -> String {
+    format!("{score:.4}")
+}
+
+fn pair_row(verdict: &gridweave_runtime::ros::Verdict) -> Pair {
+    let alignment = &verdict.alignment;
+    Pair {
+        a: alignment.a.clone(),
+        b: alignment.b.clone(),
+        accepted: alignment.accepted,
+        checked: verdict.checked,
+        score: score(alignment.score),
+        method: alignment.method.clone(),
+        reason: alignment.reason.clone(),
+    }
+}
+
+fn frame_row(frame: &RobotFrame, reference: &str) -> Frame {
+    let deviation = |index: usize| frame.covariance[index].max(0.0).sqrt();
+    Frame {
+        robot: frame.robot.clone(),
+        reference: reference.to_owned(),
+        x: format!("{:.3}", frame.x),
+        y: format!("{:.3}", frame.y),
+        yaw: format!("{:.3}", frame.yaw.to_degrees()),
+        deviations: [
+            format!("{:.3}", deviation(0)),
+            format!("{:.3}", deviation(4)),
+            format!("{:.3}", deviation(8).to_degrees()),
+        ],
+        covariance: frame
+            .covariance
+            .chunks(3)
+            .map(|row| row.iter().map(|value| format!("{value:.2e}")).collect())
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn some_moments_are_picked_evenly_with_the_last() {
+        let times: Vec<f64> = (0..10).map(f64::from).collect();
+        assert_eq!(some_of(&times, 24), times);
+        assert_eq!(some_of(&times, 3), [2.0, 5.0, 9.0]);
+        assert_eq!(some_of(&times, 1), [9.0]);
+        assert_eq!(some_of(&[], 3), [0.0; 0]);
+    }
+
+    #[test]
+    fn an_ellipse_has_two_standard_deviations_and_turns_with_its_map() {
+        let [first, second, angle] = ellipse(&[0.04, 0.0, 0.0, 0.01], 0.5);
+        let (long, along) = if first > second { (first, angle) } else { (second, angle + std::f64::consts::FRAC_PI_2) };
+        assert!((long - 0.4).abs() < 1e-9 && ((along - 0.5) % std::f64::consts::PI).abs() < 1e-3, "{along}");
+        assert_eq!(ellipse(&[f64::NAN; 4], 0.0), [0.0; 3]);
+    }
+}

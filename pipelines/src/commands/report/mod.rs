@@ -1,0 +1,90 @@
+//! `gridweave report`: what a merge has found and how, as one page for a browser.
+
+mod collect;
+mod graph;
+mod grids;
+mod model;
+mod page;
+
+use crate::job::{Inputs, NamingOptions};
+use crate::status::{BadUse, Status};
+use crate::terminal::{print_line, say};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use collect::Limits;
+use gridweave_logs::file::replace;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// What `gridweave report` is told.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// The log that a merge has written; several are read as one. Of the logs of robots, the report shows the maps beside each
+    /// other.
+    #[arg(required = true, value_name = "LOG")]
+    inputs: Vec<PathBuf>,
+    /// The page to write.
+    #[arg(short, long, value_name = "FILE.html")]
+    output: PathBuf,
+    /// The summary of the run (`--summary` of `merge` and `run`): what each stage has done, its time and its warnings.
+    #[arg(long, value_name = "FILE.json")]
+    summary: Option<PathBuf>,
+    #[command(flatten)]
+    names: NamingOptions,
+}
+
+/// A page of more bytes is made of fewer and coarser pictures.
+const LARGEST_PAGE: usize = 9_500_000;
+/// How many moments a page shows, and how many cells its maps have along a side, at most: from the best that is tried to what
+/// is always taken.
+const LIMITS: [Limits; 5] = [
+    Limits { steps: 24, side: 2000 },
+    Limits { steps: 12, side: 2000 },
+    Limits { steps: 6, side: 1500 },
+    Limits { steps: 3, side: 1000 },
+    Limits { steps: 1, side: 600 },
+];
+
+/// Writes the page.
+pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
+    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+        let text = "`report` reads logs: `gridweave merge A.yaml B.yaml -o OUT.mcap` makes one of map files, and `gridweave render` \
+                    draws them";
+        return Err(BadUse(text.to_owned()).into());
+    }
+    let files = args.inputs.iter().chain(&args.summary);
+    if let Some(input) = files.into_iter().find(|input| **input == args.output) {
+        return Err(BadUse(format!("{} is an input, and would be overwritten", input.display())).into());
+    }
+    let summary = args.summary.as_deref().map(read_summary).transpose()?;
+    let times = collect::moments(&args.inputs, &args.names)?;
+    if times.is_empty() {
+        bail!(
+            "there is nothing to report: no map is on /map or /ROBOT/map, and nothing of a merge; `gridweave info LOG` shows what \
+             there is, and --rename gives a topic another name"
+        );
+    }
+    let mut page = String::new();
+    for limits in LIMITS {
+        let report = collect::collect(&args.inputs, &args.names, &times, limits)?;
+        page = page::render(&report, summary.as_ref())?;
+        if page.len() <= LARGEST_PAGE {
+            report.problems.iter().for_each(|problem| say(format_args!("warning: {problem}")));
+            break;
+        }
+    }
+    replace(&[(&args.output, page.as_bytes())])?;
+    let megabytes = page.len() as f64 / 1e6;
+    print_line(format_args!("wrote {} ({megabytes:.1} MB): open it in a browser", args.output.display()))?;
+    Ok(Status::Done)
+}
+
+fn read_summary(path: &Path) -> Result<Value> {
+    let text = std::fs::read(path).with_context(|| format!("cannot read the summary {}", path.display()))?;
+    let summary: Value = serde_json::from_slice(&text)
+        .with_context(|| format!("{} is no summary, as `merge --summary` writes it", path.display()))?;
+    if !summary["stages"].is_object() {
+        bail!("{} is no summary, as `merge --summary` writes it: it has no `stages`", path.display());
+    }
+    Ok(summary)
+}

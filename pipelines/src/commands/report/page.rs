@@ -1,0 +1,167 @@
+//! The page: a template, its style, its script, and its data.
+
+use super::model::Report;
+use anyhow::{Context, Result};
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, Value as Html, context};
+use serde::Serialize;
+use serde_json::Value;
+
+const TEMPLATE: &str = include_str!("page/page.html");
+const STYLE: &str = include_str!("page/page.css");
+/// What the entry of a log's metadata is called that is the text of its pipeline.
+const PIPELINE: &str = "gridweave_run: pipeline";
+/// The parts of the script, in one scope each after the other.
+const SCRIPT: [&str; 4] = [
+    include_str!("page/data.js"),
+    include_str!("page/drawing.js"),
+    include_str!("page/layers.js"),
+    include_str!("page/page.js"),
+];
+
+/// What a stage has done, as a row with bars.
+#[derive(Debug, PartialEq, Serialize)]
+struct Stage {
+    name: String,
+    messages_in: u64,
+    messages_out: u64,
+    busy_ms: String,
+    /// Its time as a share of the longest of all stages, percent.
+    share: u64,
+    counts: Vec<(String, u64)>,
+    dropped: u64,
+    restarts: u64,
+}
+
+/// Makes the page.
+///
+/// # Errors
+/// What was collected cannot be written as JSON, or the template is wrong.
+pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.add_template("page", TEMPLATE).context("the template of the page is wrong")?;
+    let template = environment.get_template("page").context("the template of the page is wrong")?;
+    let stages = summary.map(stages).unwrap_or_default();
+    let page = template.render(context! {
+        report => told(report),
+        stages => told(&stages),
+        warnings => told(summary.map(warnings).unwrap_or_default()),
+        graph => told(pipeline(report).and_then(super::graph::graph)),
+        has_summary => summary.is_some(),
+        last => report.times.last().map(|seconds| format!("{seconds:.1}")),
+        agreement => told(report.agreement.map(|areas| areas.map(|area| format!("{area:.1}")))),
+        findings => told(report.robots.iter().map(finding_row).collect::<Vec<_>>()),
+        version => env!("CARGO_PKG_VERSION"),
+        style => Html::from_safe_string(STYLE.to_owned()),
+        script => Html::from_safe_string(SCRIPT.concat()),
+        data => Html::from_safe_string(data(report)?),
+    });
+    page.context("the page cannot be made")
+}
+
+/// The pipeline that has written the log, as the log tells it.
+fn pipeline(report: &Report) -> Option<&str> {
+    let found = report.metadata.iter().find(|(name, _)| name == PIPELINE);
+    found.map(|(_, text)| text.as_str())
+}
+
+/// What the template is told.
+fn told(what: impl Serialize) -> Html {
+    Html::from(Serde(what))
+}
+
+/// The data as JSON that can stand within a script element: no text in it ends that.
+fn data(report: &Report) -> Result<String> {
+    let text = serde_json::to_string(report).context("what was collected cannot be written as JSON")?;
+    Ok(text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
+}
+
+/// How much was found in a robot's map: its name, and how many walls, tags, and nodes of its bend.
+fn finding_row(robot: &super::model::Robot) -> (String, String, [usize; 4]) {
+    let counts = robot
+        .findings
+        .last()
+        .map_or([0; 4], |found| [found.segments.len(), found.tags.len(), found.bends.len(), found.places.len()]);
+    (robot.name.clone(), robot.colour.clone(), counts)
+}
+
+fn stages(summary: &Value) -> Vec<Stage> {
+    let stages = summary["stages"].as_object();
+    let busy = |stage: &Value| stage["busy_ms"].as_f64().unwrap_or_default().max(0.0);
+    let longest = stages.iter().flat_map(|stages| stages.values()).map(busy).fold(f64::MIN_POSITIVE, f64::max);
+    let number = |stage: &Value, key: &str| stage[key].as_u64().unwrap_or_default();
+    let row = |(name, stage): (&String, &Value)| Stage {
+        name: name.clone(),
+        messages_in: number(stage, "messages_in"),
+        messages_out: number(stage, "messages_out"),
+        busy_ms: format!("{:.1}", busy(stage)),
+        share: (100.0 * busy(stage) / longest).round() as u64,
+        counts: counted(&stage["counts"]),
+        dropped: number(stage, "dropped"),
+        restarts: number(stage, "restarts"),
+    };
+    stages.iter().flat_map(|stages| stages.iter()).map(row).collect()
+}
+
+/// Stage, text and how often.
+fn warnings(summary: &Value) -> Vec<(String, String, u64)> {
+    let stages = summary["stages"].as_object();
+    let of_stage = |(name, stage): (&String, &Value)| {
+        let of = name.clone();
+        counted(&stage["warnings"]).into_iter().map(move |(text, count)| (of.clone(), text, count)).collect::<Vec<_>>()
+    };
+    stages.iter().flat_map(|stages| stages.iter()).flat_map(of_stage).collect()
+}
+
+fn counted(object: &Value) -> Vec<(String, u64)> {
+    let entries = object.as_object().into_iter().flatten();
+    entries.map(|(text, count)| (text.clone(), count.as_u64().unwrap_or_default())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    const MARKUP: &str = "</script><script>alert(1)</script>&\"'<!--";
+
+    #[test]
+    fn no_text_of_a_log_or_a_summary_is_markup_on_the_page() {
+        let mut report = Report { logs: vec![MARKUP.into()], times: vec![1.0], ..Report::default() };
+        report.unmerged = vec![(MARKUP.into(), MARKUP.into())];
+        report.metadata = vec![(MARKUP.into(), MARKUP.into())];
+        report.problems = vec![MARKUP.into()];
+        report.robots = vec![super::super::model::Robot { name: MARKUP.into(), ..Default::default() }];
+        let summary = json!({"stages": {MARKUP: {"busy_ms": 1.0, "warnings": {MARKUP: 2}, "counts": {MARKUP: 3}}}});
+        let page = render(&report, Some(&summary)).unwrap();
+        let scripts = page.matches("<script").count();
+        let empty = render(&Report::default(), None).unwrap();
+        assert_eq!((scripts, page.matches("</script").count()), (empty.matches("<script").count(), 2));
+        assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
+        assert!(page.contains("&lt;&#x2f;script&gt;") && page.contains("\\u003c/script\\u003e"), "{page}");
+    }
+
+    #[test]
+    fn the_page_asks_for_nothing_from_elsewhere() {
+        let page = render(&Report::default(), None).unwrap();
+        for text in ["http://", "https://", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
+            assert!(!page.contains(text), "{text}");
+        }
+        assert!(page.contains("default-src 'none'"));
+    }
+
+    #[test]
+    fn stages_are_told_with_their_share_of_the_longest_time() {
+        let summary = json!({"stages": {
+            "log": {"messages_in": 0, "messages_out": 9, "busy_ms": 50.0},
+            "icp": {"messages_in": 9, "messages_out": 3, "busy_ms": 200.0, "counts": {"pairs": 2}, "dropped": 4},
+        }});
+        let rows = stages(&summary);
+        let icp = rows.iter().find(|stage| stage.name == "icp").unwrap();
+        let log = rows.iter().find(|stage| stage.name == "log").unwrap();
+        assert_eq!((icp.share, log.share, icp.dropped), (100, 25, 4));
+        assert_eq!(icp.counts, [("pairs".to_owned(), 2)]);
+        assert_eq!(stages(&json!({"stages": {"a": null, "b": {"busy_ms": "x"}}})).len(), 2);
+    }
+}

@@ -1,0 +1,166 @@
+//! What is told while a command runs, beside its results: events of the libraries as lines on standard error, and a trace of what
+//! every stage did when, for a viewer.
+
+use crate::status::BadUse;
+use crate::terminal::say;
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use tracing::field::{Field, Visit};
+use tracing::span;
+use tracing::{Level, Subscriber};
+use tracing_chrome::{ChromeLayerBuilder, EventOrSpan, FlushGuard};
+use tracing_subscriber::filter::{EnvFilter, filter_fn};
+use tracing_subscriber::layer::{self, Layer};
+use tracing_subscriber::prelude::*;
+use tracing_subscriber::registry::LookupSpan;
+
+/// What all commands are told of that.
+#[derive(Debug, Args)]
+pub(crate) struct TellingArgs {
+    /// Say on standard error what the stages do; twice: with every message. `RUST_LOG` says it in more detail.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+    /// How that is written; the processes of a live run write text.
+    #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
+    log_format: LogFormat,
+    /// Write what every stage did when, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not with the
+    /// engine `processes`.
+    #[arg(long, global = true, value_name = "FILE.json")]
+    pub(crate) trace: Option<PathBuf>,
+}
+
+/// How events are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LogFormat {
+    /// A line of text each.
+    Text,
+    /// A JSON object each, in a line.
+    Json,
+}
+
+impl TellingArgs {
+    /// Begins to tell. A trace is complete when what is given is dropped.
+    pub(crate) fn start(&self) -> Result<Option<FlushGuard>> {
+        let (trace, guard) = self.trace_layer()?.unzip();
+        tracing_subscriber::registry().with(self.lines()).with(StageNames).with(trace).init();
+        Ok(guard)
+    }
+
+    /// Events as lines: warnings, or all that `RUST_LOG` or the user asks for.
+    fn lines<S: Subscriber + for<'a> LookupSpan<'a>>(&self) -> impl Layer<S> {
+        let level = ["warn", "info", "debug"].get(usize::from(self.verbose)).copied().unwrap_or("trace");
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+        let lines = tracing_subscriber::fmt::layer()
+            .with_writer(std::io::stderr)
+            .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+            .without_time()
+            .with_target(false)
+            // It would say on standard error that standard error cannot be written to.
+            .log_internal_errors(false);
+        match self.log_format {
+            LogFormat::Text => lines.with_filter(filter).boxed(),
+            LogFormat::Json => lines.json().with_span_list(false).with_filter(filter).boxed(),
+        }
+    }
+
+    /// Spans as a trace in the format of Chrome, if one is asked for.
+    fn trace_layer<S>(&self) -> Result<Option<(impl Layer<S>, FlushGuard)>>
+    where
+        S: Subscriber + for<'a> LookupSpan<'a> + Send + Sync,
+    {
+        let Some(path) = &self.trace else { return Ok(None) };
+        let file = TraceFile::create(path)?;
+        let name_of = |spoken: &EventOrSpan<'_, '_, S>| match spoken {
+            EventOrSpan::Span(span) => {
+                let stage = span.extensions().get::<StageName>().map(|StageName(name)| name.clone());
+                stage.unwrap_or_else(|| span.name().to_owned())
+            }
+            EventOrSpan::Event(event) => event.metadata().name().to_owned(),
+        };
+        let (layer, guard) = ChromeLayerBuilder::new()
+            .writer(BufWriter::new(file))
+            .include_args(true)
+            .include_locations(false)
+            .name_fn(Box::new(name_of))
+            .build();
+        let is_work = filter_fn(|what| what.is_span() && *what.level() <= Level::DEBUG);
+        Ok(Some((layer.with_filter(is_work), guard)))
+    }
+}
+
+/// The file of a trace. What cannot be written is told once and left out: the run goes on.
+struct TraceFile {
+    path: PathBuf,
+    file: File,
+    has_failed: bool,
+}
+
+impl TraceFile {
+    /// A new file, in the place of an earlier trace. Another kind of file is not overwritten, as a log may be meant to be read.
+    fn create(path: &Path) -> Result<Self> {
+        if path.extension().is_none_or(|ending| ending != "json") {
+            let text = format!("cannot write the trace {}: its name must end in .json", path.display());
+            return Err(BadUse(text).into());
+        }
+        let file = File::create(path).with_context(|| format!("cannot write the trace {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), file, has_failed: false })
+    }
+
+    fn note(&mut self, written: io::Result<()>) {
+        if let Err(error) = written {
+            self.has_failed = true;
+            say(format_args!("the trace {} is not complete: {error}", self.path.display()));
+        }
+    }
+}
+
+impl Write for TraceFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !self.has_failed {
+            let written = self.file.write_all(bytes);
+            self.note(written);
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Keeps with each span the name of the stage that it belongs to.
+struct StageNames;
+
+/// The name of a stage.
+struct StageName(String);
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for StageNames {
+    fn on_new_span(&self, attributes: &span::Attributes<'_>, id: &span::Id, context: layer::Context<'_, S>) {
+        let mut found = StageField(None);
+        attributes.record(&mut found);
+        if let (Some(span), Some(name)) = (context.span(id), found.0) {
+            span.extensions_mut().insert(StageName(name));
+        }
+    }
+
+    fn max_level_hint(&self) -> Option<tracing::level_filters::LevelFilter> {
+        // It asks for no span by itself.
+        Some(tracing::level_filters::LevelFilter::OFF)
+    }
+}
+
+/// The value of the field `stage`.
+struct StageField(Option<String>);
+
+impl Visit for StageField {
+    fn record_str(&mut self, field: &Field, value: &str) {
+        if field.name() == "stage" {
+            self.0 = Some(value.to_owned());
+        }
+    }
+
+    fn record_debug(&mut self, _: &Field, _: &dyn std::fmt::Debug) {}
+}

@@ -1,0 +1,117 @@
+//! `visualization_msgs`: shapes that RViz and Foxglove draw. Fields that are none of ours are always empty.
+
+use super::{Header, Point, Pose, Vector3, ros_messages};
+use serde::{Deserialize, Serialize};
+
+/// `std_msgs/msg/ColorRGBA`, each part 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct ColorRGBA {
+    pub r: f32,
+    pub g: f32,
+    pub b: f32,
+    pub a: f32,
+}
+
+/// `builtin_interfaces/msg/Duration`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct Duration {
+    pub sec: i32,
+    pub nanosec: u32,
+}
+
+/// `visualization_msgs/msg/Marker`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Marker {
+    /// Time, and the frame that the shape is in.
+    pub header: Header,
+    /// What sort of shape it is, to us; viewers switch shapes by it.
+    pub ns: String,
+    /// Its number among those of its sort.
+    pub id: i32,
+    /// What it is: see the constants.
+    #[serde(rename = "type")]
+    pub shape: i32,
+    /// What becomes of it: [`ADD`](Self::ADD) or [`DELETE_ALL`](Self::DELETE_ALL).
+    pub action: i32,
+    /// Where it is.
+    pub pose: Pose,
+    /// Its sides; of lines, x is the width; of text, z is the height. Metres.
+    pub scale: Vector3,
+    /// Its colour, where the points have none of their own.
+    pub color: ColorRGBA,
+    /// How long it is shown; zero for ever.
+    pub lifetime: Duration,
+    /// Whether it moves with its frame.
+    pub frame_locked: bool,
+    /// Of lists.
+    pub points: Vec<Point>,
+    /// For each point, or none.
+    pub colors: Vec<ColorRGBA>,
+    /// Empty.
+    pub texture_resource: String,
+    /// Empty.
+    pub texture: CompressedImage,
+    /// Empty.
+    pub uv_coordinates: Vec<UVCoordinate>,
+    /// Of text.
+    pub text: String,
+    /// Empty.
+    pub mesh_resource: String,
+    /// Empty.
+    pub mesh_file: MeshFile,
+    /// False.
+    pub mesh_use_embedded_materials: bool,
+}
+
+impl Marker {
+    /// An arrow along x.
+    pub const ARROW: i32 = 0;
+    /// An ellipsoid.
+    pub const SPHERE: i32 = 2;
+    /// Lines between each two points.
+    pub const LINE_LIST: i32 = 5;
+    /// A sphere at each point.
+    pub const SPHERE_LIST: i32 = 7;
+    /// Text that faces who looks.
+    pub const TEXT: i32 = 9;
+    /// Draws the shape, in place of the one of its sort and number.
+    pub const ADD: i32 = 0;
+    /// Takes all shapes of the topic away.
+    pub const DELETE_ALL: i32 = 3;
+}
+
+/// `sensor_msgs/msg/CompressedImage`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct CompressedImage {
+    pub header: Header,
+    pub format: String,
+    pub data: Vec<u8>,
+}
+
+/// `visualization_msgs/msg/UVCoordinate`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct UVCoordinate {
+    pub u: f32,
+    pub v: f32,
+}
+
+/// `visualization_msgs/msg/MeshFile`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct MeshFile {
+    pub filename: String,
+    pub data: Vec<u8>,
+}
+
+/// `visualization_msgs/msg/MarkerArray`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MarkerArray {
+    /// The shapes.
+    pub markers: Vec<Marker>,
+}
+
+ros_messages!("visualization_msgs": MarkerArray);

@@ -1,0 +1,138 @@
+//! The transforms, as a program sees them that listens to them all.
+
+use super::*;
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+/// Static transforms as a reader keeps them: the last of each frame, which has one parent for good.
+#[derive(Default)]
+struct Buffer {
+    /// By child: the parent, and the child in it.
+    edges: BTreeMap<String, (String, Pose2)>,
+}
+
+impl Buffer {
+    /// Takes up what was sent since the last look.
+    fn listen(&mut self, run: &mut Run) {
+        for one in run.stage.take::<TFMessage>("tf").unwrap().into_iter().flat_map(|message| message.transforms) {
+            let (parent, place) = (one.header.frame_id, one.transform.planar());
+            if let Some((before, _)) = self.edges.insert(one.child_frame_id.clone(), (parent.clone(), place)) {
+                assert_eq!(before, parent, "{} has another parent", one.child_frame_id);
+            }
+        }
+    }
+
+    /// The root above a frame, and the frame in it.
+    fn root(&self, frame: &str) -> (String, Pose2) {
+        match self.edges.get(frame) {
+            None => (frame.to_owned(), Pose2::identity()),
+            Some((parent, place)) => {
+                let (root, above) = self.root(parent);
+                (root, above * place)
+            }
+        }
+    }
+
+    #[track_caller]
+    fn assert_at(&self, frame: &str, root: &str, place: &Pose2) {
+        let (found, pose) = self.root(frame);
+        assert_eq!(found, root, "{frame}");
+        assert!(is_near(&pose, place, 1e-9), "{frame}: {pose} and not {place}");
+    }
+}
+
+#[test]
+fn the_robots_of_a_group_that_meets_the_reference_have_never_been_elsewhere() {
+    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
+    (1..=4).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
+    run.align(&between(3, 4));
+    buffer.listen(&mut run);
+    assert!(buffer.edges.is_empty(), "nothing is certain");
+    run.align(&between(1, 2));
+    buffer.listen(&mut run);
+    buffer.assert_at("robot2/map", "world", &place(2));
+    assert_eq!(buffer.root("robot4/map").0, "robot4/map", "it may still be tied to the reference");
+    run.align(&between(2, 3));
+    buffer.listen(&mut run);
+    run.finish().unwrap();
+    buffer.listen(&mut run);
+    (1..=4).for_each(|robot| buffer.assert_at(&format!("robot{robot}/map"), "world", &place(robot)));
+}
+
+#[test]
+fn a_group_that_stays_apart_is_told_at_the_end_in_a_tree_of_its_own() {
+    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
+    (1..=4).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
+    run.align(&between(3, 4));
+    run.finish().unwrap();
+    buffer.listen(&mut run);
+    buffer.assert_at("robot1/map", "world", &place(1));
+    assert_eq!(buffer.root("robot2/map").0, "robot2/map");
+    buffer.assert_at("robot3/map", "world/robot3", &place(1));
+    buffer.assert_at("robot4/map", "world/robot3", &(place(3).inverse() * place(4)));
+    run.finish().unwrap();
+    assert!(run.stage.take::<TFMessage>("tf").unwrap().is_empty(), "nothing has changed");
+}
+
+#[test]
+fn a_robot_that_is_the_reference_for_a_while_only_does_not_lie_in_the_world() {
+    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
+    run.map("robot2", "map");
+    run.map("robot1", "map");
+    run.finish().unwrap();
+    buffer.listen(&mut run);
+    buffer.assert_at("robot1/map", "world", &place(1));
+    assert_eq!(buffer.root("robot2/map").0, "robot2/map");
+}
+
+#[test]
+fn the_reference_that_the_pipeline_names_lies_in_the_world_at_once() {
+    let (mut run, mut buffer) = (Run::new(Some("robot2")), Buffer::default());
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    buffer.listen(&mut run);
+    buffer.assert_at("robot2/map", "world", &place(1));
+}
+
+#[test]
+fn a_robot_that_has_been_in_the_world_is_told_in_no_other_tree() {
+    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
+    run.align(&between(1, 2));
+    run.align(&between(2, 3));
+    buffer.listen(&mut run);
+    run.align(&refused("robot1", "robot2", 0.1, "the larger maps disagree"));
+    run.align(&between(3, 4));
+    run.finish().unwrap();
+    buffer.listen(&mut run);
+    buffer.assert_at("robot3/map", "world", &place(3));
+    assert_eq!(buffer.root("robot4/map").0, "world/robot2");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    /// The buffer checks that no frame ever changes its parent.
+    #[test]
+    fn what_is_merged_lies_in_the_world_whatever_was_said_before(
+        statements in prop::collection::vec((1..7_usize, 1..7_usize, 0..4), 1..25),
+    ) {
+        let (mut run, mut buffer) = (Run::new(None), Buffer::default());
+        for (a, b, kind) in statements {
+            match (a == b, kind) {
+                (true, _) => run.map(&format!("robot{a}"), "map"),
+                (_, 0) => run.align(&refused(&format!("robot{}", a.min(b)), &format!("robot{}", a.max(b)), 0.1, "no")),
+                _ => run.align(&between(a.min(b), a.max(b))),
+            }
+            buffer.listen(&mut run);
+            let Some(frames) = run.latest().filter(|frames| frames.frames.len() > 1) else { continue };
+            for frame in &frames.frames {
+                buffer.assert_at(&frame.frame_id, "world", &frame.transform_reference_robot());
+            }
+        }
+        run.finish().unwrap();
+        buffer.listen(&mut run);
+        for frame in run.latest().into_iter().flat_map(|frames| frames.frames) {
+            buffer.assert_at(&frame.frame_id, "world", &frame.transform_reference_robot());
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The marker maker as a stage.
+
+use super::{direction, hypotheses, segments, tags, ways};
+use gridweave_runtime::robot_colour::robot_colour;
+use gridweave_runtime::ros::{Alignment, MapDirection, MarkerArray, Segments, TagEstimates, TopologicalMap, Verdicts};
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use std::collections::BTreeMap;
+
+/// The kind `marker_maker`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "marker_maker",
+        "Turns walls, directions, tags, topological maps and hypotheses into shapes that RViz and Foxglove draw.",
+        |(), _: &Context| Ok(MarkerMaker::default()),
+    )
+    .optional_inputs("segments", "the walls of the maps", MarkerMaker::segments)
+    .optional_inputs("direction", "the directions of their walls", MarkerMaker::direction)
+    .optional_inputs("tags", "where the tags are", MarkerMaker::tags)
+    .optional_inputs("topology", "topological maps", MarkerMaker::topology)
+    .optional_inputs("alignment", "how maps may lie to each other", MarkerMaker::alignment)
+    .optional_inputs("verdicts", "what became of each pair of robots", MarkerMaker::verdicts)
+    .build()
+}
+
+struct Markers {
+    segments: Out<MarkerArray>,
+    direction: Out<MarkerArray>,
+    tags: Out<MarkerArray>,
+    ways: Out<MarkerArray>,
+    hypotheses: Out<MarkerArray>,
+    graph: Out<MarkerArray>,
+}
+
+impl Outputs for Markers {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            segments: ports.output_on("/{robot}/markers/walls", "segments", "the walls as lines"),
+            direction: ports.output_on(
+                "/{robot}/markers/direction",
+                "direction",
+                "the direction of the walls as arrows",
+            ),
+            tags: ports.output_on("/{robot}/markers/tags", "tags", "the tags as ellipses of two standard deviations"),
+            ways: ports.output_on("/{robot}/markers/ways", "ways", "topological maps as lines and balls"),
+            hypotheses: ports.output_on("/markers/hypotheses", "hypotheses", "where hypotheses lay the maps"),
+            graph: ports.output_on("/markers/graph", "graph", "the pairs of robots, and what became of each"),
+        }
+    }
+}
+
+/// A stage that sends hypotheses, by its wire, and the pair that they are of.
+type Source = (usize, String, String);
+
+#[derive(Default)]
+struct MarkerMaker {
+    /// In the order in which they were first heard of.
+    robots: Vec<String>,
+    hypotheses: BTreeMap<Source, Vec<Alignment>>,
+    /// The frame of a robot's map.
+    frames: BTreeMap<String, String>,
+}
+
+impl MarkerMaker {
+    fn colour(&mut self, robot: &str) -> [u8; 3] {
+        let known = self.robots.iter().position(|known| known == robot);
+        robot_colour(known.unwrap_or_else(|| {
+            self.robots.push(robot.to_owned());
+            self.robots.len() - 1
+        }))
+    }
+
+    fn segments(&mut self, found: Received<'_, Segments>, output: &Output<Markers>) -> Result<(), StageError> {
+        let colour = self.colour(&found.robot);
+        output.segments.send(&found.robot, &segments(&found, colour))
+    }
+
+    fn direction(&mut self, found: Received<'_, MapDirection>, output: &Output<Markers>) -> Result<(), StageError> {
+        let colour = self.colour(&found.robot);
+        output.direction.send(&found.robot, &direction(&found, colour))
+    }
+
+    fn tags(&mut self, found: Received<'_, TagEstimates>, output: &Output<Markers>) -> Result<(), StageError> {
+        let colour = self.colour(&found.robot);
+        output.tags.send(&found.robot, &tags(&found, colour))
+    }
+
+    fn topology(&mut self, found: Received<'_, TopologicalMap>, output: &Output<Markers>) -> Result<(), StageError> {
+        let colour = self.colour(&found.robot);
+        output.ways.send(&found.robot, &ways(&found, colour))
+    }
+
+    /// Hypotheses of a pair come one after the other, by rank; they are shown once all have come.
+    fn alignment(&mut self, found: Received<'_, Alignment>, output: &Output<Markers>) -> Result<(), StageError> {
+        let source = (found.wire(), found.a.clone(), found.b.clone());
+        let alignment = found.into_content();
+        if !self.frames.contains_key(&alignment.a) {
+            self.frames.insert(alignment.a.clone(), alignment.header.frame_id.clone());
+        }
+        let is_last = alignment.rank + 1 >= alignment.hypotheses;
+        let of_pair = self.hypotheses.entry(source).or_default();
+        of_pair.truncate(alignment.rank as usize);
+        of_pair.push(alignment);
+        if !is_last {
+            return Ok(());
+        }
+        output.hypotheses.send("", &hypotheses(self.hypotheses.values().flatten()))
+    }
+
+    /// Verdicts name no frames: they are in those of the alignments that they are about.
+    fn verdicts(&mut self, found: Received<'_, Verdicts>, output: &Output<Markers>) -> Result<(), StageError> {
+        let mut verdicts = found.into_content();
+        for alignment in verdicts.verdicts.iter_mut().map(|verdict| &mut verdict.alignment) {
+            if let Some(frame) = self.frames.get(&alignment.a).filter(|_| alignment.header.frame_id.is_empty()) {
+                alignment.header.frame_id.clone_from(frame);
+            }
+        }
+        output.graph.send("", &hypotheses(verdicts.verdicts.iter().map(|verdict| &verdict.alignment)))
+    }
+}

@@ -1,0 +1,113 @@
+//! Logs that are written: they explain themselves, keep what the input holds beside messages, and may be bags of rosbag2.
+
+use crate::support::{SMALL_BUILDING, gridweave, simulate};
+use gridweave_logs::reader::{LogFile, SupplementKind};
+use gridweave_runtime::ros::{TFMessage, decode};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// A log with one message, an attachment and a metadata record.
+fn write_log_with_attachment(path: &Path) {
+    let mut writer = mcap::Writer::new(std::io::BufWriter::new(fs::File::create(path).unwrap())).unwrap();
+    let channel_id = writer.add_channel(0, "/notes", "json", &BTreeMap::new()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id, sequence: 1, log_time: 5, publish_time: 5 };
+    writer.write_to_known_channel(&header, b"{}").unwrap();
+    let attachment = mcap::Attachment {
+        log_time: 7,
+        create_time: 8,
+        name: "calibration.txt".into(),
+        media_type: "text/plain".into(),
+        data: Cow::Borrowed(b"f = 1"),
+    };
+    writer.attach(&attachment).unwrap();
+    let metadata = BTreeMap::from([("weather".to_owned(), "rain".to_owned())]);
+    writer.write_metadata(&mcap::records::Metadata { name: "drive".into(), metadata }).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_log_explains_itself_and_keeps_what_is_beside_the_messages_on_every_engine() {
+    let folder = TempDir::new().unwrap();
+    write_log_with_attachment(&folder.path().join("notes.mcap"));
+    let cut = |engine: &str, output: &str| {
+        let args = ["run", "cut", "--input", "notes.mcap", "-o", output, "--engine", engine, "--seed", "3"];
+        gridweave(folder.path(), &args).assert(0, &[]);
+        fs::read(folder.path().join(output)).unwrap()
+    };
+    let bytes = cut("single", "a.mcap");
+    for (engine, output) in [("threads", "b.mcap"), ("threads-ipc", "c.mcap"), ("processes", "d.mcap")] {
+        assert!(cut(engine, output) == bytes, "{engine}");
+    }
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    assert_eq!((attachment.name.as_str(), &*attachment.data), ("calibration.txt", b"f = 1".as_slice()));
+    let log = LogFile::open(folder.path().join("a.mcap")).unwrap();
+    assert_eq!(log.metadata("drive").unwrap()["weather"], "rain");
+    let pipeline = &log.metadata("gridweave_run").unwrap()["pipeline"];
+    assert!(pipeline.contains("seed = 3") && pipeline.contains("mcap_source"), "{pipeline}");
+    assert!(log.metadata("gridweave_inputs").unwrap()["1"].contains("notes.mcap"));
+    let here = folder.path().to_str().unwrap();
+    for (kind, body) in log.supplements().filter(|(kind, _)| *kind == SupplementKind::Metadata) {
+        assert!(!String::from_utf8_lossy(&body.unwrap()).contains(here), "{kind:?} names a place");
+    }
+    let words = ["pipeline cut, seed 3", "notes.mcap  ", "sha256", "metadata records: drive", "attachments: 1"];
+    gridweave(folder.path(), &["info", "a.mcap"]).assert(0, &words);
+
+    // What explained an input is not lost.
+    gridweave(folder.path(), &["convert", "a.mcap", "-o", "e.mcap"]).assert(0, &["wrote 1 messages"]);
+    let log = LogFile::open(folder.path().join("e.mcap")).unwrap();
+    assert_eq!(&log.metadata("earlier_gridweave_run").unwrap()["pipeline"], pipeline);
+    assert_eq!(log.attachments(), 1);
+
+    // What is recorded is a pipeline that can be run.
+    fs::write(folder.path().join("again.toml"), pipeline).unwrap();
+    let args = ["run", "again.toml", "--input", "notes.mcap", "-o", "f.mcap"];
+    gridweave(folder.path(), &args).assert(0, &[]);
+    assert!(fs::read(folder.path().join("f.mcap")).unwrap() == bytes);
+}
+
+#[test]
+fn a_path_with_a_slash_behind_it_is_a_bag_of_rosbag2() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    let path = |name: &str| folder.path().join(name);
+    gridweave(folder.path(), &["merge", "in.mcap", "-o", "merged/"]).assert(0, &["merged 2 of 2"]);
+    assert_eq!(fs::read_dir(path("merged")).unwrap().count(), 2);
+    let description = fs::read_to_string(path("merged/metadata.yaml")).unwrap();
+    assert!(description.contains("storage_identifier: mcap") && description.contains("merged_0.mcap"), "{description}");
+    gridweave(folder.path(), &["info", "merged"]).assert(0, &["merged_0.mcap", "/map"]);
+
+    // Once more, over itself, and as a file: the log is the same.
+    gridweave(folder.path(), &["run", "auto_merge", "--input", "in.mcap", "-o", "merged"]).assert(0, &[]);
+    gridweave(folder.path(), &["merge", "in.mcap", "-o", "merged.mcap"]).assert(0, &[]);
+    assert!(fs::read(path("merged/merged_0.mcap")).unwrap() == fs::read(path("merged.mcap")).unwrap());
+    assert_has_one_parent(&path("merged.mcap"));
+
+    gridweave(folder.path(), &["convert", "merged/", "-o", "copy/"]).assert(0, &["wrote ", "to copy/"]);
+    assert!(path("copy/copy_0.mcap").exists() && path("copy/metadata.yaml").exists());
+    gridweave(folder.path(), &["convert", "merged", "-o", "merged"]).assert(2, &["is an input"]);
+    gridweave(folder.path(), &["convert", "in.mcap", "-o", "."]).assert(1, &["of another bag"]);
+    gridweave(folder.path(), &["convert", "none.mcap", "-o", "new/"]).assert(1, &["none.mcap"]);
+    assert!(!path("new").exists(), "nothing was written");
+    gridweave(folder.path(), &["convert", "in.mcap", "-o", "none/new/"]).assert(1, &["none/new"]);
+}
+
+/// No frame changes its parent over the whole log.
+fn assert_has_one_parent(log: &Path) {
+    let mut parents = BTreeMap::new();
+    let bytes = fs::read(log).unwrap();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if !message.channel.topic.ends_with("tf_static") {
+            continue;
+        }
+        for one in decode::<TFMessage>(&message.data).unwrap().transforms {
+            let parent = parents.entry(one.child_frame_id.clone()).or_insert(one.header.frame_id.clone());
+            assert_eq!(*parent, one.header.frame_id, "{}", one.child_frame_id);
+        }
+    }
+    assert_eq!(parents.len(), 2, "{parents:?}");
+}

@@ -1,0 +1,60 @@
+//! The libraries for Python that people read logs with (`mcap`, `mcap-ros2-support`, `rosbags`) read every message that is written.
+
+use crate::support::{SMALL_BUILDING, gridweave, simulate};
+use gridweave_logs::reader::{LogFile, LogReader};
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// Runs a program, and gives what it prints.
+#[track_caller]
+fn output(program: &Path, args: &[&OsStr]) -> String {
+    let child = Command::new(program).args(args).stdin(Stdio::null()).output();
+    let ended = child.unwrap_or_else(|error| panic!("cannot start {}: {error}", program.display()));
+    let errors = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{} {args:?} failed: {errors}", program.display());
+    String::from_utf8(ended.stdout).unwrap()
+}
+
+/// The interpreter of a virtual environment with the libraries.
+fn python(folder: &Path) -> PathBuf {
+    let environment = folder.join("python");
+    output(Path::new("python3"), &["-m".as_ref(), "venv".as_ref(), environment.as_ref()]);
+    let python = environment.join("bin/python");
+    let requirements = Path::new(env!("CARGO_MANIFEST_DIR")).join("end_to_end/python_libraries/requirements.txt");
+    let install = ["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--requirement"];
+    let install: Vec<&OsStr> = install.iter().map(OsStr::new).chain([requirements.as_ref()]).collect();
+    output(&python, &install);
+    python
+}
+
+/// How many messages every topic of a log has.
+fn counts(log: &Path) -> BTreeMap<String, u64> {
+    let mut reader = LogReader::new(vec![LogFile::open(log).unwrap()]);
+    let files = reader.files().clone();
+    let mut counts = BTreeMap::new();
+    while let Some(message) = reader.next_message() {
+        *counts.entry(files[0].channel(message.channel).unwrap().topic).or_default() += 1;
+    }
+    counts
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn python_libraries_read_every_message() {
+    let folder = TempDir::new().unwrap();
+    let python = python(folder.path());
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    gridweave(folder.path(), &["merge", "in.mcap", "-o", "merge/"]).assert(0, &["merged 2 of 2"]);
+    gridweave(folder.path(), &["run", "topological", "--input", "in.mcap", "-o", "run/"]);
+    gridweave(folder.path(), &["convert", "in.mcap", "-o", "convert/"]).assert(0, &[]);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("end_to_end/python_libraries/read.py");
+    for name in ["merge", "run", "convert"] {
+        let bag = folder.path().join(name);
+        let read = output(&python, &[script.as_ref(), bag.as_ref()]);
+        let read: BTreeMap<String, u64> = serde_json::from_str(&read).unwrap();
+        assert_eq!(read, counts(&bag.join(format!("{name}_0.mcap"))), "{name}");
+    }
+}

@@ -1,0 +1,86 @@
+//! What the command tells beside its results, and what it knows of itself.
+
+use crate::support::{SMALL_BUILDING, gridweave, simulate};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use tempfile::TempDir;
+
+const STAGES: [&str; 3] = ["log", "fuser", "output"];
+
+#[test]
+fn a_name_that_is_mistyped_gets_a_suggestion() {
+    let folder = TempDir::new().unwrap();
+    gridweave(folder.path(), &["run", "tag_mrege", "--input", "x"]).assert(2, &["did you mean `tag_merge`?"]);
+    gridweave(folder.path(), &["pipelines", "tag_mrege"]).assert(2, &["did you mean `tag_merge`?"]);
+    gridweave(folder.path(), &["kinds", "line_extracter"]).assert(2, &["did you mean `line_extractor`?"]);
+    gridweave(folder.path(), &["run", "./tag_mrege"]).assert(2, &["cannot read the pipeline"]);
+}
+
+#[test]
+fn every_pipeline_that_ships_is_listed_and_its_file_passes_the_check() {
+    let folder = TempDir::new().unwrap();
+    let list = gridweave(folder.path(), &["pipelines"]);
+    list.assert(0, &["auto_merge", "merge by the maps alone"]);
+    let names: Vec<&str> = list.stdout.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
+    for name in &names {
+        let file = format!("{name}.toml");
+        fs::write(folder.path().join(&file), gridweave(folder.path(), &["pipelines", name]).stdout).unwrap();
+        gridweave(folder.path(), &["check", &file]).assert(0, &[]);
+    }
+    assert!(names.len() > 10, "{names:?}");
+}
+
+#[test]
+fn what_the_stages_do_is_told_if_asked_for_on_any_engine() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    for engine in ["single", "processes"] {
+        let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "--engine", engine];
+        let told = gridweave(folder.path(), &[&merge[..], &["-v"]].concat());
+        for stage in STAGES {
+            assert!(told.stderr.contains(&format!("stage {stage} (")), "{}", told.stderr);
+            assert!(told.stderr.contains(&format!("stage {stage} ends: ")), "{}", told.stderr);
+        }
+        let silent = gridweave(folder.path(), &merge);
+        assert!(!silent.stderr.contains("stage fuser"), "{}", silent.stderr);
+    }
+    let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "-vv", "--log-format", "json"];
+    let told = gridweave(folder.path(), &merge);
+    let lines: Vec<Value> = told.stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let receives = |line: &&Value| line["level"] == "DEBUG" && line["span"]["stage"] == "fuser";
+    assert!(lines.iter().any(|line| receives(&line)), "{}", told.stderr);
+}
+
+#[test]
+fn a_trace_has_a_span_for_each_stage_and_message() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
+    gridweave(folder.path(), &[&merge[..], &["--trace", "trace.json"]].concat()).assert(0, &[]);
+    let read = |name: &str| -> Value { serde_json::from_slice(&fs::read(folder.path().join(name)).unwrap()).unwrap() };
+    let (trace, summary) = (read("trace.json"), read("summary.json"));
+    let begins: Vec<&Value> = trace.as_array().unwrap().iter().filter(|event| event["ph"] == "B").collect();
+    let stages: BTreeSet<&str> = begins.iter().filter_map(|event| event["name"].as_str()).collect();
+    assert!(STAGES.iter().all(|stage| stages.contains(stage)), "{stages:?}");
+    let received = begins.iter().filter(|event| event["name"] == "fuser" && event["args"]["from"].is_string()).count();
+    assert_eq!(Some(received as u64), summary["stages"]["fuser"]["messages_in"].as_u64());
+    // A log that was meant to be read is not overwritten, and a full disk ends the trace and not the run.
+    let log = fs::read(folder.path().join("in.mcap")).unwrap();
+    gridweave(folder.path(), &[&merge[..], &["--trace", "in.mcap"]].concat()).assert(2, &["must end in .json"]);
+    assert!(fs::read(folder.path().join("in.mcap")).unwrap() == log);
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("full.json")).unwrap();
+    let merge = gridweave(folder.path(), &[&merge[..], &["--trace", "full.json"]].concat());
+    merge.assert(0, &["the trace full.json is not complete: No space left on device"]);
+}
+
+#[test]
+fn shells_and_man_are_told_of_every_command() {
+    let folder = TempDir::new().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        gridweave(folder.path(), &["shell", "completions", shell]).assert(0, &["merge", "--summary"]);
+    }
+    gridweave(folder.path(), &["shell", "man", "man1"]).assert(0, &[]);
+    let page = fs::read_to_string(folder.path().join("man1/gridweave-merge.1")).unwrap();
+    assert!(page.contains("map_server"), "{page}");
+}

@@ -1,0 +1,116 @@
+//! Drives past tags of which all is known: odometry that drifts, ranges with outliers, and tags that a camera sees.
+//!
+//! They have the shapes of public logs: that of UTIAS (Leung, Halpern, Barfoot and Liu, "The UTIAS multi-robot cooperative
+//! localization and mapping dataset", 2011), whose robots see landmarks in a hall by a camera, and that of Plaza (Djugash, Hamner and
+//! Roth, "Navigating with ranging radios", 2009), where radio ranges of tens of metres have outliers; both without maps.
+
+use crate::{LogBuilder, header};
+use gridweave_runtime::ros::{PoseStamped, TFMessage, Transform, TransformStamped, Vector3};
+use nalgebra::{Isometry2, Point2, Vector2};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+/// Metres a second.
+const SPEED: f64 = 0.8;
+/// Seconds between two poses.
+const TICK: f64 = 0.1;
+
+/// How a robot perceives tags.
+#[derive(Clone, Copy, Debug)]
+pub enum Sense {
+    /// It hears how far they are, with this standard deviation in metres; this share of the ranges is up to 5 m too long.
+    Ranges {
+        /// Metres.
+        stddev: f64,
+        /// Share of all ranges.
+        outliers: f64,
+    },
+    /// It sees where they are, with this standard deviation per metre of distance: tags of the AprilTag family `tag36h11`.
+    Camera {
+        /// Metres per metre.
+        stddev: f64,
+    },
+}
+
+/// One robot's drive.
+#[derive(Clone, Debug)]
+pub struct TagDrive {
+    /// Its name.
+    pub robot: &'static str,
+    /// Where it starts in the world: the frame in which it tells its poses.
+    pub start: Isometry2<f64>,
+    /// The corners of its way in the world, metres, which it drives round twice.
+    pub corners: Vec<Point2<f64>>,
+    /// How its odometry drifts: radians of heading after one metre, growing with the root of the way.
+    pub drift: f64,
+    /// How far tags are perceived, metres.
+    pub reach: f64,
+    /// How.
+    pub sense: Sense,
+    /// Seeds its noise.
+    pub seed: u64,
+}
+
+impl TagDrive {
+    /// Writes what the robot tells of itself and of tags, which are named by their number.
+    pub fn write(&self, log: &mut LogBuilder, tags: &[Point2<f64>]) {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let noise = Normal::new(0.0, 1.0).unwrap();
+        let robot = self.robot;
+        if matches!(self.sense, Sense::Camera { .. }) {
+            let topic = format!("/{robot}/camera/tags");
+            log.raw(0.0, &topic, "apriltag_msgs/msg/AprilTagDetectionArray", &[0, 1, 0, 0]);
+            let mount = TransformStamped {
+                header: header(0.0, format!("{robot}/base_link")),
+                child_frame_id: format!("{robot}/camera"),
+                transform: Isometry2::translation(0.1, 0.0).into(),
+            };
+            log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
+        }
+        let mut place = Point2::from(self.start.translation.vector);
+        let mut told = Isometry2::identity();
+        let mut heading = self.start.rotation.angle();
+        let mut seconds = 0.0;
+        for corner in self.corners.iter().chain(&self.corners) {
+            while (corner - place).norm() > SPEED * TICK {
+                let step = (corner - place).normalize() * SPEED * TICK;
+                let turn = step.y.atan2(step.x) - heading;
+                heading += turn;
+                place += step;
+                let error = self.drift * step.norm().sqrt() * noise.sample(&mut random);
+                told = told * Isometry2::rotation(turn + error) * Isometry2::translation(step.norm(), 0.0);
+                seconds += TICK;
+                let pose = PoseStamped { header: header(seconds, format!("{robot}/map")), pose: told.into() };
+                log.message(seconds, &format!("/{robot}/pose"), &pose);
+                let base = Isometry2::new(place.coords, heading);
+                for (number, tag) in tags.iter().enumerate() {
+                    let seen = base.inverse() * tag;
+                    let distance = seen.coords.norm();
+                    if distance > self.reach {
+                        continue;
+                    }
+                    match self.sense {
+                        Sense::Ranges { stddev, outliers } => {
+                            let longer =
+                                if random.random::<f64>() < outliers { 5.0 * random.random::<f64>() } else { 0.0 };
+                            let range = (distance + stddev * noise.sample(&mut random) + longer).max(0.01);
+                            log.reading(seconds, robot, &format!("beacon{number}"), range);
+                        }
+                        Sense::Camera { stddev } => {
+                            let error = Vector2::new(noise.sample(&mut random), noise.sample(&mut random));
+                            let seen = seen.coords + error * stddev * distance - Vector2::new(0.1, 0.0);
+                            let translation = Vector3 { x: seen.x, y: seen.y, z: 0.2 };
+                            let tag = TransformStamped {
+                                header: header(seconds, format!("{robot}/camera")),
+                                child_frame_id: format!("tag36h11:{number}"),
+                                transform: Transform { translation, ..Default::default() },
+                            };
+                            log.message(seconds, "/tf", &TFMessage { transforms: vec![tag] });
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
