@@ -257,7 +257,7 @@ fn a_claimed_length_allocates_nothing_that_is_not_there() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
     fn damaged_bytes_are_an_error_or_a_value_but_no_panic(

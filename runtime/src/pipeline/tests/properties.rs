@@ -65,8 +65,6 @@ fn apply(text: &str, mutation: &Mutation) -> String {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
-
     #[test]
     fn the_order_of_the_stages_in_the_file_changes_nothing(order in Just(sections().1).prop_shuffle()) {
         let text = sections().0 + &order.concat();
