@@ -8,13 +8,13 @@ use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Parameters, Received, Source, StageError, StageKind,
 };
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
 /// What happens, and at which message.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Trouble {
     /// How many messages a source sends.

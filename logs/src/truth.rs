@@ -4,12 +4,12 @@ use crate::file::replace;
 use gridweave_runtime::ros::SimulationTruth;
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
 /// The parameters of `truth_sink`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct TruthParameters {
     /// The JSON file to write. A file that has this name is replaced.

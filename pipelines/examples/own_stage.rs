@@ -7,17 +7,18 @@ use gridweave_runtime::ros::cell::is_occupied;
 use gridweave_runtime::ros::{GridPrefix, OccupancyGrid};
 use gridweave_runtime::stage::*;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 fn main() -> std::process::ExitCode {
     gridweave::command([kind()])
 }
 
-/// The doc comments are what `kinds` shows.
-#[derive(Deserialize, JsonSchema)]
+/// The doc comments and the ranges are what `kinds` shows.
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct InflaterParameters {
     /// Cells nearer to an obstacle than this become occupied, metres: the radius of the robot.
+    #[schemars(range(min = 0.01, max = 10.0))]
     radius: f64,
 }
 
@@ -27,12 +28,7 @@ impl Default for InflaterParameters {
     }
 }
 
-impl Parameters for InflaterParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let usable = self.radius > 0.0 && self.radius <= 10.0;
-        (!usable).then(|| ParameterError::new("radius", "must be above 0 m, up to 10 m")).into_iter().collect()
-    }
-}
+impl Parameters for InflaterParameters {}
 
 /// Grows the obstacles of maps by the radius of a robot, so that its centre can be planned for as a point.
 struct Inflater(InflaterParameters);

@@ -20,7 +20,7 @@ use gridweave_runtime::stage::{
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -77,7 +77,7 @@ impl Times {
     }
 }
 
-#[derive(Default, Deserialize, JsonSchema)]
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 struct Load {
     size: usize,

@@ -1,6 +1,6 @@
 //! The parameters of the grid fuser.
 
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,29 +18,36 @@ pub enum Warp {
 }
 
 /// The parameters of the grid fuser.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridFuserParameters {
     /// How cells get from a robot's map to the fused one.
     pub warp: Warp,
     /// Metres a cell of the fused map. If it is not given: the finest of the maps' resolutions (the paper: 0.02 m). A
     /// value coarser than the maps' leaves cells out, thin walls among them.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub resolution: Option<f64>,
     /// Probability that a cell is occupied when a map says 100. Greater values are cut to it before maps are added, so
     /// that no map is ever beyond doubt. 0.971 is the upper clamping threshold of OctoMap.
+    #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub max_probability: f64,
     /// Probability that a cell is occupied when a map says 0. 0.1192 is the lower clamping threshold of OctoMap. With
     /// the default pair one map's wall outweighs another map's free cell, as a wall that is off by a cell should.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
     /// Metres. The map is fused again when a robot's frame has moved by more than this.
+    #[schemars(range(min = 0.0))]
     pub min_move: f64,
     /// Radians. The map is fused again when a robot's frame has turned by more than this.
+    #[schemars(range(min = 0.0))]
     pub min_turn: f64,
     /// Metres. The longest side that the fused map may have; a robot whose map would make it longer is left out with a
     /// warning.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_extent: f64,
     /// The most cells that the fused map may have; a robot whose map would make it larger is left out with a warning, and so
     /// is one that lies so far away that next to nothing of the fused map would be known.
+    #[schemars(range(min = 1, max = u32::MAX))]
     pub max_cells: u64,
 }
 
@@ -59,25 +66,4 @@ impl Default for GridFuserParameters {
     }
 }
 
-impl Parameters for GridFuserParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        let mut require = |holds: bool, field, problem: &str| {
-            if !holds {
-                errors.push(ParameterError::new(field, problem));
-            }
-        };
-        let is_length = |value: f64| value.is_finite() && value > 0.0;
-        require(self.resolution.is_none_or(is_length), "resolution", "must be above 0 m");
-        let is_high = self.max_probability > 0.5 && self.max_probability < 1.0;
-        require(is_high, "max_probability", "must be above 0.5 and below 1");
-        let is_low = self.min_probability > 0.0 && self.min_probability < 0.5;
-        require(is_low, "min_probability", "must be above 0 and below 0.5");
-        require(self.min_move.is_finite() && self.min_move >= 0.0, "min_move", "must be 0 m or above");
-        require(self.min_turn.is_finite() && self.min_turn >= 0.0, "min_turn", "must be 0 rad or above");
-        require(is_length(self.max_extent), "max_extent", "must be above 0 m");
-        let fits = (1..=u64::from(u32::MAX)).contains(&self.max_cells);
-        require(fits, "max_cells", "must be 1 to 4294967295");
-        errors
-    }
-}
+impl Parameters for GridFuserParameters {}

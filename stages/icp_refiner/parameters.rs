@@ -31,7 +31,7 @@ pub enum Weighting {
 }
 
 /// Parameters of the ICP refiner. What takes them expects values that have passed [`check`](Parameters::check).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IcpParameters {
     /// What registration measures between two points: `point_to_line`, or `point_to_point` (the paper).
@@ -42,42 +42,59 @@ pub struct IcpParameters {
     /// first guess that can be mended.
     pub max_distance: f64,
     /// How far the partner may lie in the end, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_distance: f64,
-    /// The factor by which that distance shrinks with every iteration, above 0 and below 1.
+    /// The factor by which that distance shrinks with every iteration.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
     /// The most iterations at that last distance; an alignment that still moves then is refused.
+    #[schemars(range(min = 1))]
     pub max_iterations: usize,
     /// Registration has converged when an iteration moves the wall points by less than this, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub convergence: f64,
     /// The number of points that the iterations before the last distance make do with.
+    #[schemars(range(min = 1))]
     pub coarse_points: usize,
     /// Where the first guess's rotation is vague, rotations this far apart are tried as starts, as far as two standard
     /// deviations to either side, radians.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub start_spacing: f64,
     /// The radius in which a wall's direction is measured, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub normal_radius: f64,
     /// The length of wall that counts as one independent measurement, metres: the errors of cells that stand side by
     /// side are alike. It scales the covariance.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub correlation_length: f64,
     /// Standard deviation of x and y of a first guess that brings no covariance, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub initial_position_deviation: f64,
     /// Standard deviation of the rotation of a first guess that brings no covariance, radians.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub initial_yaw_deviation: f64,
     /// Added to the first guess's own uncertainty, as a standard deviation of x and y in the common section, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub position_slack: f64,
     /// Added to the first guess's own uncertainty, as a standard deviation of the rotation, radians.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub yaw_slack: f64,
     /// How many standard deviations of the first guess the refined transform may lie away from it.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_step: f64,
     /// The greatest standard deviation of the position in the common section, in any direction, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_position_deviation: f64,
     /// The greatest standard deviation of the rotation, radians.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_yaw_deviation: f64,
     /// An accepted alignment is kept while the maps stay the same and the first guess moves by no more than this in the
     /// common section, metres.
+    #[schemars(range(min = 0.0))]
     pub reuse_within: f64,
     /// An accepted alignment is kept while the maps stay the same and the first guess turns by no more than this,
     /// radians.
+    #[schemars(range(min = 0.0))]
     pub reuse_within_yaw: f64,
 }
 
@@ -109,44 +126,11 @@ impl Default for IcpParameters {
 }
 
 impl Parameters for IcpParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        let positive = [
-            ("min_distance", self.min_distance),
-            ("convergence", self.convergence),
-            ("start_spacing", self.start_spacing),
-            ("normal_radius", self.normal_radius),
-            ("correlation_length", self.correlation_length),
-            ("initial_position_deviation", self.initial_position_deviation),
-            ("initial_yaw_deviation", self.initial_yaw_deviation),
-            ("position_slack", self.position_slack),
-            ("yaw_slack", self.yaw_slack),
-            ("max_step", self.max_step),
-            ("max_position_deviation", self.max_position_deviation),
-            ("max_yaw_deviation", self.max_yaw_deviation),
-        ];
-        for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                errors.push(ParameterError::new(field, format!("must be a finite number above 0, not {value}")));
-            }
-        }
-        let not_negative = [("reuse_within", self.reuse_within), ("reuse_within_yaw", self.reuse_within_yaw)];
-        for (field, value) in not_negative {
-            if !(value.is_finite() && value >= 0.0) {
-                errors.push(ParameterError::new(field, format!("must be a finite number from 0 up, not {value}")));
-            }
-        }
-        if !(self.max_distance.is_finite() && self.max_distance >= self.min_distance) {
-            errors.push(ParameterError::new("max_distance", "must be finite and at least min_distance"));
-        }
-        if !(self.shrink > 0.0 && self.shrink < 1.0) {
-            errors.push(ParameterError::new("shrink", format!("must lie between 0 and 1, not {}", self.shrink)));
-        }
-        for (field, value) in [("max_iterations", self.max_iterations), ("coarse_points", self.coarse_points)] {
-            if value == 0 {
-                errors.push(ParameterError::new(field, "must be at least 1"));
-            }
-        }
-        errors
+    fn check_together(&self) -> Vec<ParameterError> {
+        let is_larger = self.max_distance >= self.min_distance;
+        (!is_larger)
+            .then(|| ParameterError::new("max_distance", "must be at least `min_distance`"))
+            .into_iter()
+            .collect()
     }
 }

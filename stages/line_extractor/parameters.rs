@@ -1,6 +1,6 @@
 //! The parameters of the line extractor.
 
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,12 +41,13 @@ pub enum Fit {
 }
 
 /// The parameters of `line_extractor`. The paper's cell (px) is 0.02 m.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LineExtractorParameters {
     /// How the two points are drawn that make a line: `local` (the second near the first) or `uniform` (the paper).
     pub sampling: Sampling,
     /// How far apart the two points of `local` sampling may be, metres.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub sampling_radius: f64,
     /// When a line counts as a wall: `points` or `percentage` (the paper).
     pub scoring: Scoring,
@@ -54,32 +55,45 @@ pub struct LineExtractorParameters {
     pub fit: Fit,
     /// Of more occupied cells than these a random part is searched for lines (the set P); the lines found are then
     /// fitted to all cells.
+    #[schemars(range(min = 2))]
     pub max_points: usize,
     /// Cells nearer to a line than this are its members (D_line), metres; never less than three quarters of a cell,
     /// which a straight wall of single cells takes up. Paper: 2 px.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub inlier_distance: f64,
     /// Points that a wall must hold under `points` scoring.
+    #[schemars(range(min = 2))]
     pub min_points: usize,
-    /// Share of all points that a line must hold under `percentage` scoring (T_perc), 0 to 1. Paper: 0.15.
+    /// Share of all points that a line must hold under `percentage` scoring (T_perc). Paper: 0.15.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
-    /// The search ends when less than this share of the points is left (T_final), 0 to 1. Paper: 0.5.
+    /// The search ends when less than this share of the points is left (T_final). Paper: 0.5.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub stop_share: f64,
     /// Lines drawn to choose the best of, each time. Paper: 1, the first that suffices is taken.
+    #[schemars(range(min = 1))]
     pub candidates: usize,
     /// The search ends after this many choices in a row that gave no wall (`points` scoring).
+    #[schemars(range(min = 1))]
     pub patience: usize,
     /// Lines drawn in all, at most. Under `percentage` scoring the best line so far is kept when they are spent.
+    #[schemars(range(min = 1))]
     pub max_iterations: usize,
     /// A line is broken where neighbouring members are farther apart than this (D_s), metres. Paper: 30 px.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: f64,
     /// Segments whose directions differ by less than this may be merged (T_theta), radians. The paper gives no value.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub merge_angle: f64,
     /// Segments whose nearest ends are nearer than this may be merged (T_j), metres; they are if one line then has
     /// both within `inlier_distance`. 0 merges none. The paper gives no value.
+    #[schemars(range(min = 0.0))]
     pub merge_distance: f64,
     /// Shorter segments are dropped (T_len), metres. Paper: 30 px.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_length: f64,
-    /// Segments whose mean occupancy is below this are dropped, 0 to 1. Paper: 0.6.
+    /// Segments whose mean occupancy is below this are dropped. Paper: 0.6.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_reliability: f64,
 }
 
@@ -107,38 +121,7 @@ impl Default for LineExtractorParameters {
     }
 }
 
-impl Parameters for LineExtractorParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        let mut require = |good: bool, field: &'static str, problem: &str| {
-            if !good {
-                errors.push(ParameterError::new(field, problem));
-            }
-        };
-        for (field, value) in [
-            ("sampling_radius", self.sampling_radius),
-            ("inlier_distance", self.inlier_distance),
-            ("max_gap", self.max_gap),
-            ("min_length", self.min_length),
-        ] {
-            require(value.is_finite() && value > 0.0, field, "must be a number above 0 m");
-        }
-        for (field, value) in
-            [("min_share", self.min_share), ("stop_share", self.stop_share), ("min_reliability", self.min_reliability)]
-        {
-            require((0.0..=1.0).contains(&value), field, "must be from 0 to 1");
-        }
-        require((0.0..=0.5).contains(&self.merge_angle), "merge_angle", "must be from 0 to 0.5 rad");
-        let merge_distance = self.merge_distance.is_finite() && self.merge_distance >= 0.0;
-        require(merge_distance, "merge_distance", "must be a number of 0 m or more");
-        require(self.min_points >= 2, "min_points", "must be 2 or more");
-        require(self.max_points >= 2, "max_points", "must be 2 or more");
-        require(self.candidates >= 1, "candidates", "must be 1 or more");
-        require(self.max_iterations >= 1, "max_iterations", "must be 1 or more");
-        require(self.patience >= 1, "patience", "must be 1 or more");
-        errors
-    }
-}
+impl Parameters for LineExtractorParameters {}
 
 #[cfg(test)]
 mod tests {

@@ -1,23 +1,27 @@
 //! The parameters of the stage.
 
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Parameters of the map cleaner. What takes them expects values that have passed [`check`](Parameters::check).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapCleanerParameters {
     /// Occupied cells that lie within this distance along x and along y belong to one object, metres; never less than two
     /// cells, so that a wall that lacks single cells stays whole.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub link: f64,
     /// An object is a wall if the box round it is at least so long from corner to corner, metres; legs, people and dust are
     /// shorter.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub min_wall_length: f64,
-    /// The least share of that length that cells of the object would fill if they stood in a row, 0 to 1. Single cells that
+    /// The least share of that length that cells of the object would fill if they stood in a row. Single cells that
     /// lie near each other by chance fill less.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_fill: f64,
     /// Known space that is narrower than this is left out, metres: the rays of a lidar through glass and open doors.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub min_passage: f64,
 }
 
@@ -27,19 +31,4 @@ impl Default for MapCleanerParameters {
     }
 }
 
-impl Parameters for MapCleanerParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        for (field, value) in
-            [("link", self.link), ("min_wall_length", self.min_wall_length), ("min_passage", self.min_passage)]
-        {
-            if !(0.0..=10.0).contains(&value) {
-                errors.push(ParameterError::new(field, format!("must lie between 0 and 10, not {value}")));
-            }
-        }
-        if !(0.0..=1.0).contains(&self.min_fill) {
-            errors.push(ParameterError::new("min_fill", format!("must lie between 0 and 1, not {}", self.min_fill)));
-        }
-        errors
-    }
-}
+impl Parameters for MapCleanerParameters {}

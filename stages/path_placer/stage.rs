@@ -4,17 +4,18 @@ use super::Drive;
 use crate::placement::Placement;
 use gridweave_runtime::ros::{Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrames};
 use gridweave_runtime::stage::{
-    Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, Received, StageError, StageKind,
+    Context, Out, Output, OutputPorts, Outputs, Parameters, Received, StageError, StageKind,
 };
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The parameters of the path placer.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PathPlacerParameters {
     /// Metres. A pose nearer than this to the one before is left out.
+    #[schemars(range(min = 0.0))]
     spacing: f64,
 }
 
@@ -24,12 +25,7 @@ impl Default for PathPlacerParameters {
     }
 }
 
-impl Parameters for PathPlacerParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let is_right = self.spacing.is_finite() && self.spacing >= 0.0;
-        if is_right { Vec::new() } else { vec![ParameterError::new("spacing", "must be 0 m or above")] }
-    }
-}
+impl Parameters for PathPlacerParameters {}
 
 /// The kind `path_placer`.
 pub fn kind() -> StageKind {

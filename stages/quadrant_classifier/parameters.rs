@@ -1,6 +1,6 @@
 //! The parameters of the quadrant classifier.
 
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +69,7 @@ pub enum TranslationFrom {
 }
 
 /// The parameters of `quadrant_classifier`.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuadrantClassifierParameters {
     /// How the directions of many walls become one: `circular` or `groups` (the paper).
@@ -86,49 +86,64 @@ pub struct QuadrantClassifierParameters {
     pub translation: TranslationFrom,
     /// A wall within this angle of the map's direction, or of its perpendicular, agrees with it, radians. Others have no
     /// say in the `circular` mean.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 0.5))]
     pub tolerance: f64,
-    /// A map has a direction if at least this share of its wall length agrees with it, 0 to 1. Walls of all directions
+    /// A map has a direction if at least this share of its wall length agrees with it. Walls of all directions
     /// alike give tolerance / 45 degrees, 0.11 by default.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_agreement: f64,
     /// A map has a direction if at least this length of walls agrees with it, metres.
+    #[schemars(range(min = 0.0))]
     pub min_wall_length: f64,
     /// How far the end of a wall may lie off the wall, metres, one standard deviation: about half a cell. It bounds how
     /// well a short wall tells a direction.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub end_deviation: f64,
     /// Standard deviation of a wall's direction that no length removes, radians: walls are not quite straight, nor quite
     /// at right angles. With `end_deviation` it tells how well each wall's direction is known; walls that lie far off by
     /// that measure have no say in the `circular` mean.
+    #[schemars(range(min = 0.0))]
     pub wall_deviation: f64,
     /// Standard deviation of a map's direction that no number of walls removes, radians: maps bend, and corners are not
     /// square.
+    #[schemars(range(min = 0.0))]
     pub min_deviation: f64,
     /// Standard deviation of a tag's position in one map, metres, which is added to what its estimate claims.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tag_deviation: f64,
     /// Tags that tell the rotation no better than this standard deviation, radians, cannot tell the quarter turn: the
     /// maps are not aligned.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 0.25))]
     pub max_tag_rotation_deviation: f64,
     /// Directions contradict the tags when the two rotations differ by more than three joint standard deviations and
     /// this angle, radians.
+    #[schemars(range(min = 0.0))]
     pub contradiction_angle: f64,
     /// Directions contradict the tags in any case when the two rotations differ by more than this, radians: 45 degrees
     /// away the quarter turn is a toss of a coin. The paper has no such bounds; with 0.8 for this one and for
     /// `contradiction_angle` they are out of reach.
+    #[schemars(extend("exclusiveMinimum" = 0), range(max = 0.8))]
     pub max_contradiction: f64,
     /// Two common tags, or more of which it may be chance that they agree, count only where the directions of both maps
     /// do not contradict them, and could have: where the bound on the difference of the two rotations (see
     /// `contradiction_angle`) is at most this angle, radians. The next quarter turn then is dozens of standard
     /// deviations away.
+    #[schemars(range(min = 0.0))]
     pub max_confirming_angle: f64,
     /// Whether a single common tag proposes a place for each quarter turn that the directions leave open. What it proposes
     /// is provisional: `merge_verifier` must find one of them right, or another source must have found it, too.
     pub single_tag: bool,
-    /// The least certainty of a single tag in both maps, 0 to 1.
+    /// The least certainty of a single tag in both maps.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub single_tag_certainty: f64,
     /// Maps are not aligned if their tags then lie farther apart than this, metres (root mean square).
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.
+    #[schemars(range(min = 0.0))]
     pub resend_distance: f64,
     /// A pair's alignment is sent again when it has turned by more than this, radians, or one of its maps has changed.
+    #[schemars(range(min = 0.0))]
     pub resend_angle: f64,
 }
 
@@ -160,52 +175,7 @@ impl Default for QuadrantClassifierParameters {
     }
 }
 
-impl Parameters for QuadrantClassifierParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        let mut require = |good: bool, field: &'static str, problem: &str| {
-            if !good {
-                errors.push(ParameterError::new(field, problem));
-            }
-        };
-        let above_zero = |value: f64| value.is_finite() && value > 0.0;
-        let not_below_zero = |value: f64| value.is_finite() && value >= 0.0;
-        require(self.tolerance > 0.0 && self.tolerance <= 0.5, "tolerance", "must be above 0 and at most 0.5 rad");
-        require((0.0..=1.0).contains(&self.min_agreement), "min_agreement", "must be from 0 to 1");
-        require((0.0..=1.0).contains(&self.single_tag_certainty), "single_tag_certainty", "must be from 0 to 1");
-        for (field, value) in [("end_deviation", self.end_deviation), ("tag_deviation", self.tag_deviation)] {
-            require(above_zero(value), field, "must be a number above 0 m");
-        }
-        require(above_zero(self.max_residual), "max_residual", "must be a number above 0 m");
-        for (field, value) in [("min_wall_length", self.min_wall_length), ("resend_distance", self.resend_distance)] {
-            require(not_below_zero(value), field, "must be a number of 0 m or more");
-        }
-        for (field, value) in [
-            ("wall_deviation", self.wall_deviation),
-            ("min_deviation", self.min_deviation),
-            ("contradiction_angle", self.contradiction_angle),
-            ("max_confirming_angle", self.max_confirming_angle),
-            ("resend_angle", self.resend_angle),
-        ] {
-            require(not_below_zero(value), field, "must be a number of 0 rad or more");
-        }
-        // More than an eighth turn they never differ, but for rounding.
-        let contradiction = self.max_contradiction;
-        require(
-            contradiction > 0.0 && contradiction <= 0.8,
-            "max_contradiction",
-            "must be above 0 and at most 0.8 rad",
-        );
-        let deviation = self.max_tag_rotation_deviation;
-        // Three deviations must stay below an eighth turn, where quadrants meet.
-        require(
-            deviation > 0.0 && deviation <= 0.25,
-            "max_tag_rotation_deviation",
-            "must be above 0 and at most 0.25 rad",
-        );
-        errors
-    }
-}
+impl Parameters for QuadrantClassifierParameters {}
 
 #[cfg(test)]
 mod tests {

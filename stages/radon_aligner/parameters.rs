@@ -1,28 +1,34 @@
 //! The parameters of the stage.
 
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Parameters of the Radon aligner. What takes them expects values that have passed [`check`](Parameters::check).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RadonAlignerParameters {
     /// The step between two angles of the Radon transform, radians; a quarter turn is cut into the nearest whole number of
     /// them.
+    #[schemars(range(min = 1e-4, max = 0.1))]
     pub angle_step: f64,
     /// The least correlation of the energies of two maps over the angle, up to 1, at which a rotation is taken from them.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_correlation: f64,
     /// As many shifts are tried on each of the two axes of the walls, at each of the four rotations.
+    #[schemars(range(min = 1, max = 100))]
     pub shifts: usize,
     /// The least share that two maps must have in common of the smaller one's known cells, 0 to 1, for a place to count.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_overlap: f64,
     /// The least acceptance index at which an alignment is accepted, 0 to 1: the share of the cells known to both maps on which
     /// they agree. The method has no other test, and none that is sure: right places in nine real logs had 0.963 and more, the
     /// best ones of unrelated maps up to 0.945.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub min_similarity: f64,
     /// Maps whose walls lie farther apart than this are not aligned, metres.
+    #[schemars(range(min = 1.0, max = 1e4))]
     pub max_extent: f64,
 }
 
@@ -46,25 +52,4 @@ impl RadonAlignerParameters {
     }
 }
 
-impl Parameters for RadonAlignerParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        let ranges = [
-            ("angle_step", self.angle_step, 1e-4, 0.1),
-            ("min_correlation", self.min_correlation, 0.0, 1.0),
-            ("min_overlap", self.min_overlap, 0.0, 1.0),
-            ("min_similarity", self.min_similarity, 0.0, 1.0),
-            ("max_extent", self.max_extent, 1.0, 1e4),
-        ];
-        for (field, value, least, most) in ranges {
-            if !(least..=most).contains(&value) {
-                errors.push(ParameterError::new(field, format!("must lie between {least} and {most}, not {value}")));
-            }
-        }
-        // All pairs of shifts are tried.
-        if !(1..=100).contains(&self.shifts) {
-            errors.push(ParameterError::new("shifts", format!("must lie between 1 and 100, not {}", self.shifts)));
-        }
-        errors
-    }
-}
+impl Parameters for RadonAlignerParameters {}

@@ -5,80 +5,107 @@ use super::lidar::Lidar;
 use super::tags::TagReader;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// A map has at most this many cells while it is made.
 const MOST_CELLS: f64 = 6e7;
 
 /// What is simulated.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulatorParameters {
-    /// How many robots there are, 1 to 64. They are called `robot1`, `robot2`, ...
+    /// How many robots there are. They are called `robot1`, `robot2`, ...
+    #[schemars(range(min = 1, max = 64))]
     pub robots: u32,
-    /// Size of the building along its corridors, metres, 10 to 300. In a building of the default size three robots
+    /// Size of the building along its corridors, metres. In a building of the default size three robots
     /// drive for about two minutes; it grows with the floor area that each of them covers.
+    #[schemars(range(min = 10.0, max = 300.0))]
     pub width: f64,
-    /// Size of the building across its corridors, metres, 9 to 300. There is one corridor for every two rows of rooms.
+    /// Size of the building across its corridors, metres. There is one corridor for every two rows of rooms.
+    #[schemars(range(min = 9.0, max = 300.0))]
     pub height: f64,
-    /// Mean width of a room, metres, 2.5 to 30.
+    /// Mean width of a room, metres.
+    #[schemars(range(min = 2.5, max = 30.0))]
     pub room_width: f64,
-    /// Mean depth of a room, from its corridor, metres, 4 to 40.
+    /// Mean depth of a room, from its corridor, metres.
+    #[schemars(range(min = 4.0, max = 40.0))]
     pub room_depth: f64,
-    /// Width of the corridors, metres, 1.4 to 3.
+    /// Width of the corridors, metres.
+    #[schemars(range(min = 1.4, max = 3.0))]
     pub corridor_width: f64,
-    /// Pieces of furniture a square metre of a room, 0 to 1. Where pieces would block a way there are fewer.
+    /// Pieces of furniture a square metre of a room. Where pieces would block a way there are fewer.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub clutter: f64,
     /// How the rooms are laid out: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
     /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at random in
     /// all but the last.
     pub layout: Layout,
-    /// Share of the rooms whose furniture stands elsewhere for each robot, 0 to 1.
+    /// Share of the rooms whose furniture stands elsewhere for each robot.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub moved: f64,
-    /// Share of its rooms that a robot has in common with the next one, 0 to 1.
+    /// Share of its rooms that a robot has in common with the next one.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub overlap: f64,
     /// Top speed of the robots, metres a second.
+    #[schemars(range(min = 0.05, max = 5.0))]
     pub speed: f64,
     /// A drive that takes longer is cut off, seconds, up to 7200.
+    #[schemars(range(min = 1.0, max = 7200.0))]
     pub duration: f64,
     /// Beams of one lidar scan.
+    #[schemars(range(min = 1, max = 10000))]
     pub beams: u32,
     /// The angle about straight ahead over which they are spread, radians, 0.1 to 2 pi: a lidar's full circle, or what a depth
     /// camera sees.
+    #[schemars(range(min = 0.1, max = TAU))]
     pub field_of_view: f64,
     /// The longest range of the lidar, metres. A beam that meets nothing within it returns nothing.
+    #[schemars(range(min = 0.5, max = 300.0))]
     pub lidar_range: f64,
     /// Standard deviation of a lidar range, metres.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lidar_noise: f64,
-    /// Share of the lidar's beams that return nothing although they meet something, 0 to 0.99.
+    /// Share of the lidar's beams that return nothing although they meet something.
+    #[schemars(range(min = 0.0, max = 0.99))]
     pub dropped_beams: f64,
     /// Drift of the poses that a robot believes in: standard deviation after one metre of driving, of the heading in
     /// radians and of the distance in metres; it grows with the root of the way. 0 makes poses exact.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub drift: f64,
     /// The length of way over which loop closures take an error back to 37 %, metres. 0 lets drift grow without end,
     /// and makes the truth of a merge a matter of where one looks.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub correction_length: f64,
     /// Metres a cell of the maps. Several values are given to the robots in turn.
     pub resolution: Vec<f64>,
-    /// Share of a map's free cells that are drawn occupied, as people's legs, dust and glass leave them, 0 to 0.1.
+    /// Share of a map's free cells that are drawn occupied, as people's legs, dust and glass leave them.
+    #[schemars(range(min = 0.0, max = 0.1))]
     pub specks: f64,
     /// How many maps each robot sends, growing, at the ends of equal parts of its drive.
+    #[schemars(range(min = 1, max = 1000))]
     pub snapshots: u32,
     /// The robots' map frames are turned against the walls by at most this, radians. 0 lays all maps along the walls.
+    #[schemars(range(min = 0.0, max = PI))]
     pub map_yaw: f64,
     /// The origins of the map frames lie at most this far from where the robots start, in x and in y, metres.
+    #[schemars(range(min = 0.0, max = 1e5))]
     pub map_offset: f64,
     /// How many radio tags there are on the walls. Robots share enough of them with about one in 8 square metres of
     /// floor.
+    #[schemars(range(min = 0, max = 10000))]
     pub tags: u32,
     /// The longest distance at which a tag is read, metres. The paper's is 3 m.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub tag_reach: f64,
     /// Standard deviation of a tag's range, metres. The paper's is 0.05 m.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub tag_noise: f64,
-    /// Share of the readings of tags that are lost, 0 to 1.
+    /// Share of the readings of tags that are lost.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub lost_readings: f64,
-    /// Share of the readings of tags that come over a reflection and are 0.3 m to 2 m too long, 0 to 1.
+    /// Share of the readings of tags that come over a reflection and are 0.3 m to 2 m too long.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub reflections: f64,
 }
 
@@ -155,49 +182,14 @@ impl SimulatorParameters {
 }
 
 impl Parameters for SimulatorParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let ranges = [
-            ("robots", f64::from(self.robots), 1.0, 64.0),
-            ("width", self.width, 10.0, 300.0),
-            ("height", self.height, 9.0, 300.0),
-            ("room_width", self.room_width, 2.5, 30.0),
-            ("room_depth", self.room_depth, 4.0, 40.0),
-            ("corridor_width", self.corridor_width, 1.4, 3.0),
-            ("clutter", self.clutter, 0.0, 1.0),
-            ("moved", self.moved, 0.0, 1.0),
-            ("overlap", self.overlap, 0.0, 1.0),
-            ("speed", self.speed, 0.05, 5.0),
-            ("duration", self.duration, 1.0, 7200.0),
-            ("beams", f64::from(self.beams), 1.0, 10_000.0),
-            ("field_of_view", self.field_of_view, 0.1, TAU),
-            ("lidar_range", self.lidar_range, 0.5, 300.0),
-            ("lidar_noise", self.lidar_noise, 0.0, 1.0),
-            ("dropped_beams", self.dropped_beams, 0.0, 0.99),
-            ("drift", self.drift, 0.0, 1.0),
-            ("correction_length", self.correction_length, 0.0, 1e6),
-            ("specks", self.specks, 0.0, 0.1),
-            ("snapshots", f64::from(self.snapshots), 1.0, 1000.0),
-            ("map_yaw", self.map_yaw, 0.0, PI),
-            ("map_offset", self.map_offset, 0.0, 1e5),
-            ("tags", f64::from(self.tags), 0.0, 10_000.0),
-            ("tag_reach", self.tag_reach, 0.0, 100.0),
-            ("tag_noise", self.tag_noise, 0.0, 10.0),
-            ("lost_readings", self.lost_readings, 0.0, 1.0),
-            ("reflections", self.reflections, 0.0, 1.0),
-        ];
-        let mut errors: Vec<ParameterError> = ranges
-            .into_iter()
-            .filter(|(_, value, low, high)| !(low..=high).contains(&value))
-            .map(|(field, value, low, high)| {
-                ParameterError::new(field, format!("must be between {low} and {high}, and is {value}"))
-            })
-            .collect();
+    fn check_together(&self) -> Vec<ParameterError> {
+        let mut errors = Vec::new();
         if self.resolution.is_empty() {
             errors.push(ParameterError::new("resolution", "must hold at least one value"));
         }
         for &resolution in &self.resolution {
             if !(0.005..=1.0).contains(&resolution) {
-                let problem = format!("must be between 0.005 and 1 m a cell, and is {resolution}");
+                let problem = format!("must be from 0.005 to 1 m a cell, not {resolution}");
                 errors.push(ParameterError::new("resolution", problem));
             } else if self.most_cells_a_side(resolution).powi(2) > MOST_CELLS {
                 let problem = format!(
@@ -216,7 +208,7 @@ impl Parameters for SimulatorParameters {
 mod tests {
     use super::*;
 
-    fn wrong(change: impl FnOnce(&mut SimulatorParameters)) -> Vec<&'static str> {
+    fn wrong(change: impl FnOnce(&mut SimulatorParameters)) -> Vec<String> {
         let mut parameters = SimulatorParameters::default();
         change(&mut parameters);
         parameters.check().into_iter().map(|error| error.field).collect()

@@ -17,13 +17,14 @@ pub enum Readout {
 }
 
 /// Parameters of `tag_localizer`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TagLocalizerParameters {
     /// Width and height of a tag's grid, metres; its centre is where the robot was at the first reading. The paper has
     /// 6 m (300 px), which cuts off tags that are first heard at the full reach along an axis. At least twice `reach`.
     pub grid_size: f64,
     /// Width of a grid cell, metres. The paper has 0.02 m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub resolution: f64,
     /// How the certainty is read from the grid: `window` or `blocks`.
     pub readout: Readout,
@@ -33,33 +34,44 @@ pub struct TagLocalizerParameters {
     /// The window is at least so many standard deviations of the tag's most exact reading wide. The paper's 0.06 m are
     /// 1.2 of its 0.05 m; so the certainty says how far the place is the only one, whatever the noise, and the covariance
     /// says how exact it is. 0 keeps `window` as it is.
+    #[schemars(range(min = 0.0))]
     pub window_deviations: f64,
     /// How far a tag can be heard, metres. Readings that say more are left out, and a tag is read out when it is out of
     /// reach. The paper has 3 m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
     /// Least standard deviation of a reading, metres: used where a reading brings none, or a smaller one. The paper has
     /// 0.05 m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_stddev: f64,
     /// Standard deviation of the robot's position, metres. It is shared by all readings of one place, so many readings
     /// of a robot that stands still do not make it certain. 0 is the paper's.
+    #[schemars(range(min = 0.0))]
     pub pose_stddev: f64,
     /// The robot has changed its place when it is this far from where the last place began, metres. Readings of one place
     /// are averaged. 0 takes every reading by itself, as the paper does.
+    #[schemars(range(min = 0.0))]
     pub min_travel: f64,
     /// Share of readings that say nothing of where the tag is, such as echoes: every ring is mixed with this share of
     /// an equal chance for every range up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can lead
     /// astray.
+    #[schemars(range(min = 0.0, max = 0.5))]
     pub outlier_share: f64,
     /// Standard deviation of a position at which a tag is seen and that brings none, metres at a distance of up to one metre,
     /// and as much more as the tag is farther off.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub sighting_stddev: f64,
     /// Standard deviation of the robot's heading, radians: the farther off a tag is seen, the more it moves it.
+    #[schemars(range(min = 0.0))]
     pub heading_stddev: f64,
     /// Least standard deviation of a tag's position, metres: what the grid cannot know, such as the bends of the map.
+    #[schemars(range(min = 0.0))]
     pub position_stddev: f64,
     /// A tag of which nothing was heard for so long is out of reach, seconds.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub timeout: f64,
     /// How old the last pose before a reading may be, seconds. Between two poses the position is interpolated.
+    #[schemars(range(min = 0.0))]
     pub max_pose_age: f64,
     /// A tag with fewer readings is not reported.
     pub min_readings: u32,
@@ -105,42 +117,18 @@ impl TagLocalizerParameters {
 }
 
 impl Parameters for TagLocalizerParameters {
-    fn check(&self) -> Vec<ParameterError> {
+    fn check_together(&self) -> Vec<ParameterError> {
         let mut errors = Vec::new();
-        let mut expect = |good: bool, field: &'static str, problem: &str| {
+        let mut expect = |good: bool, field, problem| {
             if !good {
                 errors.push(ParameterError::new(field, problem));
             }
         };
-        let positive = |value: f64| value > 0.0 && value.is_finite();
-        let not_negative = |value: f64| value >= 0.0 && value.is_finite();
-        expect(positive(self.reach), "reach", "must be above 0 m");
-        expect(
-            self.grid_size.is_finite() && self.grid_size >= 2.0 * self.reach,
-            "grid_size",
-            "must be at least twice `reach`",
-        );
-        expect(positive(self.resolution), "resolution", "must be above 0 m");
-        expect(
-            self.grid_size / self.resolution <= MOST_CELLS,
-            "resolution",
-            "must not divide `grid_size` into more than 4000 cells",
-        );
-        expect(
-            self.window >= self.resolution && self.window <= self.grid_size,
-            "window",
-            "must lie between `resolution` and `grid_size`",
-        );
-        expect(not_negative(self.window_deviations), "window_deviations", "must not be below 0");
-        expect(positive(self.range_stddev), "range_stddev", "must be above 0 m");
-        expect(not_negative(self.pose_stddev), "pose_stddev", "must not be below 0 m");
-        expect(not_negative(self.min_travel), "min_travel", "must not be below 0 m");
-        expect((0.0..=0.5).contains(&self.outlier_share), "outlier_share", "must lie between 0 and 0.5");
-        expect(positive(self.sighting_stddev), "sighting_stddev", "must be above 0 m");
-        expect(not_negative(self.heading_stddev), "heading_stddev", "must not be below 0 radians");
-        expect(not_negative(self.position_stddev), "position_stddev", "must not be below 0 m");
-        expect(positive(self.timeout), "timeout", "must be above 0 s");
-        expect(not_negative(self.max_pose_age), "max_pose_age", "must not be below 0 s");
+        expect(self.grid_size >= 2.0 * self.reach, "grid_size", "must be at least twice `reach`");
+        let cells = self.grid_size / self.resolution;
+        expect(cells <= MOST_CELLS, "resolution", "must not divide `grid_size` into more than 4000 cells");
+        let is_between = self.window >= self.resolution && self.window <= self.grid_size;
+        expect(is_between, "window", "must lie between `resolution` and `grid_size`");
         errors
     }
 }
@@ -198,7 +186,7 @@ mod tests {
             "timeout",
             "max_pose_age",
         ] {
-            assert!(fields.contains(&field), "{field}");
+            assert!(fields.iter().any(|wrong| wrong == field), "{field}");
         }
     }
 }

@@ -1,29 +1,35 @@
 //! The parameters of the stage.
 
 use crate::skeleton::SkeletonParameters;
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Parameters of the topology extractor. What takes them expects values that have passed [`check`](Parameters::check).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TopologyExtractorParameters {
     /// Objects and unknown spots in free space that cover no more than this are taken for free, square metres: a way would go
     /// round each of them.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub max_hole: f64,
     /// Ways do not pass where an obstacle or an unknown cell is nearer than this, metres: half the width of the narrowest way.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub min_clearance: f64,
     /// A way that leads from a junction to an end is left out if it reaches less far than this beyond what a square corner
     /// would give, metres: it comes from a corner or a rough wall, and leads nowhere.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub min_spur: f64,
     /// Pieces of the map are left out whose ways together with the width at their widest are shorter than this, metres: what a
     /// beam has seen through a window.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub min_piece: f64,
     /// A narrow place of a way is a door if it is at most so wide, metres, and `door_widening` holds.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub max_door_width: f64,
     /// A narrow place of a way is a door if the way is so many times wider before it and behind it, and `max_door_width`
     /// holds.
+    #[schemars(range(min = 1.0, max = 100.0))]
     pub door_widening: f64,
 }
 
@@ -41,20 +47,4 @@ impl TopologyExtractorParameters {
     }
 }
 
-impl Parameters for TopologyExtractorParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let ranges = [
-            ("max_hole", self.max_hole, 0.0, 1e4),
-            ("min_clearance", self.min_clearance, 0.0, 10.0),
-            ("min_spur", self.min_spur, 0.0, 1e3),
-            ("min_piece", self.min_piece, 0.0, 1e6),
-            ("max_door_width", self.max_door_width, 0.0, 100.0),
-            ("door_widening", self.door_widening, 1.0, 100.0),
-        ];
-        let wrong = ranges.into_iter().filter(|(_, value, least, most)| !(*least..=*most).contains(value));
-        let error = |(field, value, least, most)| {
-            ParameterError::new(field, format!("must lie between {least} and {most}, not {value}"))
-        };
-        wrong.map(error).collect()
-    }
-}
+impl Parameters for TopologyExtractorParameters {}

@@ -1,25 +1,30 @@
 //! The parameters of the stage.
 
-use crate::log_odds::check_bounds;
-use gridweave_runtime::stage::{ParameterError, Parameters};
+use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Parameters of the uncertain transform. What takes them expects values that have passed [`check`](Parameters::check).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertainTransformParameters {
     /// Metres a cell in the world. If it is not given: that of the reference robot's map.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub resolution: Option<f64>,
     /// Metres. A place whose standard deviation is greater is blurred as if it had this one. The time goes with its square.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub max_deviation: f64,
     /// Probability that a cell is occupied when a map says 100; greater values are cut to it.
+    #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub max_probability: f64,
     /// Probability that a cell is occupied when a map says 0; lesser values are cut to it.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
     /// Metres. The longest side that a map may have in the world; one that would be longer is left out with a warning.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_extent: f64,
     /// The most cells that a map may have in the world; one that would have more is left out with a warning.
+    #[schemars(range(min = 1, max = u32::MAX))]
     pub max_cells: u64,
 }
 
@@ -36,23 +41,4 @@ impl Default for UncertainTransformParameters {
     }
 }
 
-impl Parameters for UncertainTransformParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = check_bounds(self.min_probability, self.max_probability);
-        let is_length = |value: f64| value.is_finite() && value > 0.0;
-        if !self.resolution.is_none_or(is_length) {
-            errors.push(ParameterError::new("resolution", "must be above 0 m"));
-        }
-        if !(0.0..=10.0).contains(&self.max_deviation) {
-            let problem = format!("must lie between 0 and 10, not {}", self.max_deviation);
-            errors.push(ParameterError::new("max_deviation", problem));
-        }
-        if !is_length(self.max_extent) {
-            errors.push(ParameterError::new("max_extent", "must be above 0 m"));
-        }
-        if !(1..=u64::from(u32::MAX)).contains(&self.max_cells) {
-            errors.push(ParameterError::new("max_cells", "must be 1 to 4294967295"));
-        }
-        errors
-    }
-}
+impl Parameters for UncertainTransformParameters {}

@@ -5,11 +5,11 @@ use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The parameters of `map_file_sink`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct MapFileSinkParameters {
     /// The YAML file to write; the image gets the same name with the ending pgm. Files that have these names are replaced.

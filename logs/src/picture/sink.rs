@@ -6,13 +6,13 @@ use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, TopologicalMap};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use nalgebra::Isometry2;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// The parameters of `picture_sink`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PictureParameters {
     /// The file to write: PNG, SVG or PDF by its ending. A file that has this name is replaced.

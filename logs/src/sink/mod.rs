@@ -30,7 +30,7 @@ pub(crate) use provenance::{INPUTS_RECORD, RUN_RECORD};
 pub use rewrite::{RecoverError, Recovery, recover};
 pub use routing::result_channel;
 
-use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
+use gridweave_runtime::stage::{Output, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use stage::McapSink;
@@ -50,7 +50,7 @@ pub enum Compression {
 }
 
 /// The parameters of `mcap_sink`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
     /// The log to write. A file that has this name is replaced. Set by `--output`.
@@ -63,7 +63,8 @@ pub struct SinkParameters {
     /// How chunks are compressed.
     pub compression: Compression,
     /// A chunk is closed when it holds this many bytes before compression. If the program is killed, the open chunk is
-    /// lost. 1 KiB to 512 MiB.
+    /// lost.
+    #[schemars(range(min = 1 << 10, max = 1 << 29))]
     pub chunk_size: u64,
     /// The pipeline as the text of a pipeline file, to be recorded in the log. Set by the command.
     pub recorded_pipeline: String,
@@ -86,15 +87,7 @@ impl Default for SinkParameters {
     }
 }
 
-impl Parameters for SinkParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        if !(1 << 10..=1 << 29).contains(&self.chunk_size) {
-            errors.push(ParameterError::new("chunk_size", "must be 1024 to 536870912 bytes"));
-        }
-        errors
-    }
-}
+impl Parameters for SinkParameters {}
 
 /// The stage kind.
 pub fn kind() -> StageKind {

@@ -28,11 +28,11 @@ use crate::names::{Convention, Input, NameRules};
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagPosition, TagRange, TopologicalMap};
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The parameters of `mcap_source`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
     /// The logs to read: MCAP files, and folders of ROS 2 bags. The messages of several are merged by log time. `ROBOT=LOG`
@@ -52,6 +52,7 @@ pub struct SourceParameters {
     pub align_start: bool,
     /// Seconds from the first message of the logs at which to begin. The last map of each robot before that, and other
     /// latched messages, are sent at the beginning.
+    #[schemars(range(min = 0.0))]
     pub start: f64,
     /// Seconds from the first message of the logs at which to end; to the end of the logs if it is not given.
     pub end: Option<f64>,
@@ -75,15 +76,12 @@ impl SourceParameters {
 }
 
 impl Parameters for SourceParameters {
-    fn check(&self) -> Vec<ParameterError> {
+    fn check_together(&self) -> Vec<ParameterError> {
         let mut errors = Vec::new();
         if let Err(wrong) = self.rules() {
             errors.push(ParameterError::new("rename", wrong));
         }
-        if !(self.start.is_finite() && self.start >= 0.0) {
-            errors.push(ParameterError::new("start", "must be 0 s or more"));
-        }
-        if self.end.is_some_and(|end| !(end.is_finite() && end > self.start)) {
+        if self.end.is_some_and(|end| end <= self.start) {
             errors.push(ParameterError::new("end", "must be later than `start`"));
         }
         errors

@@ -5,11 +5,11 @@ use crate::file::replace;
 use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The parameters of `summary_sink`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct SummaryParameters {
     /// The JSON file to write. A file that has this name is replaced.

@@ -1,6 +1,7 @@
 //! What the JSON schema of a stage kind says of its parameters, in words.
 
 use crate::stage::StageKind;
+use crate::stage::range::Range;
 use serde_json::{Map, Value};
 
 /// A parameter of a stage kind, as its users see it.
@@ -86,7 +87,7 @@ fn type_text(root: &Value, schema: &Value) -> String {
     let types = schema.get("type");
     let first = types.and_then(Value::as_array).and_then(|types| types.iter().find(|name| *name != "null"));
     match first.or(types).and_then(Value::as_str) {
-        Some("number") => "number".to_owned(),
+        Some("number") => format!("number{}", range(schema)),
         Some("integer") => format!("whole number{}", range(schema)),
         Some("string") => "text".to_owned(),
         Some("boolean") => "true or false".to_owned(),
@@ -96,13 +97,12 @@ fn type_text(root: &Value, schema: &Value) -> String {
     }
 }
 
-/// The range of a whole number. Limits of its size in memory are left out: nobody chose them.
+/// The range of a number, to follow it.
 fn range(schema: &Value) -> String {
-    let limit = |name: &str| schema.get(name).and_then(Value::as_f64);
-    match (limit("minimum"), limit("maximum")) {
-        (Some(least), Some(most)) if most < 256.0 => format!(" from {least} to {most}"),
-        (Some(least), _) if least >= 0.0 => format!(", at least {least}"),
-        _ => String::new(),
+    match Range::of(schema).to_string() {
+        limits if limits.is_empty() => limits,
+        limits if limits.starts_with("at ") => format!(" of {limits}"),
+        limits => format!(" {limits}"),
     }
 }
 
@@ -195,7 +195,8 @@ mod tests {
     fn types_are_put_in_words() {
         let cases = [
             (json!({ "type": "number" }), "number"),
-            (json!({ "type": ["number", "null"] }), "number"),
+            (json!({ "type": ["number", "null"], "exclusiveMinimum": 0 }), "number above 0"),
+            (json!({ "type": "number", "minimum": 0.0, "maximum": 1.5 }), "number from 0 to 1.5"),
             (
                 json!({ "type": "integer", "format": "uint8", "minimum": 0, "maximum": 255 }),
                 "whole number from 0 to 255",
@@ -204,7 +205,7 @@ mod tests {
             (json!({ "type": "array", "items": { "type": "string" } }), "list of texts"),
             (
                 json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } }),
-                "list of whole numbers, at least 0",
+                "list of whole numbers of at least 0",
             ),
             (
                 json!({ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 }),

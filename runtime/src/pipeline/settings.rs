@@ -74,7 +74,7 @@ impl Settings {
                 }
                 "seed" => match read_seed(item) {
                     Some(seed) => self.seed = seed,
-                    None => problems.push(wrong_type(key, item, "a whole number, at least 0")),
+                    None => problems.push(wrong_type(key, item, "a whole number of at least 0")),
                 },
                 "depth" => self.depth = depth(item, problems).unwrap_or(DEFAULT_DEPTH),
                 "batch" => match item.as_bool() {

@@ -59,7 +59,7 @@ fn ignore<T: RosMessage, O>(_: &mut Idle, _: Received<'_, T>, _: &Output<O>) -> 
     Ok(())
 }
 
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Files {
     /// The logs to read, in this order.
@@ -70,7 +70,7 @@ struct Files {
 
 impl Parameters for Files {}
 
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct File {
     /// The log to write.
@@ -90,13 +90,15 @@ enum Mean {
     Groups,
 }
 
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct Lines {
     /// Segments shorter than this are dropped, in metres. The
     /// paper: 30 px.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     min_length: f64,
     /// The number of iterations.
+    #[schemars(range(min = 1))]
     iterations: u32,
     /// How the segments' angles are averaged.
     mean: Mean,
@@ -112,18 +114,7 @@ impl Default for Lines {
     }
 }
 
-impl Parameters for Lines {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        if self.min_length.is_nan() || self.min_length <= 0.0 {
-            errors.push(ParameterError::new("min_length", "must be above 0 m"));
-        }
-        if self.iterations == 0 {
-            errors.push(ParameterError::new("iterations", "must be at least 1"));
-        }
-        errors
-    }
-}
+impl Parameters for Lines {}
 
 /// Kinds that look like those of the tag pipeline from outside.
 pub(super) fn registry() -> Registry {

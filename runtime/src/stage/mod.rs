@@ -52,6 +52,7 @@ mod node;
 mod output;
 mod parameters;
 mod ports;
+pub(crate) mod range;
 mod received;
 mod registry;
 mod tag_fields;

@@ -9,13 +9,13 @@ use gridweave_runtime::stage::{
     Source, StageError, StageKind,
 };
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Duration;
 
 pub const TEXT: PortType = PortType::Ros("std_msgs/msg/String");
 
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TestParameters {
     pub count: u64,

@@ -12,11 +12,11 @@ pub use stage::MapFileSource;
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Out, OutputPorts, Outputs, Parameters, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The parameters of `map_file_source`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapFileSourceParameters {
     /// The maps to read: YAML files of nav2's map server, one for each robot. A robot is called as its file without the

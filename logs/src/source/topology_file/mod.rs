@@ -12,11 +12,11 @@ pub use stage::TopologyFileSource;
 use gridweave_runtime::ros::TopologicalMap;
 use gridweave_runtime::stage::{Out, OutputPorts, Outputs, Parameters, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// The parameters of `topology_file_source`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TopologyFileSourceParameters {
     /// The topological maps to read: JSON files, one for each robot, as in `{"nodes": [{"x": 0, "y": 0}, {"x": 4, "y": 0}],

@@ -57,9 +57,9 @@ fn an_unknown_parameter_names_the_nearest() {
 #[test]
 fn a_value_of_the_wrong_type_says_what_was_expected() {
     let cases = [
-        ("min_length = \"long\"", "14", "\"long\"", "expected a number, found text"),
-        ("iterations = 1.5", "14", "1.5", "expected a whole number, at least 0, found a number"),
-        ("iterations = -3", "14", "-3", "expected a whole number, at least 0, found `-3`"),
+        ("min_length = \"long\"", "14", "\"long\"", "expected a number above 0, found text"),
+        ("iterations = 1.5", "14", "1.5", "expected a whole number of at least 1, found a number"),
+        ("iterations = -3", "14", "-3", "expected a whole number of at least 1, found `-3`"),
         ("iterations = 5000000000", "14", "5000000000", "u32"),
         ("merge = 1", "9", "1", "expected true or false, found `1`"),
         ("starts = 0.5", "10", "0.5", "expected a list of numbers, found a number"),
@@ -72,7 +72,7 @@ fn a_value_of_the_wrong_type_says_what_was_expected() {
     for (line, column, underlined, says) in cases {
         assert_error(("min_length = 0.8", line), &format!("17:{column}"), underlined, &[says, "wrong value of"]);
     }
-    assert_error(("seed = 7", "seed = -7"), "5:8", "-7", &["expected a whole number, at least 0, found `-7`"]);
+    assert_error(("seed = 7", "seed = -7"), "5:8", "-7", &["expected a whole number of at least 0, found `-7`"]);
     assert_error(("\"walls\"", "[]"), "3:8", "[]", &["expected text in quotes, found a list"]);
 }
 
@@ -91,7 +91,7 @@ fn every_wrong_parameter_of_a_stage_is_shown() {
 
 #[test]
 fn a_value_out_of_range_is_underlined() {
-    let says = ["`min_length` is out of range", "must be above 0 m"];
+    let says = ["`min_length` is out of range", "must be above 0, not"];
     assert_error(("min_length = 0.8", "min_length = -2"), "17:14", "-2", &says);
     assert_error(("min_length = 0.8", "min_length = nan"), "17:14", "nan", &says);
     assert_error(("depth = 4", "depth = 0"), "26:9", "0", &["expected a whole number from 1 to 4096, found `0`"]);

@@ -45,9 +45,9 @@ line_extractor
     segments  gridweave_msgs/msg/Segments  Walls.
 
   parameters
-    min_length = 0.6  (number)
+    min_length = 0.6  (number above 0)
         Segments shorter than this are dropped, in metres. The paper: 30 px.
-    iterations = 200  (whole number, at least 0)
+    iterations = 200  (whole number of at least 1)
         The number of iterations.
     mean = \"circular\"  (\"circular\" | \"groups\")
         How the segments' angles are averaged.
