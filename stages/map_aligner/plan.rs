@@ -1,6 +1,6 @@
 //! Which maps of many robots are searched, so that not every pair of them must be.
 
-use super::group::Group;
+use super::group::{Group, Groups};
 use super::peaks::{JUDGED, is_near, overlay};
 use super::statement::{Statement, with_reasons};
 use super::{
@@ -31,11 +31,9 @@ pub struct MergePlan {
     /// The side of the narrowest cells, metres.
     cell: f64,
     robots: BTreeMap<String, Robot>,
-    groups: Vec<Group>,
+    groups: Groups,
     /// Pairs of groups that were searched, by number.
     tried: BTreeSet<(u64, u64)>,
-    /// The number of the next group.
-    next: u64,
     /// What was told last of each pair.
     told: BTreeMap<RobotPair, Statement>,
     /// Searches made since they were last counted.
@@ -60,9 +58,8 @@ impl MergePlan {
             cell: 0.5 * parameters.cell,
             parameters,
             robots: BTreeMap::new(),
-            groups: Vec::new(),
+            groups: Groups::default(),
             tried: BTreeSet::new(),
-            next: 0,
             told: BTreeMap::new(),
             searches: 0,
             predictions: 0,
@@ -88,18 +85,17 @@ impl MergePlan {
         let has_grown_little =
             map.is_ok() && (cells as f64) <= searched_cells as f64 * (1.0 + self.parameters.little_growth);
         self.robots.insert(robot.to_owned(), Robot { map, searched_cells, is_searched: false });
-        if let (true, Some(group)) = (has_grown_little, self.group_of(robot)) {
-            if self.groups[group].members.len() == 1 {
+        if let (true, Some(group)) = (has_grown_little, self.groups.of(robot)) {
+            let number = group.number;
+            if group.members.len() == 1 {
                 return Vec::new();
             }
             if let Some(kept) = self.kept(robot) {
-                // The map of the group holds the one before.
-                let members = self.groups.remove(group).members;
-                self.add(members);
+                self.groups.renew(number);
                 return self.tell(kept);
             }
         }
-        self.leave(&[robot]);
+        self.groups.leave(&[robot]);
         let number = self.add_alone(robot);
         let mut statements = self.refusals(robot);
         if let Some(number) = number {
@@ -115,13 +111,13 @@ impl MergePlan {
         let mut statements = Vec::new();
         let not_searched = self.robots.iter().filter(|(_, known)| known.map.is_ok() && !known.is_searched);
         let robots: Vec<String> = not_searched.map(|(robot, _)| robot.clone()).collect();
-        self.leave(&robots.iter().map(String::as_str).collect::<Vec<_>>());
+        self.groups.leave(&robots.iter().map(String::as_str).collect::<Vec<_>>());
         for robot in &robots {
             self.add_alone(robot);
         }
         for robot in &robots {
-            if let Some(group) = self.group_of(robot) {
-                self.tie_with_others(self.groups[group].number, usize::MAX, &mut statements);
+            if let Some(number) = self.groups.of(robot).map(|group| group.number) {
+                self.tie_with_others(number, usize::MAX, &mut statements);
             }
         }
         for robot in &robots {
@@ -129,7 +125,7 @@ impl MergePlan {
         }
         for _ in 0..LAST_ROUNDS {
             let count = self.groups.len();
-            let Some(largest) = self.by_size().first().copied() else { break };
+            let Some(largest) = self.groups.by_size().first().copied() else { break };
             self.tie_with_others(largest, usize::MAX, &mut statements);
             if self.groups.len() == count {
                 break;
@@ -141,7 +137,7 @@ impl MergePlan {
     /// Tries to lay a group together with others, the largest first.
     fn tie_with_others(&mut self, number: u64, most: usize, statements: &mut Vec<Statement>) {
         let mut mine = number;
-        let others: Vec<u64> = self.by_size().into_iter().filter(|other| *other != number).take(most).collect();
+        let others: Vec<u64> = self.groups.by_size().into_iter().filter(|other| *other != number).take(most).collect();
         for other in others {
             let pair = (mine.min(other), mine.max(other));
             if self.tried.insert(pair) {
@@ -152,13 +148,10 @@ impl MergePlan {
 
     /// Searches one group on another. The number of the group of both, if they fit clearly.
     fn tie(&mut self, one: u64, other: u64, statements: &mut Vec<Statement>) -> Option<u64> {
-        let (one, other) = (self.index_of(one)?, self.index_of(other)?);
+        let (one, other) = (self.groups.get(one)?, self.groups.get(other)?);
         // The larger stays; of two robots the first by name.
-        let is_before =
-            |one: &Group, other: &Group| (other.members.len(), one.name()) < (one.members.len(), other.name());
-        let (first, second) =
-            if is_before(&self.groups[one], &self.groups[other]) { (one, other) } else { (other, one) };
-        let (group_a, group_b) = (&self.groups[first], &self.groups[second]);
+        let (group_a, group_b) = if one.rank() < other.rank() { (one, other) } else { (other, one) };
+        let (first, second) = (group_a.number, group_b.number);
         let window = self.window(group_a, group_b);
         let found = align_prepared(self.map_of(group_a)?, self.map_of(group_b)?, window.as_ref(), &self.parameters);
         let pair = RobotPair::by_name(group_a.name(), group_b.name());
@@ -175,9 +168,9 @@ impl MergePlan {
         let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
             statements.push(Statement::of(pair, Ok(with_reasons(&found))));
-            return is_clear.then(|| self.unite(first, second, &best));
+            return is_clear.then(|| self.groups.unite(first, second, &best)).flatten();
         }
-        let pairs = self.pairs_in_common(&self.groups[first], &self.groups[second], &best);
+        let pairs = self.pairs_in_common(group_a, group_b, &best);
         if is_clear {
             let is_supported = self.supports(&found);
             let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), lead));
@@ -186,7 +179,7 @@ impl MergePlan {
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
             statements.extend(told);
-            return fits.then(|| self.unite(first, second, &best));
+            return fits.then(|| self.groups.unite(first, second, &best)).flatten();
         }
         if self.has_alike(&found) {
             let reason = format!(
@@ -312,7 +305,7 @@ impl MergePlan {
 
     /// What was told of a robot before, and cannot be so any more.
     fn retractions(&self, robot: &str, statements: &[Statement]) -> Vec<Statement> {
-        let group = self.group_of(robot).map(|group| &self.groups[group]);
+        let group = self.groups.of(robot);
         let stands = |told: &Statement| {
             let (Some(group), Ok(found)) = (group, &told.found) else { return told.found.is_err() };
             let places = group.members.get(&told.pair.a).zip(group.members.get(&told.pair.b));
@@ -347,37 +340,7 @@ impl MergePlan {
         let known = self.robots.get_mut(robot)?;
         known.is_searched = true;
         known.searched_cells = known.map.as_ref().map_or(0, |map| map.level(0).known_cells());
-        known.map.is_ok().then(|| self.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())])))
-    }
-
-    /// Takes robots out of their groups.
-    fn leave(&mut self, robots: &[&str]) {
-        let left = |group: &mut Group| robots.iter().any(|robot| group.members.contains_key(*robot));
-        let groups: Vec<Group> = self.groups.extract_if(.., left).collect();
-        for mut members in groups.into_iter().map(|group| group.members) {
-            members.retain(|robot, _| !robots.contains(&robot.as_str()));
-            if !members.is_empty() {
-                self.add(members);
-            }
-        }
-    }
-
-    /// Lays two groups together. The number of the group of both.
-    fn unite(&mut self, first: usize, second: usize, transform_groups: &Pose2) -> u64 {
-        let (kept, moved) = (&self.groups[first], &self.groups[second]);
-        let mut members = kept.members.clone();
-        members.extend(moved.members.iter().map(|(robot, place)| (robot.clone(), transform_groups * place)));
-        let numbers = [kept.number, moved.number];
-        self.groups.retain(|group| !numbers.contains(&group.number));
-        self.add(members)
-    }
-
-    /// Adds a group of robots with their places. Its number.
-    fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
-        let number = self.next;
-        self.next += 1;
-        self.groups.push(Group::new(number, members));
-        number
+        known.map.is_ok().then(|| self.groups.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())])))
     }
 
     fn map_of<'a>(&'a self, group: &'a Group) -> Option<&'a PreparedMap> {
@@ -390,21 +353,6 @@ impl MergePlan {
 
     fn common_walls(&self, a: &str, b: &str, transform_a_b: &Pose2) -> Option<CommonWalls> {
         overlay(self.map(a)?, self.map(b)?, JUDGED, 0.0).common_walls(transform_a_b)
-    }
-
-    /// The numbers of all groups, the largest first, of equals the first by name.
-    fn by_size(&self) -> Vec<u64> {
-        let mut groups: Vec<&Group> = self.groups.iter().collect();
-        groups.sort_by(|one, other| (other.members.len(), one.name()).cmp(&(one.members.len(), other.name())));
-        groups.into_iter().map(|group| group.number).collect()
-    }
-
-    fn index_of(&self, number: u64) -> Option<usize> {
-        self.groups.iter().position(|group| group.number == number)
-    }
-
-    fn group_of(&self, robot: &str) -> Option<usize> {
-        self.groups.iter().position(|group| group.members.contains_key(robot))
     }
 }
 

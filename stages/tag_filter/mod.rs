@@ -18,6 +18,9 @@ mod judge;
 mod parameters;
 mod stage;
 
+#[cfg(test)]
+mod judge_tests;
+
 pub use chance::chance_of_agreement;
 pub use common::common_tags;
 pub use consensus::{Consensus, ConsensusSearch, TagPair, find_consensus};
