@@ -29,6 +29,7 @@ pub mod path_placer;
 pub mod pgvd_extractor;
 pub mod place_window;
 pub mod placement;
+pub mod python_stage;
 pub mod quadrant_classifier;
 pub mod radon_aligner;
 pub mod random_walk_aligner;
@@ -66,6 +67,7 @@ pub fn kinds() -> Vec<StageKind> {
         merge_verifier::kind(),
         path_placer::kind(),
         pgvd_extractor::kind(),
+        python_stage::kind(),
         quadrant_classifier::kind(),
         radon_aligner::kind(),
         random_walk_aligner::kind(),

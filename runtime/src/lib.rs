@@ -13,6 +13,7 @@ pub mod input_file;
 pub mod link;
 pub mod message;
 pub mod pipeline;
+pub mod program;
 pub mod robot_colour;
 pub mod ros;
 pub mod stage;

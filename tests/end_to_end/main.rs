@@ -32,6 +32,7 @@ mod names;
 mod output_files;
 mod processes;
 mod python_libraries;
+mod python_stages;
 mod real_logs;
 mod render;
 mod report;

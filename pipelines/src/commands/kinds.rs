@@ -5,16 +5,26 @@ use crate::terminal::{print, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text, suggest};
-use gridweave_runtime::stage::Registry;
+use gridweave_runtime::stage::{Registry, StageKind};
+use std::path::Path;
 
 /// What `gridweave kinds` is told.
 #[derive(Debug, Args)]
 pub(crate) struct KindsArgs {
-    /// Only this kind.
+    /// Only this kind; or FILE.py or FILE.py:NAME, a stage in Python.
     pub(crate) kind: Option<String>,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What the stage in a file of Python is, if that is what is named.
+fn stage_in_python(name: &str, registry: &Registry) -> Result<Option<StageKind>> {
+    let is_file = name.ends_with(".py") || name.contains(".py:");
+    let Some(kind) = registry.get("python").filter(|_| is_file) else { return Ok(None) };
+    let module = toml::Table::from_iter([("module".to_owned(), name.into())]);
+    let asked = kind.ask(&module, Path::new("")).transpose();
+    Ok(asked.map_err(|error| BadUse(error.to_string()))?.map(|asked| asked.kind.clone()))
 }
 
 /// Lists the stage kinds.
@@ -22,7 +32,9 @@ pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Status> {
     let registry = match &args.kind {
         None => registry.clone(),
         Some(name) => {
-            let kind = registry.get(name).cloned().ok_or_else(|| {
+            let found = registry.get(name).cloned();
+            let found = found.map_or_else(|| stage_in_python(name, registry), |kind| Ok(Some(kind)))?;
+            let kind = found.ok_or_else(|| {
                 let names: Vec<&str> = registry.kinds().map(|kind| kind.name).collect();
                 let meant = suggest(name, &names, "the kinds are").unwrap_or_default();
                 BadUse(format!("there is no stage kind `{name}`: {meant}"))

@@ -20,7 +20,7 @@ mod work;
 
 pub use error::{Failure, RunError};
 pub use feed::{Feed, FeedStopper};
-pub use processes::memory_of_process;
+pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
 pub use watch::{WatchedLink, watch_stages};

@@ -6,7 +6,7 @@
 
 use super::links::board_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
-use super::run_prefix::{board_path, is_prefix, new_prefix, shared_memory};
+use super::run_prefix::{board_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
 use crate::link::{Board, RunNames};
 use crate::pipeline::Pipeline;
@@ -197,9 +197,19 @@ pub fn clean() -> Result<Vec<LeftOver>, RunFolderError> {
     clean_in(&user_folder::path())
 }
 
+/// Removes what a process of this user that has died has left of the folders that were its own, such as those that it has shared
+/// with its programs.
+pub(super) fn clean_after(process: u32) -> Result<Vec<LeftOver>, RunFolderError> {
+    clean_of(&user_folder::path(), |prefix| is_prefix_of(prefix, process))
+}
+
 fn clean_in(parent: &Path) -> Result<Vec<LeftOver>, RunFolderError> {
+    clean_of(parent, |_| true)
+}
+
+fn clean_of(parent: &Path, is_meant: impl Fn(&str) -> bool) -> Result<Vec<LeftOver>, RunFolderError> {
     let mut cleaned = Vec::new();
-    for (folder, prefix) in run_folders(parent)? {
+    for (folder, prefix) in run_folders(parent)?.into_iter().filter(|(_, prefix)| is_meant(prefix)) {
         let locked = lock_for_removal(&folder).map_err(failed("lock a file in the folder", &folder))?;
         let Removal::Dead(_lock) = locked else { continue };
         let files = shared_memory(&prefix);

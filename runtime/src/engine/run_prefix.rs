@@ -21,6 +21,11 @@ pub(super) fn new_prefix() -> io::Result<String> {
     Ok(format!("gw{}_{:016x}_", std::process::id(), u64::from_le_bytes(random)))
 }
 
+/// Whether a prefix was made by the process of this number, here or on another machine that shares these folders.
+pub(super) fn is_prefix_of(prefix: &str, process: u32) -> bool {
+    is_prefix(prefix) && prefix.starts_with(&format!("gw{process}_"))
+}
+
 /// Whether a name has exactly the form of a prefix.
 pub(super) fn is_prefix(name: &str) -> bool {
     let parts = name.strip_prefix("gw").and_then(|rest| rest.strip_suffix('_')).and_then(|rest| rest.split_once('_'));
@@ -74,6 +79,13 @@ mod tests {
         for name in wrong {
             assert!(!is_prefix(&name) && shared_memory(&name).is_empty(), "{name}");
         }
+    }
+
+    #[test]
+    fn a_prefix_tells_the_process_that_made_it() {
+        let made = new_prefix().unwrap();
+        let own = std::process::id();
+        assert!(is_prefix_of(&made, own) && !is_prefix_of(&made, own + 1) && !is_prefix_of(&made, own / 10));
     }
 
     #[test]

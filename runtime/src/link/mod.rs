@@ -80,7 +80,7 @@ pub use observer::Observer;
 pub use order::{Order, latest, lower_bound, next_input};
 pub use outputs::Outputs;
 pub use receiver::{LinkReceiver, ReaderEnd};
-pub(crate) use room::SHARED_MEMORY;
+pub(crate) use room::{Room, SHARED_MEMORY};
 pub(crate) use sample::unpack;
 pub use sample::{PROTOCOL_VERSION, SampleHeader};
 pub use sender::{LinkSender, SenderRole};

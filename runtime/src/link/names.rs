@@ -97,6 +97,11 @@ impl RunNames {
         self.service(&format!("link/{stage}/{port}"))
     }
 
+    /// A service between a stage and its program, `to` or `from` that.
+    pub(crate) fn call(&self, way: &str) -> Result<ServiceName, LinkError> {
+        self.service(&format!("call/{way}"))
+    }
+
     fn service(&self, name: &str) -> Result<ServiceName, LinkError> {
         let name = format!("{}/{name}", self.prefix);
         ServiceName::new(&name).map_err(|e| LinkError::shared(format!("name the service {name}"))(&e))

@@ -20,7 +20,7 @@ const SPARE: u64 = 256 << 10;
 
 /// The room of one sender.
 #[derive(Debug, Default)]
-pub(super) struct Room {
+pub(crate) struct Room {
     /// Whether the sample before was one whose memory is taken, as all are once each was used.
     is_warm: Cell<bool>,
     taken: RefCell<Taken>,
@@ -39,7 +39,7 @@ impl Room {
     ///
     /// # Errors
     /// There is not enough.
-    pub(super) fn ask(&self, bytes: usize, doing: impl FnOnce() -> String) -> Result<(), LinkError> {
+    pub(crate) fn ask(&self, bytes: usize, doing: impl FnOnce() -> String) -> Result<(), LinkError> {
         if self.is_warm.get() && bytes <= self.taken.borrow().longest {
             return Ok(());
         }
@@ -54,7 +54,7 @@ impl Room {
     ///
     /// # Errors
     /// There is not enough.
-    pub(super) fn take(&self, memory: Range<usize>, doing: impl FnOnce() -> String) -> Result<(), LinkError> {
+    pub(crate) fn take(&self, memory: Range<usize>, doing: impl FnOnce() -> String) -> Result<(), LinkError> {
         let Taken { ends, longest } = &mut *self.taken.borrow_mut();
         if memory.len() > *longest {
             ends.clear();

@@ -51,8 +51,9 @@ impl Pipeline {
         settings.override_with(overrides, &mut problems);
         overrides.apply(&mut stages, &mut problems);
 
+        let folder = folder_of(source_name);
         let drafts: Vec<Draft<'_>> =
-            stages.iter().map(|stage| read_stage(stage, &settings, registry, &mut problems)).collect();
+            stages.iter().map(|stage| read_stage(stage, &settings, folder, registry, &mut problems)).collect();
         let wiring = Wiring::new(&drafts, registry, &mut problems);
         check_used(&drafts, &wiring, &mut problems);
         check_topics_differ(&drafts, &wiring, &mut problems);
@@ -60,6 +61,11 @@ impl Pipeline {
 
         if problems.is_empty() { Ok(assemble(settings, drafts, &wiring, &order)) } else { Err(problems.into_errors()) }
     }
+}
+
+/// The folder that a file lies in.
+pub(super) fn folder_of(file: &str) -> &Path {
+    Path::new(file).parent().unwrap_or(Path::new(""))
 }
 
 /// Reads the sections, the stages by name.

@@ -184,6 +184,7 @@ impl Pipeline {
             robots: self.robots.clone(),
             initial_poses: self.initial_poses.clone(),
             inputs: spec.inputs.iter().map(|wire| self.input_wire(spec, wire)).collect(),
+            stall_timeout: self.stall_timeout,
         }
     }
 

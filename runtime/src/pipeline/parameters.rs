@@ -4,7 +4,7 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::nearest::{nearest, quoted_list};
 use super::parameter_schema::{ParameterInfo, parameters_of};
-use crate::stage::StageKind;
+use crate::stage::{ParameterError, StageKind};
 
 /// The keys of a stage that are no parameters.
 pub(super) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth", "process", "overflow", "restart"];
@@ -34,14 +34,7 @@ pub(super) fn read_parameters(
     match kind.check_parameters(&table) {
         Ok(errors) => {
             for error in errors {
-                let title = format!("`{}` is out of range", error.field);
-                // A nested value is named with dots, and stands at its table.
-                let field = error.field.split('.').next().unwrap_or_default();
-                let problem = match given.iter().find(|entry| entry.key == field) {
-                    Some(entry) => Diagnostic::new(title).at(&entry.item.at, error.problem),
-                    None => Diagnostic::new(title).at(stage_at, format!("`{}` {}", error.field, error.problem)),
-                };
-                problems.push(problem);
+                problems.push(out_of_range(&error, given, stage_at, "is out of range"));
             }
         }
         Err(error) => {
@@ -50,6 +43,20 @@ pub(super) fn read_parameters(
         }
     }
     table
+}
+
+/// A value of a parameter that its type allows and its meaning does not: `what` says so in general, the error in particular. What
+/// the error says in further lines stands below.
+pub(super) fn out_of_range(error: &ParameterError, given: &[&Entry], stage_at: &Location, what: &str) -> Diagnostic {
+    let title = format!("`{}` {what}", error.field);
+    let (problem, more) = error.problem.split_once('\n').unwrap_or((&error.problem, ""));
+    // A nested value is named with dots, and stands at its table.
+    let field = error.field.split('.').next().unwrap_or_default();
+    let diagnostic = match given.iter().find(|entry| entry.key == field) {
+        Some(entry) => Diagnostic::new(title).at(&entry.item.at, problem),
+        None => Diagnostic::new(title).at(stage_at, format!("`{}` {problem}", error.field)),
+    };
+    if more.is_empty() { diagnostic } else { diagnostic.note(more) }
 }
 
 fn unknown_parameter(kind: &StageKind, entry: &Entry, known: &[ParameterInfo]) -> Diagnostic {

@@ -2,6 +2,7 @@
 
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
 use super::document::{self, Entry};
+use super::load::folder_of;
 use super::nearest::did_you_mean;
 use super::overrides::Overrides;
 use super::settings::Settings;
@@ -71,7 +72,7 @@ impl SingleStage {
         };
         let name = stage_name(kind.and_then(|kind| kind.item.as_str()).unwrap_or("stage"));
         let entry = Entry { key: name.clone(), key_at: item.at.clone(), item: item.clone() };
-        let draft = read_stage(&entry, &settings, registry, &mut problems);
+        let draft = read_stage(&entry, &settings, folder_of(source_name), registry, &mut problems);
         if let Some(inputs) = draft.inputs {
             let problem =
                 Diagnostic::new("a stage by itself names no other stages").at(&inputs.at, "expected no inputs");

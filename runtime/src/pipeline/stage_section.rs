@@ -4,11 +4,12 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::live::{Mode, Overflow, Restart, check_is_live, read_overflow, read_word};
 use super::nearest::suggest;
-use super::parameters::{RESERVED_KEYS, read_parameters};
+use super::parameters::{RESERVED_KEYS, out_of_range, read_parameters};
 use super::settings::{Settings, depth};
 use super::topics::{Topic, read_topics};
 use super::values::text;
-use crate::stage::{Registry, StageKind};
+use crate::stage::{Asked, Registry, StageKind};
+use std::path::Path;
 
 /// The longest name of a stage, in bytes. It is part of the names of topics and of links.
 const LONGEST_NAME: usize = 64;
@@ -35,10 +36,11 @@ pub(super) struct Draft<'a> {
     pub(super) restart: Restart,
 }
 
-/// Reads a stage of a pipeline with the given settings.
+/// Reads a stage of a pipeline with the given settings, whose file lies in `folder`.
 pub(super) fn read_stage<'a>(
     stage: &'a Entry,
     settings: &Settings,
+    folder: &Path,
     registry: &'a Registry,
     problems: &mut Problems,
 ) -> Draft<'a> {
@@ -62,7 +64,12 @@ pub(super) fn read_stage<'a>(
         return draft;
     };
     let find = |key: &str| entries.iter().find(|entry| entry.key == key);
+    let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
     draft.kind = read_kind(stage, find("kind"), registry, problems);
+    let asked = draft.kind.filter(|kind| kind.is_asked()).and_then(|kind| ask(stage, kind, &given, folder, problems));
+    if draft.kind.is_some_and(StageKind::is_asked) {
+        draft.kind = asked.as_ref().map(|asked| asked.kind);
+    }
     draft.inputs = find("inputs").map(|entry| &entry.item);
     draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(settings.depth);
     if let Some(entry) = find("process")
@@ -78,11 +85,18 @@ pub(super) fn read_stage<'a>(
     if let Some(kind) = draft.kind {
         check_mode(stage, kind, settings.mode, problems);
         draft.overflow = read_overflow(kind, find("overflow").map(|entry| &entry.item), problems);
-        let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
         draft.parameters = read_parameters(kind, &given, &stage.key_at, problems);
+        draft.parameters.extend(asked.map(|asked| asked.parameters).unwrap_or_default());
         draft.topics = read_topics(stage, kind, find("topics").map(|entry| &entry.item), problems);
     }
     draft
+}
+
+/// Finds out what a stage is whose kind leaves that to it. What is wrong is reported.
+fn ask(stage: &Entry, kind: &StageKind, given: &[&Entry], folder: &Path, problems: &mut Problems) -> Option<Asked> {
+    let table = given.iter().map(|entry| (entry.key.clone(), entry.item.to_toml())).collect();
+    let asked = kind.ask(&table, folder)?;
+    asked.map_err(|error| problems.push(out_of_range(&error, given, &stage.key_at, "cannot be used"))).ok()
 }
 
 /// A kind whose messages come from outside of the run has nobody to wait for in a replay.

@@ -1,11 +1,12 @@
 //! How a kind of stage is put together: its inputs, each with what is done with a message that comes in on it.
 
 use super::node::{Node, Role, RunningStage};
-use super::{Context, InputPort, Output, OutputPorts, Outputs, Parameters, PortType, Received, StageError, StageKind};
+use super::{Context, InputPort, Output, OutputPorts, Parameters, PortType, Received, StageError, StageKind};
 use crate::message::{Channel, Message};
 use crate::ros::RosMessage;
 use std::sync::Arc;
 
+type Declare<O> = dyn Fn(&mut OutputPorts) -> O + Send + Sync;
 type Make<P, S> = dyn Fn(P, &Context) -> Result<S, StageError> + Send + Sync;
 type Receive<S, O> = dyn Fn(&mut S, &Message, &Output<O>) -> Result<(), StageError> + Send + Sync;
 type Announce<S> = dyn Fn(&mut S, usize, u32, &Channel) -> Result<(), StageError> + Send + Sync;
@@ -17,6 +18,7 @@ pub struct StageBuilder<P, S, O> {
     name: &'static str,
     summary: &'static str,
     inputs: Vec<InputPort>,
+    declare: Box<Declare<O>>,
     make: Box<Make<P, S>>,
     handlers: Handlers<S, O>,
 }
@@ -30,10 +32,11 @@ struct Handlers<S, O> {
     abort: Box<Abort<S>>,
 }
 
-impl<P: Parameters, S: 'static, O: Outputs> StageBuilder<P, S, O> {
+impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
     pub(super) fn new(
         name: &'static str,
         summary: &'static str,
+        declare: impl Fn(&mut OutputPorts) -> O + Send + Sync + 'static,
         make: impl Fn(P, &Context) -> Result<S, StageError> + Send + Sync + 'static,
     ) -> Self {
         let handlers = Handlers {
@@ -42,7 +45,7 @@ impl<P: Parameters, S: 'static, O: Outputs> StageBuilder<P, S, O> {
             finish: Box::new(|_, _| Ok(())),
             abort: Box::new(|_, _| ()),
         };
-        Self { name, summary, inputs: Vec::new(), make: Box::new(make), handlers }
+        Self { name, summary, inputs: Vec::new(), declare: Box::new(declare), make: Box::new(make), handlers }
     }
 
     /// An input that must be wired to one output.
@@ -153,12 +156,12 @@ impl<P: Parameters, S: 'static, O: Outputs> StageBuilder<P, S, O> {
 
     /// The kind.
     pub fn build(self) -> StageKind {
-        let Self { name, summary, inputs, make, handlers } = self;
+        let Self { name, summary, inputs, declare, make, handlers } = self;
         let mut declared = OutputPorts::default();
-        drop(O::declare(&mut declared));
+        drop(declare(&mut declared));
         let handlers = Arc::new(handlers);
         let make = move |parameters: P, context: &Context, mut ports: OutputPorts| {
-            let outputs = O::declare(&mut ports);
+            let outputs = declare(&mut ports);
             let output = ports.tied_to(outputs);
             let state = make(parameters, context)?;
             let running = Running { state, output, handlers: Arc::clone(&handlers) };

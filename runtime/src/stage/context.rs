@@ -3,6 +3,7 @@
 use super::{InitialPoses, TagFields};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::time::Duration;
 
 /// What a stage is told of its pipeline when it is made.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +20,8 @@ pub struct Context {
     pub initial_poses: InitialPoses,
     /// What is wired to the stage, in the order of its wires: see [`Message::wire`](crate::message::Message::wire).
     pub inputs: Vec<InputWire>,
+    /// For how long a stage may work on one message; none for ever.
+    pub stall_timeout: Option<Duration>,
 }
 
 impl Context {

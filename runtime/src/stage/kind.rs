@@ -1,16 +1,19 @@
 //! Stage kinds: what a stage looks like from outside, and how one is made.
 
 use super::builder::StageBuilder;
+use super::json_schema;
 use super::node::{Node, Role, RunningSource};
 use super::{
     Context, InputPort, Output, OutputEnd, OutputPort, OutputPorts, Outputs, ParameterError, Parameters, StageError,
 };
 use schemars::Schema;
 use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
 type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
+type AskFn = dyn Fn(&toml::Table, &Path) -> Result<Asked, ParameterError> + Send + Sync;
 
 /// A kind of stage: its name, ports and parameters, and how to make one.
 #[derive(Clone)]
@@ -27,6 +30,16 @@ pub struct StageKind {
     schema: Schema,
     check: Arc<CheckFn>,
     make: Arc<MakeFn>,
+    ask: Option<Arc<AskFn>>,
+}
+
+/// What a stage is of which only its own program knows the ports and parameters.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// Its kind, kept for as long as this program runs, as all kinds are.
+    pub kind: &'static StageKind,
+    /// Parameters that stand in place of those that were given, such as a path that holds from every folder.
+    pub parameters: toml::Table,
 }
 
 /// A stage without inputs: it makes the messages that start everything else.
@@ -57,7 +70,22 @@ impl StageKind {
         S: 'static,
         O: Outputs,
     {
-        StageBuilder::new(name, summary, make)
+        StageBuilder::new(name, summary, O::declare, make)
+    }
+
+    /// The same for a kind whose outputs are known only when the program runs: `declare` names them.
+    pub fn stage_with<P, S, O>(
+        name: &'static str,
+        summary: &'static str,
+        declare: impl Fn(&mut OutputPorts) -> O + Send + Sync + 'static,
+        make: impl Fn(P, &Context) -> Result<S, StageError> + Send + Sync + 'static,
+    ) -> StageBuilder<P, S, O>
+    where
+        P: Parameters,
+        S: 'static,
+        O: 'static,
+    {
+        StageBuilder::new(name, summary, declare, make)
     }
 
     /// A kind of source with parameters `P`.
@@ -120,6 +148,7 @@ impl StageKind {
             inputs,
             outputs,
             external: false,
+            ask: None,
             schema: P::schema(),
             check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
             make: Arc::new(move |table, context, ports| {
@@ -131,6 +160,55 @@ impl StageKind {
                 make(parameters, context, ports)
             }),
         }
+    }
+
+    /// A kind whose stages differ in ports and parameters, which only the program behind each of them knows: `ask` finds them
+    /// out from the parameters that are given and the folder that paths among them begin at. `P` are those that all have.
+    pub fn asked<P: Parameters>(
+        name: &'static str,
+        summary: &'static str,
+        ask: impl Fn(&toml::Table, &Path) -> Result<Asked, ParameterError> + Send + Sync + 'static,
+    ) -> Self {
+        let ask: Arc<AskFn> = Arc::new(ask);
+        let asked = Arc::clone(&ask);
+        let make = move |mut table: toml::Table, context: &Context, ports| {
+            let failed = |error| StageError::new(format!("make stage `{}`", context.stage), error);
+            let Asked { kind, parameters } = asked(&table, Path::new("")).map_err(failed)?;
+            table.extend(parameters);
+            (kind.make)(table, context, ports)
+        };
+        Self {
+            name,
+            summary,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            external: false,
+            schema: P::schema(),
+            check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
+            make: Arc::new(make),
+            ask: Some(ask),
+        }
+    }
+
+    /// Whether each stage of the kind has ports and parameters of its own, which it must be asked for.
+    pub fn is_asked(&self) -> bool {
+        self.ask.is_some()
+    }
+
+    /// What the stage with the given parameters is, where each has ports and parameters of its own; paths among them begin at
+    /// `folder`. None for every other kind.
+    ///
+    /// # Errors
+    /// The parameters do not lead to a stage.
+    pub fn ask(&self, parameters: &toml::Table, folder: &Path) -> Option<Result<Asked, ParameterError>> {
+        self.ask.as_ref().map(|ask| ask(parameters, folder))
+    }
+
+    /// The same kind with parameters that a JSON schema describes, by which they are checked.
+    #[must_use]
+    pub fn with_schema(self, schema: Schema) -> Self {
+        let described = schema.clone();
+        Self { schema, check: Arc::new(move |table| json_schema::check(&described, table)), ..self }
     }
 
     /// Whether its messages come from outside of the run.

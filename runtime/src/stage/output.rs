@@ -124,6 +124,11 @@ impl OutputPorts {
         self.add(OutputPort { name, port_type, topic: None, side: false, summary })
     }
 
+    /// The same, with all that is said of the port.
+    pub fn encoded_port(&mut self, port: OutputPort) -> Out<AnyMessage> {
+        self.add(port)
+    }
+
     fn add<T>(&mut self, port: OutputPort) -> Out<T> {
         let OutputEnd { topic, sink } = self.ends.next().unwrap_or_default();
         let topic = TopicTemplate { template: topic, last: None };

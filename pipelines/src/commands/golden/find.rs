@@ -51,10 +51,10 @@ pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
 }
 
 /// The kinds of the registry of which there is no case, but for those that only let messages in from outside of a live
-/// run.
+/// run, and those of which each stage has ports of its own.
 pub(super) fn kinds_without_a_case(registry: &Registry, cases: &[CaseFolder]) -> Vec<String> {
     let with: BTreeSet<&str> = cases.iter().map(|case| case.kind.as_str()).collect();
-    let kinds = registry.kinds().filter(|kind| !kind.is_external());
+    let kinds = registry.kinds().filter(|kind| !kind.is_external() && !kind.is_asked());
     kinds.map(|kind| kind.name).filter(|kind| !with.contains(kind)).map(str::to_owned).collect()
 }
 

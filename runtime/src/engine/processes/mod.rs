@@ -29,7 +29,7 @@ mod system;
 mod words;
 
 pub use child::run_process;
-pub use system::memory_of_process;
+pub use system::{describe_exit, memory_of_process};
 
 use super::{Observer, RunError, RunReport};
 use crate::pipeline::Pipeline;

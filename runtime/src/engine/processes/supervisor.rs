@@ -6,9 +6,9 @@ use super::backoff::Backoff;
 use super::drain::{Drain, STUCK_AFTER};
 use super::event::{Event, listen};
 use super::process::Process;
-use super::system::describe;
+use super::system::describe_exit;
 use super::words::{Said, Told};
-use crate::engine::run_folder::RunFolder;
+use crate::engine::run_folder::{RunFolder, clean_after};
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{LinkError, RunNames};
 use crate::link::{StageBoard, StageNumber, StageState, WireNumber};
@@ -196,7 +196,7 @@ impl Supervisor<'_> {
         process.ended = true;
         let lost = || {
             let (stage, others) = process.running.split_first()?;
-            let how = status.map_or_else(|error| error.to_string(), describe);
+            let how = status.map_or_else(|error| error.to_string(), describe_exit);
             let together = match others {
                 [] => String::new(),
                 others => format!(" (it ran {} as well)", others.join(", ")),
@@ -204,6 +204,8 @@ impl Supervisor<'_> {
             Some((stage.clone(), Failure::Ended(how + &together)))
         };
         let Some((stage, failure)) = process.failure.take().or_else(lost) else { return };
+        // What cannot be removed waits for `clean`.
+        let _ = clean_after(self.processes[place].child.id());
         match self.is_restarted(place) {
             true => self.start_later(place, &stage, &failure),
             false => self.fail(RunError::of_stage(&stage, failure)),

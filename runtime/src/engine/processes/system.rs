@@ -14,7 +14,7 @@ pub fn memory_of_process(process: u32) -> Option<u64> {
 }
 
 /// How a process ended, to follow "which".
-pub(super) fn describe(status: ExitStatus) -> String {
+pub fn describe_exit(status: ExitStatus) -> String {
     match (status.signal(), status.code()) {
         (Some(signal), _) => {
             let (name, hint) = match signal {

@@ -1,0 +1,184 @@
+//! A program as its stage calls it: the shared memory between them, and one call at a time.
+
+use super::header::{CALL_VERSION, CallHeader, Said, Told};
+use super::process::{Launch, Lost, Process};
+use crate::engine::RunFolder;
+use crate::link::{LinkError, Room, RunNames};
+use crate::message::MessageHeader;
+use crate::stage::StageError;
+use iceoryx2::node::Node;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{AllocationStrategy, BackpressureStrategy};
+use iceoryx2::service::ipc::Service;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::fmt::Debug;
+use std::time::Duration;
+
+/// How many samples of a program may wait for its stage.
+pub const CREDITS: usize = 16;
+/// How many messages a program may hold without copying them.
+const HELD: usize = 32;
+/// For how large a payload, in bytes, room is set aside before the first is sent.
+const FIRST_PLACE: usize = 4 * 1024;
+
+/// A program that runs, and the memory that it shares with its stage.
+pub(super) struct Program {
+    process: Process,
+    ports: Option<Ports>,
+    folder: Option<RunFolder>,
+    room: Room,
+    /// How long a call may take.
+    longest: Option<Duration>,
+    /// Whether it can still be called.
+    is_alive: bool,
+}
+
+struct Ports {
+    publisher: Publisher<Service, [u8], CallHeader>,
+    subscriber: Subscriber<Service, [u8], CallHeader>,
+    _node: Node<Service>,
+}
+
+impl Ports {
+    fn open(names: &RunNames) -> Result<Self, LinkError> {
+        let node = names.node::<Service>()?;
+        let to = open(&node, names, "to", 1)?;
+        let from = open(&node, names, "from", CREDITS)?;
+        let publisher = to.publisher_builder().initial_max_slice_len(FIRST_PLACE).max_loaned_samples(1);
+        let publisher = publisher
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|error| failed("send to a program")(&error))?;
+        let subscriber = from.subscriber_builder().create().map_err(|error| failed("hear from a program")(&error))?;
+        Ok(Self { publisher, subscriber, _node: node })
+    }
+}
+
+fn open(
+    node: &Node<Service>,
+    names: &RunNames,
+    way: &str,
+    buffer: usize,
+) -> Result<PortFactory<Service, [u8], CallHeader>, LinkError> {
+    Room::default().ask(0, || "share memory with a program".to_owned())?;
+    node.service_builder(&names.call(way)?)
+        .publish_subscribe::<[u8]>()
+        .user_header::<CallHeader>()
+        .enable_safe_overflow(false)
+        .history_size(0)
+        .subscriber_max_buffer_size(buffer)
+        .subscriber_max_borrowed_samples(HELD)
+        .max_publishers(1)
+        .max_subscribers(1)
+        .max_nodes(2)
+        .create()
+        .map_err(|error| failed("share memory with a program")(&error))
+}
+
+fn failed(doing: &str) -> impl FnOnce(&dyn Debug) -> LinkError {
+    LinkError::shared(doing.to_owned())
+}
+
+impl Program {
+    /// Starts a program, of which each call may take `longest`.
+    pub(super) fn start(launch: &Launch, longest: Option<Duration>) -> Result<Self, StageError> {
+        let program = || format!("run `{}`", launch.program.display());
+        let folder = RunFolder::create().map_err(|error| StageError::new(program(), error))?;
+        let ports = Ports::open(&folder.names()).map_err(|error| StageError::new(program(), error))?;
+        let process = Process::start(launch, folder.path()).map_err(|error| StageError::new(program(), error))?;
+        let (ports, folder) = (Some(ports), Some(folder));
+        // A little before the engine would end the stage, which could not say where its program hangs.
+        let longest = longest.map(|longest| longest.mul_f64(0.9));
+        let mut started = Self { process, ports, folder, room: Room::default(), longest, is_alive: true };
+        match started.process.wait(longest) {
+            Ok(b'r') => Ok(started),
+            Ok(other) => Err(StageError::new(program(), format!("it rings {other}, which says nothing"))),
+            Err(lost) => Err(StageError::new(program(), lost)),
+        }
+    }
+
+    /// Calls the program, and hands to `take` what it sends and warns of. When this has failed, so have all later calls.
+    pub(super) fn call(
+        &mut self,
+        what: Told,
+        (port, wire): (usize, usize),
+        (message, bytes): (&MessageHeader, &[u8]),
+        take: impl FnMut(Said, &CallHeader, &[u8]) -> Result<(), StageError>,
+    ) -> Result<(), CallError> {
+        if !self.is_alive {
+            return Ok(());
+        }
+        let (port, wire) = (port as u32, wire as u32);
+        let header = CallHeader { version: CALL_VERSION, what: what as u32, port, wire, message: *message };
+        let result = self.tell(header, bytes).map_err(CallError::Link).and_then(|()| self.hear(take));
+        self.is_alive = result.is_ok();
+        result
+    }
+
+    fn tell(&mut self, header: CallHeader, bytes: &[u8]) -> Result<(), LinkError> {
+        let Some(ports) = &self.ports else { return Ok(()) };
+        let doing = || format!("send {} bytes to a program", bytes.len());
+        self.room.ask(bytes.len(), doing)?;
+        let sample = ports.publisher.loan_slice_uninit(bytes.len()).map_err(|error| failed(&doing())(&error))?;
+        let start = std::ptr::from_ref(sample.user_header()).addr();
+        self.room.take(start..sample.payload().as_ptr_range().end.addr(), doing)?;
+        let mut sample = sample.write_from_slice(bytes);
+        *sample.user_header_mut() = header;
+        sample.send().map_err(|error| failed(&doing())(&error))?;
+        self.process.ring(b'm');
+        Ok(())
+    }
+
+    /// Hears what the program says until it is done.
+    fn hear(
+        &mut self,
+        mut take: impl FnMut(Said, &CallHeader, &[u8]) -> Result<(), StageError>,
+    ) -> Result<(), CallError> {
+        let Some(ports) = &self.ports else { return Ok(()) };
+        loop {
+            self.process.wait(self.longest).map_err(CallError::Lost)?;
+            let sample =
+                ports.subscriber.receive().map_err(|error| CallError::Link(failed("hear from a program")(&error)))?;
+            let header = sample.as_ref().map(|sample| *sample.user_header()).unwrap_or_default();
+            let said = Said::of(header.what).filter(|_| header.version == CALL_VERSION);
+            let (Some(sample), Some(said)) = (sample, said) else { return Err(CallError::Words) };
+            self.process.ring(b'c');
+            match said {
+                Said::Done => return Ok(()),
+                Said::Failed => return Err(CallError::Failed(String::from_utf8_lossy(sample.payload()).into_owned())),
+                said => take(said, &header, sample.payload()).map_err(CallError::Stage)?,
+            }
+        }
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        self.process.end();
+        self.ports = None;
+        // What cannot be removed is removed with what killed runs leave.
+        let _ = self.folder.take().map(RunFolder::remove);
+    }
+}
+
+/// Why a call has failed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CallError {
+    /// The program says so itself.
+    #[error("{0}")]
+    Failed(String),
+    /// The program is no more.
+    #[error("{0}")]
+    Lost(Lost),
+    /// The memory between them fails.
+    #[error("{0}")]
+    Link(LinkError),
+    /// It does not keep to the protocol.
+    #[error("it rings without saying anything that is known")]
+    Words,
+    /// What it says cannot be passed on.
+    #[error("{0}")]
+    Stage(StageError),
+}

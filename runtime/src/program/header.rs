@@ -1,0 +1,66 @@
+//! What goes with every sample between a stage and its program.
+
+use crate::message::MessageHeader;
+use iceoryx2::prelude::ZeroCopySend;
+
+/// The version of the protocol of a call.
+pub const CALL_VERSION: u32 = 1;
+
+/// The user header of a sample between a stage and its program, 256 bytes, little-endian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[type_name("gridweave_call_header_1")]
+#[repr(C)]
+pub struct CallHeader {
+    /// [`CALL_VERSION`].
+    pub version: u32,
+    /// What it says, as a number.
+    pub what: u32,
+    /// The input or output port, by its place in the interface.
+    pub port: u32,
+    /// The wire that a message has come on.
+    pub wire: u32,
+    /// The header of the message.
+    pub message: MessageHeader,
+}
+
+/// What a sample to a program says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Told {
+    Start = 1,
+    Message = 2,
+    Finish = 3,
+    Abort = 4,
+}
+
+/// What a sample of a program says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Said {
+    Output,
+    Warning,
+    Done,
+    Failed,
+}
+
+impl Said {
+    /// By its number.
+    pub(super) fn of(what: u32) -> Option<Self> {
+        Some(match what {
+            16 => Self::Output,
+            17 => Self::Warning,
+            18 => Self::Done,
+            19 => Self::Failed,
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_layout_is_that_of_the_protocol() {
+        assert_eq!(std::mem::size_of::<CallHeader>(), 256);
+        assert_eq!(std::mem::offset_of!(CallHeader, message), 16);
+    }
+}

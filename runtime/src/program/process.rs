@@ -1,0 +1,212 @@
+//! The process of a program, and the bells between it and its stage.
+
+use crate::engine::describe_exit;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::process::{Pid, Signal, kill_process};
+use std::ffi::OsString;
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Duration;
+
+/// So long is waited at a time. What is counted is how often, so that time in which this process was halted does not count.
+const LOOK: Duration = Duration::from_millis(100);
+/// So long a program may take to exit that has been told to.
+const EXIT_TIME: Duration = Duration::from_secs(5);
+/// So long a program may take to say where it hangs.
+const LAST_WORDS_TIME: Duration = Duration::from_millis(500);
+
+/// How a program is started: with these arguments and, behind them, the folder of the run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Launch {
+    /// The program.
+    pub program: PathBuf,
+    /// What stands before the folder.
+    pub arguments: Vec<OsString>,
+}
+
+/// Why nothing more is to be expected of a program.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Lost {
+    /// Its process has ended.
+    #[error("its process {0}")]
+    Ended(String),
+    /// It has said nothing for too long.
+    #[error(
+        "it hangs: it has not been done with one message for {seconds} s, and was ended; what it did then stands above; \
+         `stall_timeout` in [pipeline] sets how long it may take"
+    )]
+    Hung {
+        /// For how long.
+        seconds: f64,
+    },
+    /// The system does not let it be watched.
+    #[error("its process cannot be watched: {0}")]
+    Unwatched(io::Error),
+}
+
+/// A program that runs.
+pub(super) struct Process {
+    child: Child,
+    input: Option<ChildStdin>,
+    output: ChildStdout,
+    /// Bells that were heard, and for which nothing was taken yet.
+    heard: Vec<u8>,
+}
+
+impl Process {
+    /// Starts a program in the folder of a run.
+    pub(super) fn start(launch: &Launch, folder: &Path) -> io::Result<Self> {
+        let mut command = Command::new(&launch.program);
+        command.args(&launch.arguments).arg(folder).stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.spawn()?;
+        match (child.stdin.take(), child.stdout.take()) {
+            (input @ Some(_), Some(output)) => Ok(Self { child, input, output, heard: Vec::new() }),
+            _ => Err(io::Error::other("it has no standard input and output")),
+        }
+    }
+
+    /// Rings at the program. That one is gone is heard when it is waited for.
+    pub(super) fn ring(&mut self, bell: u8) {
+        let _ = self.input.as_mut().map(|input| input.write_all(&[bell]));
+    }
+
+    /// Waits until the program rings, but not for longer than `longest`.
+    pub(super) fn wait(&mut self, longest: Option<Duration>) -> Result<u8, Lost> {
+        let mut waited = Duration::ZERO;
+        while self.heard.is_empty() {
+            if self.listen(LOOK)? {
+                continue;
+            }
+            waited += LOOK;
+            if let Some(longest) = longest.filter(|longest| waited >= *longest) {
+                self.end_hung();
+                return Err(Lost::Hung { seconds: longest.as_secs_f64() });
+            }
+        }
+        Ok(self.heard.remove(0))
+    }
+
+    /// Takes in what the program has rung, waiting for so long at the most. `false` if it has not.
+    fn listen(&mut self, longest: Duration) -> Result<bool, Lost> {
+        let timeout = Timespec { tv_sec: 0, tv_nsec: i64::from(longest.subsec_nanos()) };
+        match poll(&mut [PollFd::new(&self.output, PollFlags::IN)], Some(&timeout)) {
+            Ok(0) | Err(Errno::INTR) => return Ok(false),
+            Ok(_) => {}
+            Err(error) => return Err(Lost::Unwatched(error.into())),
+        }
+        let mut bells = [0; 64];
+        match self.output.read(&mut bells) {
+            Ok(0) => Err(self.ended()),
+            Ok(count) => {
+                self.heard.extend_from_slice(&bells[..count]);
+                Ok(true)
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => Ok(false),
+            Err(error) => Err(Lost::Unwatched(error)),
+        }
+    }
+
+    /// How it ended. Its end of the pipe is closed; if it lives on all the same, it is ended.
+    fn ended(&mut self) -> Lost {
+        match self.exit_within(EXIT_TIME) {
+            Some(how) => Lost::Ended(how),
+            None => {
+                self.kill();
+                Lost::Ended("has closed its standard output, and was ended".to_owned())
+            }
+        }
+    }
+
+    /// Ends a program that hangs; one that can says before where it does.
+    fn end_hung(&mut self) {
+        if let Some(process) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw) {
+            // The number is that of the child until it is waited for.
+            let _ = kill_process(process, Signal::USR1);
+            let _ = self.exit_within(LAST_WORDS_TIME);
+        }
+        self.kill();
+    }
+
+    /// Tells it to exit, by the end of its standard input, and waits until it has.
+    pub(super) fn end(&mut self) {
+        self.input = None;
+        if self.exit_within(EXIT_TIME).is_none() {
+            self.kill();
+        }
+    }
+
+    fn kill(&mut self) {
+        // One that has ended is only waited for.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// How it ended, if it does so in this time.
+    fn exit_within(&mut self, longest: Duration) -> Option<String> {
+        const STEP: Duration = Duration::from_millis(5);
+        let mut waited = Duration::ZERO;
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return Some(describe_exit(status)),
+                Ok(None) if waited < longest => std::thread::sleep(STEP),
+                Ok(None) => return None,
+                Err(error) => return Some(format!("cannot be waited for: {error}")),
+            }
+            waited += STEP;
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A program of the shell, which gets the folder as `$0`.
+    fn shell(script: &str) -> Process {
+        let launch = Launch { program: "/bin/sh".into(), arguments: vec!["-c".into(), script.into()] };
+        Process::start(&launch, Path::new("/tmp")).unwrap()
+    }
+
+    #[test]
+    fn each_bell_is_heard_once_and_in_order() {
+        let mut process = shell("printf rs; read line; printf s");
+        assert_eq!(process.wait(None).unwrap(), b'r');
+        assert_eq!(process.wait(None).unwrap(), b's');
+        process.ring(b'\n');
+        assert_eq!(process.wait(None).unwrap(), b's');
+    }
+
+    #[test]
+    fn how_a_program_ended_is_told() {
+        for (script, says) in [
+            ("exit 3", "its process ended with status 3"),
+            ("kill -9 $$", "its process was ended by signal 9 (SIGKILL)"),
+            ("exec >/dev/null; kill -11 $$", "signal 11 (SIGSEGV)"),
+        ] {
+            let lost = shell(script).wait(None).unwrap_err().to_string();
+            assert!(lost.contains(says), "{lost}");
+        }
+    }
+
+    #[test]
+    fn a_program_that_says_nothing_hangs_and_is_ended() {
+        let mut process = shell("trap '' USR1; while :; do sleep 1; done");
+        let lost = process.wait(Some(Duration::from_millis(200))).unwrap_err().to_string();
+        assert!(lost.contains("it hangs") && lost.contains("0.2 s"), "{lost}");
+        assert!(process.child.try_wait().unwrap().is_some());
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_cannot_be_started() {
+        let launch = Launch { program: "/nonexistent/python3".into(), arguments: Vec::new() };
+        assert!(Process::start(&launch, Path::new("/tmp")).is_err());
+    }
+}

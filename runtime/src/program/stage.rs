@@ -1,0 +1,119 @@
+//! The stage round a program.
+
+use super::call::{CallError, Program};
+use super::header::{CallHeader, Said, Told};
+use super::{Interface, Launch};
+use crate::message::{Message, MessageHeader};
+use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Parameters, StageError, StageKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+/// Parameters as they are given: the schema of the program says what they may be.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(transparent)]
+struct Given(Map<String, Value>);
+
+impl Parameters for Given {}
+
+/// A running program, and what its stage calls it in errors.
+struct ProgramStage {
+    program: Program,
+    /// The names of the inputs.
+    inputs: Vec<&'static str>,
+    /// What runs, such as the name of a module.
+    what: String,
+}
+
+type Outputs = Vec<Out<AnyMessage>>;
+
+/// The kind `name` of a stage with the ports and parameters of `interface`, which is the program of `launch` and is called `what` in
+/// errors. It is kept for as long as this program runs.
+pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Launch) -> &'static StageKind {
+    let Interface { summary, inputs, outputs, parameters, text } = interface;
+    let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();
+    let what = what.to_owned();
+    let declare = move |ports: &mut OutputPorts| -> Outputs {
+        outputs.iter().map(|port| ports.encoded_port(port.clone())).collect()
+    };
+    let make = move |Given(parameters): Given, context: &Context| {
+        let program = Program::start(&launch, context.stall_timeout)?;
+        let mut stage = ProgramStage { program, inputs: names.clone(), what: what.clone() };
+        stage.start(parameters, context, &text)?;
+        Ok(stage)
+    };
+    let mut builder = StageKind::stage_with(name, summary, declare, make);
+    for (index, port) in inputs.into_iter().enumerate() {
+        builder = builder.encoded_input(port, move |stage: &mut ProgramStage, message, output| {
+            stage.receive(index, message, output)
+        });
+    }
+    let kind = builder.finish(ProgramStage::finish).abort(ProgramStage::abort).build();
+    Box::leak(Box::new(kind.with_schema(parameters)))
+}
+
+impl ProgramStage {
+    fn start(&mut self, parameters: Map<String, Value>, context: &Context, interface: &str) -> Result<(), StageError> {
+        let inputs: Vec<Value> = context
+            .inputs
+            .iter()
+            .map(|wire| json!({ "port": wire.port, "from": wire.from, "type": wire.ros_type, "topic": wire.topic }))
+            .collect();
+        let start = json!({
+            "stage": context.stage, "parameters": parameters, "seed": context.seed, "reference": context.reference,
+            "robots": context.robots, "inputs": inputs, "interface": interface,
+        });
+        let bytes = (&MessageHeader::default(), start.to_string().into_bytes());
+        let nothing_yet = |_, _: &CallHeader, _: &[u8]| Ok(());
+        let started = self.program.call(Told::Start, (0, 0), (bytes.0, &bytes.1), nothing_yet);
+        started.map_err(|error| StageError::new(format!("start {}", self.what), error))
+    }
+
+    fn receive(&mut self, port: usize, message: &Message, output: &Output<Outputs>) -> Result<(), StageError> {
+        let name = self.inputs.get(port).copied().unwrap_or_default();
+        let doing = |what: &str| {
+            let of_robot = if message.robot().is_empty() { String::new() } else { format!(" of {}", message.robot()) };
+            format!("take a message{of_robot} on the input `{name}` in {what}")
+        };
+        let said = (message.header(), message.bytes());
+        let called = self
+            .program
+            .call(Told::Message, (port, message.wire()), said, |said, header, bytes| take(output, said, header, bytes));
+        called.map_err(|error| self.failed(error, doing))
+    }
+
+    fn finish(&mut self, output: &Output<Outputs>) -> Result<(), StageError> {
+        let nothing = (&MessageHeader::default(), &[][..]);
+        let called =
+            self.program.call(Told::Finish, (0, 0), nothing, |said, header, bytes| take(output, said, header, bytes));
+        called.map_err(|error| self.failed(error, |what| format!("finish in {what}")))
+    }
+
+    fn abort(&mut self, reason: &str) {
+        let words = (&MessageHeader::default(), reason.as_bytes());
+        // The run has failed already.
+        let _ = self.program.call(Told::Abort, (0, 0), words, |_, _, _| Ok(()));
+    }
+
+    fn failed(&self, error: CallError, doing: impl FnOnce(&str) -> String) -> StageError {
+        match error {
+            CallError::Stage(error) => error,
+            error => StageError::new(doing(&self.what), error),
+        }
+    }
+}
+
+/// Passes on what a program says.
+fn take(output: &Output<Outputs>, said: Said, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
+    match said {
+        Said::Output => match output.get(header.port as usize) {
+            Some(port) => port.send_bytes(header.message.robot.as_str(), bytes),
+            None => Err(StageError::new("send a message", format!("the program has no output {}", header.port))),
+        },
+        Said::Warning => {
+            output.warn(String::from_utf8_lossy(bytes));
+            Ok(())
+        }
+        Said::Done | Said::Failed => Ok(()),
+    }
+}

@@ -1,0 +1,244 @@
+"""What a stage is: its ports and parameters, and what it does with a message."""
+
+import inspect
+import typing
+from dataclasses import dataclass
+from typing import Any, Callable
+
+from .msg import ros_type
+
+#: The version of the protocol of a call, in which the stage is spoken to.
+PROTOCOL = 1
+
+_JSON_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input, for messages of one type. A method `on_NAME(self, message, about)` is given each message that comes in on it."""
+
+    type: type
+    #: What it is for.
+    summary: str = ""
+    #: Whether any number of outputs may be wired to it; otherwise it is one.
+    many: bool = False
+    #: Whether it may be left unwired.
+    optional: bool = False
+
+
+class Output:
+    """An output, for messages of one type."""
+
+    def __init__(self, type: type, summary: str = "", *, topic: str | None = None, side: bool = False):
+        """`topic` is that of its messages in a log, with `{robot}` and `{stage}` put in, where it is not
+        `/{robot}/{stage}/NAME`. A `side` output is beside what the stage is for: the name of a stage alone does not mean it.
+        """
+        self.type, self.summary, self.topic, self.side = type, summary, topic, side
+        self._send: Callable[[Any, str], None] | None = None
+
+    def send(self, message: Any, robot: str = "") -> None:
+        """Sends a message about `robot` (empty: about none in particular), with the log time of the message that is handled."""
+        if type(message) is not self.type:
+            raise TypeError(f"this output takes {ros_type(self.type)}, not {type(message).__name__}")
+        if self._send is None:
+            raise RuntimeError("a stage sends through its own outputs, as `self.NAME.send(...)`")
+        self._send(message, robot)
+
+    def _tied(self, send: Callable[[Any, str], None]) -> "Output":
+        tied = Output(self.type, self.summary, topic=self.topic, side=self.side)
+        tied._send = send
+        return tied
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a stage, which a pipeline file may set; in the stage it is the value. It is of the type of its default."""
+
+    default: Any
+    #: What it means, with its unit: metres, radians, seconds.
+    summary: str = ""
+    #: The least and the greatest value; `above` and `below` are not allowed themselves.
+    minimum: float | None = None
+    maximum: float | None = None
+    above: float | None = None
+    below: float | None = None
+    #: The only values that a text may have.
+    choices: tuple[str, ...] | None = None
+
+    def schema(self) -> dict[str, Any]:
+        """Its JSON schema."""
+        schema = _schema_of(self.default) | {"default": self.default, "description": self.summary}
+        limited = schema["items"] if schema["type"] == "array" else schema
+        limits = {"minimum": self.minimum, "maximum": self.maximum, "exclusiveMinimum": self.above,
+                  "exclusiveMaximum": self.below, "enum": self.choices and list(self.choices)}
+        limited |= {name: limit for name, limit in limits.items() if limit is not None}
+        return schema
+
+    def value(self, given: Any) -> Any:
+        """A given value as the stage has it: a whole number may stand for one with a fraction."""
+        if isinstance(self.default, float):
+            return float(given)
+        if isinstance(self.default, list) and self.default and isinstance(self.default[0], float):
+            return [float(item) for item in given]
+        return given
+
+
+def _schema_of(default: Any) -> dict[str, Any]:
+    if isinstance(default, list) and default:
+        return {"type": "array", "items": _schema_of(default[0])}
+    if type(default) in _JSON_TYPES:
+        return {"type": _JSON_TYPES[type(default)]}
+    raise TypeError(f"a parameter is a number, a text, true or false, or a list of such that is not empty, not {default!r}")
+
+
+@dataclass(frozen=True)
+class About:
+    """What is known of a message beside what it says."""
+
+    #: The robot that it is about; empty if it is about none in particular.
+    robot: str
+    #: When it was logged, nanoseconds.
+    log_time: int
+    #: The topic that it has, or will have, in a log.
+    topic: str
+    #: Which of the stage's wires it came on, as an index into `Context.inputs`.
+    wire: int
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a stage is told of its pipeline."""
+
+    #: The stage's name in the pipeline.
+    stage: str = ""
+    #: Seeds the stage's randomness: `numpy.random.default_rng(self.context.seed)`.
+    seed: int = 0
+    #: The robot whose map frame is the world, if the pipeline says so.
+    reference: str | None = None
+    #: How topics are told apart, as in the section `[robots]`.
+    robots: dict[str, Any] | None = None
+    #: What is wired to the stage, each with `port`, `from`, `type` and `topic`.
+    inputs: tuple[dict[str, str], ...] = ()
+
+
+class Stage:
+    """A stage: `Input`s, `Output`s and `Parameter`s as attributes of the class, and a method `on_NAME` for each input.
+
+        class Corners(Stage):
+            \"\"\"Sends the pose of each map's corner.\"\"\"
+            map = Input(OccupancyGrid, "the robots' maps")
+            corner = Output(PoseStamped, "the pose of the outer corner of cell (0, 0)")
+            height = Parameter(0.0, "how high above the map it lies, metres")
+
+            def on_map(self, map, about):
+                self.corner.send(PoseStamped(map.header, map.info.origin), about.robot)
+
+    The first line of its documentation is what `gridweave kinds` shows. `__init__` takes nothing and may use the parameters and
+    `self.context`. A stage keeps its state itself, and reads no clock: what it sends follows from what it was given, so that a replay
+    gives the same output each time.
+    """
+
+    context: Context
+
+    def finish(self) -> None:
+        """All inputs have ended. What is sent here carries the log time that they had come to."""
+
+    def abort(self, reason: str) -> None:
+        """The run has failed elsewhere: leave what was made in a state that can be used."""
+
+    def warn(self, what: str) -> None:
+        """Counts something that is wrong with the input and that the stage can live with. The summary shows each text with its
+        count."""
+        self._warn(what)
+
+    _warn: Callable[[str], None] = staticmethod(lambda what: None)
+
+    @classmethod
+    def _members(cls, kind: type) -> dict[str, Any]:
+        members: dict[str, Any] = {}
+        for base in reversed(cls.__mro__):
+            members |= {name: member for name, member in vars(base).items() if isinstance(member, kind)}
+        return members
+
+    @classmethod
+    def interface(cls) -> dict[str, Any]:
+        """The ports and parameters, as the program that runs a pipeline is told them."""
+        for name in cls._members(Input):
+            if not callable(getattr(cls, f"on_{name}", None)):
+                raise TypeError(f"{cls.__name__} has an input `{name}`, and no method on_{name}(self, message, about)")
+        handlers = [name[3:] for name in dir(cls) if name.startswith("on_")]
+        for name in handlers:
+            if name not in cls._members(Input):
+                raise TypeError(f"{cls.__name__} has a method on_{name}, and no input `{name}`")
+        inputs = [{"name": name, "type": ros_type(port.type), "many": port.many, "optional": port.optional,
+                   "summary": port.summary} for name, port in cls._members(Input).items()]
+        outputs = [{"name": name, "type": ros_type(port.type), "topic": port.topic, "side": port.side,
+                    "summary": port.summary} for name, port in cls._members(Output).items()]
+        properties = {name: parameter.schema() for name, parameter in cls._members(Parameter).items()}
+        summary = " ".join((inspect.getdoc(cls) or cls.__name__).split("\n\n")[0].split())
+        return {"protocol": PROTOCOL, "name": cls.__name__, "summary": summary, "inputs": inputs, "outputs": outputs,
+                "parameters": {"type": "object", "properties": properties, "additionalProperties": False}}
+
+    @classmethod
+    def begin(cls, parameters: dict[str, Any] | None = None, context: Context | None = None,
+              send: Callable[[str, Any, str], None] = lambda output, message, robot: None,
+              warn: Callable[[str], None] = lambda what: None) -> "Stage":
+        """Makes the stage as a pipeline does: with some parameters, and with what takes its messages (the name of the output,
+        the message, the robot) and its warnings. For tests of a stage by itself."""
+        made = cls.__new__(cls)
+        known = cls._members(Parameter)
+        given = parameters or {}
+        if unknown := sorted(set(given) - set(known)):
+            raise TypeError(f"{cls.__name__} has no parameter `{unknown[0]}`")
+        for name, parameter in known.items():
+            setattr(made, name, parameter.value(given.get(name, parameter.default)))
+        for name, output in cls._members(Output).items():
+            setattr(made, name, output._tied(lambda message, robot, name=name: send(name, message, robot)))
+        made._warn = warn
+        made.context = context or Context()
+        made.__init__()
+        return made
+
+
+def stage(function: Callable[..., Any] | None = None, *, output: str = "out") -> Any:
+    """Makes a stage of a function: its first argument is the input, its result goes to the output, and its keyword arguments are
+    parameters.
+
+    The types of the argument and of the result are message types. A result of None sends nothing, and of a list each of its
+    messages. What is sent is about the robot that the input was about. A second argument is given the `About` of the message. The
+    function itself stays as it was.
+    """
+    if function is None:
+        return lambda function: stage(function, output=output)
+    arguments = list(inspect.signature(function).parameters.values())
+    hints = typing.get_type_hints(function)
+    positional = [argument for argument in arguments if argument.kind is argument.POSITIONAL_OR_KEYWORD]
+    keywords = [argument for argument in arguments if argument.kind is argument.KEYWORD_ONLY]
+    name = function.__name__
+    if not 1 <= len(positional) <= 2 or len(positional) + len(keywords) != len(arguments):
+        raise TypeError(f"{name} must have one input, an `about` if it likes, and parameters behind a `*`")
+    message = positional[0].name
+    if message not in hints or "return" not in hints:
+        raise TypeError(f"{name} must say the types of its input and of its result, such as (map: OccupancyGrid) -> Segments")
+    for keyword in keywords:
+        if keyword.default is keyword.empty:
+            raise TypeError(f"the parameter `{keyword.name}` of {name} has no default")
+
+    def on_message(self: Stage, received: Any, about: About) -> None:
+        values = {keyword.name: getattr(self, keyword.name) for keyword in keywords}
+        result = function(received, *[about][: len(positional) - 1], **values)
+        for sent in result if isinstance(result, list) else [result]:
+            if sent is not None:
+                getattr(self, output).send(sent, about.robot)
+
+    members = {keyword.name: Parameter(keyword.default) for keyword in keywords}
+    members |= {message: Input(hints[message]), output: Output(_sent_type(hints["return"])), f"on_{message}": on_message,
+                "__doc__": function.__doc__, "__module__": function.__module__}
+    function.__gridweave_stage__ = type(name, (Stage,), members)  # type: ignore[attr-defined]
+    return function
+
+
+def _sent_type(hint: Any) -> type:
+    """The message type of a result that may be None, or a list."""
+    given = [item for item in typing.get_args(hint) if item is not type(None)]
+    return _sent_type(given[0]) if given else hint
