@@ -67,23 +67,32 @@ impl fmt::Display for Range {
     }
 }
 
-/// The values of a table that are out of the ranges that its schema gives them.
+/// The values of a table that are out of the ranges that its schema gives them, each told once.
 pub(crate) fn out_of_range(schema: &Value, table: &toml::Table) -> Vec<ParameterError> {
     let properties = schema.get("properties").and_then(Value::as_object).into_iter().flatten();
     let wrong = properties.filter_map(|(field, schema)| {
-        let value = match table.get(field)? {
-            toml::Value::Float(value) => *value,
-            toml::Value::Integer(value) => *value as f64,
-            _ => return None,
-        };
-        let range = Range::of(schema);
-        let problem = match range.to_string() {
-            limits if !limits.is_empty() => format!("must be {limits}, not {value}"),
-            _ => format!("must be a finite number, not {value}"),
-        };
-        (!range.contains(value)).then(|| ParameterError::new(field, problem))
+        let problem = problem(schema, table.get(field)?)?;
+        Some(ParameterError::new(field, problem))
     });
     wrong.collect()
+}
+
+/// What is wrong with a number, or with the first of a list that is.
+fn problem(schema: &Value, value: &toml::Value) -> Option<String> {
+    let value = match value {
+        toml::Value::Float(value) => *value,
+        toml::Value::Integer(value) => *value as f64,
+        toml::Value::Array(items) => {
+            let schema = schema.get("items")?;
+            return items.iter().find_map(|item| problem(schema, item));
+        }
+        _ => return None,
+    };
+    let range = Range::of(schema);
+    (!range.contains(value)).then(|| match range.to_string() {
+        limits if limits.is_empty() => format!("must be a finite number, not {value}"),
+        limits => format!("must be {limits}, not {value}"),
+    })
 }
 
 #[cfg(test)]
@@ -116,6 +125,13 @@ mod tests {
         let number = json!({ "type": "number" });
         assert!(problems(&number, -1e300).is_empty());
         assert_eq!(problems(&number, f64::INFINITY), ["`a` must be a finite number, not inf"]);
+    }
+
+    #[test]
+    fn the_items_of_a_list_have_their_range() {
+        let sizes = json!({ "items": { "minimum": 0 } });
+        assert!(problems(&sizes, vec![0.0, 1.5]).is_empty());
+        assert_eq!(problems(&sizes, vec![1.0, -1.0, -2.0]), ["`a` must be at least 0, not -1"]);
     }
 
     #[test]
