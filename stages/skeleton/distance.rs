@@ -8,6 +8,8 @@ use rayon::prelude::*;
 const ROWS: usize = 32;
 /// Cells of a row whose distances are found together.
 const CHUNK: usize = 32;
+/// The greatest distance, in cells, whose square is less than [`i16::MAX`].
+const MOST_NARROW: u16 = 181;
 /// So many steps along the row are made before it is asked whether more are needed.
 const TOGETHER: usize = 4;
 
@@ -67,22 +69,37 @@ fn distances_along_columns(cells: &[u8], stride: usize) -> Vec<u16> {
     distances
 }
 
-/// Squared distances along columns of one row, as they are read while distances along the row are found.
+/// Squared distances along columns of one row, as they are read while distances along the row are found: with as many cells that
+/// are not free before the row and behind it as the row has, and [`CHUNK`] more behind it. Beyond the cells that bound a stretch of
+/// free ones, nothing is nearer than they.
 #[derive(Default)]
 struct Squares {
-    /// With as many cells that are not free before the row and behind it as the row has, and [`CHUNK`] more behind it: beyond the
-    /// cells that bound a stretch of free ones, nothing is nearer than they.
-    padded: Vec<f32>,
+    /// Cut at [`i16::MAX`]: twice as many are looked at together as of `wide`.
+    narrow: Vec<i16>,
+    /// As they are; empty where no distance of the row called for them.
+    wide: Vec<f32>,
 }
 
 impl Squares {
     fn fill(&mut self, along_columns: &[u16]) {
         let stride = along_columns.len();
-        self.padded.clear();
-        self.padded.resize(3 * stride + CHUNK, 0.0);
-        for (square, distance) in self.padded[stride..].iter_mut().zip(along_columns) {
-            *square = f32::from(*distance) * f32::from(*distance);
+        self.wide.clear();
+        self.narrow.clear();
+        self.narrow.resize(3 * stride + CHUNK, 0);
+        for (square, distance) in self.narrow[stride..].iter_mut().zip(along_columns) {
+            *square = (*distance).min(MOST_NARROW + 1).pow(2).min(i16::MAX.cast_unsigned()).cast_signed();
         }
+    }
+
+    fn wide(&mut self, along_columns: &[u16]) -> &[f32] {
+        let stride = along_columns.len();
+        if self.wide.is_empty() {
+            self.wide.resize(3 * stride + CHUNK, 0.0);
+            for (square, distance) in self.wide[stride..].iter_mut().zip(along_columns) {
+                *square = f32::from(*distance) * f32::from(*distance);
+            }
+        }
+        &self.wide
     }
 }
 
@@ -91,38 +108,64 @@ impl Squares {
 fn distances_of_row(along_columns: &[u16], distances: &mut [f32], squares: &mut Squares) {
     let stride = along_columns.len();
     squares.fill(along_columns);
-    let padded = &squares.padded;
     for (number, (into, along)) in distances.chunks_mut(CHUNK).zip(along_columns.chunks(CHUNK)).enumerate() {
         if along.iter().all(|distance| *distance == 0) {
             continue;
         }
         let first = stride + number * CHUNK;
-        let mut least = [0.0; CHUNK];
-        least.copy_from_slice(&padded[first..first + CHUNK]);
-        let mut most = greatest(&least);
-        let mut apart = 1;
-        while apart <= stride && ((apart * apart) as f32) < most {
-            for apart in apart..(apart + TOGETHER).min(stride + 1) {
-                let square = (apart * apart) as f32;
-                let (before, behind) = (&padded[first - apart..][..CHUNK], &padded[first + apart..][..CHUNK]);
-                for ((least, before), behind) in least.iter_mut().zip(before).zip(behind) {
-                    *least = lesser(*least, square + lesser(*before, *behind));
-                }
-            }
-            most = greatest(&least);
-            apart += TOGETHER;
-        }
-        for (distance, least) in into.iter_mut().zip(&least) {
-            *distance = least.sqrt();
+        let least = least_narrow(&squares.narrow, first, stride);
+        if least.contains(&i16::MAX) {
+            let least = least_wide(squares.wide(along_columns), first, stride);
+            into.iter_mut().zip(least).for_each(|(distance, least)| *distance = least.sqrt());
+        } else {
+            into.iter_mut().zip(least).for_each(|(distance, least)| *distance = f32::from(least).sqrt());
         }
     }
+}
+
+/// The least squares for the cells from `first` on; [`i16::MAX`] where it is that or more.
+fn least_narrow(squares: &[i16], first: usize, stride: usize) -> [i16; CHUNK] {
+    let mut least = [0; CHUNK];
+    least.copy_from_slice(&squares[first..first + CHUNK]);
+    let greatest = |least: &[i16; CHUNK]| least.iter().fold(0, |most, square| (*square).max(most));
+    let (mut most, mut apart) = (greatest(&least), 1);
+    let farthest = stride.min(usize::from(MOST_NARROW));
+    while apart <= farthest && apart * apart < usize::from(most.cast_unsigned()) {
+        for apart in apart..(apart + TOGETHER).min(farthest + 1) {
+            let square = (apart * apart) as i16;
+            let (before, behind) = (&squares[first - apart..][..CHUNK], &squares[first + apart..][..CHUNK]);
+            for ((least, before), behind) in least.iter_mut().zip(before).zip(behind) {
+                *least = (*least).min(square.saturating_add((*before).min(*behind)));
+            }
+        }
+        most = greatest(&least);
+        apart += TOGETHER;
+    }
+    least
+}
+
+/// The least squares for the cells from `first` on.
+fn least_wide(squares: &[f32], first: usize, stride: usize) -> [f32; CHUNK] {
+    let mut least = [0.0; CHUNK];
+    least.copy_from_slice(&squares[first..first + CHUNK]);
+    let greatest =
+        |least: &[f32; CHUNK]| least.iter().fold(0.0, |most: f32, square| if *square > most { *square } else { most });
+    let (mut most, mut apart) = (greatest(&least), 1);
+    while apart <= stride && ((apart * apart) as f32) < most {
+        for apart in apart..(apart + TOGETHER).min(stride + 1) {
+            let square = (apart * apart) as f32;
+            let (before, behind) = (&squares[first - apart..][..CHUNK], &squares[first + apart..][..CHUNK]);
+            for ((least, before), behind) in least.iter_mut().zip(before).zip(behind) {
+                *least = lesser(*least, square + lesser(*before, *behind));
+            }
+        }
+        most = greatest(&least);
+        apart += TOGETHER;
+    }
+    least
 }
 
 /// The lesser of two numbers, of which none is not a number: one instruction, many at a time.
 fn lesser(one: f32, other: f32) -> f32 {
     if one < other { one } else { other }
-}
-
-fn greatest(squares: &[f32; CHUNK]) -> f32 {
-    squares.iter().fold(0.0, |most, square| if *square > most { *square } else { most })
 }

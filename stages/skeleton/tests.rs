@@ -154,6 +154,17 @@ fn small_holes_are_filled_and_large_ones_stay() {
 }
 
 #[test]
+fn in_a_hall_wider_than_small_numbers_reach_distances_are_exact() {
+    let (width, height) = (500, 460);
+    let map = rooms(width, height, &[[0, 0, width, height]]);
+    let distances = DistanceMap::of(FreeSpace::of(&Grid::new(map.0, &map.1).unwrap(), 0.0).unwrap());
+    for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
+        let cells = (column + 1).min(width - column).min(row + 1).min(height - row);
+        assert_eq!(distances.distance(Cell { column, row }), cells as f64 * RESOLUTION, "({column}, {row})");
+    }
+}
+
+#[test]
 fn a_corridor_is_one_way_from_end_to_end() {
     let graph = graph(&rooms(220, 40, &[[10, 10, 210, 30]]), &SkeletonParameters::default());
     assert_eq!(graph.nodes.len(), 2);

@@ -10,6 +10,11 @@ const STEPS_PER_CELL: f32 = 4.0;
 /// distance is greater by 0.92 or more.
 const RIDGE_SLOPE: f32 = 0.55;
 
+/// Rows that are sorted together.
+const BAND: usize = 32;
+/// Cells of a row that are looked through together.
+const PIECE: usize = 16;
+
 /// A skeleton: lines one cell wide that hang together as the free space did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Skeleton {
@@ -34,59 +39,117 @@ impl Skeleton {
         if u32::try_from(window.cell_count()).is_err() {
             return Self { cells: vec![0; window.cell_count()], window, places: Vec::new() };
         }
-        let mut cells: Vec<u8> = distances.distances.iter().map(|distance| u8::from(*distance >= least)).collect();
-        let ridges = ridges(distances, least);
-        let is_ridge = |place: u32| ridges[place as usize] == 1;
+        let stride = window.stride;
+        let mut cells = vec![0; window.cell_count()];
+        let bands = cells.par_chunks_mut(stride * BAND).enumerate();
+        let sorted = |kinds: &mut Vec<u32>, (number, cells): (usize, &mut [u8])| {
+            Band::of(distances, least, number, cells, kinds)
+        };
+        let bands: Vec<Band> = bands.map_init(Vec::new, sorted).collect();
         let mut rest = Vec::new();
-        for place in by_distance(&distances.distances, &cells, &ridges) {
-            match is_removable(neighbourhood(&cells, place as usize, window.stride)) {
-                true => cells[place as usize] = 0,
-                false => rest.push(place),
+        let steps = bands.iter().map(|band| band.starts.len()).max().unwrap_or_default();
+        for place in (0..steps).flat_map(|step| bands.iter().flat_map(move |band| band.slopes_of(step))) {
+            match is_removable(neighbourhood(&cells, *place as usize, stride)) {
+                true => cells[*place as usize] = 0,
+                false => rest.push(*place),
             }
         }
-        rest.extend((0..cells.len() as u32).filter(|place| is_ridge(*place)));
-        thin_from_four_sides(&mut cells, rest, window.stride);
-        let places = (0..cells.len() as u32).filter(|place| cells[*place as usize] == 1).collect();
+        rest.extend(bands.iter().flat_map(|band| &band.ridges));
+        thin_from_four_sides(&mut cells, rest, stride);
+        // Most of a row is empty, and passed over as a whole.
+        let is_there = |place: &u32| cells[*place as usize] == 1;
+        let pieces = cells.chunks(PIECE).zip((0..).step_by(PIECE));
+        let places = pieces.filter(|(piece, _)| piece.iter().fold(0, |any, cell| any | cell) == 1);
+        let places = places.flat_map(|(piece, first)| (first..first + piece.len() as u32).filter(is_there)).collect();
         Self { window, cells, places }
     }
 }
 
-/// Which cells with a clearance of `least` lie on a ridge of the distances.
-fn ridges(distances: &DistanceMap, least: f32) -> Vec<u8> {
-    let (stride, all) = (distances.window.stride, &distances.distances);
-    let mut ridges = vec![0; all.len()];
-    let rows = ridges.par_chunks_mut(stride).enumerate().skip(1);
-    rows.filter(|(row, _)| (row + 2) * stride <= all.len()).for_each(|(row, ridges)| {
-        let row_of = |row: usize| &all[row * stride..(row + 1) * stride];
-        let (above, here, below) = (row_of(row - 1), row_of(row), row_of(row + 1));
-        for column in 1..stride - 1 {
-            let at = here[column];
-            let beside = above[column].max(below[column]).max(here[column - 1]).max(here[column + 1]);
-            let at_corners = above[column - 1].max(above[column + 1]).max(below[column - 1]).max(below[column + 1]);
-            let is_ridge = beside - at < RIDGE_SLOPE && at_corners - at < RIDGE_SLOPE * std::f32::consts::SQRT_2;
-            ridges[column] = u8::from(is_ridge & (at >= least));
-        }
-    });
-    ridges
+/// What there is to do in some rows of a window.
+struct Band {
+    /// The places of ridges, row by row.
+    ridges: Vec<u32>,
+    /// The places of all other cells that have the clearance, by steps of their distances, and row by row within a step.
+    slopes: Vec<u32>,
+    /// Where in `slopes` each step begins, and where the last ends.
+    starts: Vec<usize>,
 }
 
-/// The places of all cells that are no ridges, by rising distance and row by row.
-fn by_distance(distances: &[f32], cells: &[u8], ridges: &[u8]) -> Vec<u32> {
-    let step = |place: usize| (distances[place] * STEPS_PER_CELL) as usize;
-    let chosen = || (0..cells.len()).filter(|place| cells[*place] > ridges[*place]);
-    let most = distances.iter().fold(0.0f32, |most, distance| most.max(*distance));
-    let mut starts = vec![0usize; (most * STEPS_PER_CELL) as usize + 2];
-    chosen().for_each(|place| starts[step(place) + 1] += 1);
-    for number in 1..starts.len() {
-        starts[number] += starts[number - 1];
+/// A cell without the clearance.
+const NARROW: u32 = 0;
+/// A cell of a ridge. What is greater by more than a number of steps stands for a slope at so many.
+const RIDGE: u32 = 1;
+
+impl Band {
+    /// Sorts the cells of the rows from `number * BAND` on that have a clearance of `least`, and marks them in `cells`. The memory of
+    /// `kinds` is used again.
+    fn of(distances: &DistanceMap, least: f32, number: usize, cells: &mut [u8], kinds: &mut Vec<u32>) -> Self {
+        let (stride, all) = (distances.window.stride, &distances.distances);
+        kinds.clear();
+        kinds.resize(cells.len(), NARROW);
+        for (row, kinds) in (number * BAND..).zip(kinds.chunks_exact_mut(stride)) {
+            // The rim is never free.
+            if let Some(rows) = row.checked_sub(1).and_then(|above| all.get(above * stride..(row + 2) * stride)) {
+                tell_kinds(rows, least, kinds);
+            }
+        }
+        for (cell, kind) in cells.iter_mut().zip(&*kinds) {
+            *cell = u8::from(*kind != NARROW);
+        }
+        let steps = kinds.iter().fold(RIDGE, |most, kind| most.max(*kind)) as usize - RIDGE as usize;
+        // By kind at first: one place more than there are steps.
+        let mut counts = vec![0; steps + 2];
+        kinds.iter().filter(|kind| **kind != NARROW).for_each(|kind| counts[*kind as usize] += 1);
+        let mut ridges = Vec::with_capacity(counts[RIDGE as usize]);
+        let mut starts = vec![0; steps + 1];
+        for step in 0..steps {
+            starts[step + 1] = starts[step] + counts[step + 2];
+        }
+        let mut slopes = vec![0; starts[steps]];
+        let next = &mut counts;
+        next[2..].copy_from_slice(&starts[..steps]);
+        let first = (number * BAND * stride) as u32;
+        for (place, &kind) in (first..).zip(&*kinds).filter(|(_, kind)| **kind != NARROW) {
+            match kind {
+                RIDGE => ridges.push(place),
+                _ => {
+                    let next = &mut next[kind as usize];
+                    slopes[*next] = place;
+                    *next += 1;
+                }
+            }
+        }
+        Self { ridges, slopes, starts }
     }
-    let mut ordered = vec![0; starts.last().copied().unwrap_or_default()];
-    for place in chosen() {
-        let next = &mut starts[step(place)];
-        ordered[*next] = place as u32;
-        *next += 1;
+
+    /// The places of a step.
+    fn slopes_of(&self, step: usize) -> &[u32] {
+        match self.starts.get(step..step + 2) {
+            Some(&[start, end]) => &self.slopes[start..end],
+            _ => &[],
+        }
     }
-    ordered
+}
+
+/// Tells the kinds of the cells of the middle one of three rows of distances: [`NARROW`] with less clearance than `least`,
+/// [`RIDGE`], or beyond that a step of the distance.
+fn tell_kinds(rows: &[f32], least: f32, kinds: &mut [u32]) {
+    let (stride, inner) = (kinds.len(), kinds.len() - 2);
+    // The cells to the left of those within the rim, these, and those to the right.
+    let three = |row: usize| [0, 1, 2].map(|from| &rows[row * stride + from..][..inner]);
+    let ([above_left, above, above_right], [left, here, right], [below_left, below, below_right]) =
+        (three(0), three(1), three(2));
+    let greater = |one: f32, other: f32| if one > other { one } else { other };
+    for (column, kind) in kinds[1..].iter_mut().take(inner).enumerate() {
+        let at = here[column];
+        let beside = greater(greater(above[column], below[column]), greater(left[column], right[column]));
+        let at_corners =
+            greater(greater(above_left[column], above_right[column]), greater(below_left[column], below_right[column]));
+        let is_ridge = (beside - at < RIDGE_SLOPE) & (at_corners - at < RIDGE_SLOPE * std::f32::consts::SQRT_2);
+        let slope = RIDGE + 1 + (at * STEPS_PER_CELL) as u32;
+        let with_clearance = if is_ridge { RIDGE } else { slope };
+        *kind = if at >= least { with_clearance } else { NARROW };
+    }
 }
 
 /// Takes away of `rest` all that can be but the ends of lines.
@@ -112,19 +175,15 @@ fn thin_from_four_sides(cells: &mut [u8], mut rest: Vec<u32>, stride: usize) {
     }
 }
 
-/// Which of the eight neighbours of a cell are there: a bit each, row by row.
+/// Which of the eight neighbours of a cell are there: a bit each, column by column.
 pub(super) fn neighbourhood(cells: &[u8], place: usize, stride: usize) -> u8 {
-    let above = &cells[place - stride - 1..place - stride + 2];
-    let here = &cells[place - 1..place + 2];
-    let below = &cells[place + stride - 1..place + stride + 2];
-    above[0]
-        | above[1] << 1
-        | above[2] << 2
-        | here[0] << 3
-        | here[2] << 4
-        | below[0] << 5
-        | below[1] << 6
-        | below[2] << 7
+    // Three cells of a row, in the lowest bits of three bytes. What reaches beyond the last cell is the rim, where nothing is.
+    let three = |place: usize| match cells.get(place - 1..place + 3) {
+        Some(&[before, at, behind, _]) => u32::from_le_bytes([before, at, behind, 0]),
+        _ => 0,
+    };
+    let nine = three(place - stride) | three(place) << 1 | three(place + stride) << 2;
+    (nine & 0b111 | nine >> 5 & 0b1000 | nine >> 6 & 0b1_0000 | nine >> 11 & 0b1110_0000) as u8
 }
 
 /// Whether all hangs together as before without a cell that has these neighbours.
@@ -146,7 +205,7 @@ const REMOVABLE: [bool; 256] = {
 /// for one that stands alone or is surrounded, 1 for one that can be taken away, more for one that ties pieces together.
 const fn connectivity_number(neighbours: usize) -> usize {
     // The bits of the eight neighbours on the way round the cell, from the right one.
-    const ROUND: [usize; 8] = [4, 2, 1, 0, 3, 5, 6, 7];
+    const ROUND: [usize; 8] = [6, 5, 3, 0, 1, 2, 4, 7];
     let mut number = 0;
     let mut side = 0;
     while side < 8 {
