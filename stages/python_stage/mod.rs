@@ -9,13 +9,13 @@ mod describe;
 use gridweave_runtime::program::{self, Interface, Launch};
 use gridweave_runtime::stage::{Asked, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// What every stage in Python has beside the parameters of its own.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PythonParameters {
     /// What has the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a module that

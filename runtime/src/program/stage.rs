@@ -6,11 +6,11 @@ use super::{Interface, Launch};
 use crate::message::{Message, MessageHeader};
 use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Parameters, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 /// Parameters as they are given: the schema of the program says what they may be.
-#[derive(Default, Deserialize, JsonSchema)]
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 struct Given(Map<String, Value>);
 
