@@ -43,8 +43,8 @@ pub fn kind() -> StageKind {
         "elastic_refiner",
         "Bends the maps of all placed robots, so that walls that several have seen lie on each other. What is sent for each \
          robot is a lattice of small displacements and turns with their covariances, and how sharp its walls come out; the rigid frames stay as they are. The \
-         bends are estimated when other robots are placed, when a frame has changed by more than `min_move` or `min_turn`, \
-         and at the end if anything has changed since.",
+         bends are estimated when other robots are placed, when a frame has changed by more than `min_move` or `min_turn` or a map has grown by more \
+         than `min_growth`, and at the end if anything has changed since.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)

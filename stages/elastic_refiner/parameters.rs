@@ -33,6 +33,9 @@ pub struct ElasticRefinerParameters {
     /// Radians. The same when a frame has turned by more than this.
     #[schemars(range(min = 0.0))]
     pub min_turn: f64,
+    /// The same when a map covers more than before by this share.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub min_growth: f64,
 }
 
 impl Default for ElasticRefinerParameters {
@@ -46,6 +49,7 @@ impl Default for ElasticRefinerParameters {
             reach: 2.0,
             min_move: 0.1,
             min_turn: 0.01,
+            min_growth: 0.25,
         }
     }
 }

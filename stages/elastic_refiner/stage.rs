@@ -1,8 +1,9 @@
 //! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
 
 use super::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
+use crate::deformation::Lattice;
 use crate::geometry::row_by_row;
-use crate::robot_maps::RobotMaps;
+use crate::robot_maps::{RobotMap, RobotMaps};
 use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
 use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames, Sharpness};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
@@ -31,10 +32,21 @@ pub(super) struct ElasticRefiner {
     parameters: ElasticRefinerParameters,
     maps: RobotMaps<WallsOnDemand>,
     frames: RobotFrames,
-    /// The frames in which the maps were bent last, and the numbers of these maps.
-    bent: (RobotFrames, BTreeMap<String, u64>),
+    /// The frames in which the maps were bent last.
+    bent_frames: RobotFrames,
+    /// The maps that were bent last, by robot.
+    bent_maps: BTreeMap<String, BentMap>,
     /// Whether any bend was sent.
     has_sent: bool,
+}
+
+/// A map as it was when it was bent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct BentMap {
+    /// Which of its robot's maps it was.
+    number: u64,
+    /// How many nodes its lattice had.
+    nodes: usize,
 }
 
 impl ElasticRefiner {
@@ -43,12 +55,13 @@ impl ElasticRefiner {
             parameters,
             maps: RobotMaps::default(),
             frames: RobotFrames::default(),
-            bent: Default::default(),
+            bent_frames: RobotFrames::default(),
+            bent_maps: BTreeMap::new(),
             has_sent: false,
         }
     }
 
-    /// Maps wait for frames, or for the end: a map that has grown is bent as the last one was until then.
+    /// Maps wait for frames, or for the end: a map that has grown a little is bent as the last one was until then.
     pub(super) fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
@@ -69,30 +82,45 @@ impl ElasticRefiner {
     }
 
     pub(super) fn finish(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
-        let is_bent = (&self.frames.frames, &self.numbers()) == (&self.bent.0.frames, &self.bent.1);
+        let numbers = self.bent_maps.iter().map(|(robot, map)| (robot, map.number));
+        let is_bent = self.frames.frames == self.bent_frames.frames
+            && self.placed().map(|(robot, map)| (robot, map.number)).eq(numbers);
         if is_bent { Ok(()) } else { self.bend(output) }
     }
 
-    /// Whether the robots are about where they were when their maps were bent.
+    /// Whether the robots are about where they were when their maps were bent, and know about as much.
     fn is_near(&self) -> bool {
-        let (before, after) = (&self.bent.0, &self.frames);
+        let (before, after) = (&self.bent_frames, &self.frames);
         let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
         let mut pairs = before.frames.iter().zip(&after.frames);
-        let robots = self.numbers();
         before.reference == after.reference
             && before.frames.len() == after.frames.len()
-            && robots.keys().eq(self.bent.1.keys())
+            && self.placed().map(|(robot, _)| robot).eq(self.bent_maps.keys())
             && pairs.all(|(one, next)| one.is_near(next, min_move, min_turn))
+            && self.placed().zip(self.bent_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
     }
 
-    /// The maps of the placed robots, by their numbers.
-    fn numbers(&self) -> BTreeMap<String, u64> {
-        let placed = self.frames.frames.iter().map(|frame| &frame.robot);
-        placed.filter_map(|robot| Some((robot.clone(), self.maps.get(robot)?.number))).collect()
+    /// Whether a map knows so much that it did not when it was bent that it is to be bent again.
+    fn has_grown(&self, before: &BentMap, map: &RobotMap<WallsOnDemand>) -> bool {
+        let ElasticRefinerParameters { min_growth, spacing, .. } = self.parameters;
+        let most = before.nodes as f64 * (1.0 + min_growth);
+        map.number != before.number && Lattice::over(&map.grid(), spacing).len() as f64 > most
+    }
+
+    /// The maps of the placed robots, by their names.
+    fn placed(&self) -> impl Iterator<Item = (&String, &RobotMap<WallsOnDemand>)> {
+        let placed: BTreeMap<&String, &RobotMap<WallsOnDemand>> =
+            self.frames.frames.iter().filter_map(|frame| Some((&frame.robot, self.maps.get(&frame.robot)?))).collect();
+        placed.into_iter()
     }
 
     fn bend(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
-        self.bent = (self.frames.clone(), self.numbers());
+        self.bent_frames = self.frames.clone();
+        let spacing = self.parameters.spacing;
+        let of_map = |(robot, map): (&String, &RobotMap<WallsOnDemand>)| {
+            (robot.clone(), BentMap { number: map.number, nodes: Lattice::over(&map.grid(), spacing).len() })
+        };
+        self.bent_maps = self.placed().map(of_map).collect();
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
         // What is alone is not bent, which is news if it was.

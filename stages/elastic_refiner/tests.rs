@@ -202,6 +202,23 @@ fn frames_that_change_little_go_through_and_are_bent_anew_at_the_end() {
 }
 
 #[test]
+fn maps_that_have_grown_are_bent_anew_when_frames_come() {
+    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let width = map.info().width as usize;
+    let of_half = |(index, cell): (usize, &i8)| if index % width < width / 2 { *cell } else { UNKNOWN };
+    let half: Vec<i8> = map.cells.iter().enumerate().map(of_half).collect();
+    for (parameters, bends) in [("", 2), ("min_growth = 10.0", 0)] {
+        let (mut stage, map, frames) = stage(parameters, &half);
+        stage.take::<MapDeformation>("deformation").unwrap();
+        let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
+        let message = OccupancyGrid { info: map.info(), data: &data, ..Default::default() };
+        stage.give::<OccupancyGrid<'_>>("map", "robot2", LogTime(3), &message).unwrap();
+        stage.give::<RobotFrames>("frames", "", LogTime(4), &frames).unwrap();
+        assert_eq!(stage.take::<MapDeformation>("deformation").unwrap().len(), bends, "{parameters}");
+    }
+}
+
+#[test]
 fn a_stage_that_is_not_enabled_passes_the_frames_on_and_nothing_else() {
     let (mut stage, map, frames) = stage("enabled = false", &[UNKNOWN; 0]);
     drop(map);

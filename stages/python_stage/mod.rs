@@ -137,7 +137,7 @@ mod tests {
         assert_eq!(again.parameters, asked.parameters);
         let wrong = |text: &str| asked.kind.check_parameters(&text.parse().unwrap());
         assert!(wrong("level = \"a\"").is_err());
-        assert_eq!(wrong("level = -1").unwrap()[0].to_string(), "`level` must be 0 or more");
+        assert_eq!(wrong("level = -1").unwrap()[0].to_string(), "`level` must be at least 0, not -1");
         assert_eq!(wrong("level = 2\nmodule = \"a.py\"").unwrap(), []);
     }
 
