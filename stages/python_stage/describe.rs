@@ -1,15 +1,21 @@
 //! Asks a module in Python what its stage is.
 
+use super::INTERPRETER;
 use gridweave_runtime::stage::ParameterError;
+use std::ffi::OsStr;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// What a module says of its stage, in JSON. The module is imported for that.
-pub(super) fn describe(python: &str, module: &str) -> Result<String, ParameterError> {
+pub(super) fn describe(python: &OsStr, module: &str) -> Result<String, ParameterError> {
     let mut command = Command::new(python);
     command.args(["-m", "gridweave.describe", module]).stdin(Stdio::null());
-    let ended = command
-        .output()
-        .map_err(|error| ParameterError::new("python", format!("cannot be started: `{python}`: {error}")))?;
+    let shown = Path::new(python).display();
+    let ended = command.output().map_err(|error| {
+        let problem =
+            format!("needs an interpreter, and `{shown}` cannot be started: {error}; name one in {INTERPRETER}");
+        ParameterError::new("module", problem)
+    })?;
     let errors = String::from_utf8_lossy(&ended.stderr);
     if ended.status.success() {
         return String::from_utf8(ended.stdout)
@@ -18,10 +24,10 @@ pub(super) fn describe(python: &str, module: &str) -> Result<String, ParameterEr
     let is_missing = |name: &str| errors.contains(&format!("No module named {name}"));
     if is_missing("gridweave") || is_missing("'gridweave'") {
         let help = format!(
-            "has no package `gridweave` (`{python}`): install it there by `pip install stages/python`, or name in `python` \
-             the interpreter that has it"
+            "needs the package `gridweave`, which `{shown}` does not have: install it there by `pip install stages/python`, or \
+             name in {INTERPRETER} the interpreter that has it"
         );
-        return Err(ParameterError::new("python", help));
+        return Err(ParameterError::new("module", help));
     }
     let last = errors.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing");
     Err(ParameterError::new("module", format!("cannot be asked for its stage: {last}\n{}", errors.trim_end())))

@@ -21,8 +21,6 @@ struct PythonParameters {
     /// What has the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a module that
     /// Python can import such as `my_stages.lines`; with `:NAME` behind it where it has several.
     module: String,
-    /// The interpreter: a name to be looked for in PATH, or a path. `python3` if left out, which is that of an active environment.
-    python: Option<String>,
     /// What the module says of its ports and parameters, in JSON. It is asked for when left out, which is what you want.
     interface: Option<String>,
 }
@@ -30,7 +28,11 @@ struct PythonParameters {
 impl Parameters for PythonParameters {}
 
 /// Those of a parameter's name that every stage in Python has.
-const OWN: [&str; 3] = ["module", "python", "interface"];
+const OWN: [&str; 2] = ["module", "interface"];
+
+/// The variable of the environment that names the interpreter, where it is not the `python3` of PATH. A pipeline file cannot: it may
+/// come from anywhere.
+const INTERPRETER: &str = "GRIDWEAVE_PYTHON";
 
 /// `python`: what the module that it names says.
 pub fn kind() -> StageKind {
@@ -42,15 +44,13 @@ pub fn kind() -> StageKind {
     )
 }
 
-/// By interpreter, module and given interface: the kinds that were asked for, each with its interface.
-static ASKED: Mutex<BTreeMap<[String; 3], (&'static StageKind, String)>> = Mutex::new(BTreeMap::new());
+/// By module and given interface: the kinds that were asked for, each with its interface.
+static ASKED: Mutex<BTreeMap<[String; 2], (&'static StageKind, String)>> = Mutex::new(BTreeMap::new());
 
 fn ask(given: &toml::Table, folder: &Path) -> Result<Asked, ParameterError> {
     let module = text(given, "module")?.filter(|module| !module.is_empty());
     let module =
         module.ok_or_else(|| ParameterError::new("module", "must say what has the stage, such as \"lines.py\""))?;
-    let python = text(given, "python")?.unwrap_or("python3");
-    let python = if python.contains('/') { absolute(folder, python)? } else { python.to_owned() };
     // The same wherever it is run from.
     let shown = module.rsplit_once('/').map_or(module, |(_, file)| file);
     let module = match file_of(module) {
@@ -58,22 +58,23 @@ fn ask(given: &toml::Table, folder: &Path) -> Result<Asked, ParameterError> {
         None => module.to_owned(),
     };
     let told = text(given, "interface")?;
-    let key = [python.clone(), module.clone(), told.unwrap_or_default().to_owned()];
+    let key = [module.clone(), told.unwrap_or_default().to_owned()];
     // What a thread that has panicked has asked for is right all the same.
     let mut asked = ASKED.lock().unwrap_or_else(PoisonError::into_inner);
     let (kind, interface) = match asked.get(&key) {
         Some(known) => known.clone(),
         None => {
+            let python = std::env::var_os(INTERPRETER).filter(|python| !python.is_empty()).unwrap_or("python3".into());
             let said = told.map_or_else(|| describe::describe(&python, &module), |told| Ok(told.to_owned()))?;
             let interface = read(&said)?;
             let arguments = ["-m", "gridweave.run", &module].map(Into::into).to_vec();
-            let launch = Launch { program: PathBuf::from(&python), arguments };
+            let launch = Launch { program: PathBuf::from(python), arguments };
             let kind = program::kind_of("python", shown, interface, launch);
             asked.insert(key, (kind, said.clone()));
             (kind, said)
         }
     };
-    let parameters = [("module", module), ("python", python), ("interface", interface)];
+    let parameters = [("module", module), ("interface", interface)];
     Ok(Asked { kind, parameters: parameters.map(|(key, value)| (key.to_owned(), value.into())).into_iter().collect() })
 }
 
@@ -147,7 +148,6 @@ mod tests {
         let problem = |text: &str| ask(&text.parse().unwrap(), empty).unwrap_err().to_string();
         assert!(problem("").contains("`module` must say what has the stage"));
         assert!(problem("module = 1").contains("`module` must be a text"));
-        assert!(problem("module = \"a.py\"\npython = \"/nonexistent/python\"").contains("`python` cannot be started"));
         assert!(problem("module = \"a.py\"\ninterface = \"{}\"").contains("says of its stage what none can be"));
     }
 }

@@ -112,7 +112,7 @@ impl Program {
         }
         let (port, wire) = (port as u32, wire as u32);
         let header = CallHeader { version: CALL_VERSION, what: what as u32, port, wire, message: *message };
-        let result = self.tell(header, bytes).map_err(CallError::Link).and_then(|()| self.hear(take));
+        let result = self.tell(header, bytes).map_err(CallError::from).and_then(|()| self.hear(take));
         self.is_alive = result.is_ok();
         result
     }
@@ -175,10 +175,22 @@ pub(super) enum CallError {
     /// The memory between them fails.
     #[error("{0}")]
     Link(LinkError),
+    /// There is none for what is to be said.
+    #[error("there is no room left in /dev/shm, which it needs on every engine; make room there")]
+    Full,
     /// It does not keep to the protocol.
     #[error("it rings without saying anything that is known")]
     Words,
     /// What it says cannot be passed on.
     #[error("{0}")]
     Stage(StageError),
+}
+
+impl From<LinkError> for CallError {
+    fn from(error: LinkError) -> Self {
+        match error {
+            LinkError::Full { .. } => Self::Full,
+            other => Self::Link(other),
+        }
+    }
 }

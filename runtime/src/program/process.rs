@@ -8,10 +8,12 @@ use std::ffi::OsString;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// So long is waited at a time. What is counted is how often, so that time in which this process was halted does not count.
+/// So long is waited at a time.
 const LOOK: Duration = Duration::from_millis(100);
+/// What counts of such a wait at the most: a process that has been away for longer was halted, and so was its program.
+const HALT: Duration = Duration::from_secs(1);
 /// So long a program may take to exit that has been told to.
 const EXIT_TIME: Duration = Duration::from_secs(5);
 /// So long a program may take to say where it hangs.
@@ -76,10 +78,11 @@ impl Process {
     pub(super) fn wait(&mut self, longest: Option<Duration>) -> Result<u8, Lost> {
         let mut waited = Duration::ZERO;
         while self.heard.is_empty() {
+            let start = Instant::now();
             if self.listen(LOOK)? {
                 continue;
             }
-            waited += LOOK;
+            waited += start.elapsed().min(HALT);
             if let Some(longest) = longest.filter(|longest| waited >= *longest) {
                 self.end_hung();
                 return Err(Lost::Hung { seconds: longest.as_secs_f64() });

@@ -26,6 +26,13 @@ class MessageTest(unittest.TestCase):
                 encoded = msg.encode(made)
                 self.assertEqual(msg.encode(msg.decode(message_class, memoryview(encoded))), encoded)
 
+    def test_a_message_is_the_same_bytes_whatever_was_in_the_memory_that_it_is_written_to(self):
+        for name, message_class in msg._STORE.types.items():
+            with self.subTest(name):
+                dirty = bytearray(b"\xff" * msg.size(message_class()))
+                msg.encode_into(message_class(), memoryview(dirty))
+                self.assertEqual(bytes(dirty), msg.encode(message_class()))
+
     def test_cells_are_a_view_of_the_bytes_and_cannot_be_written(self):
         encoded = msg.encode(grid(np.arange(5)))
         data = msg.decode(OccupancyGrid, memoryview(encoded)).data

@@ -14,7 +14,7 @@ class Troubled(Stage):
     pose = Input(PoseWithCovarianceStamped, "the robots' poses")
     map = Input(OccupancyGrid, "the robots' maps")
     seen = Output(PoseStamped, "how many poses and maps have come, as a position")
-    what = Parameter("nothing", "what it does", choices=("nothing", "raise", "exit", "kill", "segfault", "hang"))
+    what = Parameter("nothing", "what it does", choices=("nothing", "raise", "exit", "kill", "segfault", "hang", "eat"))
     at = Parameter(3, "with which map", minimum=1)
 
     def __init__(self):
@@ -48,6 +48,11 @@ class Troubled(Stage):
 
     def do_segfault(self):
         os.kill(os.getpid(), signal.SIGSEGV)
+
+    def do_eat(self):
+        eaten = [bytes([1]) * (64 << 20) for _ in range(16)]
+        self.do_hang()
+        del eaten
 
     def do_hang(self):
         while True:

@@ -142,6 +142,8 @@ def size(message: Any) -> int:
 
 def encode_into(message: Any, data: memoryview) -> None:
     """Writes a message into memory of its `size`."""
+    # What lies between the fields is not written, and must not be what was there before.
+    np.frombuffer(data, np.uint8).fill(0)
     data[:4] = b"\x00\x01\x00\x00"
     written = _STORE.get_msgdef(ros_type(type(message))).serialize_cdr_le(data[4:], 0, message, _STORE)
     assert written + 4 == len(data)
