@@ -192,7 +192,7 @@ impl Python {
             (
                 "inputs = [\"log.map\", \"log.pose\"]",
                 "at = 0\ninputs = [\"log.map\", \"log.pose\"]",
-                "must be 1 or more",
+                "must be at least 1",
             ),
             ("inputs = [\"log.map\"]", "inputs = [\"log.pose\"]", "nav_msgs/msg/OccupancyGrid"),
             ("module = \"invert.py\"", "module = \"invert.py\"\npython = \"/bin/sh\"", "unknown parameter `python`"),
