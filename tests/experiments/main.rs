@@ -10,7 +10,9 @@
 mod align;
 mod cut;
 mod direction;
+mod edges;
 mod few_tags;
+mod hough;
 mod localization;
 mod log;
 mod methods;
@@ -51,6 +53,10 @@ enum Experiment {
     Align(align::AlignArgs),
     /// The energy of the Radon transform over the angle, of the maps of a log (Saeedi et al., "Group mapping").
     Radon(radon::RadonArgs),
+    /// The Hough spectra of the maps of a log (Carpin, "Fast and accurate map merging").
+    Hough(hough::HoughArgs),
+    /// Which edges of the Voronoi diagrams of two maps tell the translation (Saeedi et al., "Group mapping").
+    Edges(edges::EdgesArgs),
     /// How often a merge succeeds as tags, odometry and overlap get worse.
     Noise(noise::NoiseArgs),
 }
@@ -66,6 +72,8 @@ fn main() -> Result<()> {
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::Align(args) => align::run(args, &registry, &mut results),
         Experiment::Radon(args) => radon::run(args, &mut results),
+        Experiment::Hough(args) => hough::run(args, &mut results),
+        Experiment::Edges(args) => edges::run(args, &mut results),
         Experiment::Noise(args) => noise::run(args, &registry, &mut results),
     }?;
     results.say_where();
