@@ -52,6 +52,7 @@ pub const PIPELINES: &[Shipped] = &[
     shipped!("tag_merge", "merge by tags, directions and ICP, confirmed by the maps: Tsardoulias et al., method 3"),
     shipped!("tag_only", "merge as Tsardoulias et al., method 1: tags alone (to compare)"),
     shipped!("topological", "merge as Wang et al.: topological maps (to compare)"),
+    shipped!("topology_file_merge", "lay topological maps that were drawn by hand on each other (JSON)"),
 ];
 
 /// The pipeline that ships under a name.

@@ -19,9 +19,10 @@ pub fn kind() -> StageKind {
          first two are merged, and stays so.",
         |parameters, context| Ok(FrameSolver::new(parameters, context)),
     )
-    .input(
+    .optional_input(
         "map",
-        "the robots' maps: says which robots there are, and how their map frames are called",
+        "the robots' maps: says which robots there are, and how their map frames are called; without it there are those that \
+         alignments name",
         FrameSolver::receive_map,
     )
     .input("alignment", "alignments of pairs, accepted and refused ones", FrameSolver::receive_alignment)

@@ -39,6 +39,7 @@ mod report;
 mod support;
 mod tags_as_they_come;
 mod telling;
+mod topological;
 mod torture;
 mod two_tags;
 mod user_knowledge;

@@ -27,7 +27,7 @@ pub(crate) struct ConvertArgs {
 
 /// Writes logs as one MCAP file.
 pub(crate) fn convert(args: &ConvertArgs, registry: &Registry) -> Result<Status> {
-    if Inputs::of(&args.inputs)? == Inputs::MapFiles || is_yaml(&args.output) {
+    if Inputs::of_maps_or_logs(&args.inputs, "convert")? == Inputs::MapFiles || is_yaml(&args.output) {
         let text = "`convert` reads logs and writes an MCAP file; map files are merged: `gridweave merge A.yaml B.yaml -o OUT`";
         return Err(BadUse(text.to_owned()).into());
     }

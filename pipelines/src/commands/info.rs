@@ -38,7 +38,7 @@ pub(crate) struct InfoArgs {
 
 /// Shows what is in logs, or in map files.
 pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
-    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+    if Inputs::of_maps_or_logs(&args.inputs, "info")? == Inputs::MapFiles {
         let maps = map_file_info::inspect(&args.inputs)?;
         match args.json {
             true => print_line(serde_json::to_string_pretty(&maps)?),

@@ -29,6 +29,7 @@ pub(crate) struct MergeArgs {
 /// Merges the maps of logs or of map files.
 pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
     let pipeline = match Inputs::of(&args.inputs)? {
+        Inputs::TopologyFiles => "topology_file_merge",
         Inputs::Logs if holds_tags_alone(args)? => "tag_frames",
         Inputs::Logs => "auto_merge",
         Inputs::MapFiles => "map_file_merge",

@@ -1,4 +1,4 @@
-//! What the files on a command line are: logs, or map files.
+//! What the files on a command line are: logs, map files, or topological maps.
 
 use crate::status::BadUse;
 use gridweave_logs::names::Input;
@@ -11,16 +11,28 @@ pub(crate) enum Inputs {
     Logs,
     /// YAML files of nav2's map server.
     MapFiles,
+    /// JSON files of topological maps.
+    TopologyFiles,
 }
 
 impl Inputs {
-    /// Tells by the names of the files. An error if there are images of maps.
+    /// Tells by the names of the files. An error if there are images of maps, or JSON files beside others.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
         if let Some(image) =
             paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm", "bmp", "jpg", "jpeg"]))
         {
             let text = format!("{} is an image: give the YAML file that describes the map", image.display());
             return Err(BadUse(text));
+        }
+        if let Some(topology) = paths.iter().find(|path| is_topology(path)) {
+            return match paths.iter().find(|path| !is_topology(path)) {
+                None => Ok(Self::TopologyFiles),
+                Some(other) => Err(BadUse(format!(
+                    "{} is a topological map, and {} is none: what reads the one does not read the other",
+                    topology.display(),
+                    other.display()
+                ))),
+            };
         }
         // A rosbag2 folder may have any name; and a map that is said to be a robot's is read as a log of it.
         let is_map_file = |typed: &PathBuf| {
@@ -38,6 +50,20 @@ impl Inputs {
         match self {
             Self::Logs => "mcap_source",
             Self::MapFiles => "map_file_source",
+            Self::TopologyFiles => "topology_file_source",
+        }
+    }
+
+    /// The same for a command that does nothing with topological maps.
+    ///
+    /// # Errors
+    /// That is what the files are.
+    pub(crate) fn of_maps_or_logs(paths: &[PathBuf], command: &str) -> Result<Self, BadUse> {
+        match Self::of(paths)? {
+            Self::TopologyFiles => Err(BadUse(format!(
+                "`{command}` reads no topological maps: `gridweave run topology_file_merge` lays those of JSON files on each other"
+            ))),
+            inputs => Ok(inputs),
         }
     }
 }
@@ -45,6 +71,11 @@ impl Inputs {
 /// Whether a file is called as the YAML file of a map.
 pub(crate) fn is_yaml(path: &Path) -> bool {
     has_ending(path, &["yaml", "yml"])
+}
+
+/// Whether a file is called as a topological map. A rosbag2 folder may have any name.
+fn is_topology(path: &Path) -> bool {
+    has_ending(path, &["json"]) && !path.is_dir()
 }
 
 fn has_ending(path: &Path, endings: &[&str]) -> bool {
@@ -63,6 +94,8 @@ mod tests {
     fn inputs_are_told_by_their_names() {
         assert_eq!(of(&["a.mcap", "bag"]), Ok(Inputs::Logs));
         assert_eq!(of(&["a.yaml", "b.YML"]), Ok(Inputs::MapFiles));
+        assert_eq!(of(&["a.json", "b.JSON"]), Ok(Inputs::TopologyFiles));
+        assert!(of(&["a.json", "b.mcap"]).unwrap_err().contains("a.json is a topological map, and b.mcap is none"));
         let folder = tempfile::tempdir().unwrap();
         let bag = folder.path().join("bag.yaml");
         std::fs::create_dir(&bag).unwrap();

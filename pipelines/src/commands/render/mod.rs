@@ -89,7 +89,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<Status> {
 }
 
 fn read(args: &RenderArgs) -> Result<MergeState> {
-    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+    if Inputs::of_maps_or_logs(&args.inputs, "render")? == Inputs::MapFiles {
         return map_files(&args.inputs);
     }
     let mut opened = Opened::new(&args.inputs, &args.names)?;

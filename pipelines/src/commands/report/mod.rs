@@ -47,7 +47,7 @@ const LIMITS: [Limits; 5] = [
 
 /// Writes the page.
 pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
-    if Inputs::of(&args.inputs)? == Inputs::MapFiles {
+    if Inputs::of_maps_or_logs(&args.inputs, "report")? == Inputs::MapFiles {
         let text = "`report` reads logs: `gridweave merge A.yaml B.yaml -o OUT.mcap` makes one of map files, and `gridweave render` \
                     draws them";
         return Err(BadUse(text.to_owned()).into());
