@@ -1,7 +1,7 @@
 //! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
 //! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `log_odds`, `placement`, `robot_maps`, `robot_pair` and
-//! `skeleton`.
+//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `log_odds`, `placement`, `robot_maps`, `robot_pair`,
+//! `scan_grid` and `skeleton`.
 
 #![forbid(unsafe_code)]
 
@@ -35,6 +35,8 @@ pub mod radon_aligner;
 pub mod random_walk_aligner;
 pub mod robot_maps;
 pub mod robot_pair;
+pub mod scan_grid;
+pub mod scan_mapper;
 pub mod simulator;
 pub mod skeleton;
 pub mod tag_filter;
@@ -71,6 +73,7 @@ pub fn kinds() -> Vec<StageKind> {
         quadrant_classifier::kind(),
         radon_aligner::kind(),
         random_walk_aligner::kind(),
+        scan_mapper::kind(),
         simulator::kind(),
         tag_filter::kind(),
         tag_localizer::kind(),

@@ -55,6 +55,7 @@ definitions![
         "MapAgreement",
         "MapDeformation",
         "MapDirection",
+        "RangeScan",
         "RobotFrame",
         "RobotFrames",
         "RobotGroup",

@@ -43,6 +43,10 @@ pub const PIPELINES: &[Shipped] = &[
     shipped!("map_files_to_log", "write map files as a log that the other pipelines read"),
     shipped!("map_merge", "merge by the maps alone"),
     shipped!("random_walk", "merge as Birk and Carpin 2006: random walks (to compare)"),
+    shipped!(
+        "scan_merge",
+        "merge where maps must be drawn from scans first (what `gridweave merge` runs where robots have scans and no map)"
+    ),
     shipped!("simulate", "simulate robots in a building (what `gridweave simulate` runs)"),
     shipped!("tag_direction", "merge as Tsardoulias et al., method 2: tags and the direction of walls (to compare)"),
     shipped!(

@@ -30,7 +30,7 @@ pub fn kind() -> StageKind {
          not look at those that lie between.",
         |parameters: MapSelectorParameters, _| Ok(MapSelector::new(parameters)),
     )
-    .input("map", "The robots' maps.", MapSelector::receive_map)
+    .inputs("map", "The robots' maps.", MapSelector::receive_map)
     .finish(MapSelector::finish)
     .build()
 }

@@ -35,7 +35,7 @@ pub fn kind() -> StageKind {
          frames or bends change, and at the end if any robot has moved since.",
         |parameters: PathPlacerParameters, _: &Context| Ok(PathPlacer { parameters, ..PathPlacer::default() }),
     )
-    .input("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
+    .inputs("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
     .optional_input("deformation", "how the maps are bent", PathPlacer::receive_deformation)
     .input("frames", "where the maps lie", PathPlacer::receive_frames)
     .finish(PathPlacer::finish)

@@ -7,11 +7,11 @@
 //! (noise of ranges), there is furniture at odd angles, and single cells are occupied where nothing stands.
 
 use super::floor_plan::{BuildingSize, FloorPlan};
-use super::mapper::SnapshotMap;
 use super::room::WALL;
 use super::scanned_map::{ScanSettings, scan_building};
 use super::shape::{Rectangle, Solid, between};
 use crate::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use crate::scan_grid::SnapshotMap;
 use nalgebra::Vector2;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -35,15 +35,20 @@ pub(super) struct Beam {
 }
 
 impl Lidar {
+    /// The direction of the first beam from the robot's heading, radians.
+    pub(super) fn first_angle(&self) -> f64 {
+        match self.field_of_view < TAU {
+            true => 0.5 * self.field_of_view * (1.0 / self.beams as f64 - 1.0),
+            false => 0.0,
+        }
+    }
+
     /// Scans the true world from a pose in the building; puts the beams that return into `beams`.
     pub(super) fn scan(&self, world: &RayCaster, pose: &Pose2, random: &mut impl Rng, beams: &mut Vec<Beam>) {
         beams.clear();
         let origin = Point2::from(pose.translation.vector);
         let heading = pose.rotation.angle();
-        let first = match self.field_of_view < TAU {
-            true => 0.5 * self.field_of_view * (1.0 / self.beams as f64 - 1.0),
-            false => 0.0,
-        };
+        let first = self.first_angle();
         for beam in 0..self.beams {
             // Both draws are made for every beam, so that what one beam meets does not change the noise of the others.
             let dropped = random.random::<f64>() < self.dropped;

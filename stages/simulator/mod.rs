@@ -38,7 +38,6 @@ mod world;
 pub use drawn_map::{DrawnMapSettings, WallStyle, draw_map};
 pub use drive::TICK_SECONDS;
 pub use floor_plan::{FloorPlan, Layout};
-pub use mapper::SnapshotMap;
 pub use parameters::SimulatorParameters;
 pub use robot::RobotLog;
 pub use room::{Door, Room};
@@ -49,3 +48,5 @@ pub use stage::kind;
 pub use tags::{Tag, TagReading};
 pub use truth::Truth;
 pub use world::SimulationError;
+
+pub use crate::scan_grid::SnapshotMap;

@@ -80,6 +80,8 @@ pub struct SimulatorParameters {
     /// Metres a cell of the maps. Several values are given to the robots in turn.
     #[schemars(inner(range(min = 0.005, max = 1.0)))]
     pub resolution: Vec<f64>,
+    /// Whether the scans of the lidars are logged as well.
+    pub scans: bool,
     /// Share of a map's free cells that are drawn occupied, as people's legs, dust and glass leave them.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub specks: f64,
@@ -133,6 +135,7 @@ impl Default for SimulatorParameters {
             drift: 0.002,
             correction_length: 10.0,
             resolution: vec![0.05],
+            scans: false,
             specks: 0.0,
             snapshots: 3,
             map_yaw: PI,

@@ -1,7 +1,8 @@
 //! One robot's part of a simulation: its drive, and what it believes and logs.
 
 use super::drive::{DriveLimits, drive};
-use super::mapper::{Mapper, SnapshotMap};
+use super::lidar::Beam;
+use super::mapper::Mapper;
 use super::odometry::{Drift, estimate_poses};
 use super::parameters::SimulatorParameters;
 use super::route::plan_route;
@@ -9,6 +10,7 @@ use super::shape::{Rectangle, between};
 use super::tags::TagReading;
 use super::world::{SimulationError, Stream, World};
 use crate::geometry::{Point2, Pose2, is_free, pose};
+use crate::scan_grid::SnapshotMap;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
@@ -33,6 +35,8 @@ pub struct RobotLog {
     pub poses: Vec<Pose2>,
     /// The tags it has read, with their ticks.
     pub readings: Vec<(usize, TagReading)>,
+    /// What its lidar has measured, a scan a tick; none if scans are not logged.
+    pub(super) scans: Vec<Vec<Beam>>,
     /// The maps it has sent, with the ticks of their last scans.
     pub maps: Vec<(usize, SnapshotMap)>,
 }
@@ -63,12 +67,13 @@ pub(super) fn simulate_robot(
     let drift = Drift { deviation: parameters.drift, correction_length: parameters.correction_length };
     let poses = estimate_poses(&exact, &drift, &mut world.random(Stream::Drift(robot)));
 
-    let maps = map_building(world, robot, &true_poses, &poses, parameters);
+    let mut scans = Vec::new();
+    let maps = map_building(world, robot, &true_poses, &poses, parameters, &mut scans);
     if maps.len() != parameters.snapshots as usize {
         return Err(SimulationError::SeenNothing { robot: name });
     }
     let readings = read_tags(world, robot, &true_poses, parameters);
-    Ok(RobotLog { name, transform_building_map, true_poses, poses, readings, maps })
+    Ok(RobotLog { name, transform_building_map, true_poses, poses, readings, scans, maps })
 }
 
 /// A map frame near the start of the drive, turned at random: `T_building_map`.
@@ -85,6 +90,7 @@ fn map_building(
     true_poses: &[Pose2],
     poses: &[Pose2],
     parameters: &SimulatorParameters,
+    scans: &mut Vec<Vec<Beam>>,
 ) -> Vec<(usize, SnapshotMap)> {
     let lidar = parameters.lidar();
     let (mut random, mut specks) = (world.random(Stream::Lidar(robot)), world.random(Stream::Specks(robot)));
@@ -98,6 +104,9 @@ fn map_building(
     for (tick, (true_pose, pose)) in true_poses.iter().zip(poses).enumerate() {
         lidar.scan(&world.caster, true_pose, &mut random, &mut beams);
         mapper.add_scan(pose, &beams);
+        if parameters.scans {
+            scans.push(beams.clone());
+        }
         // The last scan of each of the equal parts of the drive; a very short drive sends some maps twice.
         while maps.len() < snapshots && (tick + 1) * snapshots >= true_poses.len() * (maps.len() + 1) {
             let Some(mut map) = mapper.snapshot() else { return maps };

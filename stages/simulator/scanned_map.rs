@@ -3,9 +3,10 @@
 use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
 use super::lidar::Lidar;
-use super::mapper::{Mapper, SnapshotMap};
+use super::mapper::Mapper;
 use super::ray_caster::RayCaster;
 use crate::geometry::{GridGeometry, Pose2, pose};
+use crate::scan_grid::SnapshotMap;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use std::f64::consts::TAU;

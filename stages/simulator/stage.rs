@@ -7,7 +7,8 @@ use super::simulation::{Simulation, simulate};
 use crate::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    GridPrefix, Header, MapMetaData, OccupancyGrid, PoseStamped, SimulationTruth, TFMessage, TagRange, TransformStamped,
+    GridPrefix, Header, LaserScan, MapMetaData, OccupancyGrid, PoseStamped, SimulationTruth, TFMessage, TagRange,
+    TransformStamped,
 };
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Source, StageError, StageKind};
 
@@ -31,6 +32,7 @@ struct SimulatedLog {
     pose: Out<PoseStamped>,
     tags: Out<TagRange>,
     tf: Out<TFMessage>,
+    scan: Out<LaserScan>,
     truth: Out<SimulationTruth>,
 }
 
@@ -41,6 +43,7 @@ impl Outputs for SimulatedLog {
             pose: ports.output_on("/{robot}/pose", "pose", "Each robot's pose in its map, at 10 Hz."),
             tags: ports.output_on("/{robot}/tag_ranges", "tags", "Ranges of radio tags in reach, at 10 Hz."),
             tf: ports.output_on("/tf", "tf", "The same poses: robotN/map to robotN/base_link."),
+            scan: ports.output_on("/{robot}/scan", "scan", "Each robot's scans, at 10 Hz, if `scans` says so."),
             truth: ports.output_on(
                 "/truth",
                 "truth",
@@ -77,6 +80,7 @@ struct Event {
 enum What {
     Pose(usize),
     Reading(usize),
+    Scan(usize),
     Map(usize),
 }
 
@@ -99,6 +103,7 @@ impl Source for Simulator {
             match what {
                 What::Pose(index) => send_pose(output, log, index)?,
                 What::Reading(index) => send_reading(output, &playback.simulation, log, index, &self.parameters)?,
+                What::Scan(index) => send_scan(output, log, index, &self.parameters)?,
                 What::Map(index) => send_map(output, log, index)?,
             }
         }
@@ -119,6 +124,7 @@ impl Playback {
         for (robot, log) in simulation.robots.iter().enumerate() {
             let mut add = |tick, what| events.push(Event { time: time_of(tick, what), robot, what });
             (0..log.poses.len()).for_each(|tick| add(tick, What::Pose(tick)));
+            (0..log.scans.len()).for_each(|tick| add(tick, What::Scan(tick)));
             log.readings.iter().enumerate().for_each(|(index, (tick, _))| add(*tick, What::Reading(index)));
             log.maps.iter().enumerate().for_each(|(index, (tick, _))| add(*tick, What::Map(index)));
         }
@@ -167,6 +173,38 @@ fn send_reading(
         rssi: reading.rssi,
     };
     output.tags.send(&log.name, &message)
+}
+
+/// Sends a scan with a beam for each direction; those that have not returned measure nothing.
+fn send_scan(
+    output: &Output<SimulatedLog>,
+    log: &RobotLog,
+    index: usize,
+    parameters: &SimulatorParameters,
+) -> Result<(), StageError> {
+    let Some(beams) = log.scans.get(index) else { return Ok(()) };
+    let lidar = parameters.lidar();
+    let (first, apart) = (lidar.first_angle(), lidar.field_of_view / lidar.beams as f64);
+    let mut ranges = vec![f32::INFINITY; lidar.beams];
+    for beam in beams {
+        if let Some(range) = ranges.get_mut(((beam.angle - first) / apart).round() as usize) {
+            *range = beam.range as f32;
+        }
+    }
+    let scan = LaserScan {
+        header: Header::new(output.log_time(), base_frame(log)),
+        angle_min: first as f32,
+        angle_max: (first + apart * (lidar.beams as f64 - 1.0)) as f32,
+        angle_increment: apart as f32,
+        // The robot does not move during a scan.
+        time_increment: 0.0,
+        scan_time: TICK_SECONDS as f32,
+        range_min: 0.0,
+        range_max: (lidar.reach + 5.0 * lidar.noise) as f32,
+        ranges,
+        intensities: Vec::new(),
+    };
+    output.scan.send(&log.name, &scan)
 }
 
 fn send_map(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Result<(), StageError> {

@@ -19,7 +19,7 @@ pub fn kind() -> StageKind {
          robot whenever one of them gets out of reach, and at the end.",
         |parameters, _| Ok(TagLocalizerStage { parameters, robots: BTreeMap::new() }),
     )
-    .input(
+    .inputs(
         "pose",
         "poses of the robots in their maps; a covariance of zeros is not known",
         TagLocalizerStage::receive_pose,
@@ -199,7 +199,7 @@ impl Robot {
 }
 
 /// The time that a message tells of: that of its header or, where it has none, when it was logged.
-fn time_of(stamp: Time, log_time: LogTime) -> LogTime {
+pub(crate) fn time_of(stamp: Time, log_time: LogTime) -> LogTime {
     match LogTime::from(stamp) {
         LogTime::MIN => log_time,
         time => time,

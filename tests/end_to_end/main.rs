@@ -36,6 +36,7 @@ mod python_stages;
 mod real_logs;
 mod render;
 mod report;
+mod scans;
 mod support;
 mod tags_as_they_come;
 mod telling;

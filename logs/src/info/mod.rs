@@ -229,7 +229,17 @@ pub fn holds_tags_alone(inputs: &[Input], rules: &NameRules, robots: &RobotTopic
     let channels = RobotChannels::new(robots.clone(), names.channels());
     let roles: Vec<Role> = names.channels().map(|channel| channels.classify(channel).role).collect();
     let holds_tags = roles.iter().any(|role| matches!(role, Role::Tags | Role::TagMessage));
-    Ok(holds_tags && !roles.contains(&Role::Map))
+    Ok(holds_tags && !roles.contains(&Role::Map) && !roles.contains(&Role::Scan))
+}
+
+/// The robots of logs that have scans and no map, by name: their maps can be drawn. Nothing but the channels is looked at.
+///
+/// # Errors
+/// A log cannot be read, or the rules do not fit what is in them.
+pub fn robots_to_draw(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<Vec<String>, NameError> {
+    let (_, names) = names::open(inputs, rules, robots)?;
+    let channels = RobotChannels::new(robots.clone(), names.channels());
+    Ok(channels.scanned().map(str::to_owned).collect())
 }
 
 fn add_late_damage(reader: &mut LogReader, info: &mut LogInfo) {

@@ -19,6 +19,9 @@ pub struct RobotInfo {
     pub maps: u64,
     /// How many updates of parts of maps there are.
     pub map_updates: u64,
+    /// How many scans there are, if there are no maps: these would be drawn from them.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub scans: u64,
     /// How many poses there are, or can be made from other messages.
     pub poses: u64,
     /// What they are taken from: a topic, or frames of tf; `None` if there are none.
@@ -28,6 +31,10 @@ pub struct RobotInfo {
     pub readings: u64,
     /// The tags that were read, and how often.
     pub tags: BTreeMap<String, u64>,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// The fields of a range reading up to the tag's name.
@@ -48,6 +55,8 @@ pub(super) struct RobotSurvey {
     robots: BTreeMap<String, RobotInfo>,
     tf: Option<TfPoses>,
     inferred: InferredPoses,
+    /// Odometry in frames of its own: the topic, by robot.
+    odometry: BTreeMap<String, String>,
     /// By topic.
     tag_readers: BTreeMap<String, TagReader>,
     /// Messages that do not fit their type, by topic.
@@ -60,6 +69,7 @@ impl RobotSurvey {
         let roles = RobotChannels::new(topics.clone(), channels);
         Self {
             inferred: InferredPoses::new(&roles),
+            odometry: BTreeMap::new(),
             tag_readers: BTreeMap::new(),
             roles,
             tf: topics.tf.clone().map(TfPoses::new),
@@ -116,6 +126,7 @@ impl RobotSurvey {
                 }
             }
             Role::MapUpdate => info.map_updates += 1,
+            Role::Scan => info.scans += 1,
             Role::Pose(_) => {
                 info.poses += 1;
                 info.poses_from.get_or_insert_with(|| topic.to_owned());
@@ -123,7 +134,9 @@ impl RobotSurvey {
             Role::Odometry => {
                 match pose_with_covariance(PoseSource::Odometry, data).map(|pose| decode::<Header>(&pose)) {
                     Ok(Ok(header)) if self.inferred.takes_odometry(robot, topic, &header.frame_id) => info.poses += 1,
-                    Ok(_) => {}
+                    Ok(_) => {
+                        self.odometry.entry(robot.to_owned()).or_insert_with(|| topic.to_owned());
+                    }
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
                 }
             }
@@ -154,6 +167,7 @@ impl RobotSurvey {
         match role {
             Role::Map => info.maps += messages,
             Role::MapUpdate => info.map_updates += messages,
+            Role::Scan => info.scans += messages,
             Role::Pose(_) => info.poses += messages,
             Role::Odometry if info.poses_from.as_deref() == Some(topic) => info.poses += messages,
             // A message of tags holds one reading or more.
@@ -203,7 +217,7 @@ impl RobotSurvey {
             problems.push(format!("{count} messages on `{topic}` do not fit their type"));
         }
         let robots = &self.robots;
-        if robots.values().all(|robot| robot.maps == 0) {
+        if robots.values().all(|robot| robot.maps == 0 && robot.scans == 0) {
             let elsewhere = match self.other_maps.is_empty() {
                 true => "; there is no occupancy grid at all".to_owned(),
                 false => {
@@ -226,19 +240,40 @@ impl RobotSurvey {
         };
         type Lacking = (&'static str, fn(&RobotInfo) -> u64);
         let kinds: [Lacking; 3] = [
-            ("map", |robot: &RobotInfo| robot.maps),
+            ("map", |robot: &RobotInfo| robot.maps + robot.scans),
             ("pose", |robot: &RobotInfo| robot.poses),
             ("tag reading", |robot: &RobotInfo| robot.readings),
         ];
         for (what, count) in kinds {
             let names = lacking(what, count);
-            let already_told = what == "map" && robots.values().all(|robot| robot.maps == 0);
+            let already_told = what == "map" && robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
             if !names.is_empty() && !already_told {
                 problems.push(format!("there is no {what} of {names}"));
             }
         }
         problems.extend(told.into_values());
         problems
+            .extend(robots.iter().filter(|(_, robot)| robot.scans > 0).map(|(name, robot)| self.drawing(name, robot)));
+        problems
+    }
+
+    /// How the map of a robot would be drawn that has none.
+    fn drawing(&self, name: &str, robot: &RobotInfo) -> String {
+        let poses = robot.poses_from.clone().or_else(|| self.inferred.origin(name)).filter(|_| robot.poses > 0);
+        let how = match (poses, self.odometry.get(name)) {
+            (Some(poses), _) => {
+                format!("draws one from its {} scans, at the poses of {poses}; a SLAM does better", robot.scans)
+            }
+            (None, Some(odometry)) => format!(
+                "draws one from its {} scans, each matched with those before it along `{odometry}`: it drifts, and a full SLAM \
+                 is better",
+                robot.scans
+            ),
+            (None, None) => {
+                format!("cannot draw one from its {} scans, as nothing says where it was", robot.scans)
+            }
+        };
+        format!("there is no map of {name}: `merge` {how}")
     }
 
     pub(super) fn into_robots(mut self) -> BTreeMap<String, RobotInfo> {

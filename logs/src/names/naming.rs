@@ -55,7 +55,8 @@ pub(super) fn name(
         let classified = roles.classify(&channel);
         let is_map = matches!(classified.role, Role::Map | Role::MapUpdate);
         // The frame of a robot's map, and of its poses in it, is the robot's in any case.
-        let is_robots = is_map || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage);
+        let is_robots =
+            is_map || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan);
         let by_role = is_robots && rules.convention == Convention::ByRobot;
         let robot = robot.or(by_role.then(|| classified.robot.to_owned())).unwrap_or_default();
         let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));

@@ -277,3 +277,40 @@ fn a_schema_is_laid_out_as_in_a_bag() {
     assert_eq!(schema_text("visualization_msgs/msg/MenuEntry"), None);
     assert_eq!(schema_text(""), None);
 }
+
+#[test]
+fn scans_agree_with_their_definitions() {
+    let ranges = vec![1.5, 2.5, 3.5];
+    assert_agrees(&LaserScan {
+        header: header(),
+        angle_min: -1.5,
+        angle_max: 1.5,
+        angle_increment: 0.25,
+        time_increment: 0.125,
+        scan_time: 0.5,
+        range_min: 0.0625,
+        range_max: 30.0,
+        ranges: ranges.clone(),
+        intensities: vec![7.0],
+    });
+    let beam = |echoes: &[f32]| LaserEcho { echoes: echoes.to_vec() };
+    assert_agrees(&MultiEchoLaserScan {
+        header: header(),
+        angle_min: -1.5,
+        ranges: vec![beam(&[1.5, 2.5]), beam(&[]), beam(&[3.5])],
+        intensities: vec![beam(&[7.0])],
+        ..Default::default()
+    });
+    assert_agrees(&RangeScan {
+        header: header(),
+        x: 0.25,
+        y: -0.5,
+        yaw: 0.125,
+        angle_min: -1.5,
+        angle_increment: 0.25,
+        time_increment: 0.0625,
+        range_min: 0.5,
+        range_max: 30.0,
+        ranges,
+    });
+}

@@ -4,9 +4,11 @@
 use super::RobotMessages;
 use super::channel::Route;
 use super::inferred_poses::InferredPoses;
+use super::mounts::Untied;
 use super::pose::{NoPose, pose_with_covariance};
 use super::route::{PoseSource, RobotChannels, Role};
-use super::tag_positions::{TagPositions, Untied};
+use super::scans::{Scans, read_scan};
+use super::tag_positions::TagPositions;
 use super::tag_reader::Seen;
 use super::updated_maps::{UpdatedMap, UpdatedMaps};
 use crate::tf::{TfPoses, is_static};
@@ -15,6 +17,7 @@ use gridweave_runtime::ros::{
     TagRange, decode,
 };
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use std::collections::BTreeSet;
 
 /// Makes these of messages as they pass.
 pub(super) struct Derived {
@@ -28,6 +31,12 @@ pub(super) struct Derived {
     tag_positions: Option<TagPositions>,
     /// Whether readings of tags were made from other messages.
     has_made_readings: bool,
+    /// Where lidars are mounted; `None` if nobody has scans and no maps.
+    scans: Option<Scans>,
+    /// The robots with scans and without maps.
+    scanned: BTreeSet<String>,
+    /// Whether odometry was sent along which scans can be matched.
+    has_odometry: bool,
     /// `None` if maps are passed on as they are.
     updated_maps: Option<UpdatedMaps>,
 }
@@ -42,6 +51,9 @@ impl Derived {
             has_inferred_poses: false,
             tag_positions: roles.sees_tags().then(|| TagPositions::new(base_frame, roles.tags_in_tf().clone())),
             has_made_readings: false,
+            scans: roles.scanned().next().map(|_| Scans::new(base_frame)),
+            scanned: roles.scanned().map(str::to_owned).collect(),
+            has_odometry: false,
             updated_maps: updates_maps.then(UpdatedMaps::default),
         }
     }
@@ -53,6 +65,7 @@ impl Derived {
         {
             self.poses_of_tf(route, &transforms);
             self.tags_of_tf(route, &transforms);
+            self.mounts_of_tf(route, &transforms);
         }
         self.learn_map_frame(route, data);
         self.update_map(route, roles, data, output);
@@ -67,7 +80,11 @@ impl Derived {
     ) -> Result<(), StageError> {
         match route.role {
             Role::Pose(source) => self.send_pose(route, source, data, output),
-            Role::Odometry => self.send_pose(route, PoseSource::Odometry, data, output),
+            Role::Odometry => {
+                self.send_odometry(route, data, output)?;
+                self.send_pose(route, PoseSource::Odometry, data, output)
+            }
+            Role::Scan => self.send_scan(route, data, output),
             Role::TagMessage => self.send_tag_readings(route, data, output),
             Role::Tf => self.send_of_tf(route, data, output),
             _ => Ok(()),
@@ -162,15 +179,59 @@ impl Derived {
         }
     }
 
+    /// Sends odometry along which scans can be matched.
+    fn send_odometry(&mut self, route: &Route, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
+        if !output.odometry.is_read() || !self.scanned.contains(&route.robot) {
+            return Ok(());
+        }
+        match pose_with_covariance(PoseSource::Odometry, data) {
+            Ok(pose) => {
+                self.has_odometry = true;
+                output.odometry.send_bytes(&route.robot, &pose)
+            }
+            // It is warned of where the pose is asked for.
+            Err(NoPose) => Ok(()),
+        }
+    }
+
+    /// Sends a scan as the base of its robot sees it.
+    fn send_scan(&mut self, route: &mut Route, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let Some(scans) = self.scans.as_ref().filter(|_| output.scans.is_read()) else { return Ok(()) };
+        let topic = &route.channel.topic;
+        let Ok(scan) = read_scan(&route.channel, data) else {
+            route.unreadable += 1;
+            output.warn(format!("messages on `{topic}` could not be read as scans"));
+            return Ok(());
+        };
+        let frame = scan.header.frame_id.clone();
+        match scans.seen_from_base(&route.robot, scan) {
+            Ok(scan) => output.scans.send(&route.robot, &scan),
+            Err(Untied) => {
+                output.warn(format!(
+                    "scans on `{topic}` were left out: tf does not tie their frame, `{frame}`, to the base of {}",
+                    route.robot
+                ));
+                Ok(())
+            }
+        }
+    }
+
+    fn mounts_of_tf(&mut self, route: &Route, message: &TFMessage) {
+        if let Some(scans) = &mut self.scans {
+            scans.transforms(&route.robot, is_static(&route.channel.topic), message);
+        }
+    }
+
     /// Sends the poses and the positions of tags that transforms tell.
     fn send_of_tf(&mut self, route: &Route, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
-        if !output.pose.is_read() && !output.positions.is_read() {
+        if !output.pose.is_read() && !output.positions.is_read() && !output.scans.is_read() {
             return Ok(());
         }
         let Ok(message) = decode::<TFMessage>(data) else {
             output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
             return Ok(());
         };
+        self.mounts_of_tf(route, &message);
         let (poses, unusable) = self.poses_of_tf(route, &message);
         for _ in 0..unusable {
             output.warn("transforms with values that are not finite, or between a frame and itself");
@@ -259,6 +320,11 @@ impl Derived {
     /// Whether poses were made from transforms or odometry.
     pub(super) fn has_inferred_poses(&self) -> bool {
         self.has_inferred_poses
+    }
+
+    /// Whether odometry was sent along which scans can be matched.
+    pub(super) fn has_odometry(&self) -> bool {
+        self.has_odometry
     }
 
     /// Whether readings of tags were made from other messages.

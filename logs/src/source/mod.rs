@@ -6,9 +6,11 @@ mod channel;
 mod derived;
 mod inferred_poses;
 pub mod map_file;
+mod mounts;
 mod pose;
 mod route;
 mod router;
+mod scans;
 mod stage;
 mod tag_positions;
 mod tag_reader;
@@ -25,7 +27,9 @@ pub use stage::McapSource;
 pub(crate) use tag_reader::TagReader;
 
 use crate::names::{Convention, Input, NameRules};
-use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, TagPosition, TagRange, TopologicalMap};
+use gridweave_runtime::ros::{
+    OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagPosition, TagRange, TopologicalMap,
+};
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,6 +117,8 @@ pub struct RobotMessages {
     pub(crate) tags: Out<TagRange>,
     pub(crate) positions: Out<TagPosition>,
     pub(crate) topology: Out<TopologicalMap>,
+    pub(crate) scans: Out<RangeScan>,
+    pub(crate) odometry: Out<PoseWithCovarianceStamped>,
     pub(crate) other: Out<AnyMessage>,
 }
 
@@ -137,6 +143,14 @@ impl Outputs for RobotMessages {
                 "positions at which cameras see tags, in the frames of their robots: made from the messages of detectors, or tf",
             ),
             topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
+            scans: ports.output(
+                "scans",
+                "scans of robots that have no map, as the bases of these robots see them: made from the messages of lidars",
+            ),
+            odometry: ports.output(
+                "odometry",
+                "where robots with scans, and without a map and a topic for poses, are by odometry, in a frame of its own",
+            ),
             other: ports.any_output(
                 "other",
                 "all other messages, and those from which poses were made, as they were logged or sent",

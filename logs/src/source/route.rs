@@ -1,5 +1,6 @@
 //! What a channel carries, by its topic and its type.
 
+use super::scans::is_scan;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
@@ -20,7 +21,8 @@ pub(crate) enum Role {
     MapUpdate,
     /// Poses of a robot.
     Pose(PoseSource),
-    /// Odometry of a robot without a topic for poses, which gives them if it is in the frame of the map.
+    /// Odometry of a robot without a topic for poses, which gives them if it is in the frame of the map. Scans can be matched
+    /// along any.
     Odometry,
     /// Tag readings of a robot.
     Tags,
@@ -28,6 +30,8 @@ pub(crate) enum Role {
     TagMessage,
     /// Topological maps of a robot.
     Topology,
+    /// Scans of a robot that has no maps.
+    Scan,
     /// Transforms from which poses of robots are made.
     Tf,
     /// Anything else.
@@ -79,6 +83,8 @@ pub(crate) struct RobotChannels {
     tags_in_tf: BTreeSet<String>,
     /// Whether any message says where tags are in the frame of a camera.
     has_cameras: bool,
+    /// The robots with scans and without maps.
+    scanned: BTreeSet<String>,
 }
 
 impl RobotChannels {
@@ -93,14 +99,23 @@ impl RobotChannels {
             known: BTreeSet::new(),
             tags_in_tf: BTreeSet::new(),
             has_cameras: false,
+            scanned: BTreeSet::new(),
         };
         let (mut asking, mut with_poses) = (BTreeSet::new(), BTreeSet::new());
         let channels: Vec<&Channel> = channels.collect();
+        let has_map = |robot: &str| {
+            let roles = &roles;
+            channels
+                .iter()
+                .any(|channel| roles.classify(channel) == Classified { role: Role::Map, robot, mismatch: None })
+        };
+        let scanned = channels.iter().filter_map(|channel| roles.scanning_robot(channel));
+        roles.scanned = scanned.filter(|robot| !has_map(robot)).map(str::to_owned).collect();
         for channel in &channels {
             let Classified { role, robot, .. } = roles.classify(channel);
             match role {
                 Role::MapUpdate => roles.updated.insert(robot.to_owned()),
-                Role::Map | Role::Tags | Role::TagMessage => asking.insert(robot.to_owned()),
+                Role::Map | Role::Tags | Role::TagMessage | Role::Scan => asking.insert(robot.to_owned()),
                 Role::Pose(_) => with_poses.insert(robot.to_owned()),
                 _ => false,
             };
@@ -155,6 +170,17 @@ impl RobotChannels {
         TagReader::new(channel, &fields).ok()
     }
 
+    /// The robot whose scans a channel would hold.
+    fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
+        let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
+        match_robot(&self.topics.scan, &channel.topic).filter(|_| holds_scans)
+    }
+
+    /// The robots with scans and without maps, by name.
+    pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
+        self.scanned.iter().map(String::as_str)
+    }
+
     /// The robots whose tags are frames in tf.
     pub(crate) fn tags_in_tf(&self) -> &BTreeSet<String> {
         &self.tags_in_tf
@@ -180,10 +206,13 @@ impl RobotChannels {
         let topic = channel.topic.as_str();
         let type_name = full_type_name(&channel.schema_name);
         let is_cdr = channel.message_encoding == "cdr";
-        if (self.topics.tf.is_some() || !self.unposed.is_empty() || self.sees_tags())
+        if (self.topics.tf.is_some() || !self.unposed.is_empty() || self.sees_tags() || !self.scanned.is_empty())
             && let Some(robot) = tf_topic(channel)
         {
             return Classified { role: Role::Tf, robot, mismatch: None };
+        }
+        if let Some(robot) = self.scanning_robot(channel).filter(|robot| self.scanned.contains(*robot)) {
+            return Classified { role: Role::Scan, robot, mismatch: None };
         }
         if let Some((robot, fields)) = self.tag_fields(channel) {
             return match TagReader::new(channel, &fields) {

@@ -190,9 +190,13 @@ impl Router {
             Role::Map => route.send(stamp, data, &output.map, output.log_time()),
             Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
             Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
-            Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Tf | Role::Other => {
-                route.send(stamp, data, &output.other, output.log_time())
-            }
+            Role::MapUpdate
+            | Role::Pose(_)
+            | Role::Odometry
+            | Role::TagMessage
+            | Role::Scan
+            | Role::Tf
+            | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
         }?;
         self.derived.send(route, data, output)
     }
@@ -288,14 +292,18 @@ impl Router {
         let routed = |role: fn(Role) -> bool| {
             self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
         };
-        if output.map.is_read() && !routed(|role| role == Role::Map) {
+        let draws_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
+        if output.map.is_read() && !draws_maps && !routed(|role| role == Role::Map) {
             let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
             let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
             let others =
                 if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
         }
-        if output.pose.is_read() && !routed(|role| matches!(role, Role::Pose(_))) && !self.derived.has_inferred_poses()
+        if output.pose.is_read()
+            && !routed(|role| matches!(role, Role::Pose(_)))
+            && !self.derived.has_inferred_poses()
+            && !self.derived.has_odometry()
         {
             match &self.robots.tf {
                 Some(frames) => output.warn(format!(
@@ -308,7 +316,7 @@ impl Router {
         if output.tags.is_read() && !routed(|role| role == Role::Tags) && !self.derived.has_made_readings() {
             output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
         }
-        if output.pose.is_read() {
+        if output.pose.is_read() && !self.derived.has_odometry() {
             self.derived.warn_of_missing_poses(output);
         }
     }

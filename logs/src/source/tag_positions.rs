@@ -1,32 +1,24 @@
 //! From where a camera sees tags to where they are from the robot.
 
-use super::inferred_poses::BASES;
+use super::mounts::{Mounts, Untied};
 use super::tag_reader::tag_of_frame;
-use crate::tf::FrameTree;
 use gridweave_runtime::ros::{Header, TFMessage, TagPosition, Time};
 use gridweave_runtime::stage::frame_of_robot;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 use std::collections::BTreeSet;
 
 /// Knows how cameras are mounted on their robots, by tf.
 #[derive(Debug)]
 pub(super) struct TagPositions {
-    tree: FrameTree,
-    /// What the base of a robot is called, `{robot}` standing for its name. The first that is tied to a camera counts.
-    bases: Vec<String>,
+    mounts: Mounts,
     /// The robots whose tags are frames in tf.
     in_tf: BTreeSet<String>,
 }
 
-/// The frame of a camera is not tied to its robot.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) struct Untied;
-
 impl TagPositions {
     /// For robots whose base is called `base`, or as most are; tags of the robots `in_tf` are frames there.
     pub(super) fn new(base: Option<&str>, in_tf: BTreeSet<String>) -> Self {
-        let usual = || BASES.map(|base| format!("{{robot}}{base}")).to_vec();
-        Self { tree: FrameTree::default(), bases: base.map_or_else(usual, |base| vec![base.to_owned()]), in_tf }
+        Self { mounts: Mounts::new(base), in_tf }
     }
 
     /// Takes up transforms whose frames lack a prefix. Gives the tags that are seen in them: the robot, and where it sees the
@@ -48,7 +40,7 @@ impl TagPositions {
                     tags.push((robot, found));
                 }
                 None => {
-                    self.tree.insert(&parent, &child, &edge.transform, is_static);
+                    self.mounts.insert(&parent, &child, &edge.transform, is_static);
                 }
             }
         }
@@ -71,12 +63,7 @@ impl TagPositions {
         frame: &str,
         point: &Point3<f64>,
     ) -> Result<TagPosition, Untied> {
-        let tied = |base: &String| {
-            let base = base.replace("{robot}", robot);
-            let transform: Isometry3<f64> = self.tree.lookup(&base, frame)?;
-            Some((base, transform))
-        };
-        let (base, transform_base_frame) = self.bases.iter().find_map(tied).ok_or(Untied)?;
+        let (base, transform_base_frame) = self.mounts.mount(robot, frame)?;
         let place = transform_base_frame * point;
         let header = Header { stamp, frame_id: base };
         Ok(TagPosition { header, tag_id: tag_id.to_owned(), x: place.x, y: place.y, covariance: [0.0; 4] })

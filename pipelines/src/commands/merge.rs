@@ -4,6 +4,7 @@ use crate::job::Job;
 use crate::job::RunOptions;
 use crate::job::{Inputs, Output, is_yaml};
 use crate::status::{BadUse, Status};
+use crate::terminal::say;
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info;
@@ -31,7 +32,16 @@ pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
     let pipeline = match Inputs::of(&args.inputs)? {
         Inputs::TopologyFiles => "topology_file_merge",
         Inputs::Logs if holds_tags_alone(args)? => "tag_frames",
-        Inputs::Logs => "auto_merge",
+        Inputs::Logs => match &robots_to_draw(args)?[..] {
+            [] => "auto_merge",
+            robots => {
+                let robots = robots.join(", ");
+                say(format_args!(
+                    "no map of {robots} was logged: drawn from scans, where a SLAM would do better (scan_merge)"
+                ));
+                "scan_merge"
+            }
+        },
         Inputs::MapFiles => "map_file_merge",
     };
     let (output, options) = match is_yaml(&args.output) {
@@ -50,6 +60,13 @@ fn holds_tags_alone(args: &MergeArgs) -> Result<bool, BadUse> {
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
     let rules = args.options.reading.names.rules(Convention::ByRobot)?;
     Ok(info::holds_tags_alone(&inputs, &rules, &RobotTopics::default()).unwrap_or(false))
+}
+
+/// The robots that have scans and no map. Logs that cannot be read are told of by the run.
+fn robots_to_draw(args: &MergeArgs) -> Result<Vec<String>, BadUse> {
+    let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
+    let rules = args.options.reading.names.rules(Convention::ByRobot)?;
+    Ok(info::robots_to_draw(&inputs, &rules, &RobotTopics::default()).unwrap_or_default())
 }
 
 /// The options of a merge whose output is the map. An error if they speak of a log, which there is none of.

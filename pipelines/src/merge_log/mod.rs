@@ -19,6 +19,8 @@ use std::collections::BTreeMap;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
+/// The topic of a robot's map that was drawn from its scans.
+const DRAWN: &str = "/{robot}/drawn_map";
 /// The topic of where maps contradict each other.
 const CONFLICTS: &str = "/map_conflicts";
 /// The topic of a robot's drive in the merged frame.
@@ -152,7 +154,7 @@ impl MergeState {
         let slot = match topic {
             MERGED => &mut self.merged,
             CONFLICTS => &mut self.conflicts,
-            _ => match match_robot(&topics.map, topic) {
+            _ => match match_robot(&topics.map, topic).or_else(|| match_robot(DRAWN, topic)) {
                 Some(robot) => &mut self.robot(robot).map,
                 None => return Ok(()),
             },

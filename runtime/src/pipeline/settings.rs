@@ -96,7 +96,7 @@ impl Settings {
 
     /// Takes in the section `[robots]`.
     pub(super) fn read_robots(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 5] = ["map", "pose", "tags", "topology", "tf"];
+        const KEYS: [&str; 6] = ["map", "pose", "tags", "topology", "scan", "tf"];
         for Entry { key, key_at, item } in entries(section, "[robots]", problems) {
             let mut item = item;
             if key == "tags" && matches!(item.value, Value::Table(_)) {
@@ -110,6 +110,7 @@ impl Settings {
                 "pose" => &mut self.robots.pose,
                 "tags" => &mut self.robots.tags,
                 "topology" => &mut self.robots.topology,
+                "scan" => &mut self.robots.scan,
                 "tf" => {
                     self.robots.tf = read_frames(item, key_at, problems);
                     continue;

@@ -67,8 +67,8 @@ impl Pipeline {
 }
 
 fn robots_table(robots: &RobotTopics, initial_poses: &InitialPoses) -> Table {
-    let RobotTopics { map, pose, tags, tag_fields, topology, tf } = robots;
-    let topics = [("map", map), ("pose", pose), ("tags", tags), ("topology", topology)];
+    let RobotTopics { map, pose, tags, tag_fields, topology, scan, tf } = robots;
+    let topics = [("map", map), ("pose", pose), ("tags", tags), ("topology", topology), ("scan", scan)];
     let mut table = Table::from_iter(topics.map(|(key, topic)| (key.to_owned(), topic.as_str().into())));
     if let Some(tf) = tf {
         let frames = [("map_frame", &tf.map_frame), ("base_frame", &tf.base_frame)];

@@ -36,6 +36,31 @@ pub struct TagPosition {
     pub covariance: [f64; 4],
 }
 
+/// A scan of a lidar, seen from the base of its robot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RangeScan {
+    /// When the first beam was sent, and the frame of the robot's base.
+    pub header: Header,
+    /// Where the lidar is in that frame, metres ahead of the base.
+    pub x: f64,
+    /// Metres to its left.
+    pub y: f64,
+    /// The direction from which its angles are counted, radians.
+    pub yaw: f64,
+    /// The direction of the first beam, radians.
+    pub angle_min: f64,
+    /// From a beam to the next, radians; negative for a lidar that hangs upside down.
+    pub angle_increment: f64,
+    /// From a beam to the next, seconds; 0 if it is not known.
+    pub time_increment: f64,
+    /// What is nearer is no measurement, metres.
+    pub range_min: f32,
+    /// What is farther is no measurement, metres.
+    pub range_max: f32,
+    /// What the beams have measured, metres.
+    pub ranges: Vec<f32>,
+}
+
 /// Where a robot believes one tag to be.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TagEstimate {
@@ -391,5 +416,5 @@ impl RobotFrames {
 ros_messages!(
     "gridweave_msgs":
     TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement,
-    SimulationTruth, TagPosition
+    SimulationTruth, TagPosition, RangeScan
 );

@@ -10,6 +10,7 @@ mod geometry;
 mod gridweave;
 mod map_msgs;
 mod nav;
+mod sensor;
 mod std_msgs;
 mod topological;
 mod visualization;
@@ -21,12 +22,13 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RobotFrame, RobotFrames,
-    RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagPosition, TagRange, TrueFrame,
-    TrueTag, UnmergedRobot, Verdict, Verdicts,
+    Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RangeScan, RobotFrame,
+    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagPosition, TagRange,
+    TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
 pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
+pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};
 pub use std_msgs::{Header, Time};
 pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};
 pub use visualization::{ColorRGBA, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UVCoordinate};

@@ -59,6 +59,8 @@ pub struct RobotTopics {
     pub tag_fields: Option<TagFields>,
     /// Topological maps.
     pub topology: String,
+    /// Scans of a lidar, which count where a robot has no maps.
+    pub scan: String,
     /// Poses from tf instead of from a pose topic.
     pub tf: Option<TfFrames>,
 }
@@ -81,6 +83,7 @@ impl Default for RobotTopics {
             tags: "/{robot}/tag_ranges".into(),
             tag_fields: None,
             topology: "/{robot}/topology".into(),
+            scan: "/{robot}/scan".into(),
             tf: None,
         }
     }

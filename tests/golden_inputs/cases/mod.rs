@@ -19,6 +19,7 @@ mod placers;
 mod quadrant_classifier;
 mod random_walk_aligner;
 mod result_sinks;
+mod scan_mapper;
 mod tag_filter;
 mod tag_localizer;
 mod topology;
@@ -69,6 +70,7 @@ pub(crate) fn made_up() -> Vec<Case> {
         quadrant_classifier::cases(),
         random_walk_aligner::cases(),
         result_sinks::cases(),
+        scan_mapper::cases(),
         tag_filter::cases(),
         tag_localizer::cases(),
         topology::cases(),

@@ -1,0 +1,140 @@
+//! Scans of lidars, from where they were made to where the base of the robot was.
+
+use super::mounts::{Mounts, Untied};
+use crate::schemas::full_type_name;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{
+    DecodeError, Header, LaserEcho, LaserScan, MultiEchoLaserScan, RangeScan, RosMessage, TFMessage, decode,
+};
+use gridweave_runtime::stage::frame_of_robot;
+use nalgebra::Vector3;
+
+/// Knows how lidars are mounted on their robots.
+#[derive(Debug)]
+pub(super) struct Scans {
+    mounts: Mounts,
+}
+
+impl Scans {
+    /// For robots whose base is called `base`, or as most are.
+    pub(super) fn new(base: Option<&str>) -> Self {
+        Self { mounts: Mounts::new(base) }
+    }
+
+    /// Takes up transforms whose frames lack a prefix.
+    pub(super) fn transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
+        for edge in &message.transforms {
+            let parent = frame_of_robot(prefix, &edge.header.frame_id);
+            let child = frame_of_robot(prefix, &edge.child_frame_id);
+            self.mounts.insert(&parent, &child, &edge.transform, is_static);
+        }
+    }
+
+    /// A scan as the base of its robot sees it: in the plane, with a lidar that hangs upside down turning the other way.
+    pub(super) fn seen_from_base(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, Untied> {
+        let (base, transform_base_lidar) = self.mounts.mount(robot, &scan.header.frame_id)?;
+        let ahead = transform_base_lidar * Vector3::x();
+        let is_upright = (transform_base_lidar * Vector3::z()).z >= 0.0;
+        let turning = |angle: f32| if is_upright { f64::from(angle) } else { -f64::from(angle) };
+        let place = transform_base_lidar.translation;
+        Ok(RangeScan {
+            header: Header { stamp: scan.header.stamp, frame_id: base },
+            x: place.x,
+            y: place.y,
+            yaw: ahead.y.atan2(ahead.x),
+            angle_min: turning(scan.angle_min),
+            angle_increment: turning(scan.angle_increment),
+            time_increment: f64::from(scan.time_increment),
+            range_min: scan.range_min,
+            range_max: scan.range_max,
+            ranges: scan.ranges,
+        })
+    }
+}
+
+/// Whether a type is that of scans.
+pub(super) fn is_scan(type_name: &str) -> bool {
+    [LaserScan::NAME, MultiEchoLaserScan::NAME].contains(&type_name)
+}
+
+/// Reads a scan of a channel that [holds some](is_scan). Of several echoes of a beam the nearest counts: it has met something.
+pub(super) fn read_scan(channel: &Channel, data: &[u8]) -> Result<LaserScan, DecodeError> {
+    if full_type_name(&channel.schema_name) == LaserScan::NAME {
+        return decode(data);
+    }
+    let scan: MultiEchoLaserScan = decode(data)?;
+    let nearest = |echoes: Vec<LaserEcho>| {
+        echoes.into_iter().map(|LaserEcho { echoes }| echoes.first().copied().unwrap_or(f32::INFINITY)).collect()
+    };
+    Ok(LaserScan {
+        header: scan.header,
+        angle_min: scan.angle_min,
+        angle_max: scan.angle_max,
+        angle_increment: scan.angle_increment,
+        time_increment: scan.time_increment,
+        scan_time: scan.scan_time,
+        range_min: scan.range_min,
+        range_max: scan.range_max,
+        ranges: nearest(scan.ranges),
+        intensities: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::{Quaternion, Transform, TransformStamped, encode};
+    use nalgebra::UnitQuaternion;
+    use std::f64::consts::PI;
+
+    fn scans(at: [f64; 2], rotation: UnitQuaternion<f64>) -> Scans {
+        let mut transform = Transform::default();
+        (transform.translation.x, transform.translation.y) = (at[0], at[1]);
+        let r = rotation;
+        transform.rotation = Quaternion { x: r.i, y: r.j, z: r.k, w: r.w };
+        let header = Header { frame_id: "base_link".into(), ..Default::default() };
+        let mount = TransformStamped { header, child_frame_id: "laser".into(), transform };
+        let mut scans = Scans::new(None);
+        scans.transforms("r1", true, &TFMessage { transforms: vec![mount] });
+        scans
+    }
+
+    fn scan(frame: &str) -> LaserScan {
+        let header = Header { frame_id: frame.into(), ..Default::default() };
+        LaserScan { header, angle_min: -1.0, angle_increment: 0.5, ranges: vec![1.0, 2.0], ..Default::default() }
+    }
+
+    #[test]
+    fn a_scan_is_seen_from_where_its_lidar_is_mounted() {
+        let scans = scans([0.2, -0.1], UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5));
+        let seen = scans.seen_from_base("r1", scan("r1/laser")).unwrap();
+        assert_eq!((seen.header.frame_id.as_str(), seen.x, seen.y), ("r1/base_link", 0.2, -0.1));
+        assert!((seen.yaw - 0.5).abs() < 1e-9, "{seen:?}");
+        assert_eq!((seen.angle_min, seen.angle_increment, seen.ranges.len()), (-1.0, 0.5, 2));
+    }
+
+    #[test]
+    fn a_lidar_that_hangs_upside_down_turns_the_other_way() {
+        let scans = scans([0.0, 0.0], UnitQuaternion::from_euler_angles(PI, 0.0, 0.0));
+        let seen = scans.seen_from_base("r1", scan("r1/laser")).unwrap();
+        assert!(seen.yaw.abs() < 1e-9);
+        assert_eq!((seen.angle_min, seen.angle_increment), (1.0, -0.5));
+    }
+
+    #[test]
+    fn a_scan_in_the_frame_of_the_base_needs_no_mount_and_one_in_no_known_frame_is_told() {
+        let scans = Scans::new(None);
+        assert_eq!(scans.seen_from_base("r1", scan("r1/base_footprint")).unwrap().x, 0.0);
+        assert_eq!(scans.seen_from_base("r1", scan("r1/laser")), Err(Untied));
+    }
+
+    #[test]
+    fn of_several_echoes_the_nearest_counts() {
+        let beam = |echoes: &[f32]| LaserEcho { echoes: echoes.to_vec() };
+        let scan = MultiEchoLaserScan { ranges: vec![beam(&[1.5, 3.0]), beam(&[])], ..Default::default() };
+        let channel = |schema_name: &str| Channel { schema_name: schema_name.to_owned(), ..Default::default() };
+        let read = read_scan(&channel("sensor_msgs/MultiEchoLaserScan"), &encode(&scan).unwrap()).unwrap();
+        assert_eq!(read.ranges, [1.5, f32::INFINITY]);
+        assert!(read_scan(&channel(LaserScan::NAME), &[0, 1, 0, 0, 7]).is_err());
+    }
+}

@@ -1,0 +1,54 @@
+//! `sensor_msgs`.
+
+use super::{Header, ros_messages};
+use serde::{Deserialize, Serialize};
+
+/// `sensor_msgs/msg/LaserScan`: a scan of a lidar that turns about its axis.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LaserScan {
+    /// When the first beam was sent, and the frame of the lidar.
+    pub header: Header,
+    /// The direction of the first beam, radians.
+    pub angle_min: f32,
+    /// The direction of the last beam, radians.
+    pub angle_max: f32,
+    /// From a beam to the next, radians.
+    pub angle_increment: f32,
+    /// From a beam to the next, seconds; 0 if it is not known.
+    pub time_increment: f32,
+    /// From a scan to the next, seconds.
+    pub scan_time: f32,
+    /// What is nearer is no measurement, metres.
+    pub range_min: f32,
+    /// What is farther is no measurement, metres.
+    pub range_max: f32,
+    /// What the beams have measured, metres.
+    pub ranges: Vec<f32>,
+    /// How strong each came back, in a unit of the device; none if it does not tell.
+    pub intensities: Vec<f32>,
+}
+
+/// `sensor_msgs/msg/LaserEcho`: what came back of one beam, the nearest first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct LaserEcho {
+    pub echoes: Vec<f32>,
+}
+
+/// `sensor_msgs/msg/MultiEchoLaserScan`: a [`LaserScan`] of which each beam may have met several things.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub struct MultiEchoLaserScan {
+    pub header: Header,
+    pub angle_min: f32,
+    pub angle_max: f32,
+    pub angle_increment: f32,
+    pub time_increment: f32,
+    pub scan_time: f32,
+    pub range_min: f32,
+    pub range_max: f32,
+    pub ranges: Vec<LaserEcho>,
+    pub intensities: Vec<LaserEcho>,
+}
+
+ros_messages!("sensor_msgs": LaserScan, LaserEcho, MultiEchoLaserScan);

@@ -1,0 +1,67 @@
+//! Robots that have scans of their lidars, and no maps.
+
+use crate::support::{Ended, gridweave, simulate};
+use serde_json::Value;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Simulates two robots, and keeps of what they log these topics: in `scans.mcap`.
+fn logs_with(folder: &Path, topics: &str) {
+    let world = ["--robots", "2", "--seed", "2", "--set", "overlap=0.9", "--set", "drift=0", "--set", "scans=true"];
+    let small = ["--set", "width=12", "--set", "height=10", "--set", "tags=24", "--set", "beams=240"];
+    simulate(folder, "in.mcap", &[&world[..], &small].concat());
+    gridweave(folder, &["filter", "in.mcap", "-o", "scans.mcap", "--topics", topics]).assert(0, &["wrote"]);
+}
+
+fn merge(folder: &Path) -> Ended {
+    gridweave(folder, &["merge", "scans.mcap", "-o", "out.mcap", "--summary", "summary.json"])
+}
+
+/// How many pairs of robots were merged rightly, and how many wrongly.
+fn judged(folder: &Path) -> [Value; 2] {
+    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
+    let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    ["right", "wrong"].map(|key| evaluation[key].clone())
+}
+
+#[test]
+fn robots_with_scans_and_poses_and_without_maps_are_merged() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    logs_with(folder, "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges");
+    gridweave(folder, &["info", "scans.mcap"])
+        .assert(0, &["there is no map of robot1: `merge` draws one from its", "at the poses of /robot1/pose"]);
+    merge(folder).assert(0, &["no map of robot1, robot2 was logged: drawn from scans", "merged 2 of 2"]);
+    assert_eq!(judged(folder), [1, 0].map(Value::from));
+    // What was drawn is in the output, as is what it was drawn from.
+    let info = gridweave(folder, &["info", "out.mcap", "--json"]);
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    let topics: Vec<&str> =
+        info["topics"].as_array().unwrap().iter().filter_map(|topic| topic["topic"].as_str()).collect();
+    for topic in ["/robot1/drawn_map", "/robot2/drawn_map", "/map", "/robot1/scan", "/robot1/pose"] {
+        assert!(topics.contains(&topic), "{topic}: {topics:?}");
+    }
+}
+
+#[test]
+fn poses_of_scans_may_come_from_tf_and_a_robot_may_have_its_map() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    logs_with(folder, "/{robot}/scan,/tf,/robot2/map");
+    gridweave(folder, &["info", "scans.mcap"])
+        .assert(0, &["`merge` draws one from its", "at the poses of tf (robot1/map to robot1/base_link)"]);
+    let ended = merge(folder);
+    ended.assert(0, &["no map of robot1 was logged: drawn from scans", "merged 2 of 2"]);
+    assert!(!ended.text().contains("were left out: a result"), "{ended:?}");
+    gridweave(folder, &["render", "out.mcap", "-o", "out.png"]).assert(0, &["wrote out.png"]);
+    assert_eq!(judged(folder), [1, 0].map(Value::from));
+}
+
+#[test]
+fn scans_of_robots_of_which_nothing_says_where_they_were_give_no_map() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    logs_with(folder, "/{robot}/scan");
+    gridweave(folder, &["info", "scans.mcap"]).assert(0, &["nothing says where it was"]);
+    merge(folder).assert(1, &["nothing says where it was"]);
+}
