@@ -9,6 +9,8 @@
 //! as the rigid frames lay them and as the maps are bent.
 
 use crate::common_places::{self, CommonPlace, CommonPlaces, pose};
+use crate::merge_text::short;
+use crate::prose::broken;
 use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
@@ -217,8 +219,8 @@ impl RobotOutcome {
 }
 
 impl Evaluation {
-    /// A table for people: a line for every robot, and the counts.
-    pub fn to_text(&self) -> String {
+    /// A table for people in lines of at most `width` characters: every robot, and the counts.
+    pub fn to_text(&self, width: Option<usize>) -> String {
         let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
         let mut table = Table::new(["robot", "outcome", "error m", "error deg", ""]);
         for robot in &self.robots {
@@ -227,14 +229,17 @@ impl Evaluation {
                 robot.outcome.words().to_owned(),
                 number(robot.error_m),
                 number(robot.error_deg),
-                robot.reason.clone().unwrap_or_default(),
+                robot.reason.as_deref().map(|reason| short(reason).replace('\n', " ")).unwrap_or_default(),
             ]);
         }
         let unrelated = if self.related { "" } else { "; the truth has no frames: the robots are taken as unrelated" };
         let reference = self.reference.as_deref().unwrap_or("none");
         let Self { right, wrong, refused, .. } = self;
-        let common = self.common.as_ref().map(|common| format!("{common}\n")).unwrap_or_default();
-        format!("{table}right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})\n{common}")
+        let common =
+            self.common.as_ref().map(|common| broken(&common.to_string(), 2, width) + "\n").unwrap_or_default();
+        let table = table.fit(width);
+        let counts = format!("right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})");
+        format!("{table}{}\n{common}", broken(&counts, 2, width))
     }
 }
 

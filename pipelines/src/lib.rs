@@ -19,6 +19,7 @@ mod interrupt;
 mod job;
 mod merge_log;
 mod merge_text;
+mod prose;
 pub mod shipped;
 mod status;
 pub mod summary;

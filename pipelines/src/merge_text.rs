@@ -1,12 +1,16 @@
 //! What a merge has found, for people.
 
+use crate::prose::{broken, cut};
 use crate::table::Table;
 use gridweave_logs::summary::{Bend, Frame, Summary};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Where the maps lie, which are not merged and why, and what became of each pair.
-pub(crate) fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result {
+/// Of the reason for what became of a pair so many lines are shown; `--explain` tells the whole of it.
+const REASON_LINES: usize = 3;
+
+/// Where the maps lie, which are not merged and why, and what became of each pair, in lines of at most `width` characters.
+pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize>) -> std::fmt::Result {
     if let Some(reference) = &merge.reference {
         let merged = merge.frames.len();
         match (merged, merged + merge.unmerged.len()) {
@@ -15,28 +19,29 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result
             (1, all) => writeln!(out, "none of the other {} robots could be merged with {reference}", all - 1)?,
             (_, all) => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
         }
-        write!(out, "{}", frames_table(&merge.frames))?;
+        out.push_str(&frames_table(&merge.frames).fit(width));
         if !merge.bends.is_empty() {
-            writeln!(
-                out,
-                "how the maps are bent, and how well walls that several show come out as one (before, and bent):"
-            )?;
-            write!(out, "{}", bends_table(&merge.bends))?;
+            let head =
+                "how the maps are bent, and how well walls that several show come out as one (before, and bent):";
+            writeln!(out, "{}", broken(head, 2, width))?;
+            out.push_str(&bends_table(&merge.bends).fit(width));
         }
     }
     for (robot, reason) in &merge.unmerged {
         match short(reason) {
-            line if !line.contains('\n') => writeln!(out, "not merged: {robot}: {line}")?,
+            line if !line.contains('\n') => {
+                writeln!(out, "{}", broken(&format!("not merged: {robot}: {line}"), 2, width))?
+            }
             lines => {
                 writeln!(out, "not merged: {robot}:")?;
-                lines.lines().try_for_each(|line| writeln!(out, "  {line}"))?;
+                lines.lines().try_for_each(|line| writeln!(out, "{}", broken(&format!("  {line}"), 4, width)))?;
             }
         }
     }
     for group in &merge.groups {
         let (count, reference) = (group.frames.len(), &group.reference);
         writeln!(out, "{count} of these are tied to each other; map frames in the frame of {reference}:")?;
-        write!(out, "{}", frames_table(&group.frames))?;
+        out.push_str(&frames_table(&group.frames).fit(width));
     }
     if merge.alignments.is_empty() {
         return Ok(());
@@ -47,34 +52,42 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary) -> std::fmt::Result
         let names = format!("{} {}", pair.a, pair.b);
         table.row([names, accepted.into(), format!("{:.3}", pair.score), pair.method.clone()]);
     }
-    let table = table.to_string();
-    let mut rows = table.lines();
-    writeln!(out, "\n{}", rows.next().unwrap_or_default())?;
+    let rows = table.fit_rows(width);
+    let mut rows = rows.iter();
+    write!(out, "\n{}", rows.next().map_or("", String::as_str))?;
     for (row, pair) in rows.zip(&merge.alignments) {
-        writeln!(out, "{row}")?;
+        write!(out, "{row}")?;
         if let Some(headline) = pair.reason.lines().next() {
-            writeln!(out, "    {headline}")?;
+            writeln!(out, "{}", cut(&format!("    {headline}"), 4, width, REASON_LINES))?;
         }
     }
     Ok(())
 }
 
-/// All that is known of a robot and each other: the whole of every reason.
-pub(crate) fn write_explanation(out: &mut String, merge: &Summary, robot: &str) -> std::fmt::Result {
+/// All that is known of a robot and each other: the whole of every reason, in lines of at most `width` characters.
+pub(crate) fn write_explanation(
+    out: &mut String,
+    merge: &Summary,
+    robot: &str,
+    width: Option<usize>,
+) -> std::fmt::Result {
     let pairs: Vec<_> = merge.alignments.iter().filter(|pair| pair.a == robot || pair.b == robot).collect();
     if let Some(reason) = merge.unmerged.get(robot).filter(|_| pairs.is_empty()) {
-        writeln!(out, "\n{robot} is not merged: {reason}")?;
+        writeln!(out)?;
+        let whole = format!("{robot} is not merged: {reason}");
+        whole.lines().try_for_each(|line| writeln!(out, "{}", broken(line, 2, width)))?;
     }
     for pair in pairs {
         let outcome = if pair.accepted { "accepted" } else { "refused" };
-        writeln!(out, "\n{} and {}, {outcome} with {:.3} by {}:", pair.a, pair.b, pair.score, pair.method)?;
-        pair.reason.lines().try_for_each(|line| writeln!(out, "  {line}"))?;
+        let head = format!("{} and {}, {outcome} with {:.3} by {}:", pair.a, pair.b, pair.score, pair.method);
+        writeln!(out, "\n{}", broken(&head, 4, width))?;
+        pair.reason.lines().try_for_each(|line| writeln!(out, "{}", broken(&format!("  {line}"), 4, width)))?;
     }
     Ok(())
 }
 
 /// The first paragraph of a reason: what everybody is shown.
-fn short(reason: &str) -> &str {
+pub(crate) fn short(reason: &str) -> &str {
     reason.split("\n\n").next().unwrap_or(reason).trim_end()
 }
 
@@ -114,7 +127,7 @@ mod tests {
 
     fn text(merge: serde_json::Value) -> String {
         let mut text = String::new();
-        write_merge(&mut text, &serde_json::from_value(merge).unwrap()).unwrap();
+        write_merge(&mut text, &serde_json::from_value(merge).unwrap(), None).unwrap();
         text
     }
 
@@ -133,6 +146,31 @@ mod tests {
         assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
         assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
         assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
+    }
+
+    #[test]
+    fn no_line_is_wider_than_the_terminal_and_a_long_reason_is_cut() {
+        let reason = "walls of one map lie on free space of the other ".repeat(9);
+        let pair = json!({
+            "a": "robot1", "b": "robot2", "method": "tags+directions+icp; maps+maps+icp+walls", "x": 0.0, "y": 0.0, "yaw": 0.0,
+            "score": 0.25, "accepted": false, "checked": false, "reason": reason,
+        });
+        let merge = json!({
+            "reference": "robot1",
+            "frames": {"robot1": {"x": 0.0, "y": 0.0, "yaw": 0.0}},
+            "unmerged": {"robot2": reason, "robot3": format!("no alignment with robot1:\n{reason}")},
+            "alignments": [pair],
+        });
+        let merge: Summary = serde_json::from_value(merge).unwrap();
+        for width in [60, 80] {
+            let (mut text, mut explained) = (String::new(), String::new());
+            write_merge(&mut text, &merge, Some(width)).unwrap();
+            write_explanation(&mut explained, &merge, "robot2", Some(width)).unwrap();
+            let lines = || text.lines().chain(explained.lines());
+            assert!(lines().all(|line| line.chars().count() <= width), "{text}{explained}");
+            assert!(text.trim_end().ends_with("..."), "{text}");
+            assert_eq!(explained.matches("free").count(), 9, "{explained}");
+        }
     }
 
     #[test]
@@ -169,7 +207,7 @@ mod tests {
         assert!(shown.contains("  robot1 robot2  no        0.250  maps\n    the maps fit at 2 places\n"), "{shown}");
         assert!(!shown.contains("the whole"), "{shown}");
         let mut explained = String::new();
-        write_explanation(&mut explained, &serde_json::from_value(merge).unwrap(), "robot2").unwrap();
+        write_explanation(&mut explained, &serde_json::from_value(merge).unwrap(), "robot2", None).unwrap();
         assert!(explained.contains("robot1 and robot2, refused with 0.250 by maps:\n  the maps fit"), "{explained}");
         assert_eq!(explained.matches("the whole of it").count(), 1);
     }

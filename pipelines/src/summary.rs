@@ -1,6 +1,7 @@
 //! What a run has found, as JSON and as text.
 
 use crate::merge_text::{write_explanation, write_merge};
+use crate::prose::broken;
 use crate::table::Table;
 use anyhow::{Result, bail};
 use gridweave_logs::summary::{Areas, Summary};
@@ -109,13 +110,13 @@ impl RunSummary {
         Ok(())
     }
 
-    /// The summary for people, with the whole of what is known of some robots.
-    pub fn to_text(&self, explained: &[String]) -> String {
+    /// The summary for people in lines of at most `width` characters, with the whole of what is known of some robots.
+    pub fn to_text(&self, explained: &[String], width: Option<usize>) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write_text(&mut text);
+        let _ = self.write_text(&mut text, width);
         for (robot, merge) in explained.iter().flat_map(|robot| self.merge.as_ref().map(|merge| (robot, merge))) {
-            let _ = write_explanation(&mut text, merge, robot);
+            let _ = write_explanation(&mut text, merge, robot, width);
         }
         text
     }
@@ -133,14 +134,14 @@ impl RunSummary {
         }
     }
 
-    fn write_text(&self, out: &mut String) -> std::fmt::Result {
+    fn write_text(&self, out: &mut String, width: Option<usize>) -> std::fmt::Result {
         if let Some(merge) = &self.merge {
-            write_merge(out, merge)?;
+            write_merge(out, merge, width)?;
         }
         for (stage, area) in self.stages.iter().filter_map(|stage| Some((&stage.name, stage.area?))) {
-            write_areas(out, stage, &area)?;
+            write_areas(out, stage, &area, width)?;
         }
-        self.warning_lines().try_for_each(|line| writeln!(out, "{line}"))?;
+        self.warning_lines().try_for_each(|line| writeln!(out, "{}", broken(&line, 2, width)))?;
         // Only a live run has any of these.
         for StageSummary { name, dropped, restarts, .. } in &self.stages {
             if *dropped > 0 {
@@ -154,7 +155,7 @@ impl RunSummary {
         for StageSummary { name, messages_in, messages_out, busy_ms, .. } in &self.stages {
             table.row([name.clone(), messages_in.to_string(), messages_out.to_string(), format!("{busy_ms:.1}")]);
         }
-        write!(out, "\n{table}")
+        write!(out, "\n{}", table.fit(width))
     }
 
     /// The warnings for people, a line each.
@@ -174,12 +175,12 @@ impl RunSummary {
 }
 
 /// How much of a fused map is known, and how much of it is in conflict.
-fn write_areas(out: &mut String, stage: &str, area: &Areas) -> std::fmt::Result {
+fn write_areas(out: &mut String, stage: &str, area: &Areas, width: Option<usize>) -> std::fmt::Result {
     let Areas { known_to_one_m2, known_to_several_m2, in_conflict_m2, conflict_share } = *area;
-    write!(out, "\n{stage}: {known_to_one_m2:.1} m2 known to one map, {known_to_several_m2:.1} m2 to several")?;
+    let mut line = format!("{stage}: {known_to_one_m2:.1} m2 known to one map, {known_to_several_m2:.1} m2 to several");
     if known_to_several_m2 > 0.0 {
         let percent = 100.0 * conflict_share;
-        write!(out, ", which contradict each other on {in_conflict_m2:.1} m2 of it ({percent:.1} %)")?;
+        write!(line, ", which contradict each other on {in_conflict_m2:.1} m2 of it ({percent:.1} %)")?;
     }
-    writeln!(out)
+    writeln!(out, "\n{}", broken(&line, 2, width))
 }

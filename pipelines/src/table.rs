@@ -1,6 +1,9 @@
 //! Tables in plain text.
 
-use std::fmt::Write;
+mod layout;
+
+use crate::terminal;
+use layout::Layout;
 
 /// Lines up columns: those of numbers, with their units or without, to the right, all others to the left.
 pub struct Table {
@@ -39,29 +42,40 @@ impl Table {
         };
         self.rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
     }
+
+    /// The table in lines of at most `width` characters, as wide as it is if there is none. Texts are broken within their
+    /// columns; columns that do not fit beside the others stand below them, in lines that are indented.
+    pub fn fit(&self, width: Option<usize>) -> String {
+        self.fit_rows(width).concat()
+    }
+
+    /// The same, the lines of each row apart from those of others; the heads are the first.
+    pub fn fit_rows(&self, width: Option<usize>) -> Vec<String> {
+        let layout = Layout::new(self, width.unwrap_or(usize::MAX));
+        self.rows.iter().map(|row| layout.row(row)).collect()
+    }
+
+    /// The table as wide as the terminal that it is printed to; none where standard output is no terminal.
+    pub fn to_terminal(&self) -> Option<String> {
+        terminal::width().map(|width| self.fit(Some(width)))
+    }
+
+    /// Takes out columns with these heads, the first of them first, until the table is no wider than `width`.
+    pub fn narrow_to(&mut self, width: usize, heads: &[&str]) {
+        for head in heads {
+            if self.fit(None).lines().all(|line| line.chars().count() <= width) {
+                return;
+            }
+            if let Some(column) = self.rows[0].iter().position(|own| own == head) {
+                self.rows.iter_mut().filter(|row| column < row.len()).for_each(|row| drop(row.remove(column)));
+            }
+        }
+    }
 }
 
 impl std::fmt::Display for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let cell = |row: &Vec<String>, column: usize| row.get(column).map_or("", String::as_str).to_owned();
-        let widths: Vec<usize> = (0..columns)
-            .map(|column| self.rows.iter().map(|row| cell(row, column).chars().count()).max().unwrap_or(0))
-            .collect();
-        let is_number: Vec<bool> =
-            (0..columns).map(|column| self.rows[1..].iter().all(|row| is_numeric(&cell(row, column)))).collect();
-        for row in &self.rows {
-            let mut line = String::new();
-            for (column, &width) in widths.iter().enumerate() {
-                let text = cell(row, column);
-                match is_number[column] {
-                    true => write!(line, "  {text:>width$}")?,
-                    false => write!(line, "  {text:<width$}")?,
-                }
-            }
-            writeln!(f, "{}", line.trim_end())?;
-        }
-        Ok(())
+        f.write_str(&self.fit(None))
     }
 }
 
@@ -82,6 +96,62 @@ mod tests {
         table.row(["robot1".into(), "0.1".into(), "a".into()]);
         table.row(["r".into(), "-10.1".into(), "bcd".into()]);
         assert_eq!(table.to_string(), "  robot       x  why\n  robot1    0.1  a\n  r       -10.1  bcd\n");
+    }
+
+    fn topics() -> Table {
+        let mut table = Table::new(["topic", "type", "messages", "Hz", "frame"]);
+        table.row(["/robot1/map", "nav_msgs/msg/OccupancyGrid", "12", "0.5", "robot1/map"].map(str::to_owned));
+        table.row(["/tf", "tf2_msgs/msg/TFMessage", "1200", "50.0", "robot1/odom robot1/map"].map(str::to_owned));
+        table
+    }
+
+    #[test]
+    fn columns_that_do_not_fit_stand_below_the_others() {
+        let expected = concat!(
+            "  topic        type                        messages    Hz\n",
+            "      frame\n",
+            "  /robot1/map  nav_msgs/msg/OccupancyGrid        12   0.5\n",
+            "      robot1/map\n",
+            "  /tf          tf2_msgs/msg/TFMessage          1200  50.0\n",
+            "      robot1/odom robot1/map\n",
+        );
+        assert_eq!(topics().fit(Some(60)), expected);
+        assert_eq!(topics().fit(Some(200)), topics().to_string());
+    }
+
+    #[test]
+    fn no_line_is_wider_than_was_asked_for_and_no_word_is_lost() {
+        let mut table = topics();
+        table.row(["/a".into(), "t".repeat(70), "1".into(), String::new(), "a long sentence ".repeat(20)]);
+        let letters = |text: &str| text.chars().filter(|c| !c.is_whitespace()).count();
+        for width in 40..160 {
+            let text = table.fit(Some(width));
+            assert!(text.lines().all(|line| line.chars().count() <= width), "{width}\n{text}");
+            assert_eq!(letters(&text), letters(&table.to_string()), "{width}\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_sentence_is_broken_within_its_column() {
+        let mut table = Table::new(["robot", "error m", "why"]);
+        table.row([
+            "robot2".into(),
+            "0.1".into(),
+            "the maps fit at several places and none is better than others".into(),
+        ]);
+        let expected = concat!(
+            "  robot   error m  why\n",
+            "  robot2      0.1  the maps fit at several places\n",
+            "                   and none is better than others\n",
+        );
+        assert_eq!(table.fit(Some(50)), expected);
+    }
+
+    #[test]
+    fn the_columns_that_matter_least_are_taken_out_of_a_table_that_is_too_wide() {
+        let mut table = topics();
+        table.narrow_to(51, &["frame", "Hz", "type"]);
+        assert_eq!(table.to_string().lines().next(), Some("  topic        type                        messages"));
     }
 
     #[test]

@@ -5,9 +5,11 @@ use crate::status::BadUse;
 use crate::terminal::say;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use gridweave_runtime::engine::processes::Launch;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use tracing::field::{Field, Visit};
 use tracing::span;
 use tracing::{Level, Subscriber};
@@ -23,13 +25,29 @@ pub(crate) struct TellingArgs {
     /// Say on standard error what the stages do; twice: with every message. `RUST_LOG` says it in more detail.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
-    /// How that is written; the processes of a live run write text.
+    /// How that is written.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
     log_format: LogFormat,
     /// Write what every stage did when, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not with the
     /// engine `processes`.
     #[arg(long, global = true, value_name = "FILE.json")]
     pub(crate) trace: Option<PathBuf>,
+}
+
+/// How this program writes events.
+static FORMAT: OnceLock<LogFormat> = OnceLock::new();
+
+/// How the processes of a run are started, so that they write events as this program does.
+///
+/// # Errors
+/// The program cannot find itself.
+pub(crate) fn launch() -> Result<Launch> {
+    let mut launch = Launch::this_program().context("cannot find the program itself")?;
+    if FORMAT.get() == Some(&LogFormat::Json) {
+        let format = ["--log-format", "json"].map(str::to_owned);
+        launch.arguments = format.into_iter().chain(launch.arguments).collect();
+    }
+    Ok(launch)
 }
 
 /// How events are written.
@@ -45,6 +63,8 @@ impl TellingArgs {
     /// Begins to tell. A trace is complete when what is given is dropped.
     pub(crate) fn start(&self) -> Result<Option<FlushGuard>> {
         let (trace, guard) = self.trace_layer()?.unzip();
+        // Set once, as the subscriber is.
+        let _ = FORMAT.set(self.log_format);
         tracing_subscriber::registry().with(self.lines()).with(StageNames).with(trace).init();
         Ok(guard)
     }

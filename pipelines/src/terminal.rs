@@ -4,8 +4,12 @@
 //! cannot be written are one, and what cannot be said is left unsaid.
 
 use anyhow::{Context, Result};
+use gridweave_runtime::pipeline::TEXT_WIDTH;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+
+/// On a narrower terminal lines are broken as on one of this width.
+const LEAST_WIDTH: usize = 40;
 
 /// Prints a result, without a line end behind it. Gives whether anybody reads on.
 ///
@@ -24,6 +28,19 @@ pub(crate) fn print_line(text: impl Display) -> Result<bool> {
 pub(crate) fn say(text: impl Display) {
     // There is nobody else to be told.
     let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// How many characters a line of the results may have: what `COLUMNS` says or, on a terminal, its width. None where nobody says:
+/// programs that read on get their lines whole.
+pub(crate) fn width() -> Option<usize> {
+    let said = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
+    let measured = || terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));
+    said.or_else(measured).filter(|width| *width > 0).map(|width: usize| width.max(LEAST_WIDTH))
+}
+
+/// The width that prose is filled to.
+pub(crate) fn text_width() -> usize {
+    width().unwrap_or(TEXT_WIDTH).min(TEXT_WIDTH)
 }
 
 fn write_to(output: &mut impl Write, text: impl Display) -> Result<bool> {

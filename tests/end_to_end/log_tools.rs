@@ -90,7 +90,10 @@ fn messages_are_printed_as_lines_of_json() {
     assert_eq!(readings[0]["message"]["header"]["stamp"]["sec"], 1_700_000_010);
     assert_eq!(readings[0]["message"]["header"]["frame_id"], "robot1/base_link");
     assert_eq!(lines(&["in.mcap"]).len(), 3001);
-    assert_eq!(lines(&["in.mcap", "--topic", "/none"]).len(), 0);
+    gridweave(folder.path(), &["cat", "in.mcap", "--topic", "/mp"])
+        .assert(1, &["there is no topic `/mp` in the logs: did you mean `/map`?"]);
+    gridweave(folder.path(), &["convert", "in.mcap", "-o", "out.mcap", "--topic", "/far/from/all"])
+        .assert(1, &["there is no topic `/far/from/all` in the logs: the topics in them are: `/map`"]);
 
     // Whoever has read enough is no failure.
     let program = env!("CARGO_BIN_EXE_troubled_stages");

@@ -45,11 +45,13 @@ fn what_the_stages_do_is_told_if_asked_for_on_any_engine() {
         let silent = gridweave(folder.path(), &merge);
         assert!(!silent.stderr.contains("stage fuser"), "{}", silent.stderr);
     }
-    let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "-vv", "--log-format", "json"];
-    let told = gridweave(folder.path(), &merge);
-    let lines: Vec<Value> = told.stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
-    let receives = |line: &&Value| line["level"] == "DEBUG" && line["span"]["stage"] == "fuser";
-    assert!(lines.iter().any(|line| receives(&line)), "{}", told.stderr);
+    for engine in ["threads", "processes"] {
+        let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "--engine", engine];
+        let told = gridweave(folder.path(), &[&merge[..], &["-vv", "--log-format", "json"]].concat());
+        let lines: Vec<Value> = told.stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let receives = |line: &&Value| line["level"] == "DEBUG" && line["span"]["stage"] == "fuser";
+        assert!(lines.iter().any(|line| receives(&line)), "{}", told.stderr);
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::input::Input;
 use super::target::Target;
 use gridweave::shipped::registry;
-use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, SingleStage};
+use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, SingleStage, TEXT_WIDTH};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -53,7 +53,7 @@ fn every_pipeline_file_is_read_or_refused() {
     check("pipelines", files(&folder, |path| path.extension().is_some_and(|end| end == "toml")), |folder| {
         let parse = |text: &str| Pipeline::parse("any.toml", text, &registry([]), &Overrides::default());
         if let Some(pipeline) = answered(parse(&text(folder))) {
-            assert!(!pipeline.to_text().is_empty());
+            assert!(!pipeline.to_text(TEXT_WIDTH).is_empty());
             let again = parse(&pipeline.to_toml()).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
             assert_eq!(format!("{pipeline:?}"), format!("{again:?}"));
         }

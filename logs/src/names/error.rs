@@ -2,6 +2,7 @@
 
 use crate::reader::ReadError;
 use crate::source::map_file;
+use gridweave_runtime::pipeline::suggest;
 
 /// Logs cannot be opened and named.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +22,19 @@ pub enum NameError {
         /// The robots that are there.
         known: Vec<String>,
     },
+    /// A topic that was asked for is not there.
+    #[error("there is no topic `{topic}` in the logs{}", nearest(.topic, .known))]
+    NoSuchTopic {
+        /// What was asked for.
+        topic: String,
+        /// The topics that are there, as they are called here.
+        known: Vec<String>,
+    },
+}
+
+fn nearest(topic: &str, known: &[String]) -> String {
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    suggest(topic, &known, "the topics in them are").map_or_else(String::new, |meant| format!(": {meant}"))
 }
 
 fn listed(robots: &[String]) -> String {

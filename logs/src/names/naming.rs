@@ -1,6 +1,7 @@
 //! From what logs hold, and what was said of them, to the names of their channels.
 
 use super::channel::NamedChannel;
+use super::rules::fits;
 use super::{Convention, Input, NameError, NameRules, Names, alike};
 use crate::reader::LogFile;
 use crate::source::{RobotChannels, Role};
@@ -49,6 +50,13 @@ pub(super) fn name(
     let known = known_robots(&roles, &drafts);
     if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
         return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.into_iter().collect() });
+    }
+    if let Some(unknown) =
+        rules.topics.iter().find(|topic| !drafts.iter().any(|draft| fits(topic, &draft.channel.topic)))
+    {
+        let known: BTreeSet<&str> = drafts.iter().map(|draft| draft.channel.topic.as_str()).collect();
+        let known = known.into_iter().map(str::to_owned).collect();
+        return Err(NameError::NoSuchTopic { topic: unknown.clone(), known });
     }
     let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
     for Draft { file, number, channel, robot, .. } in drafts {

@@ -33,6 +33,11 @@ pub struct NameRules {
     pub align_start: bool,
 }
 
+/// Whether a topic is the one that is asked for, in which `{robot}` stands for any one part.
+pub(super) fn fits(wanted: &str, topic: &str) -> bool {
+    wanted == topic || match_robot(wanted, topic).is_some()
+}
+
 impl NameRules {
     /// The other name that a topic is to have.
     pub(super) fn renamed(&self, topic: &str) -> Option<String> {
@@ -41,8 +46,7 @@ impl NameRules {
 
     /// Whether a topic is read, which is that of the given robot.
     pub(super) fn wants(&self, topic: &str, robot: Option<&str>) -> bool {
-        let fits = |wanted: &String| wanted == topic || match_robot(wanted, topic).is_some();
         let of_robot = robot.is_none_or(|robot| self.robots.is_empty() || self.robots.iter().any(|one| one == robot));
-        of_robot && (self.topics.is_empty() || self.topics.iter().any(fits))
+        of_robot && (self.topics.is_empty() || self.topics.iter().any(|wanted| fits(wanted, topic)))
     }
 }

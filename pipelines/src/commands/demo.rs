@@ -4,7 +4,7 @@ use crate::commands::simulate;
 use crate::evaluate::evaluate;
 use crate::job::{Job, Output, RunOptions};
 use crate::status::Status;
-use crate::terminal::{print, print_line};
+use crate::terminal::{print, print_line, width};
 use anyhow::{Context, Result};
 use clap::Args;
 use gridweave_runtime::engine::EngineKind;
@@ -54,10 +54,10 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
         registry,
     };
     let summary = job.run()?;
-    print(summary.to_text(&[]))?;
+    print(summary.to_text(&[], width()))?;
 
     let evaluation = evaluate(&folder.join("summary.json"), &truth)?;
-    print_line(format_args!("\nerrors against the truth:\n{}", evaluation.to_text()))?;
+    print_line(format_args!("\nerrors against the truth:\n{}", evaluation.to_text(width())))?;
     print_line(format_args!("look at {0}/merged.png, or open {0}/merged.mcap in Foxglove", folder.display()))?;
     Ok(match summary.has_unmerged() {
         true => Status::NotAllMerged,

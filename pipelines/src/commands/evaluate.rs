@@ -2,7 +2,7 @@
 
 use crate::evaluate::evaluate;
 use crate::status::Status;
-use crate::terminal::{print, print_line};
+use crate::terminal::{print, print_line, width};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub(crate) fn command(args: &EvaluateArgs) -> Result<Status> {
     let evaluation = evaluate(&args.summary, &args.truth)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&evaluation)?),
-        false => print(evaluation.to_text()),
+        false => print(evaluation.to_text(width())),
     }?;
     Ok(Status::Done)
 }

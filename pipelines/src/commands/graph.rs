@@ -2,7 +2,7 @@
 
 use crate::shipped;
 use crate::status::Status;
-use crate::terminal::print;
+use crate::terminal::{print, text_width};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use gridweave_runtime::pipeline::Overrides;
@@ -35,7 +35,7 @@ pub(crate) enum GraphFormat {
 pub(crate) fn graph(args: &GraphArgs, registry: &Registry) -> Result<Status> {
     let pipeline = shipped::load(&args.pipeline, &Overrides::default(), registry)?;
     print(match args.format {
-        GraphFormat::Text => pipeline.to_text(),
+        GraphFormat::Text => pipeline.to_text(text_width()),
         GraphFormat::Mermaid => pipeline.to_mermaid(),
         GraphFormat::Dot => pipeline.to_dot(),
         GraphFormat::Toml => pipeline.to_toml(),

@@ -2,10 +2,11 @@
 
 use super::map_file_info;
 use crate::job::{Inputs, NamingOptions};
+use crate::prose::broken;
 use crate::shipped;
 use crate::status::Status;
 use crate::table::Table;
-use crate::terminal::{print, print_line};
+use crate::terminal::{print, print_line, width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info::{self, FileInfo, LogInfo, TopicInfo};
@@ -42,7 +43,7 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
         let maps = map_file_info::inspect(&args.inputs)?;
         match args.json {
             true => print_line(serde_json::to_string_pretty(&maps)?),
-            false => print(map_file_info::to_text(&maps)),
+            false => print(map_file_info::to_text(&maps, width())),
         }?;
         return Ok(Status::Done);
     }
@@ -55,19 +56,19 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
     let found = inspect(&inputs, &args.names.rules(Convention::ByRobot)?, &robots)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&found)?),
-        false => print(to_text(&found)),
+        false => print(to_text(&found, width())),
     }?;
     Ok(Status::Done)
 }
 
-fn to_text(found: &LogInfo) -> String {
+fn to_text(found: &LogInfo, width: Option<usize>) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
-    let _ = write_text(found, &mut text);
+    let _ = write_text(found, &mut text, width);
     text
 }
 
-fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
+fn write_text(found: &LogInfo, text: &mut String, width: Option<usize>) -> std::fmt::Result {
     for file in &found.files {
         let packed = match file.chunks {
             0 => file.container.clone(),
@@ -78,18 +79,17 @@ fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
         write_beside(file, text)?;
     }
     if let Some(remark) = &found.remark {
-        writeln!(text, "{remark}")?;
+        writeln!(text, "{}", broken(remark, 2, width))?;
     }
     let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
     writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;
     if found.is_sampled {
-        writeln!(
-            text,
-            "by the index and a few messages: sizes are estimates, and frames, clocks and tags those of these (--all)"
-        )?;
+        let how =
+            "by the index and a few messages: sizes are estimates, and frames, clocks and tags those of these (--all)";
+        writeln!(text, "{}", broken(how, 2, width))?;
     }
     if !found.topics.is_empty() {
-        write!(text, "\n{}", topic_table(&found.topics, found.start.unwrap_or(0.0)))?;
+        write!(text, "\n{}", topic_table(&found.topics, found.start.unwrap_or(0.0)).fit(width))?;
     }
     if !found.robots.is_empty() {
         let mut table = Table::new(["robot", "maps", "poses", "readings", "tags", "poses from"]);
@@ -102,12 +102,13 @@ fn write_text(found: &LogInfo, text: &mut String) -> std::fmt::Result {
             let poses_from = robot.poses_from.clone().unwrap_or_default();
             table.row([name.clone(), maps].into_iter().chain(counts).chain([poses_from]));
         }
-        write!(text, "\n{table}")?;
+        write!(text, "\n{}", table.fit(width))?;
     }
     if !found.problems.is_empty() {
         writeln!(text, "\nproblems")?;
     }
-    found.problems.iter().try_for_each(|problem| writeln!(text, "  - {problem}"))
+    let mut problems = found.problems.iter().map(|problem| broken(&format!("  - {problem}"), 4, width));
+    problems.try_for_each(|problem| writeln!(text, "{problem}"))
 }
 
 /// What a file holds beside messages: what is said of the run that wrote it, metadata records and attachments.
@@ -221,7 +222,7 @@ mod tests {
 problems
   - there is no tag reading of robot1
 ";
-        assert_eq!(to_text(&found), expected);
-        assert_eq!(to_text(&LogInfo::default()), "0 messages over 0.0 s\n");
+        assert_eq!(to_text(&found, None), expected);
+        assert_eq!(to_text(&LogInfo::default(), None), "0 messages over 0.0 s\n");
     }
 }

@@ -1,7 +1,7 @@
 //! `gridweave kinds`: the stage kinds with their ports and parameters.
 
 use crate::status::{BadUse, Status};
-use crate::terminal::{print, print_line};
+use crate::terminal::{print, print_line, text_width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text, suggest};
@@ -44,8 +44,8 @@ pub(crate) fn kinds(args: &KindsArgs, registry: &Registry) -> Result<Status> {
     };
     match (args.json, &args.kind) {
         (true, _) => print_line(serde_json::to_string_pretty(&kinds_json(&registry))?),
-        (false, Some(_)) => print(registry.kinds().map(kind_text).collect::<String>()),
-        (false, None) => print(kinds_text(&registry)),
+        (false, Some(_)) => print(registry.kinds().map(|kind| kind_text(kind, text_width())).collect::<String>()),
+        (false, None) => print(kinds_text(&registry, text_width())),
     }?;
     Ok(Status::Done)
 }

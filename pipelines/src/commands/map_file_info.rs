@@ -1,5 +1,6 @@
 //! `gridweave info` on map files: what is in them, as a merge reads them.
 
+use crate::prose::broken;
 use crate::table::Table;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
@@ -64,8 +65,8 @@ fn inspect_one(robot: String, file: &Path) -> Result<MapFileInfo> {
     })
 }
 
-/// What is in map files, for people.
-pub(super) fn to_text(maps: &[MapFileInfo]) -> String {
+/// What is in map files, for people, in lines of at most `width` characters.
+pub(super) fn to_text(maps: &[MapFileInfo], width: Option<usize>) -> String {
     let heads = ["robot", "cells", "cell m", "origin x m", "y m", "yaw deg", "free m2", "occupied m2", "undecided m2"];
     let mut table = Table::new(heads);
     for map in maps {
@@ -82,11 +83,11 @@ pub(super) fn to_text(maps: &[MapFileInfo]) -> String {
             format!("{:.1}", map.undecided_m2),
         ]);
     }
-    let mut text = table.to_string();
+    let mut text = table.fit(width);
     for MapFileInfo { file, remark, .. } in maps {
         if let Some(remark) = remark {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}: {remark}", file.display());
+            let _ = writeln!(text, "{}", broken(&format!("{}: {remark}", file.display()), 2, width));
         }
     }
     text

@@ -3,7 +3,7 @@
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::table::Table;
-use crate::terminal::print;
+use crate::terminal::{print, width};
 use anyhow::Result;
 use clap::Args;
 
@@ -21,7 +21,7 @@ pub(crate) fn pipelines(args: &PipelinesArgs) -> Result<Status> {
         None => {
             let mut table = Table::new(["pipeline", "what it does"]);
             shipped::PIPELINES.iter().for_each(|shipped| table.row([shipped.name, shipped.what].map(str::to_owned)));
-            print(table)?
+            print(table.fit(width()))?
         }
     };
     Ok(Status::Done)

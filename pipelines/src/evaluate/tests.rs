@@ -157,7 +157,7 @@ fn the_table_has_a_line_for_every_robot() {
         "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot2": frame(10.0, 5.0, 1.0)},
         "unmerged": {"robot3": "no tags in common"},
     });
-    let text = run(&summary, &truth()).unwrap().to_text();
+    let text = run(&summary, &truth()).unwrap().to_text(None);
     let expected = "  robot   outcome  error m  error deg
   robot2  right      0.000      0.000
   robot3  refused        -          -  no tags in common

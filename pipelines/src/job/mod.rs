@@ -17,13 +17,14 @@ pub(crate) use reading::{NamingOptions, ReadingOptions};
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
-use crate::terminal::{print, print_line};
+use crate::telling;
+use crate::terminal::{print, print_line, width};
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
 use gridweave_logs::sink::close_log;
 use gridweave_logs::source::map_file::robot_names;
-use gridweave_runtime::engine::{self, EngineKind};
+use gridweave_runtime::engine::{self, EngineKind, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
 use progress::Progress;
@@ -73,7 +74,7 @@ impl Job<'_> {
         summary.check_robots(&explained)?;
         match self.options.json {
             true => print_line(summary.to_json()),
-            false => print(summary.to_text(&explained)),
+            false => print(summary.to_text(&explained, width())),
         }?;
         Ok(match summary.has_unmerged() {
             true => Status::NotAllMerged,
@@ -96,7 +97,10 @@ impl Job<'_> {
             Mode::Replay => EngineKind::default(),
             Mode::Live => EngineKind::Processes,
         };
-        let report = engine::run(&pipeline, self.options.engine.unwrap_or(by_mode), &progress);
+        let report = match self.options.engine.unwrap_or(by_mode) {
+            EngineKind::Processes => processes::run(&pipeline, &telling::launch()?, &progress),
+            engine => engine::run(&pipeline, engine, &progress),
+        };
         progress.finish();
         if let Err(error) = &report {
             close_outputs(&pipeline, &error.to_string());

@@ -3,14 +3,14 @@
 use super::kinds::toml_text;
 use super::parameter_schema::parameters_of;
 use super::reference::type_text;
-use super::text_layout::push_table;
+use super::text_layout::{push_filled, push_table};
 use super::{Pipeline, StageSpec, Wire};
 use serde_json::Value;
 
 impl Pipeline {
-    /// A list of the stages in their order: what each is, where its inputs come from, and which of its parameters are
-    /// not the default ones.
-    pub fn to_text(&self) -> String {
+    /// A list of the stages in their order, in lines of at most `width` characters where they can be broken: what each is, where
+    /// its inputs come from, and which of its parameters are not the default ones.
+    pub fn to_text(&self, width: usize) -> String {
         let count = match self.stages.len() {
             1 => "1 stage".to_owned(),
             count => format!("{count} stages"),
@@ -27,12 +27,12 @@ impl Pipeline {
                     [port.to_owned(), format!("<- {}", self.output_name(wire)), self.wire_type(wire)]
                 })
                 .collect();
-            push_table(&mut page, 5, &inputs);
+            push_table(&mut page, 5, width, &inputs);
             let parameters: Vec<[String; 1]> = changed_parameters(stage).map(|line| [line]).collect();
-            push_table(&mut page, 5, &parameters);
+            push_table(&mut page, 5, width, &parameters);
             let unread = self.unread_outputs(index);
             if !unread.is_empty() {
-                page.push_str(&format!("     not read: {}\n", unread.join(", ")));
+                push_filled(&mut page, 5, width, &format!("not read: {}", unread.join(", ")));
             }
         }
         page

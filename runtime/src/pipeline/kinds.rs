@@ -6,15 +6,15 @@ use super::text_layout::{push_filled, push_table};
 use crate::stage::{Registry, StageKind};
 use serde_json::{Value, json};
 
-/// All kinds with what they do, and then each in full.
-pub fn kinds_text(registry: &Registry) -> String {
-    registry.kinds().map(kind_text).collect::<Vec<_>>().join("\n")
+/// All kinds, each in full, in lines of at most `width` characters.
+pub fn kinds_text(registry: &Registry, width: usize) -> String {
+    registry.kinds().map(|kind| kind_text(kind, width)).collect::<Vec<_>>().join("\n")
 }
 
-/// A kind in full: what it does, its inputs, outputs and parameters.
-pub fn kind_text(kind: &StageKind) -> String {
+/// A kind in full, in lines of at most `width` characters: what it does, its inputs, outputs and parameters.
+pub fn kind_text(kind: &StageKind, width: usize) -> String {
     let mut page = format!("{}\n", kind.name);
-    push_filled(&mut page, 2, kind.summary);
+    push_filled(&mut page, 2, width, kind.summary);
     let inputs: Vec<[String; 3]> = kind
         .inputs
         .iter()
@@ -35,28 +35,31 @@ pub fn kind_text(kind: &StageKind) -> String {
     for (title, rows) in [("inputs", inputs), ("outputs", outputs)] {
         if !rows.is_empty() {
             page.push_str(&format!("\n  {title}\n"));
-            push_table(&mut page, 4, &rows);
+            push_table(&mut page, 4, width, &rows);
         }
     }
     let parameters = parameters_of(kind);
     if !parameters.is_empty() {
         page.push_str("\n  parameters\n");
-        parameters.iter().for_each(|parameter| push_parameter(&mut page, parameter));
+        parameters.iter().for_each(|parameter| push_parameter(&mut page, width, parameter));
     }
     page
 }
 
-fn push_parameter(page: &mut String, parameter: &ParameterInfo) {
+fn push_parameter(page: &mut String, width: usize, parameter: &ParameterInfo) {
     let ParameterInfo { name, type_text, default, .. } = parameter;
     let line = match default {
         Some(value) if !value.is_null() => format!("{name} = {}  ({type_text})", toml_text(value)),
         _ if parameter.optional => format!("{name}  ({type_text}, may be left out)"),
         _ => format!("{name}  ({type_text})"),
     };
-    page.push_str(&format!("    {line}\n"));
-    push_filled(page, 8, &parameter.doc);
+    match line.chars().count() + 4 <= width {
+        true => page.push_str(&format!("    {line}\n")),
+        false => push_filled(page, 4, width, &line),
+    }
+    push_filled(page, 8, width, &parameter.doc);
     for (value, doc) in parameter.values.iter().filter(|(_, doc)| !doc.is_empty()) {
-        push_filled(page, 8, &format!("\"{value}\": {doc}"));
+        push_filled(page, 8, width, &format!("\"{value}\": {doc}"));
     }
 }
 

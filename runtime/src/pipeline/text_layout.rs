@@ -1,47 +1,100 @@
 //! Plain text for a terminal.
 
-/// The width that text is filled to.
-const WIDTH: usize = 100;
+/// The width that text is filled to where nothing says how wide a line may be, characters.
+pub const TEXT_WIDTH: usize = 100;
 
-/// Appends `text`, its lines filled with words and indented. Paragraphs stay apart.
-pub(super) fn push_filled(page: &mut String, indent: usize, text: &str) {
+/// The last column of a table is filled beside the others if so much is left for it; otherwise it stands below them.
+const LEAST_COLUMN: usize = 24;
+
+/// Behind these a word that is longer than a line is broken: they part topics, names of types and lists.
+const JOINTS: [char; 6] = ['/', '_', '-', ',', '.', '='];
+
+/// Words as lines of at most `width` characters, broken at spaces. A word that is longer than a line is broken behind the last
+/// joint of a topic or a list that fits, or else where the line ends. Paragraphs run into each other.
+pub fn fill(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let mut lines = vec![String::new()];
+    for mut word in text.split_whitespace() {
+        loop {
+            let last = lines.last().map_or(0, |line| line.chars().count());
+            let gap = usize::from(last > 0);
+            let length = word.chars().count();
+            if last + gap + length <= width {
+                if let Some(line) = lines.last_mut() {
+                    line.push_str(if gap > 0 { " " } else { "" });
+                    line.push_str(word);
+                }
+                break;
+            }
+            if length > width && last == 0 {
+                let (part, rest) = word.split_at(break_of(word, width));
+                lines.last_mut().into_iter().for_each(|line| line.push_str(part));
+                word = rest;
+            }
+            lines.push(String::new());
+        }
+    }
+    lines
+}
+
+/// Where a word that is longer than a line is broken: the length of its first part in bytes.
+fn break_of(word: &str, width: usize) -> usize {
+    let end = word.char_indices().nth(width).map_or(word.len(), |(place, _)| place);
+    match word[..end].rfind(JOINTS) {
+        // All joints are a byte long.
+        Some(joint) => joint + 1,
+        None => end,
+    }
+}
+
+/// Appends `text`, its lines filled with words up to `width` and indented. Paragraphs stay apart.
+pub(super) fn push_filled(page: &mut String, indent: usize, width: usize, text: &str) {
     for (number, paragraph) in text.split("\n\n").enumerate() {
         if number > 0 {
             page.push('\n');
         }
-        let mut line = " ".repeat(indent);
-        let mut empty = true;
-        for word in paragraph.split_whitespace() {
-            if !empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
-                page.push_str(&line);
-                page.push('\n');
-                line = " ".repeat(indent);
-                empty = true;
-            }
-            if !empty {
-                line.push(' ');
-            }
-            line.push_str(word);
-            empty = false;
-        }
-        if !empty {
-            page.push_str(&line);
-            page.push('\n');
+        for line in fill(paragraph, width.saturating_sub(indent)).iter().filter(|line| !line.is_empty()) {
+            page.push_str(&format!("{:indent$}{line}\n", ""));
         }
     }
 }
 
-/// Appends rows, each column as wide as its widest cell.
-pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, rows: &[[String; N]]) {
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
-    let widths: [usize; N] = std::array::from_fn(width);
-    for row in rows {
-        let mut line = " ".repeat(indent);
-        for (cell, width) in row.iter().zip(widths) {
-            line.push_str(&format!("{cell:<width$}  "));
+/// Appends rows, each column as wide as its widest cell. The last is filled up to `width`: beside the others or, where too
+/// little is left there, below them.
+pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width: usize, rows: &[[String; N]]) {
+    let widest = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
+    let widths: [usize; N] = std::array::from_fn(widest);
+    let before = indent + widths.iter().take(N - 1).map(|width| width + 2).sum::<usize>();
+    let is_beside = N == 1 || before + widths[N - 1] <= width || before + LEAST_COLUMN <= width;
+    let mut push = |line: &str| match line.trim_end() {
+        "" => {}
+        line => {
+            page.push_str(line);
+            page.push('\n');
         }
-        page.push_str(line.trim_end());
-        page.push('\n');
+    };
+    for row in rows {
+        let cells = row.iter().zip(widths).take(N - 1);
+        let mut line: String = cells.map(|(cell, width)| format!("{cell:<width$}  ")).collect();
+        let mut at = before;
+        if !is_beside {
+            for (number, part) in fill_cells(&line, width.saturating_sub(indent + 2)).iter().enumerate() {
+                push(&format!("{:indent$}{part}", "", indent = indent + if number == 0 { 0 } else { 2 }));
+            }
+            (line, at) = (String::new(), indent + 4);
+        }
+        for part in fill(&row[N - 1], width.saturating_sub(at)) {
+            push(&format!("{:start$}{line}{part}", "", start = if line.is_empty() { at } else { indent }));
+            line.clear();
+        }
+    }
+}
+
+/// Cells that stand beside each other, as they are if they fit.
+fn fill_cells(cells: &str, width: usize) -> Vec<String> {
+    match cells.trim_end().chars().count() <= width {
+        true => vec![cells.to_owned()],
+        false => fill(cells, width),
     }
 }
 
@@ -52,17 +105,40 @@ mod tests {
     #[test]
     fn lines_are_filled_and_paragraphs_stay_apart() {
         let mut page = String::new();
-        push_filled(&mut page, 2, &format!("{}\n\nlast", "word ".repeat(25)));
+        push_filled(&mut page, 2, 100, &format!("{}\n\nlast", "word ".repeat(25)));
         let lines: Vec<&str> = page.lines().collect();
         assert_eq!(lines.len(), 4);
-        assert!(lines[0].len() <= WIDTH && lines[0].starts_with("  word word"));
+        assert!(lines[0].len() <= 100 && lines[0].starts_with("  word word"));
         assert_eq!(lines[2..], ["", "  last"]);
+    }
+
+    #[test]
+    fn a_word_longer_than_a_line_is_broken_behind_a_joint_or_where_the_line_ends() {
+        assert_eq!(fill("see gridweave_msgs/msg/Alignment", 16), ["see", "gridweave_msgs/", "msg/Alignment"]);
+        assert_eq!(fill("abcdefg hi", 3), ["abc", "def", "g", "hi"]);
+        assert_eq!(fill("ööööö", 2), ["öö", "öö", "ö"]);
+        assert_eq!(fill("  ", 0), [""]);
     }
 
     #[test]
     fn columns_line_up() {
         let mut page = String::new();
-        push_table(&mut page, 1, &[["a".into(), "b".into()], ["long".into(), String::new()]]);
+        push_table(&mut page, 1, 100, &[["a".into(), "b".into()], ["long".into(), String::new()]]);
         assert_eq!(page, " a     b\n long\n");
+    }
+
+    #[test]
+    fn the_last_column_is_filled_beside_the_others_or_below_them() {
+        let row = [["map".to_owned(), "nav_msgs/msg/OccupancyGrid".to_owned(), "word ".repeat(12)]];
+        let table = |width: usize| {
+            let mut page = String::new();
+            push_table(&mut page, 2, width, &row);
+            assert!(page.lines().all(|line| line.chars().count() <= width), "{page}");
+            page
+        };
+        assert!(table(70).starts_with("  map  nav_msgs/msg/OccupancyGrid  word word"));
+        assert!(table(70).lines().nth(1).unwrap().starts_with(&format!("{:35}word", "")));
+        assert!(table(40).starts_with("  map  nav_msgs/msg/OccupancyGrid\n      word word"));
+        table(24);
     }
 }

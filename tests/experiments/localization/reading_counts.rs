@@ -55,7 +55,7 @@ pub(super) fn run(seeds: u64, results: &mut Results) -> Result<()> {
             }
         }
         let name = likelihood.name();
-        println!("The likelihood of the {name}:\n\n{}", shown.to_markdown());
+        println!("The likelihood of the {name}:\n\n{}", shown.to_terminal().unwrap_or_else(|| shown.to_markdown()));
         results.plot(
             &format!("localization_certainty_{name}"),
             &Plot {

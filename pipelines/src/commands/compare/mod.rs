@@ -15,7 +15,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::job::progress::Gauge;
 use crate::shipped;
 use crate::status::{BadUse, Status};
-use crate::terminal::{print, print_line};
+use crate::terminal::{print, print_line, width};
 use anyhow::{Context, Result, bail};
 use cases::Case;
 use clap::Args;
@@ -90,7 +90,7 @@ pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status>
     match (args.json, args.markdown) {
         (true, _) => print_line(report.to_json()),
         (_, true) => print(report.to_markdown()),
-        _ => print(report.to_text()),
+        _ => print(report.to_text(width())),
     }?;
     Ok(if report.has_failed() { Status::Failed } else { Status::Done })
 }
@@ -142,7 +142,8 @@ fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<Merg
         let result = merge.run(&cases[merge.case], &folder.join(format!("run{number}")))?;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         let share = count as f64 / merges.len() as f64;
-        gauge.show(share, format_args!("{count} of {} runs", merges.len()));
+        let rate = gauge.rate(60.0 * count as f64).map_or_else(String::new, |rate| format!(", {rate:.1} in a minute"));
+        gauge.show(share, format_args!("{count} of {} runs{rate}", merges.len()));
         Ok(result)
     };
     let results: Result<Vec<MergeResult>> = pool.install(|| merges.par_iter().enumerate().map(run).collect());

@@ -3,6 +3,7 @@
 use super::cases::Case;
 use super::merge_case::MergeResult;
 use super::rows::{Row, RowsBy, rows};
+use crate::prose::broken;
 use crate::table::Table;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -25,9 +26,11 @@ impl<'a> Report<'a> {
         self.results.iter().any(|result| result.robots.is_err())
     }
 
-    /// For people: the table, and why runs have failed.
-    pub(super) fn to_text(&self) -> String {
-        format!("{}{}", self.table(), self.failures(""))
+    /// For people, in lines of at most `width` characters: the table, and why runs have failed.
+    pub(super) fn to_text(&self, width: Option<usize>) -> String {
+        let failures = self.failures("");
+        let failures = failures.lines().map(|line| broken(line, 2, width) + "\n");
+        self.table().fit(width) + &failures.collect::<String>()
     }
 
     /// The same in Markdown.

@@ -3,7 +3,8 @@
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
-use crate::terminal::{print, print_line, say};
+use crate::table::Table;
+use crate::terminal::{print, print_line, say, width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
@@ -60,7 +61,11 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
         let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
         let is_read = match args.json {
             true => print_line(to_json(&running, &stages))?,
-            false => print(format_args!("{}{}", if is_redrawn { CLEAR } else { "" }, to_text(&running, &stages)))?,
+            false => print(format_args!(
+                "{}{}",
+                if is_redrawn { CLEAR } else { "" },
+                to_text(&running, &stages, is_redrawn)
+            ))?,
         };
         if is_over {
             say("the run has ended");
@@ -197,17 +202,21 @@ fn to_json(running: &Running, stages: &[StageRates]) -> Value {
     })
 }
 
-fn to_text(running: &Running, stages: &[StageRates]) -> String {
-    let heads = [
-        "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB", "STARTS",
-        "WARNINGS",
-    ];
-    let mut rows = vec![heads.map(str::to_owned)];
+/// The columns of the display, and what of them a narrow terminal is not shown: what matters least comes first.
+const HEADS: [&str; 13] = [
+    "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB", "STARTS",
+    "WARNINGS",
+];
+const LEFT_OUT_FIRST: [&str; 8] = ["P50 MS", "P99 MS", "MB", "OUT/S", "STATE", "STARTS", "WARNINGS", "P95 MS"];
+
+/// The page: on a terminal that it is redrawn on each stage has one line, and columns that do not fit are left out.
+fn to_text(running: &Running, stages: &[StageRates], is_redrawn: bool) -> String {
+    let mut table = Table::new(HEADS);
     for stage in stages {
         let milliseconds =
             |seconds: Option<f64>| seconds.map_or_else(|| "-".to_owned(), |time| format!("{:.2}", time * 1e3));
         let [p50, p95, p99] = stage.latency.map(milliseconds);
-        rows.push([
+        table.row([
             stage.name.clone(),
             stage.state.to_owned(),
             format!("{:.1}", stage.rate_in),
@@ -223,20 +232,9 @@ fn to_text(running: &Running, stages: &[StageRates]) -> String {
             stage.warnings.to_string(),
         ]);
     }
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
-    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
-    let mut page = format!("{}\n", running.name());
-    for row in &rows {
-        for (column, cell) in row.iter().enumerate() {
-            let width = widths[column];
-            // Names to the left, numbers to the right.
-            match column {
-                0 => page.push_str(&format!("{cell:width$}")),
-                1 => page.push_str(&format!("  {cell:width$}")),
-                _ => page.push_str(&format!("  {cell:>width$}")),
-            }
-        }
-        page.push('\n');
+    let width = width();
+    if let Some(width) = width.filter(|_| is_redrawn) {
+        table.narrow_to(width, &LEFT_OUT_FIRST);
     }
-    page
+    format!("{}\n{}", running.name(), table.fit(width))
 }

@@ -1,12 +1,13 @@
 //! What `graph` and `kinds` show.
 
 use super::*;
-use crate::pipeline::{kind_text, kinds_json, kinds_text};
+use crate::pipeline::{TEXT_WIDTH, kind_text, kinds_json, kinds_text};
 
 #[test]
 fn the_list_shows_stages_their_inputs_and_what_is_not_default() {
-    let text =
-        parse(&changed("min_length = 0.8", "min_length = 0.8\niterations = 200\nstarts = [1]")).unwrap().to_text();
+    let text = parse(&changed("min_length = 0.8", "min_length = 0.8\niterations = 200\nstarts = [1]"))
+        .unwrap()
+        .to_text(TEXT_WIDTH);
     let expected = "\
 2. lines (line_extractor)
      map  <- log.map  nav_msgs/msg/OccupancyGrid
@@ -15,7 +16,7 @@ fn the_list_shows_stages_their_inputs_and_what_is_not_default() {
 ";
     assert!(text.starts_with("walls: 5 stages, seed 7, reference robot1\n"), "{text}");
     assert!(text.contains(expected), "{text}");
-    let text = parse(&changed("[\"log.*\", ", "[")).unwrap().to_text();
+    let text = parse(&changed("[\"log.*\", ", "[")).unwrap().to_text(TEXT_WIDTH);
     assert!(text.contains("     not read: pose, other\n"), "{text}");
 }
 
@@ -58,8 +59,8 @@ line_extractor
     starts = []  (list of numbers)
         Starts that are tried, in radians.
 ";
-    assert_eq!(kind_text(registry.get("line_extractor").unwrap()), expected);
-    let all = kinds_text(&registry);
+    assert_eq!(kind_text(registry.get("line_extractor").unwrap(), TEXT_WIDTH), expected);
+    let all = kinds_text(&registry, TEXT_WIDTH);
     assert!(
         all.contains("    start  (number, may be left out)\n        Seconds to leave out at the start.\n"),
         "{all}"

@@ -75,7 +75,7 @@ proptest! {
     fn no_text_makes_it_panic(mutations in prop::collection::vec(mutation(), 1..6)) {
         let text = mutations.iter().fold(VALID.to_owned(), |text, mutation| apply(&text, mutation));
         match parse(&text) {
-            Ok(pipeline) => prop_assert!(!pipeline.to_text().is_empty()),
+            Ok(pipeline) => prop_assert!(!pipeline.to_text(100).is_empty()),
             Err(errors) => prop_assert!(errors.count() > 0 && !errors.render(true).is_empty()),
         }
     }
