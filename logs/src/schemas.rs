@@ -52,6 +52,7 @@ definitions![
         "CommonTags",
         "DeformationNode",
         "Evidence",
+        "IcpErrors",
         "MapAgreement",
         "MapDeformation",
         "MapDirection",

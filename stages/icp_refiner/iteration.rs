@@ -98,6 +98,11 @@ impl<'a> Iteration<'a> {
         Some(Change { transform_a_b: frame.moved(transform_a_b, &change), length: change.norm() })
     }
 
+    /// The root of the weighted mean of the squared residuals of the last iteration, before its step, metres.
+    pub(super) fn error(&self) -> f64 {
+        self.state.mean_square_error.sqrt()
+    }
+
     /// The middle and the size of the section in which the walls of the two maps lie near each other.
     pub(super) fn common_section(&mut self, transform_a_b: &Pose2, stride: usize) -> LocalFrame {
         self.pair(transform_a_b, self.parameters.max_distance, stride, self.parameters.metric).0

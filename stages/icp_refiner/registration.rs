@@ -18,6 +18,8 @@ pub struct Registration {
     pub converged: bool,
     /// Iterations made, from the start that was best.
     pub iterations: usize,
+    /// For each of them the root of the weighted mean of the squared residuals before its step, metres.
+    pub errors: Vec<f64>,
     /// Points of map b that have a partner in map a.
     pub inliers: usize,
     /// Weighted mean of the squared residuals of the last iteration, square metres.
@@ -47,22 +49,21 @@ pub struct Registration {
 pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
     let stride = stride(b.walls.points().len(), parameters.coarse_points);
-    let mut best: Option<(f64, Pose2)> = None;
-    let mut iterations = 0;
+    let mut best: Option<(f64, Pose2, Vec<f64>)> = None;
     for start in starts(&mut iteration, first_guess, stride, parameters) {
-        let transform_a_b;
-        (transform_a_b, iterations) = draw_near(&mut iteration, start, stride, parameters);
+        let (transform_a_b, errors) = draw_near(&mut iteration, start, stride, parameters);
         let matched = iteration.matched(&transform_a_b, stride);
-        if best.is_none_or(|(most, _)| matched > most) {
-            best = Some((matched, transform_a_b));
+        if best.as_ref().is_none_or(|(most, ..)| matched > *most) {
+            best = Some((matched, transform_a_b, errors));
         }
     }
-    let mut transform_a_b = best.map_or(first_guess.transform_a_b, |(_, transform)| transform);
+    let (mut transform_a_b, mut errors) =
+        best.map_or((first_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
     let mut converged = false;
     for _ in 0..parameters.max_iterations {
         let Some(change) = iteration.run(&transform_a_b, parameters.min_distance, 1) else { break };
         transform_a_b = change.transform_a_b;
-        iterations += 1;
+        errors.push(iteration.error());
         converged = change.length < parameters.convergence;
         if converged {
             break;
@@ -76,7 +77,8 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     Registration {
         transform_a_b,
         converged,
-        iterations,
+        iterations: errors.len(),
+        errors,
         inliers: state.inliers,
         mean_square_error: state.mean_square_error,
         information: inverse.transpose() * state.information * inverse,
@@ -94,17 +96,22 @@ pub(crate) fn approach(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, param
     draw_near(&mut iteration, first_guess.transform_a_b, stride, parameters).0
 }
 
-/// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the
-/// number of iterations.
-fn draw_near(iteration: &mut Iteration<'_>, start: Pose2, stride: usize, parameters: &IcpParameters) -> (Pose2, usize) {
-    let (mut transform_a_b, mut distance, mut iterations) = (start, parameters.max_distance, 0);
+/// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the error
+/// of each iteration, metres.
+fn draw_near(
+    iteration: &mut Iteration<'_>,
+    start: Pose2,
+    stride: usize,
+    parameters: &IcpParameters,
+) -> (Pose2, Vec<f64>) {
+    let (mut transform_a_b, mut distance, mut errors) = (start, parameters.max_distance, Vec::new());
     while distance > parameters.min_distance {
         let Some(change) = iteration.run(&transform_a_b, distance, stride) else { break };
         transform_a_b = change.transform_a_b;
         distance *= parameters.shrink;
-        iterations += 1;
+        errors.push(iteration.error());
     }
-    (transform_a_b, iterations)
+    (transform_a_b, errors)
 }
 
 /// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as

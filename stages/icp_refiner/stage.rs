@@ -7,7 +7,7 @@ use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::robot_maps::RobotMaps;
 use crate::walls::WallsOnDemand;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
+use gridweave_runtime::ros::{Alignment, Header, IcpErrors, OccupancyGrid};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
@@ -15,12 +15,16 @@ use std::collections::BTreeMap;
 /// What the stage sends.
 pub(super) struct RefinedAlignments {
     alignment: Out<Alignment>,
+    errors: Out<IcpErrors>,
 }
 
 impl Outputs for RefinedAlignments {
     fn declare(ports: &mut OutputPorts) -> Self {
         let summary = "The refined alignments, ranked as before, each settled or refused.";
-        Self { alignment: ports.output("alignment", summary) }
+        Self {
+            alignment: ports.output("alignment", summary),
+            errors: ports.output("errors", "How far the walls lay apart in each iteration, of each registration."),
+        }
     }
 }
 
@@ -123,7 +127,9 @@ impl IcpRefiner {
                     let covariance = Matrix3::from_row_slice(&guess.covariance);
                     let start = FirstGuess::new(guess.transform_a_b(), covariance, &self.parameters);
                     let refinement = refine(a, b, &start, &self.parameters);
-                    Refined { maps, first_guess: guess.clone(), refinement }
+                    let refined = Refined { maps, first_guess: guess.clone(), refinement };
+                    output.errors.send(&guesses.robot, &refined.errors(output.log_time()))?;
+                    refined
                 }
             };
             alignments.push(refined.alignment(guess, output.log_time()));
@@ -180,6 +186,20 @@ impl Refined {
         let shift = before.transform_a_b() * centre_b - first_guess.transform_a_b() * centre_b;
         shift.norm() <= parameters.reuse_within
             && wrap_angle(before.yaw - first_guess.yaw).abs() <= parameters.reuse_within_yaw
+    }
+
+    /// The message that tells how its error fell.
+    fn errors(&self, log_time: LogTime) -> IcpErrors {
+        let guess = &self.first_guess;
+        IcpErrors {
+            header: Header::new(log_time, guess.header.frame_id.clone()),
+            a: guess.a.clone(),
+            b: guess.b.clone(),
+            source: guess.source.clone(),
+            rank: guess.rank,
+            accepted: self.refinement.refusal.is_none(),
+            errors: self.refinement.registration.errors.clone(),
+        }
     }
 
     /// The message that tells of it. What the first guess rests on is part of the reason.

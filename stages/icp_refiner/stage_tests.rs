@@ -4,7 +4,7 @@ use crate::geometry::{Pose2, pose};
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Alignment, Header, MapMetaData, OccupancyGrid};
+use gridweave_runtime::ros::{Alignment, Header, IcpErrors, MapMetaData, OccupancyGrid};
 
 fn first_guess(transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
@@ -50,6 +50,20 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
     assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
     assert_eq!(bench.finish(), []);
     assert_eq!(bench.counted("registrations"), 1);
+}
+
+#[test]
+fn the_error_of_each_iteration_is_told_and_falls() {
+    let (a, b, _) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    bench.give(&first_guess(&(a.transform_to(&b) * pose(0.3, -0.3, 0.03))));
+    let told: Vec<IcpErrors> = bench.stage.take("errors").unwrap();
+    let [IcpErrors { a, b, rank: 0, accepted: true, errors, .. }] = told.as_slice() else { panic!("{told:?}") };
+    assert_eq!((a.as_str(), b.as_str()), ("robot1", "robot2"));
+    let (first, last) = (errors[0], errors[errors.len() - 1]);
+    assert!(errors.len() > 3 && last < 0.5 * first && last < 0.03, "{errors:?}");
 }
 
 #[test]

@@ -144,6 +144,15 @@ fn result_messages_agree_with_their_definitions() {
         hypotheses: 3,
         reason: "it fits".into(),
     });
+    assert_agrees(&IcpErrors {
+        header: header(),
+        a: "robot1".into(),
+        b: "robot2".into(),
+        source: "maps".into(),
+        rank: 2,
+        accepted: true,
+        errors: vec![0.5, 0.25],
+    });
     let frame = |robot: &str| RobotFrame {
         robot: robot.into(),
         frame_id: format!("{robot}/map"),

@@ -10,8 +10,8 @@ pub(crate) use reading::{Opened, map_files};
 use gridweave_logs::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{
-    Alignment, CommonTags, DecodeError, MapAgreement, MapDeformation, MapDirection, OccupancyGrid, Path, PoseStamped,
-    RobotFrames, RosMessage, Segments, TagEstimates, TopologicalMap, Verdicts, decode,
+    Alignment, CommonTags, DecodeError, IcpErrors, MapAgreement, MapDeformation, MapDirection, OccupancyGrid, Path,
+    PoseStamped, RobotFrames, RosMessage, Segments, TagEstimates, TopologicalMap, Verdicts, decode,
 };
 use gridweave_runtime::stage::{RobotTopics, match_robot};
 use nalgebra::Point2;
@@ -45,6 +45,8 @@ pub(crate) struct MergeState {
     pub(crate) agreement: Option<MapAgreement>,
     /// The hypotheses of each pair, by the topic that they were sent on, by rank.
     pub(crate) hypotheses: BTreeMap<(String, String, String), Vec<Alignment>>,
+    /// How the error of ICP fell, by pair, by what the first guess was found from, and by its rank.
+    pub(crate) icp_errors: BTreeMap<(String, String, String, u32), IcpErrors>,
     /// The tags that pairs have in common.
     pub(crate) common_tags: BTreeMap<(String, String), CommonTags>,
 }
@@ -105,6 +107,11 @@ impl MergeState {
             Verdicts::NAME => self.verdicts = Some(decode(data)?),
             MapAgreement::NAME => self.agreement = Some(decode(data)?),
             Alignment::NAME => self.take_hypothesis(topic, decode(data)?),
+            IcpErrors::NAME => {
+                let errors: IcpErrors = decode(data)?;
+                let IcpErrors { a, b, source, rank, .. } = &errors;
+                self.icp_errors.insert((a.clone(), b.clone(), source.clone(), *rank), errors);
+            }
             CommonTags::NAME => {
                 let tags: CommonTags = decode(data)?;
                 self.common_tags.insert((tags.robot_a.clone(), tags.robot_b.clone()), tags);

@@ -8,6 +8,7 @@ mod codec;
 mod deformation;
 mod geometry;
 mod gridweave;
+mod icp;
 mod map_msgs;
 mod nav;
 mod sensor;
@@ -26,6 +27,7 @@ pub use gridweave::{
     RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagPosition, TagRange,
     TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
+pub use icp::IcpErrors;
 pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};
