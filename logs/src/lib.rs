@@ -5,6 +5,8 @@ pub mod bag;
 pub mod drawing;
 pub mod dynamic;
 pub mod file;
+#[cfg(feature = "foxglove")]
+pub mod foxglove;
 pub mod info;
 pub mod map_file;
 pub mod names;
@@ -27,6 +29,8 @@ use gridweave_runtime::stage::StageKind;
 /// The stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
     vec![
+        #[cfg(feature = "foxglove")]
+        foxglove::kind(),
         map_file::kind(),
         picture::kind(),
         sink::kind(),

@@ -12,6 +12,7 @@ mod compare;
 mod containers;
 mod engines_agree;
 mod far_from_the_origin;
+mod foxglove_view;
 mod full_shared_memory;
 mod golden;
 mod golden_mistakes;

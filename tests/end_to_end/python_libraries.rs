@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 /// Runs a program, and gives what it prints.
 #[track_caller]
-fn output(program: &Path, args: &[&OsStr]) -> String {
+pub(crate) fn output(program: &Path, args: &[&OsStr]) -> String {
     let child = Command::new(program).args(args).stdin(Stdio::null()).output();
     let ended = child.unwrap_or_else(|error| panic!("cannot start {}: {error}", program.display()));
     let errors = String::from_utf8_lossy(&ended.stderr);
@@ -19,15 +19,20 @@ fn output(program: &Path, args: &[&OsStr]) -> String {
 }
 
 /// The interpreter of a virtual environment with the libraries.
-fn python(folder: &Path) -> PathBuf {
+pub(crate) fn python(folder: &Path) -> PathBuf {
     let environment = folder.join("python");
     output(Path::new("python3"), &["-m".as_ref(), "venv".as_ref(), environment.as_ref()]);
     let python = environment.join("bin/python");
-    let requirements = Path::new(env!("CARGO_MANIFEST_DIR")).join("end_to_end/python_libraries/requirements.txt");
+    let requirements = script("requirements.txt");
     let install = ["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--requirement"];
     let install: Vec<&OsStr> = install.iter().map(OsStr::new).chain([requirements.as_ref()]).collect();
     output(&python, &install);
     python
+}
+
+/// A script that uses the libraries.
+pub(crate) fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("end_to_end/python_libraries").join(name)
 }
 
 /// How many messages every topic of a log has.
@@ -50,7 +55,7 @@ fn python_libraries_read_every_message() {
     gridweave(folder.path(), &["merge", "in.mcap", "-o", "merge/"]).assert(0, &["merged 2 of 2"]);
     gridweave(folder.path(), &["run", "topological", "--input", "in.mcap", "-o", "run/"]);
     gridweave(folder.path(), &["convert", "in.mcap", "-o", "convert/"]).assert(0, &[]);
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("end_to_end/python_libraries/read.py");
+    let script = script("read.py");
     for name in ["merge", "run", "convert"] {
         let bag = folder.path().join(name);
         let read = output(&python, &[script.as_ref(), bag.as_ref()]);

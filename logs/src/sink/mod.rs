@@ -18,7 +18,7 @@ mod error;
 mod log_writer;
 mod provenance;
 mod rewrite;
-mod routing;
+pub(crate) mod routing;
 mod stage;
 
 pub use close::{CloseError, close_log};

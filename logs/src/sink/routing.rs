@@ -8,7 +8,7 @@ use gridweave_runtime::stage::{Context, match_robot};
 
 /// What becomes of the messages of an input's channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Route {
+pub(crate) enum Route {
     /// They are written on this channel.
     Write(Channel),
     /// They are left out, for this reason.
@@ -16,13 +16,13 @@ pub(super) enum Route {
 }
 
 /// The topics that the results of a run have, known before its first message.
-pub(super) struct ResultTopics {
+pub(crate) struct ResultTopics {
     /// Template of the topic, and ROS 2 type, of every input of the sink that has them.
     outputs: Vec<(String, String)>,
 }
 
 impl ResultTopics {
-    pub(super) fn new(context: &Context) -> Self {
+    pub(crate) fn new(context: &Context) -> Self {
         let results = context.inputs.iter().filter(|wire| !wire.topic.is_empty());
         Self { outputs: results.map(|wire| (wire.topic.clone(), wire.ros_type.clone())).collect() }
     }
@@ -36,7 +36,7 @@ impl ResultTopics {
     ///
     /// A result keeps its topic for itself: a map of the input on `/map` would pass for the merged one. Transforms are
     /// the exception, since all that are sent on a topic count together; they join the result's channel.
-    pub(super) fn route(&self, channel: &Channel) -> Route {
+    pub(crate) fn route(&self, channel: &Channel) -> Route {
         let topic = &channel.topic;
         match self.type_on(topic) {
             None => Route::Write(qos::completed(channel.clone())),

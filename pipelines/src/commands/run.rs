@@ -1,6 +1,6 @@
 //! `gridweave run`: a pipeline file, or one that ships.
 
-use crate::job::{Job, RunOptions, is_yaml};
+use crate::job::{Job, RunOptions, STANDARD_VIEW, is_yaml};
 use crate::status::{BadUse, Status};
 use anyhow::Result;
 use clap::Args;
@@ -19,6 +19,10 @@ pub(crate) struct RunArgs {
     /// The log to write; FOLDER/, with a slash behind it, is a rosbag2 folder.
     #[arg(short, long, value_name = "LOG")]
     pub(crate) output: Option<PathBuf>,
+    /// Show the run to the Foxglove app while it goes on, over a WebSocket on this address, which is 127.0.0.1:8765 unless named.
+    /// Only programs of this machine reach it there; 0.0.0.0 lets others in.
+    #[arg(long, value_name = "[HOST:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VIEW)]
+    pub(crate) view: Option<String>,
     #[command(flatten)]
     pub(crate) options: RunOptions,
 }
@@ -33,7 +37,7 @@ pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Status> {
         pipeline: &args.pipeline,
         inputs: &args.input,
         output: args.output.as_deref().into(),
-        options: &args.options,
+        options: &RunOptions { view: args.view.clone(), ..args.options.clone() },
         registry,
     };
     job.run_and_print()

@@ -7,18 +7,20 @@ pub(crate) mod progress;
 mod provenance;
 mod reading;
 mod results;
+mod view;
 
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
 pub(crate) use outputs::is_or_holds as is_input;
 pub(crate) use reading::{NamingOptions, ReadingOptions};
+pub(crate) use view::STANDARD_VIEW;
 
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
 use crate::telling;
-use crate::terminal::{print, print_line, width};
+use crate::terminal::{print, print_line, say, width};
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
@@ -92,6 +94,10 @@ impl Job<'_> {
         outputs::check(&pipeline, self.options)?;
         provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
+        if let Some(address) = &self.options.view {
+            let address = view::attach(&mut pipeline, self.registry, address)?;
+            say(format_args!("Foxglove shows this run: open the connection \"Foxglove WebSocket\" {address}"));
+        }
         let progress = Progress::new(pipeline.mode);
         let by_mode = match pipeline.mode {
             Mode::Replay => EngineKind::default(),

@@ -49,6 +49,9 @@ pub(crate) struct RunOptions {
     /// Leave the input's messages out of the output.
     #[arg(long)]
     pub(crate) results_only: bool,
+    /// Where Foxglove is shown the run while it goes on, as `gridweave run` is told.
+    #[arg(skip)]
+    pub(crate) view: Option<String>,
     /// Print the summary as JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,12 +1,13 @@
 //! Stages that are added to a pipeline, or taken out of it, after it was read.
 
+use super::binding::accepts;
 use super::topics::standard_topics;
 use super::{DEFAULT_DEPTH, Overflow, Pipeline, Restart, StageSpec, Wire};
 use crate::stage::{InputPort, OutputPort, StageKind};
 
 impl Pipeline {
-    /// Adds a stage that nothing reads but what is attached later: each of its inputs is wired to all outputs of its type of
-    /// which `takes` says that it takes them. It runs in the process `process`. Does nothing, and gives `false`, if that leaves
+    /// Adds a stage that nothing reads but what is attached later: each of its inputs is wired to all outputs of its type, or
+    /// of any if it takes any, of which `takes` says that it takes them. It runs in the process `process`. Does nothing, and gives `false`, if that leaves
     /// an input without a wire that needs one.
     pub fn attach(
         &mut self,
@@ -21,7 +22,7 @@ impl Pipeline {
             for (from_stage, from) in self.stages.iter().enumerate() {
                 let outputs = from.kind.outputs.iter().enumerate();
                 let taken =
-                    outputs.filter(|(_, output)| output.port_type == input.port_type && takes(input, from, output));
+                    outputs.filter(|(_, output)| accepts(input, output.port_type) && takes(input, from, output));
                 inputs.extend(taken.map(|(from_port, _)| Wire { port, from_stage, from_port }));
             }
             if inputs.len() == before && !input.optional {
@@ -92,6 +93,15 @@ mod tests {
             "an output of the kind that is attached here is not read, which a file must not leave so"
         );
         assert!(!pipeline.attach(&kind, toml::Table::new(), "more", |_, _, _| false));
+    }
+
+    #[test]
+    fn an_attached_stage_that_takes_any_type_reads_the_outputs_of_all() {
+        let mut pipeline = valid();
+        let outputs: usize = pipeline.stages.iter().map(|stage| stage.kind.outputs.len()).sum();
+        let kind = registry().get("mcap_sink").unwrap().clone();
+        assert!(pipeline.attach(&kind, toml::Table::new(), "more", |_, _, _| true));
+        assert_eq!(pipeline.stages.last().unwrap().inputs.len(), outputs);
     }
 
     #[test]

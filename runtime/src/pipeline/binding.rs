@@ -247,6 +247,6 @@ impl<'a> Binder<'a> {
     }
 }
 
-fn accepts(port: &InputPort, port_type: PortType) -> bool {
+pub(super) fn accepts(port: &InputPort, port_type: PortType) -> bool {
     port.port_type == port_type || port.port_type == PortType::Any
 }

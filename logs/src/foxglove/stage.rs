@@ -1,0 +1,136 @@
+//! The stage around the server.
+
+use super::FoxgloveParameters;
+use super::kept::KeptMessages;
+use crate::qos::is_transient_local;
+use crate::sink::result_channel;
+use crate::sink::routing::{ResultTopics, Route};
+use crate::supplement::SupplementKind;
+use foxglove::{ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
+use gridweave_runtime::message::{Channel, FixedText, Message};
+use gridweave_runtime::stage::{Context, Output, StageError};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A topic that is shown.
+struct Shown {
+    channel: Channel,
+    raw: Arc<RawChannel>,
+    is_latched: bool,
+}
+
+/// Shows messages to Foxglove.
+pub(super) struct FoxgloveSink {
+    /// None once it has ended.
+    server: Option<WebSocketServerHandle>,
+    /// The channels that are served. They go with it.
+    context: Arc<foxglove::Context>,
+    kept: KeptMessages,
+    result_topics: ResultTopics,
+    input_types: Vec<String>,
+    shown: Vec<Shown>,
+    /// By wire and number: numbers are given by each source for itself. None is not shown.
+    announced: BTreeMap<(usize, u32), Option<usize>>,
+    /// By wire and topic.
+    results: BTreeMap<(usize, FixedText<128>), Option<usize>>,
+}
+
+impl FoxgloveSink {
+    pub(super) fn new(parameters: FoxgloveParameters, context: &Context) -> Result<Self, StageError> {
+        let FoxgloveParameters { host, port, backlog } = parameters;
+        let (channels, kept) = (foxglove::Context::new(), KeptMessages::default());
+        let server = WebSocketServer::new()
+            .name("gridweave")
+            .context(&channels)
+            .listener(Arc::new(kept.clone()))
+            .message_backlog_size(backlog)
+            .bind(host.as_str(), port)
+            .start_blocking()
+            .map_err(|error| cannot_serve(&host, port, &error))?;
+        tracing::info!("Foxglove can open ws://{host}:{}", server.port());
+        Ok(Self {
+            server: Some(server),
+            context: channels,
+            kept,
+            result_topics: ResultTopics::new(context),
+            input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
+            shown: Vec::new(),
+            announced: BTreeMap::new(),
+            results: BTreeMap::new(),
+        })
+    }
+
+    /// The topic of a channel; equal channels share one. None if it cannot be shown.
+    fn show(&mut self, channel: Channel) -> Option<usize> {
+        if let Some(place) = self.shown.iter().position(|shown| shown.channel == channel) {
+            return Some(place);
+        }
+        let schema = Schema::new(channel.schema_name.clone(), channel.schema_encoding.clone(), channel.schema.clone());
+        let raw = ChannelBuilder::new(channel.topic.clone())
+            .message_encoding(channel.message_encoding.clone())
+            .schema(schema)
+            .context(&self.context)
+            .build_raw();
+        let is_latched = is_transient_local(&channel.metadata);
+        self.shown.push(Shown { channel, raw: raw.ok()?, is_latched });
+        Some(self.shown.len() - 1)
+    }
+
+    pub(super) fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+        let shown = match self.result_topics.route(channel) {
+            _ if SupplementKind::of_channel(channel).is_some() => None,
+            Route::Write(channel) => self.show(channel),
+            Route::LeaveOut(_) => None,
+        };
+        self.announced.insert((wire, number), shown);
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        let header = message.header();
+        let shown = match header.channel {
+            0 => self.result(message),
+            number => self.announced.get(&(message.wire(), number)).copied().flatten(),
+        };
+        if let Some(Shown { raw, is_latched, .. }) = shown.and_then(|place| self.shown.get(place)) {
+            output.count("messages", 1);
+            self.kept.send(raw, *is_latched, header.log_time.0, message.bytes());
+        }
+        Ok(())
+    }
+
+    /// The topic of what a stage has made. What has no type is not shown.
+    fn result(&mut self, message: &Message) -> Option<usize> {
+        let key = (message.wire(), message.header().topic);
+        if let Some(&place) = self.results.get(&key) {
+            return place;
+        }
+        let ros_type = self.input_types.get(message.wire()).filter(|name| !name.is_empty()).cloned();
+        let place = ros_type.and_then(|ros_type| self.show(result_channel(message.header().topic.as_str(), &ros_type)));
+        self.results.insert(key, place);
+        place
+    }
+
+    /// Ends the connections of all viewers.
+    pub(super) fn close(&mut self) {
+        if let Some(server) = self.server.take() {
+            // Without waiting for them: one that does not read could keep the run from its end.
+            drop(server.stop());
+        }
+    }
+}
+
+impl Drop for FoxgloveSink {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn cannot_serve(host: &str, port: u16, error: &FoxgloveError) -> StageError {
+    let cause = match error {
+        FoxgloveError::Bind(cause) => cause.to_string(),
+        other => other.to_string(),
+    };
+    StageError::new(format!("serve Foxglove on {host}:{port}"), cause)
+        .with_help("another program may have that port: choose another, as in --view=8766 or port = 8766")
+}

@@ -1,0 +1,65 @@
+//! The live view of a run for Foxglove, as `--view` asks for it.
+
+use super::LOG_SINK;
+use crate::status::BadUse;
+use gridweave_runtime::pipeline::Pipeline;
+use gridweave_runtime::stage::Registry;
+use std::collections::BTreeSet;
+
+/// The kind of stage that serves it.
+const VIEW: &str = "foxglove_sink";
+/// The address that is served on unless another is named, as the stage has it.
+pub(crate) const STANDARD_VIEW: &str = "127.0.0.1:8765";
+
+/// Adds the view to a pipeline: of what its logs hold or, without any, of all that its stages send to each other. Gives the
+/// address to open.
+///
+/// # Errors
+/// The address is none, or this program has no such stage.
+pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str) -> Result<String, BadUse> {
+    let (host, port) = parse(address)?;
+    let kind = registry.get(VIEW).ok_or_else(|| {
+        BadUse("this program was built without its view for Foxglove: build it with the feature `foxglove`".to_owned())
+    })?;
+    let read = |by_logs: bool| -> BTreeSet<(String, &'static str)> {
+        let stages = pipeline.stages.iter().filter(|stage| !by_logs || stage.kind.name == LOG_SINK);
+        let wires = stages.flat_map(|stage| &stage.inputs);
+        wires
+            .map(|wire| {
+                let from = &pipeline.stages[wire.from_stage];
+                (from.name.clone(), from.kind.outputs[wire.from_port].name)
+            })
+            .collect()
+    };
+    let shown = Some(read(true)).filter(|shown| !shown.is_empty()).unwrap_or_else(|| read(false));
+    let mut parameters = toml::Table::new();
+    parameters.insert("host".to_owned(), host.into());
+    parameters.insert("port".to_owned(), i64::from(port).into());
+    pipeline.attach(kind, parameters, VIEW, |_, from, output| shown.contains(&(from.name.clone(), output.name)));
+    Ok(format!("ws://{host}:{port}"))
+}
+
+/// HOST:PORT, or PORT on this machine.
+fn parse(address: &str) -> Result<(&str, u16), BadUse> {
+    let standard_host = STANDARD_VIEW.split(':').next().unwrap_or_default();
+    let (host, port) = address.rsplit_once(':').unwrap_or((standard_host, address));
+    match port.parse() {
+        Ok(port) if !host.is_empty() => Ok((host, port)),
+        _ => Err(BadUse(format!("`--view={address}` is no address: write PORT or HOST:PORT, as in {STANDARD_VIEW}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_a_port_of_this_machine_or_a_host_and_a_port() {
+        assert_eq!(parse("8766").unwrap(), ("127.0.0.1", 8766));
+        assert_eq!(parse("0.0.0.0:80").unwrap(), ("0.0.0.0", 80));
+        assert_eq!(parse("[::1]:0").unwrap(), ("[::1]", 0));
+        for wrong in ["", "host", ":8765", "host:", "127.0.0.1:70000"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! A live run is shown to the Foxglove app, and not slowed by it.
+
+use crate::python_libraries::{python, script};
+use crate::support::{LOG, Run, gridweave};
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// A port that was free a moment ago.
+fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+#[test]
+fn a_port_that_is_taken_ends_the_run_and_is_told() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    let folder = TempDir::new().unwrap();
+    let view = format!("--view={port}");
+    let run = gridweave(folder.path(), &["run", "live_merge", "-o", "out.mcap", &view]);
+    run.assert(1, &[&format!("serve Foxglove on 127.0.0.1:{port}"), "in use", "choose another"]);
+    let wrong = gridweave(folder.path(), &["run", "live_merge", "-o", "out.mcap", "--view=nowhere"]);
+    wrong.assert(2, &["`--view=nowhere` is no address"]);
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn a_client_with_python_libraries_that_comes_late_gets_the_last_of_all_that_is_latched() {
+    let tools = TempDir::new().unwrap();
+    let (python, script) = (python(tools.path()), script("foxglove.py"));
+    let client = |port: u16, wanted: &[&str]| {
+        let mut command = Command::new(&python);
+        command.arg(&script).arg(format!("ws://127.0.0.1:{port}")).args(wanted);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    };
+    let port = free_port();
+    let run = Run::start("live_merge", &[&format!("--view={port}")]);
+    run.simulate();
+    run.command(&["play", LOG, "--rate", "0", "--end", "1"]).wait().assert(0, &[]);
+    // One that reads nothing is there all the time.
+    let mut halted = client(port, &["--halt"]).spawn().unwrap();
+    let mut said = String::new();
+    BufReader::new(halted.stdout.take().unwrap()).read_line(&mut said).unwrap();
+    assert_eq!(said.trim(), "halted");
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &[]);
+    let wanted = ["/map", "/robot1/map", "/tf_static", "/markers/graph", "/robot_frames"];
+    let shown = client(port, &wanted).output().unwrap();
+    assert!(shown.status.success(), "{}", String::from_utf8_lossy(&shown.stderr));
+    let shown: Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!(shown["/map"]["frame"], "world", "{shown}");
+    assert!(shown["/map"]["known"].as_u64().unwrap() > 1000, "{shown}");
+    assert!(shown["/tf_static"]["frames"].as_array().unwrap().contains(&"robot1/map".into()), "{shown}");
+    let done = run.interrupt();
+    halted.kill().unwrap();
+    halted.wait().unwrap();
+    done.assert_done();
+    assert!(Path::new(&done.path(LOG)).exists());
+}
