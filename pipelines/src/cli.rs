@@ -68,6 +68,8 @@ enum Command {
     Tap(live::TapArgs),
     /// Show what the stages of a run that is going on do.
     Top(live::TopArgs),
+    /// Show in a browser what a run that is going on has found so far.
+    View(live::ViewArgs),
     /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
     Clean,
     /// Print the completions of a shell, or write the manual pages.
@@ -96,6 +98,7 @@ impl Command {
                 | Self::Record(_)
                 | Self::Tap(_)
                 | Self::Top(_)
+                | Self::View(_)
         )
     }
 }
@@ -129,6 +132,7 @@ impl Cli {
             Command::Record(args) => live::record(&args, registry),
             Command::Tap(args) => live::tap(&args, registry),
             Command::Top(args) => live::top(&args, registry),
+            Command::View(args) => live::view(&args, registry),
             Command::Clean => processes::clean(),
             Command::Shell(args) => shell::shell(&args, &Self::command()),
             Command::Stage(args) => processes::stage(&args, registry),

@@ -6,8 +6,10 @@ mod record;
 mod running;
 mod tap;
 mod top;
+mod view;
 
 pub(crate) use play::{PlayArgs, play};
 pub(crate) use record::{RecordArgs, record};
 pub(crate) use tap::{TapArgs, tap};
 pub(crate) use top::{TopArgs, top};
+pub(crate) use view::{ViewArgs, view};

@@ -1,13 +1,13 @@
 //! Reads what the page shows out of logs, moment by moment.
 
 use super::grids::grid;
-use super::model::{Findings, Frame, Hypothesis, Pair, Report, Robot, Tag};
+use super::model::{Findings, Frame, Hypothesis, Pair, Registration, Report, Robot, Tag};
 use crate::job::NamingOptions;
 use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, RobotState};
 use anyhow::Result;
 use gridweave_logs::picture::robot_colour;
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
-use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames, RosMessage};
+use gridweave_runtime::ros::{IcpErrors, OccupancyGrid, RobotFrame, RobotFrames, RosMessage};
 use nalgebra::{Matrix2, Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -24,6 +24,8 @@ pub(super) struct Limits {
 /// A drive has no more points than this.
 const MOST_POINTS: usize = 4000;
 const DEVIATIONS: f64 = 2.0;
+/// Width and height of a curve, pixels.
+const CURVE: [f64; 2] = [160.0, 40.0];
 
 /// The moments at which something became known that a page shows: seconds from the first message on, rising.
 pub(super) fn moments(logs: &[PathBuf], naming: &NamingOptions) -> Result<Vec<f64>> {
@@ -56,32 +58,53 @@ pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], l
         // What is sent at the very end belongs to the last moment.
         let is_last = step + 1 == times.len();
         opened.read_until((!is_last).then_some(*time), |_, _| {});
-        let state = &opened.state;
-        let side = limits.side;
-        let of_message = |map: Option<OccupancyGrid<'_>>| match map {
-            Some(map) => grid(&map.info, map.cells(), side),
-            None => Ok(None),
-        };
-        report.merged.add(step, of_message(state.merged())?);
-        report.conflicts.add(step, of_message(state.conflicts())?);
-        for placed in &Placing::of(state, &BTreeSet::new(), false).robots {
-            let robot = robots.entry(placed.name.clone()).or_default();
-            let map = placed.map.as_ref().map(|map| grid(&map.info, &map.cells, side)).transpose()?;
-            robot.map.add(step, map.flatten());
-            robot.findings.add(step, findings(placed, &state.robots[&placed.name]));
-            if is_last {
-                robot.colour = hex(robot_colour(placed.index));
-                robot.own = of_message(state.robots[&placed.name].map())?;
-                let pose = &placed.transform_world_map;
-                robot.pose = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
-            }
-        }
+        take_moment(&mut report, &mut robots, &opened.state, step, is_last, limits.side)?;
     }
     report.times = times;
     report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
     tell_end(&mut report, &opened.state);
     report.problems = opened.problems.into_iter().collect();
     Ok(report)
+}
+
+/// What is known at one moment, which is all that there is to show: of a run that goes on.
+pub(super) fn collect_moment(name: &str, state: &MergeState, seconds: f64, side: usize) -> Result<Report> {
+    let mut report = Report { logs: vec![name.to_owned()], times: vec![round(seconds)], ..Report::default() };
+    let mut robots = BTreeMap::new();
+    take_moment(&mut report, &mut robots, state, 0, true, side)?;
+    report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
+    tell_end(&mut report, state);
+    Ok(report)
+}
+
+/// Adds what is known at a moment, of the given number. At the last one each robot's own map is taken along.
+fn take_moment(
+    report: &mut Report,
+    robots: &mut BTreeMap<String, Robot>,
+    state: &MergeState,
+    step: usize,
+    is_last: bool,
+    side: usize,
+) -> Result<()> {
+    let of_message = |map: Option<OccupancyGrid<'_>>| match map {
+        Some(map) => grid(&map.info, map.cells(), side),
+        None => Ok(None),
+    };
+    report.merged.add(step, of_message(state.merged())?);
+    report.conflicts.add(step, of_message(state.conflicts())?);
+    for placed in &Placing::of(state, &BTreeSet::new(), false).robots {
+        let robot = robots.entry(placed.name.clone()).or_default();
+        let map = placed.map.as_ref().map(|map| grid(&map.info, &map.cells, side)).transpose()?;
+        robot.map.add(step, map.flatten());
+        robot.findings.add(step, findings(placed, &state.robots[&placed.name]));
+        if is_last {
+            robot.colour = hex(robot_colour(placed.index));
+            robot.own = of_message(state.robots[&placed.name].map())?;
+            let pose = &placed.transform_world_map;
+            robot.pose = [pose.translation.x, pose.translation.y, pose.rotation.angle()];
+        }
+    }
+    Ok(())
 }
 
 fn hex([red, green, blue]: [u8; 3]) -> String {
@@ -185,6 +208,35 @@ fn tell_end(report: &mut Report, state: &MergeState) {
         reason: hypothesis.reason.clone(),
     });
     report.hypotheses = rows.collect();
+    report.registrations = registrations(state.icp_errors.values());
+}
+
+/// Curves of errors, all to one scale.
+fn registrations<'a>(told: impl Iterator<Item = &'a IcpErrors> + Clone) -> Vec<Registration> {
+    let sound =
+        |told: &IcpErrors| -> Vec<f64> { told.errors.iter().copied().filter(|error| error.is_finite()).collect() };
+    let top = told.clone().flat_map(sound).fold(f64::MIN_POSITIVE, f64::max);
+    let longest = told.clone().map(|told| sound(told).len()).max().unwrap_or_default();
+    let row = |told: &IcpErrors| {
+        let errors = sound(told);
+        let point = |(number, error): (usize, &f64)| {
+            let x = CURVE[0] * number as f64 / longest.saturating_sub(1).max(1) as f64;
+            format!("{}{x:.1} {:.1}", if number == 0 { 'M' } else { 'L' }, CURVE[1] * (1.0 - error / top))
+        };
+        let metres = |error: Option<&f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3}"));
+        Registration {
+            a: told.a.clone(),
+            b: told.b.clone(),
+            source: told.source.clone(),
+            rank: told.rank,
+            accepted: told.accepted,
+            iterations: errors.len(),
+            first: metres(errors.first()),
+            last: metres(errors.last()),
+            curve: errors.iter().enumerate().map(point).collect(),
+        }
+    };
+    told.map(row).collect()
 }
 
 fn score(score: f64) -> String {
@@ -236,6 +288,17 @@ mod tests {
         assert_eq!(some_of(&times, 3), [2.0, 5.0, 9.0]);
         assert_eq!(some_of(&times, 1), [9.0]);
         assert_eq!(some_of(&[], 3), [0.0; 0]);
+    }
+
+    #[test]
+    fn curves_of_errors_are_drawn_to_one_scale() {
+        let told = |errors: &[f64]| IcpErrors { errors: errors.to_vec(), ..Default::default() };
+        let rows = registrations([told(&[0.4, f64::NAN, 0.1]), told(&[0.2, 0.2, 0.0]), told(&[])].iter());
+        let drawn: Vec<(usize, &str, &str)> =
+            rows.iter().map(|row| (row.iterations, row.last.as_str(), row.curve.as_str())).collect();
+        let expected =
+            [(2, "0.100", "M0.0 0.0L80.0 30.0"), (3, "0.000", "M0.0 20.0L80.0 20.0L160.0 40.0"), (0, "-", "")];
+        assert_eq!(drawn, expected);
     }
 
     #[test]

@@ -3,8 +3,11 @@
 mod collect;
 mod graph;
 mod grids;
+mod live;
 mod model;
 mod page;
+
+pub(crate) use live::LivePage;
 
 use crate::job::{Inputs, NamingOptions};
 use crate::status::{BadUse, Status};

@@ -44,6 +44,7 @@ pub(super) struct Report {
     pub(super) merged: Versions<Option<Grid>>,
     pub(super) conflicts: Versions<Option<Grid>>,
     pub(super) hypotheses: Vec<Hypothesis>,
+    pub(super) registrations: Vec<Registration>,
     /// Of the last moment.
     pub(super) frames: Vec<Frame>,
     pub(super) unmerged: Vec<(String, String)>,
@@ -128,6 +129,22 @@ pub(super) struct Hypothesis {
     pub(super) accepted: bool,
     pub(super) method: String,
     pub(super) reason: String,
+}
+
+/// How the error of ICP fell from a first guess.
+#[derive(Debug, PartialEq, Serialize)]
+pub(super) struct Registration {
+    pub(super) a: String,
+    pub(super) b: String,
+    pub(super) source: String,
+    pub(super) rank: u32,
+    pub(super) accepted: bool,
+    pub(super) iterations: usize,
+    /// Metres, of the first iteration and of the last.
+    pub(super) first: String,
+    pub(super) last: String,
+    /// A curve over the iterations, as a path of SVG in a box of 160 by 40 pixels.
+    pub(super) curve: String,
 }
 
 /// Where a robot's map lies, as text for a table.

@@ -7,7 +7,11 @@ use minijinja::{AutoEscape, Environment, Value as Html, context};
 use serde::Serialize;
 use serde_json::Value;
 
-const TEMPLATE: &str = include_str!("page/page.html");
+const TEMPLATES: [(&str, &str); 3] = [
+    ("page", include_str!("page/page.html")),
+    ("headline", include_str!("page/headline.html")),
+    ("findings", include_str!("page/findings.html")),
+];
 const STYLE: &str = include_str!("page/page.css");
 /// What the entry of a log's metadata is called that is the text of its pipeline.
 const PIPELINE: &str = "gridweave_run: pipeline";
@@ -18,6 +22,9 @@ const SCRIPT: [&str; 4] = [
     include_str!("page/layers.js"),
     include_str!("page/page.js"),
 ];
+
+/// What makes the page of a live run take up what it sends. It stands before the last part, which begins.
+const LIVE_SCRIPT: &str = include_str!("page/live.js");
 
 /// What a stage has done, as a row with bars.
 #[derive(Debug, PartialEq, Serialize)]
@@ -38,12 +45,48 @@ struct Stage {
 /// # Errors
 /// What was collected cannot be written as JSON, or the template is wrong.
 pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String> {
+    render_part("page", report, summary, false)
+}
+
+/// Makes the page of a live run.
+///
+/// # Errors
+/// As of [`render`].
+pub(super) fn render_live(report: &Report, summary: &Value) -> Result<String> {
+    render_part("page", report, Some(summary), true)
+}
+
+/// What takes the place of parts of that page when something has changed, as JSON in one line.
+///
+/// # Errors
+/// As of [`render`].
+pub(super) fn render_change(report: &Report, summary: &Value) -> Result<String> {
+    let part = |name: &str| Ok::<_, anyhow::Error>(Value::from(render_part(name, report, Some(summary), true)?));
+    let (headline, findings) = (part("headline")?, part("findings")?);
+    Ok(format!(r#"{{"headline":{headline},"findings":{findings},"data":{}}}"#, data(report)?))
+}
+
+/// One of the templates with all that it is told.
+fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bool) -> Result<String> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment.add_template("page", TEMPLATE).context("the template of the page is wrong")?;
-    let template = environment.get_template("page").context("the template of the page is wrong")?;
+    for (name, text) in TEMPLATES {
+        environment.add_template(name, text).context("a template of the page is wrong")?;
+    }
+    let template = environment.get_template(name).context("a template of the page is wrong")?;
+    let told_page = match name {
+        "page" => context! {
+            headline => Html::from_safe_string(render_part("headline", report, summary, is_live)?),
+            findings => Html::from_safe_string(render_part("findings", report, summary, is_live)?),
+            style => Html::from_safe_string(STYLE.to_owned()),
+            script => Html::from_safe_string(script(is_live)),
+            data => Html::from_safe_string(data(report)?),
+        },
+        _ => context! {},
+    };
     let stages = summary.map(stages).unwrap_or_default();
     let page = template.render(context! {
+        is_live => is_live,
         report => told(report),
         stages => told(&stages),
         warnings => told(summary.map(warnings).unwrap_or_default()),
@@ -51,13 +94,16 @@ pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String>
         has_summary => summary.is_some(),
         last => report.times.last().map(|seconds| format!("{seconds:.1}")),
         agreement => told(report.agreement.map(|areas| areas.map(|area| format!("{area:.1}")))),
-        findings => told(report.robots.iter().map(finding_row).collect::<Vec<_>>()),
+        robots => told(report.robots.iter().map(finding_row).collect::<Vec<_>>()),
         version => env!("CARGO_PKG_VERSION"),
-        style => Html::from_safe_string(STYLE.to_owned()),
-        script => Html::from_safe_string(SCRIPT.concat()),
-        data => Html::from_safe_string(data(report)?),
+        ..told_page
     });
     page.context("the page cannot be made")
+}
+
+fn script(is_live: bool) -> String {
+    let [before @ .., last] = SCRIPT;
+    [before.concat().as_str(), if is_live { LIVE_SCRIPT } else { "" }, last].concat()
 }
 
 /// The pipeline that has written the log, as the log tells it.

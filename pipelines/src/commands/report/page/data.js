@@ -9,8 +9,8 @@ function at(versions, step) {
   return found;
 }
 
-/** All grids of the page, each once. */
-function grids() {
+/** All grids of what a page is told, each once. */
+function grids(data) {
   const found = [];
   const add = (versions) => versions.forEach((version) => version.what && found.push(version.what));
   add(data.merged);

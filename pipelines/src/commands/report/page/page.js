@@ -16,8 +16,12 @@ function draw() {
   scaleBar();
 }
 
+/** Whether the user has moved the map since all of it was shown. */
+let isMoved = false;
+
 /** Shows all maps of the moment. */
 function fit() {
+  isMoved = false;
   let box = [Infinity, Infinity, -Infinity, -Infinity];
   const add = (grid, pose) => {
     const corner = compose(pose || [0, 0, 0], [grid.x, grid.y, grid.yaw]);
@@ -41,12 +45,14 @@ function zoom(factor, u = canvas.clientWidth / 2, v = canvas.clientHeight / 2) {
   const [nx, ny] = worldOf(u, v);
   camera.x += x - nx;
   camera.y += y - ny;
+  isMoved = true;
   draw();
 }
 
 function move(u, v) {
   camera.x -= u / camera.scale;
   camera.y += v / camera.scale;
+  isMoved = true;
   draw();
 }
 
@@ -109,6 +115,12 @@ function nearby(x, y) {
   return lines.slice(0, 6);
 }
 
+function listenToHypotheses() {
+  for (const button of document.querySelectorAll(".show")) {
+    button.addEventListener("click", () => showHypothesis(button.getAttribute("aria-pressed") === "true" ? null : Number(button.dataset.hypothesis)));
+  }
+}
+
 function listen() {
   const slider = document.getElementById("slider"), pointers = new Map();
   slider.max = data.times.length - 1;
@@ -118,9 +130,7 @@ function listen() {
   document.getElementById("out").addEventListener("click", () => zoom(1 / 1.4));
   document.getElementById("fit").addEventListener("click", fit);
   document.getElementById("back").addEventListener("click", () => showHypothesis(null));
-  for (const button of document.querySelectorAll(".show")) {
-    button.addEventListener("click", () => showHypothesis(button.getAttribute("aria-pressed") === "true" ? null : Number(button.dataset.hypothesis)));
-  }
+  listenToHypotheses();
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     zoom(Math.exp(-event.deltaY / 500), event.offsetX, event.offsetY);
@@ -158,19 +168,20 @@ function listen() {
 /** Takes up other colours. */
 function repaint() {
   readTheme();
-  for (const grid of grids()) grid.painted = {};
+  for (const grid of grids(data)) grid.painted = {};
   draw();
 }
 
 async function start() {
   readTheme();
-  await Promise.all(grids().map(decode));
+  await Promise.all(grids(data).map(decode));
   makeLayers();
   listLayers();
   listen();
   showMoment(step);
   fit();
   document.documentElement.dataset.ready = "true";
+  if (typeof follow === "function") follow();
 }
 
 start();

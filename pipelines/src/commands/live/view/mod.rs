@@ -1,0 +1,101 @@
+//! `gridweave view`: what a run that is going on has found so far, as a page for a browser.
+//!
+//! The links of the run are watched as `tap` watches one ([`watched`]), and what they tell is served to browsers ([`server`]).
+
+mod server;
+mod watched;
+
+use super::running::{RunChoice, Running, find_run};
+use super::tap::LOOK_INTERVAL;
+use crate::commands::report::LivePage;
+use crate::interrupt::stop_on_interrupt;
+use crate::status::Status;
+use crate::terminal::{print_line, say};
+use anyhow::Result;
+use clap::Args;
+use gridweave_runtime::engine::watch_stages;
+use gridweave_runtime::link::{StageBoard, StageNumber, WireNumber};
+use gridweave_runtime::stage::Registry;
+use serde_json::{Map, Value, json};
+use server::PageServer;
+use std::net::SocketAddr;
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+use watched::WatchedRun;
+
+/// What `gridweave view` is told.
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// The address to serve the page on. Anybody who can reach it can look on: 0.0.0.0:PORT lets other machines in. Port 0 is one
+    /// that is free.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8766")]
+    address: SocketAddr,
+    #[command(flatten)]
+    run: RunChoice,
+}
+
+/// The page changes no more often than this.
+const SHORTEST_INTERVAL: Duration = Duration::from_millis(300);
+/// To put a change together takes time from the run: after it so many times as long nothing is done.
+const REST: u32 = 4;
+/// At the end of the run browsers get so long to take what was found last.
+const LAST_CALL: Duration = Duration::from_secs(3);
+
+/// Serves the page until the run ends.
+pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
+    let running = find_run(&args.run, registry)?;
+    let page = LivePage::new(running.name());
+    let mut server = PageServer::start(args.address, page.empty()?)?;
+    let stop = stop_on_interrupt("the view ends");
+    let boards = watch_stages(&running.run, &running.pipeline)?;
+    let mut watched = WatchedRun::open(&running)?;
+    print_line(format_args!("open http://{} in a browser; ctrl-c ends the view, not the run", server.address()))?;
+    let (mut next, mut is_new) = (Instant::now(), true);
+    loop {
+        // What has passed before the run ended is still there after it.
+        let is_last_look = !running.run.is_running();
+        is_new |= watched.take()?;
+        if is_new && (is_last_look || server.is_watched() && Instant::now() >= next) {
+            let start = Instant::now();
+            server.show(&page.change(&watched.state, watched.seconds(), &summary(&running, &boards))?);
+            is_new = false;
+            next = Instant::now() + SHORTEST_INTERVAL.max(REST * start.elapsed());
+        }
+        if is_last_look {
+            server.end(LAST_CALL);
+            say("the run has ended");
+            break;
+        }
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        thread::sleep(LOOK_INTERVAL);
+    }
+    if watched.missed() > 0 {
+        say(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
+    }
+    Ok(Status::Done)
+}
+
+/// What the stages have done so far, in the form of the summary of a run.
+fn summary(running: &Running, boards: &[StageBoard]) -> Value {
+    let stage = |board: &StageBoard| {
+        let dropped: u64 = (0..board.wires()).map(|wire| board.get_wire(wire, WireNumber::Dropped)).sum();
+        let sent: u64 = (0..board.ports()).map(|port| board.sent(port)).sum();
+        let mut stage = json!({
+            "messages_in": board.get(StageNumber::MessagesIn),
+            "messages_out": sent,
+            "busy_ms": board.get(StageNumber::Busy) as f64 * 1e-6,
+            "dropped": dropped,
+            "restarts": board.get(StageNumber::Restarts),
+        });
+        if let warnings @ 1.. = board.get(StageNumber::Warnings) {
+            stage["warnings"] = json!({ "the run tells of it when it ends": warnings });
+        }
+        stage
+    };
+    let stages = running.pipeline.stages.iter().zip(boards);
+    let stages: Map<String, Value> = stages.map(|(spec, board)| (spec.name.clone(), stage(board))).collect();
+    json!({ "stages": stages })
+}

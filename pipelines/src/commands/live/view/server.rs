@@ -1,0 +1,268 @@
+//! Serves the page, and what changes on it, to browsers.
+//!
+//! Changes go as server-sent events: each browser has a thread, which sends it the last change and then, whenever it has taken
+//! that, the last again. So one that is slow gets fewer, and nobody waits for it.
+
+use anyhow::{Result, anyhow};
+use std::io::{self, Write};
+use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+use tiny_http::{Header, Request, Response, Server};
+
+/// So often a browser that gets nothing new is sent an empty line: so it is known whether it is still there.
+const HEARTBEAT: Duration = Duration::from_secs(5);
+
+/// Serves one page.
+pub(super) struct PageServer {
+    address: SocketAddr,
+    shared: Arc<Shared>,
+}
+
+/// What all threads know.
+struct Shared {
+    page: String,
+    latest: Mutex<Latest>,
+    changed: Condvar,
+}
+
+/// The last change.
+#[derive(Default)]
+struct Latest {
+    /// How many there were.
+    number: u64,
+    change: Arc<str>,
+    has_ended: bool,
+    /// How many browsers are there.
+    browsers: usize,
+}
+
+impl PageServer {
+    /// Serves a page on an address.
+    ///
+    /// # Errors
+    /// The address cannot be had.
+    pub(super) fn start(address: SocketAddr, page: String) -> Result<Self> {
+        let failed = |error: &dyn std::fmt::Display| {
+            anyhow!("cannot serve the page on {address}: {error}; choose another address with --address HOST:PORT")
+        };
+        let server = Server::http(address).map_err(|error| failed(&error))?;
+        let address = server.server_addr().to_ip().ok_or_else(|| failed(&"it is no address of this machine"))?;
+        let shared = Arc::new(Shared { page, latest: Mutex::default(), changed: Condvar::new() });
+        let serving = Arc::clone(&shared);
+        thread::spawn(move || {
+            for request in server.incoming_requests() {
+                let shared = Arc::clone(&serving);
+                // What goes wrong with a browser is no matter of the others.
+                thread::spawn(move || drop(shared.answer(request, address)));
+            }
+        });
+        Ok(Self { address, shared })
+    }
+
+    /// Where the page is.
+    pub(super) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Whether any browser is there.
+    pub(super) fn is_watched(&self) -> bool {
+        self.shared.lock().browsers > 0
+    }
+
+    /// Sends a change, in one line, to all browsers.
+    pub(super) fn show(&mut self, change: &str) {
+        let mut latest = self.shared.lock();
+        latest.number += 1;
+        latest.change = change.into();
+        drop(latest);
+        self.shared.changed.notify_all();
+    }
+
+    /// Tells all browsers that there is no more to come, and waits until they have taken it, but for no longer than `timeout`.
+    pub(super) fn end(&mut self, timeout: Duration) {
+        let mut latest = self.shared.lock();
+        latest.has_ended = true;
+        self.shared.changed.notify_all();
+        let end = Instant::now() + timeout;
+        while latest.browsers > 0
+            && let left = end.saturating_duration_since(Instant::now())
+            && !left.is_zero()
+        {
+            latest = match self.shared.changed.wait_timeout(latest, left) {
+                Ok((latest, _)) => latest,
+                Err(poisoned) => poisoned.into_inner().0,
+            };
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Latest> {
+        // Each change of it is whole.
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn answer(&self, request: Request, address: SocketAddr) -> io::Result<()> {
+        // A page of elsewhere whose name leads here by its own name server must not read what this machine shows itself.
+        if !is_own_host(&request, address) {
+            return request.respond(Response::from_string("this is not its host\n").with_status_code(403));
+        }
+        match request.url() {
+            "/" => {
+                let mut response = Response::from_string(self.page.as_str());
+                for (name, value) in [("Content-Type", "text/html; charset=utf-8"), ("Cache-Control", "no-store")] {
+                    if let Ok(header) = Header::from_bytes(name, value) {
+                        response.add_header(header);
+                    }
+                }
+                request.respond(response)
+            }
+            "/live" => self.send_changes(&mut request.into_writer()),
+            _ => request.respond(Response::from_string("there is only the page /\n").with_status_code(404)),
+        }
+    }
+
+    /// Sends a browser changes until there are no more, or it has gone.
+    fn send_changes(&self, browser: &mut dyn Write) -> io::Result<()> {
+        self.lock().browsers += 1;
+        let sent = self.send_each_change(browser);
+        self.lock().browsers -= 1;
+        self.changed.notify_all();
+        sent
+    }
+
+    fn send_each_change(&self, browser: &mut dyn Write) -> io::Result<()> {
+        browser.write_all(
+            b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n",
+        )?;
+        browser.flush()?;
+        let mut sent = 0;
+        loop {
+            let (number, change, has_ended) = self.wait_for_change(sent);
+            if number > sent {
+                browser.write_all(format!("event: change\ndata: {change}\n\n").as_bytes())?;
+                sent = number;
+            } else if has_ended {
+                browser.write_all(b"event: end\ndata:\n\n")?;
+                return browser.flush();
+            } else {
+                browser.write_all(b":\n\n")?;
+            }
+            browser.flush()?;
+        }
+    }
+
+    /// The last change, once there is one after the given, or the end, or some time has passed.
+    fn wait_for_change(&self, sent: u64) -> (u64, Arc<str>, bool) {
+        let nothing_new = |latest: &mut Latest| latest.number <= sent && !latest.has_ended;
+        let latest = match self.changed.wait_timeout_while(self.lock(), HEARTBEAT, nothing_new) {
+            Ok((latest, _)) => latest,
+            Err(poisoned) => poisoned.into_inner().0,
+        };
+        (latest.number, Arc::clone(&latest.change), latest.has_ended)
+    }
+}
+
+/// Whether a request names this server by an address, or as the machine itself.
+fn is_own_host(request: &Request, address: SocketAddr) -> bool {
+    let host = request.headers().iter().find(|header| header.field.equiv("Host"));
+    host.is_none_or(|host| is_own_name(host.value.as_str(), address))
+}
+
+fn is_own_name(host: &str, address: SocketAddr) -> bool {
+    let suffix = format!(":{}", address.port());
+    let name = host.strip_suffix(suffix.as_str()).unwrap_or(host);
+    let name = name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
+    name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok() || !address.ip().is_loopback()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{BufRead, BufReader, Read};
+    use std::net::TcpStream;
+
+    fn ask(server: &PageServer, path: &str, host: &str) -> BufReader<TcpStream> {
+        let mut stream = TcpStream::connect(server.address()).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        BufReader::new(stream)
+    }
+
+    fn answer(server: &PageServer, path: &str, host: &str) -> String {
+        let mut text = String::new();
+        ask(server, path, host).read_to_string(&mut text).unwrap();
+        text
+    }
+
+    fn server() -> PageServer {
+        PageServer::start("127.0.0.1:0".parse().unwrap(), "<p>page</p>".to_owned()).unwrap()
+    }
+
+    /// The next line that is not empty, and not to keep the connection alive.
+    fn line(events: &mut BufReader<TcpStream>) -> String {
+        loop {
+            let mut line = String::new();
+            assert_ne!(events.read_line(&mut line).unwrap(), 0, "it has ended");
+            if !line.trim().is_empty() && !line.starts_with(':') {
+                return line.trim_end().to_owned();
+            }
+        }
+    }
+
+    #[test]
+    fn the_page_is_served_and_nothing_else() {
+        let server = server();
+        assert!(answer(&server, "/", "localhost").ends_with("<p>page</p>"));
+        assert!(answer(&server, "/etc/passwd", "localhost").starts_with("HTTP/1.1 404"));
+        assert!(answer(&server, "/", "elsewhere.example").starts_with("HTTP/1.1 403"));
+    }
+
+    #[test]
+    fn a_browser_gets_the_last_change_at_once_and_then_each_and_the_end() {
+        let mut server = server();
+        server.show("one");
+        server.show("two");
+        let mut events = ask(&server, "/live", "127.0.0.1");
+        while line(&mut events) != "event: change" {}
+        assert_eq!(line(&mut events), "data: two");
+        assert!(server.is_watched());
+        server.show("three");
+        assert_eq!([line(&mut events), line(&mut events)], ["event: change", "data: three"]);
+        server.end(Duration::from_secs(60));
+        assert_eq!(line(&mut events), "event: end");
+        assert!(!server.is_watched());
+    }
+
+    #[test]
+    fn a_browser_that_does_not_read_holds_up_nobody() {
+        let mut server = server();
+        let _halted = ask(&server, "/live", "localhost");
+        let large = "x".repeat(1 << 22);
+        let mut events = ask(&server, "/live", "localhost");
+        while line(&mut events) != "Connection: close" {}
+        for _ in 0..20 {
+            server.show(&large);
+            assert_eq!(line(&mut events), "event: change");
+            assert_eq!(line(&mut events).len(), "data: ".len() + large.len());
+        }
+        server.end(Duration::ZERO);
+        assert_eq!(line(&mut events), "event: end");
+    }
+
+    #[test]
+    fn an_address_that_is_taken_is_told() {
+        let first = server();
+        let error = PageServer::start(first.address(), String::new()).err().unwrap().to_string();
+        assert!(error.contains(&first.address().to_string()) && error.contains("--address"), "{error}");
+    }
+
+    #[test]
+    fn a_server_for_others_may_have_any_name() {
+        let [own, open] = ["127.0.0.1:80", "0.0.0.0:80"].map(|address| address.parse().unwrap());
+        assert!(is_own_name("[::1]:80", own) && is_own_name("LocalHost:80", own) && !is_own_name("a.example", own));
+        assert!(is_own_name("robot.local:80", open));
+    }
+}
