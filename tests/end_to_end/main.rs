@@ -45,3 +45,4 @@ mod topological;
 mod torture;
 mod two_tags;
 mod user_knowledge;
+mod walkthrough;
