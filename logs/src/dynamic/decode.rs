@@ -80,7 +80,7 @@ impl Schema {
         let count = match field.count {
             Count::One => return self.one(field.of, reader),
             Count::Fixed(count) => count,
-            Count::Any => reader.number::<4, u32>()? as usize,
+            Count::Any | Count::UpTo(_) => reader.number::<4, u32>()? as usize,
         };
         // Checked first, so that a damaged count allocates nothing.
         match self.least_size(field.of).checked_mul(count) {
@@ -97,7 +97,7 @@ impl Schema {
         Ok(Value::Scalar(match primitive {
             Primitive::Bool => Scalar::Bool(reader.boolean()?),
             Primitive::I8 => Scalar::Int(reader.number::<1, i8>()?.into()),
-            Primitive::U8 => Scalar::Uint(reader.number::<1, u8>()?.into()),
+            Primitive::U8 | Primitive::Byte => Scalar::Uint(reader.number::<1, u8>()?.into()),
             Primitive::I16 => Scalar::Int(reader.number::<2, i16>()?.into()),
             Primitive::U16 => Scalar::Uint(reader.number::<2, u16>()?.into()),
             Primitive::I32 => Scalar::Int(reader.number::<4, i32>()?.into()),
@@ -123,7 +123,7 @@ impl Schema {
         Ok(match primitive {
             Primitive::Bool => Array::Bool((0..count).map(|_| reader.boolean()).collect::<Result<_, _>>()?),
             Primitive::I8 => Array::I8(bytemuck::cast_slice(reader.bytes(count)?)),
-            Primitive::U8 => Array::U8(reader.bytes(count)?),
+            Primitive::U8 | Primitive::Byte => Array::U8(reader.bytes(count)?),
             Primitive::I16 => Array::I16(reader.numbers(count)?),
             Primitive::U16 => Array::U16(reader.numbers(count)?),
             Primitive::I32 => Array::I32(reader.numbers(count)?),

@@ -6,6 +6,8 @@ pub(super) enum Primitive {
     Bool,
     I8,
     U8,
+    /// As `U8`, by another name.
+    Byte,
     I16,
     U16,
     I32,
@@ -24,7 +26,8 @@ impl Primitive {
         Some(match name {
             "bool" => Self::Bool,
             "int8" => Self::I8,
-            "uint8" | "byte" | "char" => Self::U8,
+            "uint8" | "char" => Self::U8,
+            "byte" => Self::Byte,
             "int16" => Self::I16,
             "uint16" => Self::U16,
             "int32" => Self::I32,
@@ -42,7 +45,7 @@ impl Primitive {
     /// The fewest bytes that a value takes.
     pub(super) fn least_size(self) -> usize {
         match self {
-            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::Bool | Self::I8 | Self::U8 | Self::Byte => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 | Self::Text | Self::WideText => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
@@ -59,6 +62,8 @@ pub(super) enum Count {
     Fixed(usize),
     /// Any number; the message says how many.
     Any,
+    /// Any number up to this one; the message says how many.
+    UpTo(usize),
 }
 
 /// The type of a field, or of its elements, as the definition names it.
@@ -74,6 +79,8 @@ pub(super) enum TypeName {
 pub(super) struct FieldLine {
     pub(super) name: String,
     pub(super) of: TypeName,
+    /// The most characters of a text, where that is bounded. It changes nothing in the encoding.
+    pub(super) text_bound: Option<usize>,
     pub(super) count: Count,
 }
 
@@ -100,18 +107,22 @@ fn field(line: &str) -> Result<Option<FieldLine>, String> {
         None => (type_text, Count::One),
         Some((element, bounds)) => match bounds.strip_suffix(']').ok_or_else(wrong)? {
             "" => (element, Count::Any),
-            bound if bound.starts_with("<=") => (element, Count::Any),
-            number => (element, Count::Fixed(number.parse().map_err(|_| wrong())?)),
+            bounds => match bounds.strip_prefix("<=") {
+                Some(bound) => (element, Count::UpTo(bound.trim().parse().map_err(|_| wrong())?)),
+                None => (element, Count::Fixed(bounds.parse().map_err(|_| wrong())?)),
+            },
         },
     };
-    // A bound on the length of a text changes nothing in its encoding.
-    let element = element.split("<=").next().unwrap_or(element);
+    let (element, text_bound) = match element.split_once("<=") {
+        None => (element, None),
+        Some((element, bound)) => (element, Some(bound.parse().map_err(|_| wrong())?)),
+    };
     let of = match Primitive::named(element) {
         Some(primitive) => TypeName::Primitive(primitive),
         None if element.is_empty() => return Err(wrong()),
         None => TypeName::Message(element.to_owned()),
     };
-    Ok(Some(FieldLine { name: name.to_owned(), of, count }))
+    Ok(Some(FieldLine { name: name.to_owned(), of, text_bound, count }))
 }
 
 #[cfg(test)]
@@ -124,11 +135,12 @@ mod tests {
 
     #[test]
     fn types_and_counts_are_told_apart() {
-        let field = |name: &str, of, count| FieldLine { name: name.into(), of, count };
+        let field = |name: &str, of, count| FieldLine { name: name.into(), of, text_bound: None, count };
         let primitive = TypeName::Primitive;
         assert_eq!(line("int8[] data  # cells"), field("data", primitive(Primitive::I8), Count::Any));
         assert_eq!(line("float64[36] c"), field("c", primitive(Primitive::F64), Count::Fixed(36)));
-        assert_eq!(line("string<=10[<=5] names"), field("names", primitive(Primitive::Text), Count::Any));
+        let bounded = field("names", primitive(Primitive::Text), Count::UpTo(5));
+        assert_eq!(line("string<=10[<=5] names"), FieldLine { text_bound: Some(10), ..bounded });
         assert_eq!(line("a/B[2] b"), field("b", TypeName::Message("a/B".into()), Count::Fixed(2)));
         assert_eq!(line("int32 x 5"), field("x", primitive(Primitive::I32), Count::One));
         assert_eq!(line("string s \"a=b\""), field("s", primitive(Primitive::Text), Count::One));
@@ -141,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_field_is_named() {
-        for wrong in ["int32", "int32[ x", "int32[x] y", "[] x", "int32 a.b"] {
+        for wrong in ["int32", "int32[ x", "int32[x] y", "int32[<=x] y", "string<=x y", "[] x", "int32 a.b"] {
             assert_eq!(fields(wrong), Err(wrong.to_owned()));
         }
     }

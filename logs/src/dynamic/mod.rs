@@ -26,6 +26,7 @@ mod path;
 mod reader;
 mod recode;
 mod schema;
+mod type_hash;
 mod value;
 
 #[cfg(test)]

@@ -133,7 +133,7 @@ impl Walk<'_> {
         let count = match field.count {
             Count::One => 1,
             Count::Fixed(count) => count,
-            Count::Any => {
+            Count::Any | Count::UpTo(_) => {
                 let count = reader.number::<4, u32>().map_err(own)?;
                 writer.u32(count);
                 count as usize

@@ -30,6 +30,8 @@ pub(super) struct MessageType {
 pub(super) struct Field {
     pub(super) name: String,
     pub(super) of: Element,
+    /// The most characters of a text, where that is bounded.
+    pub(super) text_bound: Option<usize>,
     pub(super) count: Count,
 }
 
@@ -164,7 +166,7 @@ impl Builder {
         let lines = fields(text).map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
         let mut made = MessageType { name: name.to_owned(), fields: Vec::with_capacity(lines.len()), least_size: 0 };
         let mut names = BTreeSet::new();
-        for FieldLine { name: field, of, count } in lines {
+        for FieldLine { name: field, of, text_bound, count } in lines {
             if !names.insert(field.clone()) {
                 return Err(SchemaError::Twice { name: name.to_owned(), field });
             }
@@ -178,10 +180,10 @@ impl Builder {
             let size = match count {
                 Count::One => size,
                 Count::Fixed(count) => size.saturating_mul(count),
-                Count::Any => 4,
+                Count::Any | Count::UpTo(_) => 4,
             };
             made.least_size = made.least_size.saturating_add(size);
-            made.fields.push(Field { name: field, of, count });
+            made.fields.push(Field { name: field, of, text_bound, count });
         }
         // A message without fields is one byte, as a structure has at least one member.
         made.least_size = made.least_size.max(1);
