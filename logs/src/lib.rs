@@ -11,7 +11,7 @@ pub mod info;
 pub mod map_file;
 pub mod names;
 pub mod picture;
-mod qos;
+pub mod qos;
 pub mod reader;
 pub mod schemas;
 pub mod sink;

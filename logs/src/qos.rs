@@ -50,8 +50,17 @@ const STATES: [&str; 9] = [
 /// The metadata of the channel of a result. What holds until it is sent again is latched, static transforms among it; of
 /// the others nothing is said, and a player takes its default.
 pub(crate) fn metadata(topic: &str, ros_type: &str) -> BTreeMap<String, String> {
-    let latched = STATES.contains(&ros_type) || topic.ends_with("/tf_static");
-    BTreeMap::from([(KEY.to_owned(), if latched { LATCHED.to_owned() } else { String::new() })])
+    offered(is_latched_result(topic, ros_type))
+}
+
+/// Whether a result on a topic holds until it is sent again, so that its last message is kept for those who come later.
+pub fn is_latched_result(topic: &str, ros_type: &str) -> bool {
+    STATES.contains(&ros_type) || topic.ends_with("/tf_static")
+}
+
+/// The metadata of a channel whose last message is kept for those who come later (`is_latched`), or of which nothing is said.
+pub fn offered(is_latched: bool) -> BTreeMap<String, String> {
+    BTreeMap::from([(KEY.to_owned(), if is_latched { LATCHED.to_owned() } else { String::new() })])
 }
 
 /// A channel of the input, of which nothing may be said: without it, maps and static transforms that are played reach nobody

@@ -147,9 +147,14 @@ impl TfPoses {
         Self { frames: Some(frames), ..Self::default() }
     }
 
-    /// Poses of these robots.
-    pub fn of_robots(robots: BTreeMap<String, Ends>) -> Self {
-        Self { robots, ..Self::default() }
+    /// Gives poses of these robots. What was learnt of the frames of those that were known stays.
+    pub fn set_robots(&mut self, robots: BTreeMap<String, Ends>) {
+        let mut known = std::mem::take(&mut self.robots);
+        let with_known = robots.into_iter().map(|(robot, ends)| {
+            let ends = known.remove(&robot).unwrap_or(ends);
+            (robot, ends)
+        });
+        self.robots = with_known.collect();
     }
 
     /// Takes up a tf message in which the frames lack the given prefix (empty: none), and which may hold for good. Gives

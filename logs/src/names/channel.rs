@@ -7,8 +7,8 @@ use std::borrow::Cow;
 
 /// A channel as it is called beside those of other robots.
 #[derive(Debug)]
-pub(super) struct NamedChannel {
-    pub(super) channel: Channel,
+pub(crate) struct NamedChannel {
+    pub(crate) channel: Channel,
     pub(super) is_wanted: bool,
     frames: Frames,
 }
@@ -39,7 +39,7 @@ pub(crate) enum Renamed {
 impl NamedChannel {
     /// A channel whose frames are put under `robot`, without a robot they stay as they were logged; and whose clock is set
     /// `later` by so many nanoseconds.
-    pub(super) fn new(channel: Channel, robot: String, is_map: bool, later: i64, is_wanted: bool) -> Self {
+    pub(crate) fn new(channel: Channel, robot: String, is_map: bool, later: i64, is_wanted: bool) -> Self {
         let frames = match robot.is_empty() && later == 0 {
             true => Frames::AsLogged,
             false => match Schema::of_channel(&channel) {
@@ -65,13 +65,13 @@ impl NamedChannel {
     }
 
     /// Why frames stay as they were logged that should be put under a robot.
-    pub(super) fn frames_left(&self) -> Option<String> {
+    pub(crate) fn frames_left(&self) -> Option<String> {
         let Frames::Unknown(why) = &self.frames else { return None };
         Some(format!("frames and stamps in messages on `{}` stay as they were logged: {why}", self.channel.topic))
     }
 
     /// Puts the frames of a message under the robot, in a copy if that changes anything.
-    pub(super) fn rename_frames(&self, message: &[u8], copy: &mut Vec<u8>) -> Renamed {
+    pub(crate) fn rename_frames(&self, message: &[u8], copy: &mut Vec<u8>) -> Renamed {
         let Frames::OfRobot { robot, is_map, later, recoder } = &self.frames else { return Renamed::AsLogged };
         copy.clear();
         let unnamed = if *is_map { "map" } else { "" };

@@ -20,7 +20,7 @@ mod rules;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use channel::Renamed;
+pub(crate) use channel::{NamedChannel, Renamed};
 pub use error::NameError;
 pub use input::Input;
 pub use rename::TopicRename;
@@ -28,7 +28,6 @@ pub use rules::{Convention, NameRules};
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};
 use crate::source::map_file::robot_names;
-use channel::NamedChannel;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::borrow::Cow;

@@ -12,7 +12,7 @@ pub struct TopicRename {
 
 impl TopicRename {
     /// The name of `topic`, if it is one that this renames.
-    pub(super) fn apply(&self, topic: &str) -> Option<String> {
+    pub fn apply(&self, topic: &str) -> Option<String> {
         match match_robot(&self.old, topic) {
             Some(robot) => Some(self.new.replace("{robot}", robot)),
             None => (self.old == topic).then(|| self.new.clone()),

@@ -27,6 +27,8 @@ pub(super) struct Derived {
     inferred: InferredPoses,
     /// Whether poses were made from transforms or odometry.
     has_inferred_poses: bool,
+    /// What the base of a robot is called in tf, if the pipeline says so.
+    base_frame: Option<String>,
     /// Where tags are that cameras see; `None` if there are no such.
     tag_positions: Option<TagPositions>,
     /// Whether readings of tags were made from other messages.
@@ -49,6 +51,7 @@ impl Derived {
             tf: robots.tf.clone().map(TfPoses::new),
             inferred: InferredPoses::new(roles),
             has_inferred_poses: false,
+            base_frame: base_frame.map(str::to_owned),
             tag_positions: roles.sees_tags().then(|| TagPositions::new(base_frame, roles.tags_in_tf().clone())),
             has_made_readings: false,
             scans: roles.scanned().next().map(|_| Scans::new(base_frame)),
@@ -56,6 +59,20 @@ impl Derived {
             has_odometry: false,
             updated_maps: updates_maps.then(UpdatedMaps::default),
         }
+    }
+
+    /// There are other channels from here on. What is known of frames and maps stays.
+    pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
+        self.inferred.set_channels(roles);
+        if let Some(positions) = &mut self.tag_positions {
+            positions.set_robots(roles.tags_in_tf().clone());
+        }
+    }
+
+    /// Learns how cameras are mounted before it is known whether there are any.
+    pub(super) fn expect_tags(&mut self) {
+        let base_frame = self.base_frame.as_deref();
+        self.tag_positions.get_or_insert_with(|| TagPositions::new(base_frame, BTreeSet::new()));
     }
 
     /// Learns from a message before the start: frames, and maps with their updates.

@@ -33,12 +33,18 @@ pub(crate) struct InferredPoses {
 impl InferredPoses {
     /// For the robots that have no topic for poses.
     pub(crate) fn new(channels: &RobotChannels) -> Self {
+        let mut poses = Self::default();
+        poses.set_channels(channels);
+        poses
+    }
+
+    /// Looks for the poses of the robots that have no topic for them now. What is known of frames stays.
+    pub(crate) fn set_channels(&mut self, channels: &RobotChannels) {
         let ends = |robot: &str| Ends {
             map: format!("{robot}/map"),
             bases: BASES.map(|base| format!("{robot}{base}")).to_vec(),
         };
-        let robots = channels.unposed().map(|robot| (robot.to_owned(), ends(robot)));
-        Self { tf: TfPoses::of_robots(robots.collect()), ..Self::default() }
+        self.tf.set_robots(channels.unposed().map(|robot| (robot.to_owned(), ends(robot))).collect());
     }
 
     /// Whether the frame of a robot's map is asked for and not known.

@@ -3,8 +3,10 @@
 
 mod carry;
 mod channel;
+mod channel_router;
 mod derived;
 mod inferred_poses;
+mod live_router;
 pub mod map_file;
 mod mounts;
 mod pose;
@@ -21,6 +23,7 @@ mod updated_maps;
 mod tests;
 
 pub(crate) use inferred_poses::InferredPoses;
+pub use live_router::{LiveMessage, LiveRouter};
 pub(crate) use pose::pose_with_covariance;
 pub(crate) use route::{Classified, PoseSource, RobotChannels, Role};
 pub use stage::McapSource;

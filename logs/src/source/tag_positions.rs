@@ -21,6 +21,11 @@ impl TagPositions {
         Self { mounts: Mounts::new(base), in_tf }
     }
 
+    /// Tags of these robots are frames in tf.
+    pub(super) fn set_robots(&mut self, in_tf: BTreeSet<String>) {
+        self.in_tf = in_tf;
+    }
+
     /// Takes up transforms whose frames lack a prefix. Gives the tags that are seen in them: the robot, and where it sees the
     /// tag, or that this cannot be told.
     pub(super) fn transforms(

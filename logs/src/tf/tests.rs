@@ -68,7 +68,8 @@ fn a_correction_that_is_dated_into_the_future_gives_no_pose_and_no_later_stamp()
 #[test]
 fn of_several_frames_the_first_that_is_tied_is_the_base_for_good() {
     let ends = Ends { map: "map".into(), bases: ["r1/base_link", "r1/base_footprint"].map(str::to_owned).to_vec() };
-    let mut tf = TfPoses::of_robots(BTreeMap::from([("r1".to_owned(), ends)]));
+    let mut tf = TfPoses::default();
+    tf.set_robots(BTreeMap::from([("r1".to_owned(), ends)]));
     tf.set_map_frame("r1", "r1/slam_map");
     assert!(tf.update("", false, &message([edge("r1/map", "r1/base_link", 1.0, 0.0, 0.0)])).0.is_empty());
     assert_eq!((tf.base_of("r1"), tf.robots_without_pose().len()), (None, 1));

@@ -69,6 +69,14 @@ impl Runner {
         more
     }
 
+    /// Lets a source wait for something to send.
+    pub(super) fn wait(&mut self, longest: Duration) -> Result<(), Failure> {
+        guarded(|| {
+            self.node.wait(longest);
+            Ok(())
+        })
+    }
+
     /// How often the stage has warned.
     pub(super) fn warnings(&self) -> u64 {
         self.node.warning_count()

@@ -19,6 +19,9 @@ use std::time::Duration;
 /// After so many messages a source tells how far it is.
 const REPORT_INTERVAL: usize = 256;
 
+/// A source of a live run that has nothing to send sees so often whether it is to end, or somebody has come to read.
+const SOURCE_WAIT: Duration = Duration::from_millis(50);
+
 /// What a stage's thread tells the run.
 pub(super) enum Event {
     /// A source has done a share of its work.
@@ -151,6 +154,13 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         sleeper.wait(|| Ok(sleeper.control().is_draining() || is_connected()))?;
         let mut count = 0;
         while !sleeper.control().is_draining() {
+            if self.order == Order::Arrival {
+                self.work.end();
+                let reached = self.outputs.borrow().reached();
+                self.outputs.borrow_mut().flush(reached)?;
+                self.show();
+                self.runner.wait(SOURCE_WAIT)?;
+            }
             self.work.begin();
             let more = self.runner.advance()?;
             self.work.note();

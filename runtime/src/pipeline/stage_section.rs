@@ -101,7 +101,7 @@ fn ask(stage: &Entry, kind: &StageKind, given: &[&Entry], folder: &Path, problem
 
 /// A kind whose messages come from outside of the run has nobody to wait for in a replay.
 fn check_mode(stage: &Entry, kind: &StageKind, mode: Mode, problems: &mut Problems) {
-    if kind.is_external() && mode == Mode::Replay {
+    if kind.is_live_only() && mode == Mode::Replay {
         let problem = Diagnostic::new(format!("`{}` is for live pipelines", kind.name));
         let help = "read logs with a `mcap_source`, or write `mode = \"live\"` in [pipeline] to run live";
         problems.push(problem.at(&stage.key_at, "this pipeline is a replay").help(help.to_owned()));

@@ -10,6 +10,7 @@ use schemars::Schema;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
 type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
@@ -27,6 +28,7 @@ pub struct StageKind {
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
     external: bool,
+    live_only: bool,
     schema: Schema,
     check: Arc<CheckFn>,
     make: Arc<MakeFn>,
@@ -50,6 +52,10 @@ pub trait Source: 'static {
     /// Sends the next message or the next few, by rising log time over all ports together. `false` when there are no
     /// more.
     fn next(&mut self, output: &Output<Self::Outputs>) -> Result<bool, StageError>;
+
+    /// Waits until there is something to send, or for as long as this: for sources whose messages come from outside of the run.
+    /// In a live run it is called before each [`next`](Self::next), and does not count as work.
+    fn wait(&mut self, _longest: Duration) {}
 
     /// How much of its work is done, 0 to 1, if it can tell.
     fn progress(&self) -> Option<f64> {
@@ -132,7 +138,7 @@ impl StageKind {
             Ok(Node { role: Role::External, sent: ports.counted() })
         };
         let kind = Self::new::<()>(name, summary, Vec::new(), declared.into_declared(), make);
-        Self { external: true, ..kind }
+        Self { external: true, ..kind }.live_only()
     }
 
     pub(super) fn new<P: Parameters>(
@@ -149,6 +155,7 @@ impl StageKind {
             outputs,
             external: false,
             ask: None,
+            live_only: false,
             schema: P::schema(),
             check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
             make: Arc::new(move |table, context, ports| {
@@ -183,6 +190,7 @@ impl StageKind {
             inputs: Vec::new(),
             outputs: Vec::new(),
             external: false,
+            live_only: false,
             schema: P::schema(),
             check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
             make: Arc::new(make),
@@ -209,6 +217,17 @@ impl StageKind {
     pub fn with_schema(self, schema: Schema) -> Self {
         let described = schema.clone();
         Self { schema, check: Arc::new(move |table| json_schema::check(&described, table)), ..self }
+    }
+
+    /// The kind for live pipelines alone: of a source that waits for what comes from outside, and has no end.
+    #[must_use]
+    pub fn live_only(self) -> Self {
+        Self { live_only: true, ..self }
+    }
+
+    /// Whether it is for live pipelines alone.
+    pub fn is_live_only(&self) -> bool {
+        self.live_only
     }
 
     /// Whether its messages come from outside of the run.
@@ -250,6 +269,10 @@ struct Running<S: Source> {
 impl<S: Source> RunningSource for Running<S> {
     fn next(&mut self) -> Result<bool, StageError> {
         self.source.next(&self.output)
+    }
+
+    fn wait(&mut self, longest: Duration) {
+        self.source.wait(longest);
     }
 
     fn progress(&self) -> Option<f64> {

@@ -4,6 +4,7 @@ use super::StageError;
 use super::output::SentCounts;
 use crate::message::{Channel, LogTime, Message};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// A stage of a pipeline, made and tied to its links.
 pub struct Node {
@@ -30,6 +31,7 @@ pub(super) trait RunningStage {
 
 pub(super) trait RunningSource {
     fn next(&mut self) -> Result<bool, StageError>;
+    fn wait(&mut self, longest: Duration);
     fn progress(&self) -> Option<f64>;
 }
 
@@ -49,6 +51,13 @@ impl Node {
         match &mut self.role {
             Role::Source(source) => source.next(),
             Role::Stage(_) | Role::External => Ok(false),
+        }
+    }
+
+    /// Lets a source wait for something to send.
+    pub fn wait(&mut self, longest: Duration) {
+        if let Role::Source(source) = &mut self.role {
+            source.wait(longest);
         }
     }
 

@@ -1,0 +1,218 @@
+//! Sends messages to the ports that their channels call for.
+
+use super::RobotMessages;
+use super::carry::Latch;
+use super::channel::{Route, Stamp};
+use super::derived::Derived;
+use super::route::{RobotChannels, Role};
+use crate::schemas::full_type_name;
+use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use std::collections::BTreeMap;
+
+/// Sends messages to the ports that their channels call for, and what they tell beside what they say.
+pub(super) struct ChannelRouter {
+    robots: RobotTopics,
+    roles: RobotChannels,
+    routes: Vec<Route>,
+    by_channel: BTreeMap<Channel, usize>,
+    derived: Derived,
+}
+
+impl ChannelRouter {
+    /// For messages of these channels. Whole maps are made of updates if `updates_maps`.
+    pub(super) fn new<'a>(
+        robots: RobotTopics,
+        channels: impl Iterator<Item = &'a Channel>,
+        updates_maps: bool,
+    ) -> Self {
+        let roles = RobotChannels::new(robots.clone(), channels);
+        let derived = Derived::new(&robots, &roles, updates_maps);
+        Self { derived, roles, robots, routes: Vec::new(), by_channel: BTreeMap::new() }
+    }
+
+    /// For channels that become known later, and whole maps of updates.
+    pub(super) fn live(robots: RobotTopics) -> Self {
+        let mut router = Self::new(robots, std::iter::empty(), true);
+        router.derived.expect_tags();
+        router
+    }
+
+    /// There are these channels from here on. What was learnt from messages stays.
+    pub(super) fn set_channels<'a>(&mut self, channels: impl Iterator<Item = &'a Channel>) {
+        self.roles = RobotChannels::new(self.robots.clone(), channels);
+        self.derived.set_roles(&self.roles);
+        for route in &mut self.routes {
+            let classified = self.roles.classify(&route.channel);
+            if classified.role != route.role {
+                route.role = classified.role;
+                route.robot = classified.robot.to_owned();
+                route.tag_reader = self.roles.tag_reader(&route.channel).filter(|_| route.role == Role::TagMessage);
+            }
+        }
+    }
+
+    /// What channels carry.
+    pub(super) fn roles(&self) -> &RobotChannels {
+        &self.roles
+    }
+
+    /// The route with the given index.
+    pub(super) fn route(&self, index: usize) -> Option<&Route> {
+        self.routes.get(index)
+    }
+
+    /// Sends a message that has come on a route. The output's log time is the message's.
+    pub(super) fn send(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        self.send_as_is(index, stamp, data, output)?;
+        match self.routes.get(index) {
+            Some(route) => self.derived.send_map_if_due(route, &self.roles, data, output),
+            None => Ok(()),
+        }
+    }
+
+    /// Sends a message as one that means nothing here.
+    pub(super) fn pass_on(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        match self.routes.get_mut(index) {
+            Some(route) => route.send(stamp, data, &output.other, output.log_time()),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes up what a message tells without sending it.
+    pub(super) fn learn(&mut self, index: usize, data: &[u8], output: &Output<RobotMessages>) {
+        if let Some(route) = self.routes.get(index) {
+            self.derived.learn(route, &self.roles, data, output);
+        }
+    }
+
+    /// Sends the maps of which updates have come since they were last sent.
+    pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.derived.send_updated_maps(output)
+    }
+
+    /// Sends a message and what it tells, but for a map that has become due.
+    pub(super) fn send_as_is(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        self.derived.learn_map_frame(route, data);
+        match route.role {
+            Role::Map => route.send(stamp, data, &output.map, output.log_time()),
+            Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
+            Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
+            Role::MapUpdate
+            | Role::Pose(_)
+            | Role::Odometry
+            | Role::TagMessage
+            | Role::Scan
+            | Role::Tf
+            | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
+        }?;
+        self.derived.send(route, data, output)
+    }
+
+    /// The route of a channel, which is added if there is none; `None` if its name is too long, and nothing that this program
+    /// does needs it.
+    pub(super) fn add(
+        &mut self,
+        channel: Channel,
+        output: &Output<RobotMessages>,
+    ) -> Result<Option<usize>, StageError> {
+        if let Some(&index) = self.by_channel.get(&channel) {
+            return Ok(Some(index));
+        }
+        let index = self.routes.len();
+        let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
+        let classified = self.roles.classify(&channel);
+        let topic = match FixedText::new(&channel.topic) {
+            Err(error) if classified.role == Role::Other => {
+                output.warn(format!("messages on a topic were left out: its name {error}"));
+                return Ok(None);
+            }
+            topic => topic.map_err(|error| StageError::new(doing("name"), error))?,
+        };
+        let robot = match FixedText::new(classified.robot) {
+            // What is passed on as it is needs no robot.
+            Err(_) if classified.role == Role::Other => FixedText::EMPTY,
+            robot => robot.map_err(|error| StageError::new(doing("robot's name"), error))?,
+        };
+        let header = MessageHeader {
+            // 0 stands for messages that no log has described.
+            channel: index as u32 + 1,
+            robot,
+            topic,
+            ..Default::default()
+        };
+        if let Some(mismatch) = classified.mismatch {
+            output.warn(mismatch);
+        }
+        let (role, robot) = (classified.role, classified.robot.to_owned());
+        self.by_channel.insert(channel.clone(), index);
+        let latch = Latch::of(&channel, role == Role::Map);
+        let tag_reader = self.roles.tag_reader(&channel).filter(|_| role == Role::TagMessage);
+        self.routes.push(Route {
+            channel,
+            role,
+            robot,
+            tag_reader,
+            header,
+            latch,
+            announced: false,
+            messages: 0,
+            unreadable: 0,
+        });
+        Ok(Some(index))
+    }
+
+    /// Warns of what was expected, and did not come.
+    pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
+        let routed = |role: fn(Role) -> bool| {
+            self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
+        };
+        let draws_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
+        if output.map.is_read() && !draws_maps && !routed(|role| role == Role::Map) {
+            let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
+            let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
+            let others =
+                if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
+            output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
+        }
+        if output.pose.is_read()
+            && !routed(|role| matches!(role, Role::Pose(_)))
+            && !self.derived.has_inferred_poses()
+            && !self.derived.has_odometry()
+        {
+            match &self.robots.tf {
+                Some(frames) => output.warn(format!(
+                    "no pose was found: tf never ties `{}` to `{}`",
+                    frames.base_frame, frames.map_frame
+                )),
+                None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
+            }
+        }
+        if output.tags.is_read() && !routed(|role| role == Role::Tags) && !self.derived.has_made_readings() {
+            output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
+        }
+        if output.pose.is_read() && !self.derived.has_odometry() {
+            self.derived.warn_of_missing_poses(output);
+        }
+    }
+}
