@@ -1,0 +1,109 @@
+//! How a stage joins the Zenoh network that ROS 2 programs are in.
+
+use gridweave_runtime::stage::{ParameterError, StageError};
+use std::path::{Path, PathBuf};
+use zenoh::{Config, Session, Wait};
+
+/// The router that `rmw_zenoh` looks for where nothing else is said.
+pub(crate) const ROUTER: &str = "tcp/localhost:7447";
+/// Other programs may connect here, from this machine only.
+pub(crate) const LISTEN: &str = "tcp/localhost:0";
+/// Names Zenoh's configuration file for ROS 2 programs.
+const CONFIGURATION_VARIABLE: &str = "ZENOH_SESSION_CONFIG_URI";
+/// Names the domain of ROS 2 programs.
+const DOMAIN_VARIABLE: &str = "ROS_DOMAIN_ID";
+
+/// What the parameters of a stage say of the network.
+#[derive(Clone, Debug)]
+pub(crate) struct Connection {
+    pub(crate) domain: Option<u32>,
+    pub(crate) connect: Vec<String>,
+    pub(crate) listen: Vec<String>,
+    pub(crate) zenoh_config: Option<PathBuf>,
+    pub(crate) node: Option<String>,
+}
+
+impl Connection {
+    /// What is wrong with it.
+    pub(crate) fn check(&self) -> Vec<ParameterError> {
+        let is_named = |name: &str| {
+            let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.chars().all(is_part)
+        };
+        let mut errors = Vec::new();
+        if self.node.as_ref().is_some_and(|node| !is_named(node)) {
+            errors.push(ParameterError::new("node", "must be letters, digits and underscores, as ROS asks of it"));
+        }
+        for (key, endpoints) in [("connect", &self.connect), ("listen", &self.listen)] {
+            if let Some(wrong) = endpoints.iter().find(|endpoint| endpoint.parse::<zenoh::config::EndPoint>().is_err())
+            {
+                errors.push(ParameterError::new(key, format!("`{wrong}` is none; write it as `tcp/HOST:PORT`")));
+            }
+        }
+        errors
+    }
+
+    /// The ROS domain: what the parameters say, or else the environment, or else 0.
+    ///
+    /// # Errors
+    /// The environment says something that is no number.
+    pub(crate) fn domain(&self) -> Result<u32, StageError> {
+        match (self.domain, std::env::var(DOMAIN_VARIABLE)) {
+            (Some(domain), _) => Ok(domain),
+            (None, Ok(text)) if !text.is_empty() => text.trim().parse().map_err(|_| {
+                StageError::new("find the ROS domain", format!("{DOMAIN_VARIABLE} is `{text}`"))
+                    .with_help("it must be a whole number; `domain` in the pipeline stands in for it")
+            }),
+            _ => Ok(0),
+        }
+    }
+
+    /// Opens a session.
+    ///
+    /// # Errors
+    /// The configuration file is wrong, or nothing can listen where it is to.
+    pub(crate) fn open(&self) -> Result<Session, StageError> {
+        let doing = "join the Zenoh network";
+        let config = self.config().map_err(|cause| StageError::new(doing, cause))?;
+        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, cause))
+    }
+
+    fn config(&self) -> Result<Config, String> {
+        let of_environment = || std::env::var_os(CONFIGURATION_VARIABLE).filter(|path| !path.is_empty());
+        if let Some(path) = self.zenoh_config.clone().or_else(|| of_environment().map(PathBuf::from)) {
+            return of_file(&path);
+        }
+        let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
+        let mut config = Config::default();
+        for (key, value) in [
+            ("mode", "\"peer\""),
+            ("connect/endpoints", &list(&self.connect)?),
+            ("listen/endpoints", &list(&self.listen)?),
+            ("scouting/multicast/enabled", "false"),
+            ("scouting/gossip/enabled", "true"),
+            // What is kept for those who come later is sorted by time.
+            ("timestamping/enabled", "true"),
+        ] {
+            config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
+        }
+        Ok(config)
+    }
+
+    /// Where a router is looked for, as words.
+    pub(crate) fn routers(&self) -> String {
+        match self.connect.is_empty() {
+            true => "anywhere".to_owned(),
+            false => self.connect.join(" or "),
+        }
+    }
+}
+
+fn of_file(path: &Path) -> Result<Config, String> {
+    Config::from_file(path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Whether a session is connected to a router, or to another program.
+pub(crate) fn is_connected(session: &Session) -> bool {
+    let info = session.info();
+    info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
+}

@@ -1,0 +1,36 @@
+//! ROS 2 without ROS: stages that take what robots publish and publish what was found, over [Zenoh](https://zenoh.io), as the ROS 2
+//! middleware `rmw_zenoh_cpp` speaks it.
+//!
+//! The binary `gridweave-ros` is the command `gridweave` with these kinds: `ros_source` and `ros_sink`. A program with stages of its
+//! own adds [`kinds`] to them:
+//!
+//! ```no_run
+//! fn main() -> std::process::ExitCode {
+//!     gridweave::command(gridweave_ros::kinds())
+//! }
+//! ```
+//!
+//! What goes over the wire is written down in the `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics,
+//! [liveliness tokens](liveliness) by which programs know of each other, and [attachments](attachment) of messages.
+
+#![forbid(unsafe_code)]
+
+pub mod attachment;
+mod connection;
+mod definitions;
+mod inbox;
+pub mod key_expression;
+pub mod liveliness;
+mod node;
+mod own_trees;
+pub mod qos;
+mod settled_frames;
+pub mod sink;
+pub mod source;
+
+use gridweave_runtime::stage::StageKind;
+
+/// The stage kinds of this crate.
+pub fn kinds() -> Vec<StageKind> {
+    vec![source::kind(), sink::kind()]
+}

@@ -1,0 +1,258 @@
+//! The stage `ros_sink`: publishes what was found, so that ROS 2 programs have it as if a node had sent it.
+
+use super::connection::{Connection, LISTEN, ROUTER};
+use super::key_expression::Topic;
+use super::node::{Node, Publisher};
+use super::own_trees::{OwnTrees, in_own_tree};
+use super::qos::Qos;
+use super::settled_frames::{Change, SettledFrames};
+use gridweave_logs::names::TopicRename;
+use gridweave_logs::qos;
+use gridweave_logs::tf::is_static;
+use gridweave_runtime::message::Message;
+use gridweave_runtime::ros::{RobotFrames, RosMessage, TFMessage, TransformStamped, encode};
+use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, StageError, StageKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// So many messages are kept that are not of those of which the last holds.
+const DEPTH: usize = 10;
+
+/// The parameters of `ros_sink`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SinkParameters {
+    /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
+    pub domain: Option<u32>,
+    /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    pub connect: Vec<String>,
+    /// Where other programs may connect, as `tcp/HOST:PORT`; port 0 is any that is free. Nothing else is listened to.
+    pub listen: Vec<String>,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not given,
+    /// the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
+    pub zenoh_config: Option<PathBuf>,
+    /// The name of the ROS 2 node; `gridweave_` and the name of the stage if it is not given.
+    pub node: Option<String>,
+    /// Topics that get other names than they would have in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` stands for one part
+    /// of both.
+    pub rename: Vec<String>,
+}
+
+impl Default for SinkParameters {
+    fn default() -> Self {
+        Self {
+            domain: None,
+            connect: vec![ROUTER.to_owned()],
+            listen: vec![LISTEN.to_owned()],
+            zenoh_config: None,
+            node: None,
+            rename: Vec::new(),
+        }
+    }
+}
+
+impl SinkParameters {
+    fn renames(&self) -> Result<Vec<TopicRename>, String> {
+        self.rename.iter().map(|text| text.parse()).collect()
+    }
+
+    fn connection(&self) -> Connection {
+        let Self { domain, connect, listen, zenoh_config, node, .. } = self.clone();
+        Connection { domain, connect, listen, zenoh_config, node }
+    }
+}
+
+impl Parameters for SinkParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let mut errors = self.connection().check();
+        if let Err(wrong) = self.renames() {
+            errors.push(ParameterError::new("rename", wrong));
+        }
+        errors
+    }
+}
+
+/// Whether this is the full name of a topic in ROS 2.
+fn is_topic(name: &str) -> bool {
+    let is_part = |part: &str| {
+        !part.is_empty()
+            && !part.starts_with(|c: char| c.is_ascii_digit())
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    name.strip_prefix('/').is_some_and(|name| name.split('/').all(is_part))
+}
+
+/// The kind `ros_sink`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "ros_sink",
+        "Publishes what it is given in ROS 2, over Zenoh as `rmw_zenoh_cpp` speaks it, on the topics that it would have in a log. \
+         What holds until it is sent again, such as maps and static transforms, is kept for those who come later (transient \
+         local). A frame is told anew only where it has moved by more than it is uncertain, by the covariances in \
+         `gridweave_msgs/msg/RobotFrames` where these are given, too",
+        |parameters, context| RosSink::new(parameters, context),
+    )
+    .any_inputs("in", "what to publish: outputs of any stage but a source", RosSink::receive)
+    .build()
+}
+
+/// Publishes what it is given.
+struct RosSink {
+    node: Node,
+    renames: Vec<TopicRename>,
+    /// The type of each wire's messages.
+    types: Vec<String>,
+    /// By topic; none for one that cannot be published.
+    publishers: BTreeMap<String, Option<Publisher>>,
+    frames: SettledFrames,
+    trees: OwnTrees,
+    /// By robot with a tree of its own: the frames that were told there.
+    told_in_trees: BTreeMap<String, Vec<TransformStamped>>,
+}
+
+impl RosSink {
+    fn new(parameters: SinkParameters, context: &Context) -> Result<Self, StageError> {
+        if let Some(wire) = context.inputs.iter().find(|wire| wire.topic.is_empty()) {
+            let text = format!("`{}` gives what robots have sent: it would be sent to them again", wire.from);
+            return Err(StageError::new(format!("make the stage `{}`", context.stage), text)
+                .with_help("leave it out of `inputs`"));
+        }
+        let doing = || format!("make the stage `{}`", context.stage);
+        let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
+        let node = Node::start(parameters.connection(), &context.stage)?;
+        Ok(Self {
+            trees: OwnTrees::watch(&node)?,
+            told_in_trees: BTreeMap::new(),
+            node,
+            renames,
+            types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
+            publishers: BTreeMap::new(),
+            frames: SettledFrames::default(),
+        })
+    }
+
+    fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        let ros_type = self.types.get(message.wire()).cloned().unwrap_or_default();
+        let topic = message.header().topic.as_str().to_owned();
+        self.tell_own_trees(output)?;
+        if ros_type == RobotFrames::NAME
+            && let Ok(frames) = message.decode::<RobotFrames>()
+        {
+            self.frames.learn(&frames);
+        }
+        if ros_type == TFMessage::NAME && is_static(&topic) {
+            return match message.decode::<TFMessage>() {
+                Ok(transforms) => self.tell_frames(&topic, &transforms, output),
+                Err(error) => {
+                    output.warn(format!("transforms that cannot be read were left out: {error}"));
+                    Ok(())
+                }
+            };
+        }
+        self.publish(&topic, &ros_type, message.bytes(), output)
+    }
+
+    /// Publishes the static transforms of all frames, those that have settled as they were. A publisher keeps its last message
+    /// alone, so that one holds all of them.
+    fn tell_frames(&mut self, topic: &str, message: &TFMessage, output: &Output<()>) -> Result<(), StageError> {
+        let mut is_changed = false;
+        for transform in &message.transforms {
+            let change = self.frames.update(transform);
+            is_changed |= matches!(change, Change::First | Change::Moved { .. });
+            announce(transform, &change, output);
+        }
+        if !is_changed {
+            return Ok(());
+        }
+        let transforms = self.frames.told().cloned().collect();
+        self.publish_transforms(topic, transforms, output)?;
+        self.tell_own_trees(output)
+    }
+
+    /// Publishes where the frames of a robot lie in the tree that it has for itself, too, with the names that they have there.
+    fn tell_own_trees(&mut self, output: &Output<()>) -> Result<(), StageError> {
+        for (robot, topic) in self.trees.topics() {
+            let transforms: Vec<_> = self.frames.told().filter_map(|told| in_own_tree(&robot, told)).collect();
+            if !transforms.is_empty() && self.told_in_trees.get(&robot) != Some(&transforms) {
+                self.told_in_trees.insert(robot, transforms.clone());
+                self.publish_transforms(&topic, transforms, output)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn publish_transforms(
+        &mut self,
+        topic: &str,
+        transforms: Vec<TransformStamped>,
+        output: &Output<()>,
+    ) -> Result<(), StageError> {
+        let bytes = encode(&TFMessage { transforms })
+            .map_err(|error| StageError::new("publish the frames of the robots", error))?;
+        self.publish(topic, TFMessage::NAME, &bytes, output)
+    }
+
+    fn publish(&mut self, topic: &str, ros_type: &str, bytes: &[u8], output: &Output<()>) -> Result<(), StageError> {
+        let name = self.renames.iter().find_map(|rename| rename.apply(topic)).unwrap_or_else(|| topic.to_owned());
+        let publisher = match self.publishers.get_mut(&name) {
+            Some(publisher) => publisher,
+            None => {
+                let is_latched = qos::is_latched_result(topic, ros_type);
+                let qos = if is_latched { Qos::latched(1) } else { Qos::reliable(DEPTH) };
+                let topic = Topic::known(&name, ros_type).filter(|topic| is_topic(&topic.name));
+                let publisher = topic.map(|topic| self.node.publish(topic, qos)).transpose()?;
+                self.publishers.entry(name.clone()).or_insert(publisher)
+            }
+        };
+        match publisher {
+            Some(publisher) => {
+                output.count("messages published", 1);
+                publisher.send(bytes)
+            }
+            None => {
+                output
+                    .warn(format!("`{name}` was not published: ROS 2 has no topic of this name, or type `{ros_type}`"));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Says what those who plan with a frame should know.
+fn announce(transform: &TransformStamped, change: &Change, output: &Output<()>) {
+    let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
+    match change {
+        Change::First => {
+            output.count("frames told", 1);
+            tracing::info!("`{child}` lies in `{parent}` from here on");
+        }
+        Change::Moved { distance, angle } => {
+            output.count("frames moved", 1);
+            let degrees = angle.to_degrees();
+            tracing::warn!("`{child}` has moved in `{parent}` by {distance:.3} m and {degrees:.2} degrees");
+        }
+        Change::Held => output.count("changes of frames within their uncertainty, not told", 1),
+        Change::Same => {}
+        Change::OtherParent { before } => {
+            output
+                .warn(format!("`{child}` stays in `{before}`: a frame that was told cannot get the parent `{parent}`"));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_topics_are_those_of_ros() {
+        for name in ["/map", "/robot1/markers/walls", "/tf_static", "/_a/b2"] {
+            assert!(is_topic(name), "{name}");
+        }
+        for name in ["", "/", "map", "/a//b", "/a/", "/2a", "/a b", "/a-b", "/a/*"] {
+            assert!(!is_topic(name), "{name}");
+        }
+    }
+}

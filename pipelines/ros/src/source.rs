@@ -1,0 +1,329 @@
+//! The stage `ros_source`: takes what robots publish into a live pipeline.
+
+use super::attachment::Attachment;
+use super::connection::{Connection, LISTEN, ROUTER};
+use super::definitions::Definitions;
+use super::inbox::{Event, Inbox};
+use super::key_expression::{NO_HASH, Topic};
+use super::liveliness::{Entity, Kind};
+use super::node::{Node, Subscriber, nanoseconds_now};
+use super::qos::Qos;
+use gridweave_logs::qos;
+use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages};
+use gridweave_runtime::message::{Channel, LogTime};
+use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, Source, StageError, StageKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use zenoh::sample::Sample;
+
+/// So many events are handled at a time.
+const BATCH: usize = 64;
+/// So long a router may take to answer before somebody is told.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The parameters of `ros_source`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SourceParameters {
+    /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
+    pub domain: Option<u32>,
+    /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    pub connect: Vec<String>,
+    /// Where other programs may connect, as `tcp/HOST:PORT`; port 0 is any that is free. Nothing else is listened to.
+    pub listen: Vec<String>,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not given,
+    /// the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
+    pub zenoh_config: Option<PathBuf>,
+    /// The name of the ROS 2 node; `gridweave_` and the name of the stage if it is not given.
+    pub node: Option<String>,
+    /// Topics of which messages are taken, too, and passed on by the output `other`, `{robot}` standing for any one part:
+    /// `["/{robot}/scan"]`.
+    pub also: Vec<String>,
+    /// Folders of ROS packages, such as `/opt/ros/jazzy/share`, where definitions of types are looked for that Gridweave does not
+    /// know, as PACKAGE/msg/TYPE.msg. If none are given, those that the environment variable AMENT_PREFIX_PATH names.
+    pub definitions: Vec<PathBuf>,
+    /// So many messages of a topic wait to be taken before the oldest is dropped. Of a map it is the last.
+    pub depth: usize,
+}
+
+impl Default for SourceParameters {
+    fn default() -> Self {
+        Self {
+            domain: None,
+            connect: vec![ROUTER.to_owned()],
+            listen: vec![LISTEN.to_owned()],
+            zenoh_config: None,
+            node: None,
+            also: Vec::new(),
+            definitions: Vec::new(),
+            depth: 100,
+        }
+    }
+}
+
+impl SourceParameters {
+    fn connection(&self) -> Connection {
+        let Self { domain, connect, listen, zenoh_config, node, .. } = self.clone();
+        Connection { domain, connect, listen, zenoh_config, node }
+    }
+}
+
+impl Parameters for SourceParameters {
+    fn check(&self) -> Vec<ParameterError> {
+        let mut errors = self.connection().check();
+        if self.depth == 0 {
+            errors.push(ParameterError::new("depth", "must be 1 or more"));
+        }
+        errors
+    }
+}
+
+/// The kind `ros_source`.
+pub fn kind() -> StageKind {
+    StageKind::source(
+        "ros_source",
+        "Takes what robots publish in ROS 2 into a live pipeline while it runs, over Zenoh as `rmw_zenoh_cpp` speaks it: maps and \
+         their updates, poses, transforms and readings of tags, on the topics that `[robots]` names. Robots come and go as they \
+         like",
+        RosSource::new,
+    )
+    .live_only()
+}
+
+/// Takes what robots publish.
+pub struct RosSource {
+    node: Node,
+    inbox: Arc<Inbox<Sample>>,
+    router: LiveRouter,
+    definitions: Definitions,
+    depth: usize,
+    /// The topics that were ever seen.
+    topics: BTreeMap<Topic, Seen>,
+    /// Those of them that are heard.
+    subscribers: BTreeMap<Topic, Subscriber>,
+    /// What was told already.
+    told: BTreeSet<String>,
+    /// When it began to wait for a router; `None` once there was one.
+    waiting_since: Option<Instant>,
+    log_time: u64,
+}
+
+/// A topic that was seen.
+struct Seen {
+    /// Its number in the router.
+    number: usize,
+    qos: Qos,
+    /// Those that publish it.
+    publishers: BTreeSet<Entity>,
+}
+
+impl RosSource {
+    /// Joins the network.
+    ///
+    /// # Errors
+    /// It cannot be joined.
+    pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
+        let node = Node::start(parameters.connection(), &context.stage)?;
+        let inbox = Arc::new(Inbox::default());
+        let events = Arc::clone(&inbox);
+        node.watch(move |entity, is_there| events.push(Event::Entity(entity, is_there), 0))?;
+        Ok(Self {
+            node,
+            inbox,
+            router: LiveRouter::new(context.robots.clone(), parameters.also),
+            definitions: Definitions::new(&parameters.definitions),
+            depth: parameters.depth,
+            topics: BTreeMap::new(),
+            subscribers: BTreeMap::new(),
+            told: BTreeSet::new(),
+            waiting_since: Some(Instant::now()),
+            log_time: 0,
+        })
+    }
+
+    /// A program has come or gone.
+    fn note_entity(
+        &mut self,
+        entity: Entity,
+        is_there: bool,
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let Kind::Publisher(topic, qos) = entity.kind.clone() else { return Ok(()) };
+        if entity.session == self.node.session_name() {
+            return Ok(());
+        }
+        if !is_there {
+            if let Some(seen) = self.topics.get_mut(&topic) {
+                seen.publishers.remove(&entity);
+            }
+            return Ok(());
+        }
+        let number = match self.topics.get_mut(&topic) {
+            Some(seen) => {
+                seen.publishers.insert(entity);
+                seen.number
+            }
+            None => {
+                let number = self.router.add(self.channel(&topic, qos));
+                let seen = Seen { number, qos, publishers: BTreeSet::from([entity]) };
+                self.topics.insert(topic.clone(), seen);
+                number
+            }
+        };
+        self.check_publishers(&topic.name, number, output);
+        self.subscribe(output)
+    }
+
+    /// Subscribes to all topics that are of use and can be read.
+    fn subscribe(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let mut wrong = Vec::new();
+        for (topic, seen) in &self.topics {
+            let number = seen.number;
+            if let Some(mismatch) = self.router.mismatch(number) {
+                wrong.push(mismatch);
+            }
+            if !self.router.is_of_use(number) {
+                continue;
+            }
+            if self.subscribers.contains_key(topic) {
+                continue;
+            }
+            let is_other = |here: &String| *here != topic.type_hash && topic.type_hash != NO_HASH;
+            if let Some(here) = self.definitions.hash(topic).filter(is_other) {
+                wrong.push(format!(
+                    "`{}` is published with another definition of {} than the one known here ({} there, {here} here): its messages \
+                     are not taken",
+                    topic.name, topic.ros_type, topic.type_hash
+                ));
+                continue;
+            }
+            let is_map = self.router.is_map(number);
+            // The last map is all that counts.
+            let depth = if is_map { 1 } else { seen.qos.depth.unwrap_or(self.depth).max(self.depth) };
+            let inbox = Arc::clone(&self.inbox);
+            let call = move |message: Sample| {
+                inbox.push(Event::Message { topic: number, message, arrived: nanoseconds_now() }, depth);
+            };
+            let qos = Qos { depth: if is_map { Some(1) } else { seen.qos.depth }, ..seen.qos };
+            let subscriber = self.node.subscribe(topic.clone(), qos, call)?;
+            self.subscribers.insert(topic.clone(), subscriber);
+            tracing::info!("takes messages of {} on `{}`", topic.ros_type, topic.name);
+        }
+        wrong.into_iter().for_each(|wrong| self.tell_once(wrong, output));
+        Ok(())
+    }
+
+    /// Two programs that publish the map or the pose of one robot are two robots of one name.
+    fn check_publishers(&mut self, name: &str, number: usize, output: &Output<RobotMessages>) {
+        if !self.router.is_of_one_robot(number) {
+            return;
+        }
+        let of_name = self.topics.iter().filter(|(topic, _)| topic.name == name);
+        let publishers: Vec<&Entity> = of_name.flat_map(|(_, seen)| &seen.publishers).collect();
+        if publishers.len() > 1 {
+            let nodes: Vec<String> = publishers
+                .iter()
+                .map(|entity| format!("{} in the session {}", entity.full_node_name(), entity.session))
+                .collect();
+            let text = format!(
+                "`{name}` is published by {} programs at once ({}): are there two robots of one name? What they say of it is mixed up",
+                publishers.len(),
+                nodes.join(", ")
+            );
+            tracing::warn!("{text}");
+            output.warn(text);
+        }
+    }
+
+    /// Tells what is wrong at once, and counts it, but only the first time.
+    fn tell_once(&mut self, text: String, output: &Output<RobotMessages>) {
+        if self.told.insert(text.clone()) {
+            tracing::warn!("{text}");
+            output.warn(text);
+        }
+    }
+
+    /// The channel of a topic in a log.
+    fn channel(&self, topic: &Topic, qos: Qos) -> Channel {
+        let schema = self.definitions.text(topic).unwrap_or_default();
+        let encoding = if schema.is_empty() { "" } else { "ros2msg" };
+        Channel {
+            topic: topic.name.clone(),
+            message_encoding: "cdr".to_owned(),
+            schema_name: topic.ros_type.clone(),
+            schema_encoding: encoding.to_owned(),
+            schema: schema.into_bytes(),
+            metadata: qos::offered(qos.is_latched),
+        }
+    }
+
+    fn take_message(
+        &mut self,
+        number: usize,
+        sample: &Sample,
+        arrived: i64,
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        // The clock of the machine may be set back, and what is sent may not.
+        self.log_time = self.log_time.max(u64::try_from(arrived).unwrap_or_default());
+        output.set_log_time(LogTime(self.log_time));
+        let attachment = sample.attachment().and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()));
+        if attachment.is_none() {
+            output.count("messages without an attachment", 1);
+        }
+        let sent = attachment.and_then(|attachment| u64::try_from(attachment.source_time).ok());
+        let sequence = attachment.map_or(0, |attachment| attachment.sequence as u32);
+        let data = sample.payload().to_bytes();
+        let message = LiveMessage { sequence, publish_time: sent.unwrap_or(self.log_time), data: &data };
+        self.router.send(number, message, output)
+    }
+
+    /// Tells once that no router answers, and that one does after all.
+    fn look_for_router(&mut self, output: &Output<RobotMessages>) {
+        let Some(since) = self.waiting_since else { return };
+        match self.node.looks_for_router() {
+            None => {
+                self.waiting_since = None;
+                tracing::info!("connected");
+            }
+            Some(routers) if since.elapsed() > PATIENCE => {
+                let text = format!(
+                    "no Zenoh router answers at {routers}: start one with `ros2 run rmw_zenoh_cpp rmw_zenohd`, or name it in `connect`. \
+                     It is looked for until it answers"
+                );
+                self.tell_once(text, output);
+            }
+            Some(_) => {}
+        }
+    }
+}
+
+impl Source for RosSource {
+    type Outputs = RobotMessages;
+
+    fn wait(&mut self, longest: Duration) {
+        self.inbox.wait(longest);
+    }
+
+    fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
+        self.look_for_router(output);
+        for _ in 0..BATCH {
+            match self.inbox.take() {
+                None => break,
+                Some(Event::Entity(entity, is_there)) => self.note_entity(entity, is_there, output)?,
+                Some(Event::Message { topic, message, arrived }) => {
+                    self.take_message(topic, &message, arrived, output)?;
+                }
+            }
+        }
+        let dropped = self.inbox.take_dropped();
+        if dropped > 0 {
+            output.count("messages that were dropped because the pipeline does not keep up", dropped);
+        }
+        Ok(true)
+    }
+}

@@ -1,0 +1,154 @@
+//! The whole command between programs that others have written: robots and a viewer in Python, by `eclipse-zenoh` and `rosbags`, which
+//! have type hashes and an encoding of their own.
+
+use crate::wire::Router;
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+const LONGEST: Duration = Duration::from_secs(300);
+
+fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name)
+}
+
+/// A command that is killed where the test ends before it.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Running {
+    #[track_caller]
+    fn start(program: &Path, args: &[&OsStr], folder: &Path, log: &str) -> Self {
+        let log = File::create(folder.join(log)).unwrap();
+        let command = Command::new(program)
+            .args(args)
+            .current_dir(folder)
+            .env_remove("ROS_DOMAIN_ID")
+            .env_remove("ZENOH_SESSION_CONFIG_URI")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(log)
+            .spawn();
+        Self(command.unwrap_or_else(|error| panic!("cannot start {}: {error}", program.display())))
+    }
+
+    /// Waits for its end, and gives the status and what it has printed.
+    #[track_caller]
+    fn end(&mut self) -> (i32, String) {
+        let mut stdout = self.0.stdout.take().unwrap();
+        let reader = thread::spawn(move || {
+            let mut text = String::new();
+            stdout.read_to_string(&mut text).unwrap();
+            text
+        });
+        let until = Instant::now() + LONGEST;
+        let status = loop {
+            if let Some(status) = self.0.try_wait().unwrap() {
+                break status;
+            }
+            assert!(Instant::now() < until, "it hangs");
+            thread::sleep(Duration::from_millis(20));
+        };
+        (status.code().unwrap_or(-1), reader.join().unwrap())
+    }
+}
+
+#[track_caller]
+fn run(program: &Path, args: &[&str], folder: &Path) -> String {
+    let args: Vec<&OsStr> = args.iter().map(OsStr::new).collect();
+    let (status, printed) = Running::start(program, &args, folder, "run.log").end();
+    let errors = std::fs::read_to_string(folder.join("run.log")).unwrap();
+    assert_eq!(status, 0, "{} {args:?}: {printed}{errors}", program.display());
+    printed
+}
+
+/// The interpreter of a virtual environment with the libraries.
+fn python(folder: &Path) -> PathBuf {
+    let environment = folder.join("python");
+    run(Path::new("python3"), &["-m", "venv", environment.to_str().unwrap()], folder);
+    let python = environment.join("bin/python");
+    let requirements = script("requirements.txt");
+    let install = ["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--requirement"];
+    let install: Vec<&str> = install.into_iter().chain([requirements.to_str().unwrap()]).collect();
+    run(&python, &install, folder);
+    python
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn robots_and_a_viewer_of_others_have_one_map() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let python = python(folder);
+    let gridweave = Path::new(env!("CARGO_BIN_EXE_gridweave-ros"));
+    let building = ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60"];
+    let building = building.into_iter().flat_map(|setting| ["--set", setting]);
+    let simulate: Vec<&str> = ["simulate", "-o", "in.mcap", "--robots", "2"].into_iter().chain(building).collect();
+    run(gridweave, &simulate, folder);
+
+    let router = Router::start();
+    let connect =
+        [format!("robots.connect=[\"{}\"]", router.endpoint()), format!("ros.connect=[\"{}\"]", router.endpoint())];
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("live_ros.toml");
+    let arguments: Vec<&OsStr> = ["run".as_ref(), pipeline.as_os_str()]
+        .into_iter()
+        .chain(["--summary".as_ref(), "summary.json".as_ref()])
+        .chain(connect.iter().flat_map(|set| ["--set".as_ref(), OsStr::new(set.as_str())]))
+        .collect();
+    let mut merging = Running::start(gridweave, &arguments, folder, "merging.log");
+    let words =
+        |what: &str| format!("{what}: {}", std::fs::read_to_string(folder.join("merging.log")).unwrap_or_default());
+
+    let robots = script("robots.py");
+    let play = |log: &str| {
+        let args = [robots.as_os_str(), router.endpoint().as_ref(), "in.mcap".as_ref(), "4".as_ref()];
+        Running::start(&python, &args, folder, log)
+    };
+    let mut playing = play("robots.log");
+    let mut line = String::new();
+    BufReader::new(playing.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    assert_eq!(line, "all is sent\n", "{}", std::fs::read_to_string(folder.join("robots.log")).unwrap());
+
+    // One who comes when all was sent sees the map and the frames all the same, and so does one who comes later still.
+    let viewer = script("viewer.py");
+    for _ in 0..2 {
+        let args = [viewer.as_os_str(), router.endpoint().as_ref(), "2".as_ref(), "200".as_ref()];
+        let (status, seen) = Running::start(&python, &args, folder, "viewer.log").end();
+        let errors = std::fs::read_to_string(folder.join("viewer.log")).unwrap();
+        assert_eq!(status, 0, "{}", words(&errors));
+        let seen: serde_json::Value = serde_json::from_str(&seen).unwrap();
+        assert_eq!(seen["map"]["frame"], "world");
+        assert!(seen["map"]["known"].as_u64().unwrap() > 1000, "{seen}");
+        let frame = |robot: &str| seen["frames"][format!("{robot}/map")].clone();
+        assert_eq!(
+            (frame("robot1")["parent"].as_str(), frame("robot2")["parent"].as_str()),
+            (Some("world"), Some("world"))
+        );
+        assert_eq!(seen["publishers"]["/map"], "nav_msgs::msg::dds_::OccupancyGrid_");
+        assert_eq!(seen["publishers"]["/tf_static"], "tf2_msgs::msg::dds_::TFMessage_");
+    }
+    // Robots that end and come again do no harm.
+    drop(playing);
+    let mut again = play("again.log");
+    let mut line = String::new();
+    BufReader::new(again.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    assert_eq!(line, "all is sent\n");
+
+    let id = merging.0.id().to_string();
+    run(Path::new("kill"), &["-INT", &id], folder);
+    let (status, printed) = merging.end();
+    assert_eq!(status, 0, "{}", words(&printed));
+    let summary = folder.join("summary.json");
+    run(gridweave, &["evaluate", summary.to_str().unwrap(), "--truth", "in.truth.json"], folder);
+}
