@@ -65,7 +65,7 @@ impl Connection {
     pub(crate) fn open(&self) -> Result<Session, StageError> {
         let doing = "join the Zenoh network";
         let config = self.config().map_err(|cause| StageError::new(doing, cause))?;
-        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, cause))
+        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
     }
 
     fn config(&self) -> Result<Config, String> {
@@ -99,11 +99,32 @@ impl Connection {
 }
 
 fn of_file(path: &Path) -> Result<Config, String> {
-    Config::from_file(path).map_err(|error| format!("{}: {error}", path.display()))
+    Config::from_file(path).map_err(|error| format!("{}: {}", path.display(), in_words(&error)))
+}
+
+/// What an error of Zenoh says, without the place in its code.
+pub(crate) fn in_words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(" at ") {
+        Some((words, place)) if place.contains(".rs:") => words.to_owned(),
+        _ => text,
+    }
 }
 
 /// Whether a session is connected to a router, or to another program.
 pub(crate) fn is_connected(session: &Session) -> bool {
     let info = session.info();
     info.routers_zid().wait().next().is_some() || info.peers_zid().wait().next().is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_of_zenoh_is_told_without_the_place_in_its_code() {
+        let missing = of_file(Path::new("/there/is/no/such/file.json5")).err().unwrap();
+        assert!(missing.starts_with("/there/is/no/such/file.json5: No such file"), "{missing}");
+        assert!(!missing.contains(".rs:"), "{missing}");
+    }
 }

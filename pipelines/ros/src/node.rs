@@ -1,7 +1,7 @@
 //! A ROS 2 node: what tells others that it is there, and what it sends and hears.
 
 use super::attachment::Attachment;
-use super::connection::{Connection, is_connected};
+use super::connection::{Connection, in_words, is_connected};
 use super::key_expression::Topic;
 use super::liveliness::{Entity, Kind};
 use super::qos::Qos;
@@ -81,7 +81,7 @@ impl Node {
         };
         let watched = self.session.liveliness().declare_subscriber(Entity::all(self.identity.domain)).history(true);
         let watched = watched.callback(callback).background().wait();
-        watched.map_err(|error| StageError::new("watch which ROS 2 programs there are", error))
+        watched.map_err(|error| StageError::new("watch which ROS 2 programs there are", in_words(&error)))
     }
 
     /// A publisher of a topic.
@@ -90,7 +90,7 @@ impl Node {
     /// The topic cannot be named so, or the session has failed.
     pub(crate) fn publish(&mut self, topic: Topic, qos: Qos) -> Result<Publisher, StageError> {
         let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
-        let failed = |error: zenoh::Error| StageError::new(format!("publish `{name}`"), error);
+        let failed = |error: zenoh::Error| StageError::new(format!("publish `{name}`"), in_words(&error));
         let mut publisher = self.session.declare_publisher(key).congestion_control(CongestionControl::Block).advanced();
         if qos.is_latched {
             publisher = publisher
@@ -115,7 +115,7 @@ impl Node {
         call: impl Fn(Sample) + Send + Sync + 'static,
     ) -> Result<Subscriber, StageError> {
         let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
-        let failed = |error: zenoh::Error| StageError::new(format!("subscribe to `{name}`"), error);
+        let failed = |error: zenoh::Error| StageError::new(format!("subscribe to `{name}`"), in_words(&error));
         let mut subscriber = self.session.declare_subscriber(key).callback(call).advanced();
         if qos.is_latched {
             let history = HistoryConfig::default().detect_late_publishers();
@@ -149,7 +149,7 @@ impl Publisher {
         self.sequence += 1;
         let attachment = Attachment { sequence: self.sequence, source_time: nanoseconds_now(), gid: self.gid };
         let sent = self.publisher.put(message).attachment(attachment.to_bytes().as_slice()).wait();
-        sent.map_err(|error| StageError::new(format!("publish `{}`", self.name), error))
+        sent.map_err(|error| StageError::new(format!("publish `{}`", self.name), in_words(&error)))
     }
 }
 
@@ -168,7 +168,7 @@ pub(crate) fn nanoseconds_now() -> i64 {
 
 fn declare(session: &Session, entity: &Entity) -> Result<LivelinessToken, StageError> {
     let token = session.liveliness().declare_token(entity.to_string()).wait();
-    token.map_err(|error| StageError::new(format!("tell of {}", entity.full_node_name()), error))
+    token.map_err(|error| StageError::new(format!("tell of {}", entity.full_node_name()), in_words(&error)))
 }
 
 /// The name of a stage as part of one of a node.

@@ -92,7 +92,7 @@ pub fn kind() -> StageKind {
          What holds until it is sent again, such as maps and static transforms, is kept for those who come later (transient \
          local). A frame is told anew only where it has moved by more than it is uncertain, by the covariances in \
          `gridweave_msgs/msg/RobotFrames` where these are given, too",
-        |parameters, context| RosSink::new(parameters, context),
+        RosSink::new,
     )
     .any_inputs("in", "what to publish: outputs of any stage but a source", RosSink::receive)
     .build()

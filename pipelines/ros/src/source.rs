@@ -47,7 +47,7 @@ pub struct SourceParameters {
     /// know, as PACKAGE/msg/TYPE.msg. If none are given, those that the environment variable AMENT_PREFIX_PATH names.
     pub definitions: Vec<PathBuf>,
     /// So many messages of a topic wait to be taken before the oldest is dropped. Of a map it is the last.
-    pub depth: usize,
+    pub keep_last: usize,
 }
 
 impl Default for SourceParameters {
@@ -60,7 +60,7 @@ impl Default for SourceParameters {
             node: None,
             also: Vec::new(),
             definitions: Vec::new(),
-            depth: 100,
+            keep_last: 100,
         }
     }
 }
@@ -75,8 +75,8 @@ impl SourceParameters {
 impl Parameters for SourceParameters {
     fn check(&self) -> Vec<ParameterError> {
         let mut errors = self.connection().check();
-        if self.depth == 0 {
-            errors.push(ParameterError::new("depth", "must be 1 or more"));
+        if self.keep_last == 0 {
+            errors.push(ParameterError::new("keep_last", "must be 1 or more"));
         }
         errors
     }
@@ -100,7 +100,7 @@ pub struct RosSource {
     inbox: Arc<Inbox<Sample>>,
     router: LiveRouter,
     definitions: Definitions,
-    depth: usize,
+    keep_last: usize,
     /// The topics that were ever seen.
     topics: BTreeMap<Topic, Seen>,
     /// Those of them that are heard.
@@ -136,7 +136,7 @@ impl RosSource {
             inbox,
             router: LiveRouter::new(context.robots.clone(), parameters.also),
             definitions: Definitions::new(&parameters.definitions),
-            depth: parameters.depth,
+            keep_last: parameters.keep_last,
             topics: BTreeMap::new(),
             subscribers: BTreeMap::new(),
             told: BTreeSet::new(),
@@ -203,7 +203,7 @@ impl RosSource {
             }
             let is_map = self.router.is_map(number);
             // The last map is all that counts.
-            let depth = if is_map { 1 } else { seen.qos.depth.unwrap_or(self.depth).max(self.depth) };
+            let depth = if is_map { 1 } else { seen.qos.depth.unwrap_or(self.keep_last).max(self.keep_last) };
             let inbox = Arc::clone(&self.inbox);
             let call = move |message: Sample| {
                 inbox.push(Event::Message { topic: number, message, arrived: nanoseconds_now() }, depth);

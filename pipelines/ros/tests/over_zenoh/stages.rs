@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 fn map(robot: &str, occupied: u8) -> Vec<u8> {
     let info = MapMetaData { width: 2, height: 1, resolution: 0.05, ..Default::default() };
-    let header = Header::new(LogTime(1_000_000_000), &format!("{robot}map"));
+    let header = Header::new(LogTime(1_000_000_000), format!("{robot}map"));
     encode(&OccupancyGrid { header, info, data: &[0, occupied] }).unwrap()
 }
 
