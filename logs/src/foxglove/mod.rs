@@ -12,7 +12,7 @@ mod stage;
 
 use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use stage::FoxgloveSink;
 
 /// Where Foxglove looks for a server unless it is told otherwise.
@@ -21,14 +21,15 @@ pub const STANDARD_PORT: u16 = 8765;
 pub const STANDARD_HOST: &str = "127.0.0.1";
 
 /// The parameters of `foxglove_sink`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct FoxgloveParameters {
     /// The address to serve on. Anybody who can reach it can read all that the run sends: `0.0.0.0` lets other machines in.
     host: String,
     /// The port to serve on; 0 for one that is free, which is told with `-v`.
     port: u16,
-    /// For each viewer so many messages may wait; above that the oldest are dropped. 1 to 100000.
+    /// For each viewer so many messages may wait; above that the oldest are dropped.
+    #[schemars(range(min = 1, max = 100_000))]
     backlog: usize,
 }
 
@@ -39,15 +40,9 @@ impl Default for FoxgloveParameters {
 }
 
 impl Parameters for FoxgloveParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = Vec::new();
-        if self.host.is_empty() {
-            errors.push(ParameterError::new("host", "must be an address or the name of a host"));
-        }
-        if !(1..=100_000).contains(&self.backlog) {
-            errors.push(ParameterError::new("backlog", "must be 1 to 100000 messages"));
-        }
-        errors
+    fn check_together(&self) -> Vec<ParameterError> {
+        let problem = || ParameterError::new("host", "must be an address or the name of a host");
+        self.host.is_empty().then(problem).into_iter().collect()
     }
 }
 

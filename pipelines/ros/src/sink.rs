@@ -13,7 +13,7 @@ use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::{RobotFrames, RosMessage, TFMessage, TransformStamped, encode};
 use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 const DEPTH: usize = 10;
 
 /// The parameters of `ros_sink`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
     /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
@@ -65,7 +65,7 @@ impl SinkParameters {
 }
 
 impl Parameters for SinkParameters {
-    fn check(&self) -> Vec<ParameterError> {
+    fn check_together(&self) -> Vec<ParameterError> {
         let mut errors = self.connection().check();
         if let Err(wrong) = self.renames() {
             errors.push(ParameterError::new("rename", wrong));

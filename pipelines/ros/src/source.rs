@@ -13,7 +13,7 @@ use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages};
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, Source, StageError, StageKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ const BATCH: usize = 64;
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The parameters of `ros_source`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
     /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
@@ -47,6 +47,7 @@ pub struct SourceParameters {
     /// know, as PACKAGE/msg/TYPE.msg. If none are given, those that the environment variable AMENT_PREFIX_PATH names.
     pub definitions: Vec<PathBuf>,
     /// So many messages of a topic wait to be taken before the oldest is dropped. Of a map it is the last.
+    #[schemars(range(min = 1))]
     pub keep_last: usize,
 }
 
@@ -73,12 +74,8 @@ impl SourceParameters {
 }
 
 impl Parameters for SourceParameters {
-    fn check(&self) -> Vec<ParameterError> {
-        let mut errors = self.connection().check();
-        if self.keep_last == 0 {
-            errors.push(ParameterError::new("keep_last", "must be 1 or more"));
-        }
-        errors
+    fn check_together(&self) -> Vec<ParameterError> {
+        self.connection().check()
     }
 }
 
