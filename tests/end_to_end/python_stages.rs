@@ -142,7 +142,7 @@ impl Python {
             ("exit", &["ended with status 7"]),
             ("kill", &["signal 9 (SIGKILL)"]),
             ("segfault", &["signal 11 (SIGSEGV)"]),
-            ("hang", &["hangs", "8 s", "stall_timeout"]),
+            ("hang", &["hangs", "stall_timeout"]),
         ];
         for engine in ["single", "threads", "processes"] {
             for (what, words) in cases {
