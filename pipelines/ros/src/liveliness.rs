@@ -171,6 +171,13 @@ mod tests {
         }
     }
 
+    /// By the library `xxhash` for Python.
+    #[test]
+    fn the_identifier_is_the_hash_of_the_token() {
+        let hex = listener().gid().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        assert_eq!(hex, "49877999dacb858702d11ac823785912");
+    }
+
     #[test]
     fn names_in_a_namespace_come_back() {
         let node = Entity { namespace: "/fleet/robot1".into(), ..listener() };

@@ -36,6 +36,7 @@ impl Running {
             .current_dir(folder)
             .env_remove("ROS_DOMAIN_ID")
             .env_remove("ZENOH_SESSION_CONFIG_URI")
+            .env("PYTHONDONTWRITEBYTECODE", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(log)

@@ -20,6 +20,8 @@ def session(router):
         "listen/endpoints": '["tcp/127.0.0.1:0"]',
         "scouting/multicast/enabled": "false",
         "timestamping/enabled": "true",
+        # What is killed would leave its memory behind.
+        "transport/shared_memory/enabled": "false",
     }.items():
         config.insert_json5(key, value)
     return zenoh.open(config)
