@@ -1,0 +1,161 @@
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+
+const TAG: Point2 = Point2::new(1.2, 1.1);
+
+fn position(x: f64, y: f64) -> Position {
+    Position::new(Point2::new(x, y))
+}
+
+fn at(seconds: f64) -> LogTime {
+    LogTime(1_000_000_000).plus_seconds(seconds)
+}
+
+/// Drives along the path and reads the tag ten times a second with noise; a share of readings is any range.
+fn locate(parameters: TagLocalizerParameters, outliers: f64, path: impl Iterator<Item = (f64, f64)>) -> TagMode {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let noise = Normal::new(0.0, 0.05).unwrap();
+    let mut localizer = TagLocalizer::new(parameters);
+    for (step, (x, y)) in path.enumerate() {
+        let time = at(0.1 * step as f64);
+        assert!(localizer.add_pose(time, position(x, y), |problem| panic!("{problem}")));
+        let range = match random.random::<f64>() < outliers {
+            true => 0.1 + 2.8 * random.random::<f64>(),
+            false => (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random),
+        };
+        localizer.add_reading(time, "tag", range, 0.05).unwrap();
+    }
+    assert!(localizer.read_out_all());
+    *localizer.modes().next().unwrap().1
+}
+
+/// Two metres along one side of the tag, then two along another.
+fn corner() -> impl Iterator<Item = (f64, f64)> {
+    (0..190).map(|step| 0.021 * f64::from(step)).map(|way| if way < 2.0 { (way, 0.0) } else { (2.0, way - 2.0) })
+}
+
+#[test]
+fn readings_with_noise_give_the_place_within_its_covariance() {
+    let mode = locate(TagLocalizerParameters::default(), 0.0, corner());
+    let error = mode.position - TAG;
+    let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
+    assert!(mode.certainty > 0.9 && squared < 9.0, "{mode:?} {squared}");
+}
+
+#[test]
+fn a_fifth_of_outliers_does_not_lead_astray() {
+    let mode = locate(TagLocalizerParameters::default(), 0.2, corner());
+    assert!((mode.position - TAG).norm() < 0.05 && mode.certainty > 0.75, "{mode:?}");
+}
+
+#[test]
+fn a_straight_drive_leaves_a_certainty_of_about_one_half() {
+    let mode = locate(TagLocalizerParameters::default(), 0.0, (0..100).map(|step| (0.02 * f64::from(step), 0.0)));
+    assert!(mode.certainty > 0.3 && mode.certainty < 0.6, "{mode:?}");
+    assert!((mode.mass - 0.5).abs() < 0.05, "{mode:?}");
+}
+
+#[test]
+fn a_robot_that_stands_still_is_not_certain_however_long_it_stands() {
+    let mode = locate(TagLocalizerParameters::default(), 0.0, (0..3000).map(|_| (0.0, 0.0)));
+    assert!(mode.certainty < 0.05, "{mode:?}");
+}
+
+#[test]
+fn far_from_the_origin_nothing_is_lost() {
+    let near = locate(TagLocalizerParameters::default(), 0.0, corner());
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let noise = Normal::new(0.0, 0.05).unwrap();
+    for (step, (x, y)) in corner().enumerate() {
+        let time = at(0.1 * step as f64);
+        localizer.add_pose(time, position(x + 5e5, y - 4e6), |problem| panic!("{problem}"));
+        let _outlier: f64 = random.random();
+        let range = (TAG - Point2::new(x, y)).norm() + noise.sample(&mut random);
+        localizer.add_reading(time, "tag", range, 0.05).unwrap();
+    }
+    localizer.read_out_all();
+    let far = *localizer.modes().next().unwrap().1;
+    assert!((far.position.coords - near.position.coords - nalgebra::Vector2::new(5e5, -4e6)).norm() < 1e-4);
+    assert!((far.covariance - near.covariance).norm() < 1e-6);
+}
+
+#[test]
+fn a_reading_between_two_poses_waits_for_the_second() {
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
+    let ignore = |_| ();
+    localizer.add_pose(at(0.0), position(0.0, 0.0), ignore);
+    localizer.add_reading(at(0.25), "tag", 1.0, 0.05).unwrap();
+    assert!(!localizer.read_out_all(), "it has no place yet");
+    localizer.add_pose(at(0.5), position(1.0, 0.0), ignore);
+    assert_eq!(localizer.tags["tag"].first_place, Point2::new(0.5, 0.0));
+    assert!(localizer.read_out_all());
+}
+
+/// Drives past the tag, and sees it with noise in the frame of the robot, which turns; hears it as well if `ranges`.
+fn look(ranges: bool, wrong: usize) -> TagMode {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let noise = Normal::new(0.0, 0.1).unwrap();
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+    for step in 0..30 {
+        let (time, yaw) = (at(0.1 * f64::from(step)), 0.3 * f64::from(step));
+        let place = Point2::new(0.1 * f64::from(step), 0.0);
+        localizer.add_pose(time, Position { yaw, ..Position::new(place) }, |problem| panic!("{problem}"));
+        let mut seen = Rotation2::new(-yaw) * (TAG - place);
+        seen += Vector2::new(noise.sample(&mut random), noise.sample(&mut random));
+        if (step as usize) < wrong {
+            seen = Vector2::new(2.0, -2.0);
+        }
+        localizer.add_sighting(time, "tag", seen, &Matrix2::zeros()).unwrap();
+        if ranges {
+            localizer.add_reading(time, "tag", (TAG - place).norm() + noise.sample(&mut random), 0.1).unwrap();
+        }
+    }
+    assert!(localizer.read_out_all());
+    let (_, mode, readings) = localizer.modes().next().unwrap();
+    assert_eq!(readings, if ranges { 60 } else { 30 });
+    *mode
+}
+
+#[test]
+fn a_tag_that_is_seen_is_where_it_is_and_a_straight_drive_leaves_no_mirror_image() {
+    let (seen, both) = (look(false, 0), look(true, 0));
+    for mode in [&seen, &both] {
+        let error = mode.position - TAG;
+        let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
+        assert!(mode.certainty > 0.8 && squared < 9.0, "{mode:?}");
+    }
+    assert!(both.covariance.trace() < seen.covariance.trace(), "what is heard adds to what is seen");
+}
+
+#[test]
+fn sightings_that_are_wrong_do_not_lead_astray() {
+    let mode = look(false, 5);
+    assert!((mode.position - TAG).norm() < 0.1, "{mode:?}");
+}
+
+#[test]
+fn a_sighting_that_is_none_is_told() {
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+    let mut add = |id: &str, x: f64| localizer.add_sighting(at(0.0), id, Vector2::new(x, 0.0), &Matrix2::zeros());
+    assert_eq!(add("", 1.0), Err(ReadingProblem::NoId));
+    for x in [f64::NAN, f64::INFINITY, 1e200] {
+        assert_eq!(add("tag", x), Err(ReadingProblem::NoPlace));
+    }
+    let odd = Matrix2::new(f64::NAN, 0.0, 0.0, -1.0);
+    assert_eq!(localizer.add_sighting(at(0.0), "tag", Vector2::zeros(), &odd), Ok(()));
+}
+
+#[test]
+fn a_standard_deviation_that_is_no_number_is_replaced() {
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
+    localizer.add_pose(at(0.0), position(0.0, 0.0), |_| ());
+    for stddev in [f64::NAN, -1.0, 0.0, f64::INFINITY, 1e300] {
+        localizer.add_reading(at(0.0), "tag", 1.0, stddev).unwrap();
+    }
+    assert!(localizer.read_out_all());
+    let mode = localizer.modes().next().unwrap().1;
+    assert!(mode.position.coords.iter().chain(mode.covariance.iter()).all(|value| value.is_finite()), "{mode:?}");
+}
