@@ -308,7 +308,7 @@ fn a_source_without_files_says_how_to_give_them() {
 fn parameters_out_of_range_are_told() {
     let wrong =
         SourceParameters { rename: vec!["/map".into()], start: -1.0, end: Some(f64::NAN), ..Default::default() };
-    assert_eq!(wrong.check().iter().map(|error| error.field.as_str()).collect::<Vec<_>>(), ["rename", "start", "end"]);
+    assert_eq!(wrong.check().iter().map(|error| error.field.as_str()).collect::<Vec<_>>(), ["start", "end", "rename"]);
     assert!(SourceParameters::default().check().is_empty());
 }
 

@@ -1,4 +1,4 @@
-//! Inputs of `mcap_source` and `mcap_sink`: small logs.
+//! Inputs of `mcap_source`, `mcap_sink` and `foxglove_sink`: small logs.
 
 use super::Case;
 use gridweave_runtime::ros::{
@@ -26,6 +26,7 @@ pub(super) fn cases() -> Vec<Case> {
         Case::new("mcap_sink", "uncompressed", every_kind),
         Case::new("mcap_sink", "only_topics", every_kind),
         Case::new("mcap_sink", "without_the_input", every_kind),
+        Case::new("foxglove_sink", "any_messages", every_kind),
     ]
 }
 
