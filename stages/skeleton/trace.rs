@@ -1,6 +1,7 @@
 //! From the cells of a skeleton to nodes and the chains of cells between them.
 
 use super::{DistanceMap, NodeKind, Skeleton};
+use std::collections::BTreeMap;
 
 /// Nodes and paths by the places of their cells in the window.
 #[derive(Default)]
@@ -10,16 +11,21 @@ pub(super) struct Traced {
     pub(super) paths: Vec<([usize; 2], Vec<usize>)>,
 }
 
-/// A cell that belongs to no node, and to no path yet.
-const FREE: u32 = u32::MAX;
+/// A cell that is not on the skeleton.
+const EMPTY: u8 = 0;
+/// A cell of the skeleton that belongs to no node, and to no path yet.
+const FREE: u8 = 1;
 /// A cell that belongs to a path.
-const ON_PATH: u32 = u32::MAX - 1;
+const ON_PATH: u8 = 2;
+/// A cell that belongs to a node.
+const OF_NODE: u8 = 3;
 
-struct Tracer<'a> {
-    cells: &'a [u8],
+struct Tracer {
+    /// For each cell of the window one of the above.
+    cells: Vec<u8>,
     stride: usize,
-    /// For each cell of the window the number of its node, [`FREE`] or [`ON_PATH`].
-    owners: Vec<u32>,
+    /// The number of the node that a cell belongs to. Few cells do: a list of all that has their numbers would take most of the time.
+    nodes: BTreeMap<usize, usize>,
     /// The cells of each node.
     node_cells: Vec<Vec<usize>>,
     traced: Traced,
@@ -30,9 +36,9 @@ struct Tracer<'a> {
 /// are neighbours of each other make one junction.
 pub(super) fn trace(skeleton: &Skeleton, distances: &DistanceMap) -> Traced {
     let mut tracer = Tracer {
-        cells: &skeleton.cells,
+        cells: skeleton.cells.clone(),
         stride: skeleton.window.stride,
-        owners: vec![FREE; skeleton.cells.len()],
+        nodes: BTreeMap::new(),
         node_cells: Vec::new(),
         traced: Traced::default(),
     };
@@ -46,7 +52,7 @@ pub(super) fn trace(skeleton: &Skeleton, distances: &DistanceMap) -> Traced {
         of.iter().fold(of[0], farther)
     };
     for place in places() {
-        if tracer.owners[place] == FREE {
+        if tracer.cells[place] == FREE {
             match tracer.neighbours(place).count() {
                 0 | 1 => tracer.add_node(vec![place], NodeKind::End, widest),
                 2 => {}
@@ -59,33 +65,34 @@ pub(super) fn trace(skeleton: &Skeleton, distances: &DistanceMap) -> Traced {
     }
     (0..tracer.node_cells.len()).for_each(|node| tracer.follow_from(node));
     for place in places() {
-        if tracer.owners[place] == FREE {
+        if tracer.cells[place] == FREE {
             let ring = tracer.ring(place);
+            ring.iter().for_each(|place| tracer.cells[*place] = FREE);
             tracer.add_node(vec![widest(&ring)], NodeKind::Loop, widest);
-            ring.iter().for_each(|place| tracer.owners[*place] = FREE);
-            let node = tracer.node_cells.len() - 1;
-            tracer.owners[tracer.node_cells[node][0]] = node as u32;
-            tracer.follow_from(node);
+            tracer.follow_from(tracer.node_cells.len() - 1);
         }
     }
     tracer.traced
 }
 
-impl<'a> Tracer<'a> {
+impl Tracer {
     /// The cells that follow on a cell.
-    fn neighbours(&self, place: usize) -> impl Iterator<Item = usize> + use<'a> {
-        let (cells, stride) = (self.cells, self.stride);
+    fn neighbours(&self, place: usize) -> impl Iterator<Item = usize> + use<'_> {
+        let (cells, stride) = (&self.cells, self.stride);
         let [left, right, above, below] = [place - 1, place + 1, place - stride, place + stride];
-        let is_there = move |place: &usize| cells[*place] == 1;
+        let is_there = move |place: &usize| cells[*place] != EMPTY;
         let by_side = [above, left, right, below].into_iter().filter(is_there);
         let corners = [(above, left), (above, right), (below, left), (below, right)];
-        let by_corner = corners.into_iter().filter(move |(one, other)| cells[*one] == 0 && cells[*other] == 0);
+        let by_corner = corners.into_iter().filter(move |(one, other)| cells[*one] == EMPTY && cells[*other] == EMPTY);
         by_side.chain(by_corner.map(move |(one, other)| one + other - place).filter(is_there))
     }
 
     fn add_node(&mut self, cells: Vec<usize>, kind: NodeKind, widest: impl Fn(&[usize]) -> usize) {
-        let number = self.node_cells.len() as u32;
-        cells.iter().for_each(|place| self.owners[*place] = number);
+        let number = self.node_cells.len();
+        for &place in &cells {
+            self.cells[place] = OF_NODE;
+            self.nodes.insert(place, number);
+        }
         self.traced.nodes.push((widest(&cells), kind));
         self.node_cells.push(cells);
     }
@@ -108,12 +115,11 @@ impl<'a> Tracer<'a> {
     /// Adds all paths that begin at a node and that are not there yet.
     fn follow_from(&mut self, node: usize) {
         for cell in self.node_cells[node].clone() {
-            for neighbour in self.neighbours(cell) {
-                match self.owners[neighbour] {
-                    ON_PATH => {}
-                    FREE => self.follow(node, cell, neighbour),
+            for neighbour in self.neighbours(cell).collect::<Vec<_>>() {
+                match self.nodes.get(&neighbour) {
+                    None if self.cells[neighbour] == FREE => self.follow(node, cell, neighbour),
                     // Nodes side by side; each pair of cells is met from both of its ends.
-                    other if other as usize > node => self.add_path(node, other as usize, Vec::new()),
+                    Some(&other) if other > node => self.add_path(node, other, Vec::new()),
                     _ => {}
                 }
             }
@@ -125,15 +131,13 @@ impl<'a> Tracer<'a> {
         let mut passed = Vec::new();
         loop {
             passed.push(place);
-            self.owners[place] = ON_PATH;
-            let next = self.neighbours(place).find(|next| *next != before && self.owners[*next] != ON_PATH);
-            match next {
+            self.cells[place] = ON_PATH;
+            let next = self.neighbours(place).find(|next| *next != before && self.cells[*next] != ON_PATH);
+            match next.map(|next| (next, self.nodes.get(&next))) {
                 // A cell of the path has two neighbours; where the other one is on a path, that is this path itself.
                 None => return self.add_path(node, node, passed),
-                Some(next) if self.owners[next] != FREE => {
-                    return self.add_path(node, self.owners[next] as usize, passed);
-                }
-                Some(next) => (before, place) = (place, next),
+                Some((_, Some(&end))) => return self.add_path(node, end, passed),
+                Some((next, None)) => (before, place) = (place, next),
             }
         }
     }
@@ -149,13 +153,14 @@ impl<'a> Tracer<'a> {
     /// The cells of a way that leads back to itself.
     fn ring(&mut self, first: usize) -> Vec<usize> {
         let mut ring = vec![first];
-        self.owners[first] = ON_PATH;
+        self.cells[first] = ON_PATH;
         let mut place = first;
-        while let Some(next) = self.neighbours(place).find(|next| self.owners[*next] == FREE) {
-            self.owners[next] = ON_PATH;
+        loop {
+            let next = self.neighbours(place).find(|next| self.cells[*next] == FREE);
+            let Some(next) = next else { return ring };
+            self.cells[next] = ON_PATH;
             ring.push(next);
             place = next;
         }
-        ring
     }
 }

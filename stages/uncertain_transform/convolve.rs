@@ -1,22 +1,16 @@
 //! A map convolved with a Gaussian that is another at every place.
 
+use super::padded_field::PaddedField;
 use super::{Kernel, PointCovariance};
 use crate::geometry::{Cell, GridGeometry};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-/// Cells along the side of a tile, which has one kernel.
+/// Cells along the side of a tile, which has one covariance.
 pub const TILE: usize = 8;
-
-/// A map in log-odds, with empty cells round it so that kernels need not ask where it ends.
-struct Padded {
-    cells: Vec<f32>,
-    width: usize,
-    reach: usize,
-    /// How many cells say something in the tiles below and left of each corner of a tile.
-    sums: Vec<u32>,
-    tile_columns: usize,
-}
+/// Where the least standard deviation is as many cells, the kernel is laid on cells twice as wide: it is as smooth there as a kernel of
+/// half as many is on the cells themselves.
+const WIDE: f64 = 4.0;
 
 /// Convolves a map in log-odds, on cells of `geometry` in the world, with the kernel of each tile (algorithm 1, step 6).
 ///
@@ -29,24 +23,99 @@ pub fn convolve(log_odds: &[f32], geometry: &GridGeometry, covariance: &PointCov
     }
     let corners = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)];
     let corners = corners.map(|(column, row)| geometry.centre(Cell { column, row }));
-    let padded =
-        Padded::new(log_odds, width, Kernel::reach(covariance.greatest_deviation(&corners) / geometry.resolution));
+    let deviation = covariance.greatest_deviation(&corners) / geometry.resolution;
+    let fine = PaddedField::new(log_odds, geometry, deviation);
+    let coarse = (deviation >= WIDE).then(|| PaddedField::coarse(log_odds, geometry, deviation));
+    let known = KnownTiles::of(log_odds, geometry);
     blurred.par_chunks_mut(width * TILE).enumerate().for_each_init(Kernel::default, |kernel, (tile_row, rows)| {
         for tile_column in 0..width.div_ceil(TILE) {
+            let tile = Tile { rows: &mut *rows, width, column: tile_column, row: tile_row };
             let covariance = covariance_of_tile(geometry, covariance, tile_column, tile_row);
             let deviation = covariance[(0, 0)].max(covariance[(1, 1)]).sqrt();
-            if !padded.says_something(tile_column, tile_row, Kernel::reach(deviation)) {
+            if !known.within(tile_column, tile_row, Kernel::reach(deviation)) {
                 continue;
             }
-            kernel.set(&covariance);
-            let first = tile_column * TILE;
-            for (offset, row) in rows.chunks_mut(width).enumerate() {
-                let sums = padded.sums(kernel, first, tile_row * TILE + offset);
-                let last = width.min(first + TILE);
-                row[first..last].copy_from_slice(&sums[..last - first]);
+            match &coarse {
+                Some(coarse) if covariance.symmetric_eigenvalues().min() >= WIDE * WIDE => {
+                    tile.convolve_on_coarse_cells(coarse, kernel, &covariance);
+                }
+                _ => tile.convolve(&fine, kernel, &covariance),
             }
         }
     });
+}
+
+/// A tile of the result.
+struct Tile<'a> {
+    /// All rows that the tile has a part in.
+    rows: &'a mut [f32],
+    /// Cells of a row.
+    width: usize,
+    column: usize,
+    row: usize,
+}
+
+impl Tile<'_> {
+    fn convolve(self, field: &PaddedField, kernel: &mut Kernel, covariance: &Matrix2<f64>) {
+        kernel.set(covariance, &Vector2::zeros());
+        let first = self.column * TILE;
+        for (row, cells) in (self.row * TILE..).zip(self.rows.chunks_mut(self.width)) {
+            let sums = field.convolved::<TILE>(kernel, first, row);
+            cells[first..].iter_mut().zip(sums).for_each(|(cell, sum)| *cell = sum);
+        }
+    }
+
+    /// The same on a field of cells twice as wide. Cells that lie at the same place in a wide one have a kernel in common.
+    fn convolve_on_coarse_cells(self, field: &PaddedField, kernel: &mut Kernel, covariance: &Matrix2<f64>) {
+        const HALF: usize = TILE / 2;
+        // A mean of two cells adds the variance of where they lie to the blur.
+        let covariance = covariance / 4.0 - Matrix2::from_diagonal_element(1.0 / 16.0);
+        let first = self.column * TILE;
+        for (right, above) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            kernel.set(&covariance, &Vector2::new(0.5 * right as f64 - 0.25, 0.5 * above as f64 - 0.25));
+            for (row, cells) in (self.row * HALF..).zip(self.rows.chunks_mut(self.width).skip(above).step_by(2)) {
+                let sums = field.convolved::<HALF>(kernel, self.column * HALF, row);
+                cells[first..].iter_mut().skip(right).step_by(2).zip(sums).for_each(|(cell, sum)| *cell = sum);
+            }
+        }
+    }
+}
+
+/// Where a map says something, by tiles.
+struct KnownTiles {
+    /// How many tiles say something below and left of each corner of a tile.
+    sums: Vec<u32>,
+    columns: usize,
+    rows: usize,
+}
+
+impl KnownTiles {
+    fn of(log_odds: &[f32], geometry: &GridGeometry) -> Self {
+        let width = geometry.width;
+        let (columns, rows) = (width.div_ceil(TILE), geometry.height.div_ceil(TILE));
+        let mut sums = vec![0; (columns + 1) * (rows + 1)];
+        for (tile_row, rows) in log_odds.chunks(width * TILE).enumerate() {
+            let mut of_row = 0;
+            for tile_column in 0..columns {
+                let (first, last) = (tile_column * TILE, width.min((tile_column + 1) * TILE));
+                let says = rows.chunks(width).any(|row| row[first..last].iter().any(|value| *value != 0.0));
+                of_row += u32::from(says);
+                sums[(tile_row + 1) * (columns + 1) + tile_column + 1] =
+                    of_row + sums[tile_row * (columns + 1) + tile_column + 1];
+            }
+        }
+        Self { sums, columns, rows }
+    }
+
+    /// Whether any cell says something within `reach` cells of a tile, as far as whole tiles tell.
+    fn within(&self, tile_column: usize, tile_row: usize, reach: usize) -> bool {
+        let tiles = reach.div_ceil(TILE);
+        let stride = self.columns + 1;
+        let (left, right) = (tile_column.saturating_sub(tiles), (tile_column + tiles + 1).min(self.columns));
+        let (low, high) = (tile_row.saturating_sub(tiles), (tile_row + tiles + 1).min(self.rows));
+        let sum = |row: usize, column: usize| self.sums[row * stride + column];
+        sum(high, right) + sum(low, left) > sum(low, right) + sum(high, left)
+    }
 }
 
 /// The covariance in the middle of a tile, in square cells along the axes of the grid.
@@ -63,59 +132,6 @@ fn covariance_of_tile(
 fn in_cells(covariance: &Matrix2<f64>, geometry: &GridGeometry) -> Matrix2<f64> {
     let turn = geometry.origin.rotation.to_rotation_matrix().into_inner();
     turn.transpose() * covariance * turn / geometry.resolution.powi(2)
-}
-
-impl Padded {
-    fn new(log_odds: &[f32], width: usize, reach: usize) -> Self {
-        let height = log_odds.len() / width;
-        let (tile_columns, tile_rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
-        // The last tile may be wider than the map.
-        let padded_width = tile_columns * TILE + 2 * reach;
-        let mut cells = vec![0.0; padded_width * (height + 2 * reach)];
-        for (row, values) in log_odds.chunks_exact(width).enumerate() {
-            let start = (row + reach) * padded_width + reach;
-            cells[start..start + width].copy_from_slice(values);
-        }
-        let mut sums = vec![0; (tile_columns + 1) * (tile_rows + 1)];
-        for (tile_row, rows) in log_odds.chunks(width * TILE).enumerate() {
-            let mut of_row = 0;
-            for tile_column in 0..tile_columns {
-                let (first, last) = (tile_column * TILE, width.min((tile_column + 1) * TILE));
-                let says = rows.chunks(width).any(|row| row[first..last].iter().any(|value| *value != 0.0));
-                of_row += u32::from(says);
-                sums[(tile_row + 1) * (tile_columns + 1) + tile_column + 1] =
-                    of_row + sums[tile_row * (tile_columns + 1) + tile_column + 1];
-            }
-        }
-        Self { cells, width: padded_width, reach, sums, tile_columns }
-    }
-
-    /// Whether any cell says something within `reach` cells of a tile, as far as whole tiles tell.
-    fn says_something(&self, tile_column: usize, tile_row: usize, reach: usize) -> bool {
-        let tiles = reach.div_ceil(TILE);
-        let stride = self.tile_columns + 1;
-        let tile_rows = self.sums.len() / stride - 1;
-        let (left, right) = (tile_column.saturating_sub(tiles), (tile_column + tiles + 1).min(self.tile_columns));
-        let (low, high) = (tile_row.saturating_sub(tiles), (tile_row + tiles + 1).min(tile_rows));
-        let sum = |row: usize, column: usize| self.sums[row * stride + column];
-        sum(high, right) + sum(low, left) > sum(low, right) + sum(high, left)
-    }
-
-    /// The convolution at [`TILE`] cells of a row, from column `first` on.
-    fn sums(&self, kernel: &Kernel, first: usize, row: usize) -> [f32; TILE] {
-        let mut sums = [0.0; TILE];
-        for (above, right, weights) in kernel.rows() {
-            let start = (row + self.reach).wrapping_add_signed(above) * self.width;
-            let start = (start + first + self.reach).wrapping_add_signed(right);
-            let Some(cells) = self.cells.get(start..start + weights.len() + TILE - 1) else { continue };
-            for (weight, cells) in weights.iter().zip(cells.windows(TILE)) {
-                for (sum, cell) in sums.iter_mut().zip(cells) {
-                    *sum += weight * cell;
-                }
-            }
-        }
-        sums
-    }
 }
 
 /// The same as the paper prints it: every cell with a kernel of its own that is as large as the map, and not cut. It takes

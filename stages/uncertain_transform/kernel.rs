@@ -1,6 +1,7 @@
 //! A Gaussian on cells, cut at three standard deviations.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
+use std::ops::RangeInclusive;
 
 /// Standard deviations at which a kernel ends.
 const CUT: f64 = 3.0;
@@ -30,27 +31,34 @@ impl Kernel {
         (CUT * deviation).floor().clamp(0.0, 1e6) as usize
     }
 
-    /// Makes this the kernel of a covariance, in square cells, which is positive definite.
-    pub fn set(&mut self, covariance: &Matrix2<f64>) {
+    /// Makes this the kernel of a covariance, in square cells, which is positive definite, round a place that lies `off` from the
+    /// middle of its cell, in cells.
+    pub fn set(&mut self, covariance: &Matrix2<f64>, off: &Vector2<f64>) {
         self.rows.clear();
         self.weights.clear();
         let (xx, xy, yy) = (covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]);
         let determinant = xx * yy - xy * xy;
         // With the row given, the column has the mean `slope * row` and the variance `of_column`.
         let (slope, of_column) = (xy / yy, determinant / yy);
-        let reach = Self::reach(yy.sqrt()) as isize;
-        for row in -reach..=reach {
-            let along = row as f64;
-            let left = CUT * CUT - along * along / yy;
-            let (middle, half) = (slope * along, (left.max(0.0) * of_column).sqrt());
-            let (first, last) = ((middle - half).ceil() as isize, (middle + half).floor() as isize);
+        let reach = CUT * yy.sqrt();
+        // The weights of neighbours in a row have a ratio that changes by the same factor from each to the next.
+        let of_ratio = (-1.0 / of_column).exp();
+        for row in whole(off.y - reach, off.y + reach) {
+            let along = row as f64 - off.y;
+            let left = (CUT * CUT - along * along / yy).max(0.0);
+            let (middle, half) = (off.x + slope * along, (left * of_column).sqrt());
+            let columns = whole(middle - half, middle + half);
             let start = self.weights.len();
-            let weight = |column: isize| {
-                let off = column as f64 - middle;
-                (-0.5 * (off * off / of_column + along * along / yy)).exp() as f32
-            };
-            self.weights.extend((first..=last).map(weight));
-            self.rows.push(KernelRow { row, column: first, start, end: self.weights.len() });
+            let across = *columns.start() as f64 - middle;
+            let mut weight = (-0.5 * (across * across / of_column + along * along / yy)).exp();
+            let mut ratio = (-(across + 0.5) / of_column).exp();
+            self.rows.push(KernelRow { row, column: *columns.start(), start, end: start + columns.clone().count() });
+            self.weights.extend(columns.map(|_| {
+                let here = weight as f32;
+                weight *= ratio;
+                ratio *= of_ratio;
+                here
+            }));
         }
         let sum: f32 = self.weights.iter().sum();
         self.weights.iter_mut().for_each(|weight| *weight /= sum);
@@ -62,33 +70,43 @@ impl Kernel {
     }
 }
 
+/// The whole numbers from one number to another.
+fn whole(first: f64, last: f64) -> RangeInclusive<isize> {
+    first.ceil() as isize..=last.floor() as isize
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn kernel(xx: f64, xy: f64, yy: f64) -> Kernel {
+    fn kernel(xx: f64, xy: f64, yy: f64, off: Vector2<f64>) -> Kernel {
         let mut kernel = Kernel::default();
-        kernel.set(&Matrix2::new(xx, xy, xy, yy));
+        kernel.set(&Matrix2::new(xx, xy, xy, yy), &off);
         kernel
     }
 
     proptest! {
         // From two cells on: where a deviation is no wider than a cell, it is the cells that shape what is cut off.
         #[test]
-        fn a_kernel_has_the_covariance_that_it_was_made_of(x in 2.0..6.0, y in 2.0..6.0, correlation in -0.8..0.8) {
+        fn a_kernel_has_the_mean_and_the_covariance_that_it_was_made_of(
+            x in 2.0..6.0, y in 2.0..6.0, correlation in -0.8..0.8, right in -0.5..0.5, above in -0.5..0.5,
+        ) {
             let expected = Matrix2::new(x * x, correlation * x * y, correlation * x * y, y * y);
-            let (mut sum, mut covariance) = (0.0, Matrix2::zeros());
-            for (row, column, weights) in kernel(expected[(0, 0)], expected[(0, 1)], expected[(1, 1)]).rows() {
-                prop_assert!(row.unsigned_abs() <= Kernel::reach(y));
-                for (off, weight) in (column..).zip(weights) {
-                    let place = nalgebra::Vector2::new(off as f64, row as f64);
-                    prop_assert!(off.unsigned_abs() <= Kernel::reach(x) && *weight > 0.0);
+            let off = Vector2::new(right, above);
+            let (mut sum, mut mean, mut covariance) = (0.0, Vector2::zeros(), Matrix2::zeros());
+            for (row, column, weights) in kernel(expected[(0, 0)], expected[(0, 1)], expected[(1, 1)], off).rows() {
+                prop_assert!((row as f64 - above).abs() <= 3.0 * y);
+                for (column, weight) in (column..).zip(weights) {
+                    let place = Vector2::new(column as f64, row as f64) - off;
+                    prop_assert!(place.x.abs() <= 3.0 * x && *weight > 0.0);
                     sum += f64::from(*weight);
+                    mean += place * f64::from(*weight);
                     covariance += place * place.transpose() * f64::from(*weight);
                 }
             }
             prop_assert!((sum - 1.0).abs() < 1e-5);
+            prop_assert!(mean.norm() < 0.1, "{mean}");
             // What is cut off takes a twentieth of the variance with it.
             prop_assert!((covariance - expected * 0.95).norm() < 0.04 * expected.norm(), "{covariance} {expected}");
         }
@@ -96,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_kernel_that_is_narrower_than_a_cell_is_that_cell() {
-        let rows: Vec<_> = kernel(1.0 / 12.0, 0.0, 1.0 / 12.0).rows().map(|(r, c, w)| (r, c, w.to_vec())).collect();
-        assert_eq!(rows, [(0, 0, vec![1.0])]);
+        let kernel = kernel(1.0 / 12.0, 0.0, 1.0 / 12.0, Vector2::zeros());
+        assert_eq!(kernel.rows().collect::<Vec<_>>(), [(0, 0, &[1.0][..])]);
     }
 }
