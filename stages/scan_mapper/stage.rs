@@ -150,6 +150,13 @@ impl ScanMapper {
                 robot.decide(&self.parameters, true);
             }
             self.draw_and_send(&name, true, output)?;
+            if self.robots.get(&name).is_some_and(|robot| robot.drawn_until.is_some() && robot.map.snapshot().is_none())
+            {
+                output.warn(format!(
+                    "no map of {name} was drawn: its scans show nothing within {} m",
+                    self.parameters.max_range
+                ));
+            }
         }
         Ok(())
     }

@@ -258,6 +258,22 @@ fn what_a_lidar_cannot_have_measured_is_no_wall() {
 }
 
 #[test]
+fn a_robot_whose_scans_show_nothing_has_no_map_and_that_is_told() {
+    let mut bench = Bench::new("");
+    for tick in 0..3 {
+        let seconds = 0.1 * f64::from(tick);
+        bench.pose("pose", "robot1/map", seconds, pose(0.0, 0.0, 0.0));
+        bench.scan(seconds, &RangeScan { ranges: vec![f32::NAN; BEAMS], ..scan(seconds) });
+    }
+    assert!(bench.map(1.0).0.is_none());
+    assert!(
+        bench.0.warnings().keys().any(|warning| warning.starts_with("no map of robot1")),
+        "{:?}",
+        bench.0.warnings()
+    );
+}
+
+#[test]
 fn nonsense_is_told_and_leaves_the_rest() {
     let mut bench = Bench::new("");
     let good = scan(0.0);

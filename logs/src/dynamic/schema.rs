@@ -146,6 +146,14 @@ fn short_name(name: &str) -> String {
     full_type_name(name).replacen("/msg/", "/", 1)
 }
 
+/// The definition of a type that some programs take for built in, so that their logs do not hold it.
+fn built_in(name: &str) -> Option<&'static str> {
+    match name {
+        "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Some("int32 sec\nuint32 nanosec"),
+        _ => None,
+    }
+}
+
 /// Makes the types of a schema, each after those that it uses.
 struct Builder {
     sections: BTreeMap<String, String>,
@@ -162,8 +170,9 @@ impl Builder {
         if depth > DEEPEST {
             return Err(SchemaError::Nested(name.to_owned()));
         }
-        let text = self.sections.get(name).ok_or_else(|| SchemaError::Undefined(name.to_owned()))?;
-        let lines = fields(text).map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
+        let text = self.sections.get(name).map(String::as_str).or_else(|| built_in(name));
+        let lines = fields(text.ok_or_else(|| SchemaError::Undefined(name.to_owned()))?)
+            .map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
         let mut made = MessageType { name: name.to_owned(), fields: Vec::with_capacity(lines.len()), least_size: 0 };
         let mut names = BTreeSet::new();
         for FieldLine { name: field, of, text_bound, count } in lines {

@@ -205,6 +205,16 @@ fn numbers_are_nearly_equal_by_the_greater_of_them_and_one() {
 }
 
 #[test]
+fn times_need_no_definition() {
+    // So the Python library mcap-ros2-support writes definitions.
+    let text = "std_msgs/Header header\n===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
+    let full = format!("{text}===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n");
+    let parsed = |text: &str| format!("{:?}", Schema::parse("a/msg/A", text).unwrap());
+    assert_eq!(parsed(text), parsed(&full));
+    assert!(Schema::parse("a/msg/A", "builtin_interfaces/Duration[] x").is_ok());
+}
+
+#[test]
 fn a_schema_that_cannot_be_used_says_why() {
     let of = |text: &str| Schema::parse("a/msg/A", text).unwrap_err().to_string();
     assert_eq!(of("b/B[] x"), "there is no definition of b/B");

@@ -29,7 +29,7 @@ impl LogTime {
 
     /// This moment and `seconds` more, held within the time line.
     pub fn plus_seconds(self, seconds: f64) -> Self {
-        let nanoseconds = self.0 as i128 + (seconds * 1e9) as i128;
+        let nanoseconds = i128::from(self.0).saturating_add((seconds * 1e9) as i128);
         Self(nanoseconds.clamp(0, u64::MAX as i128) as u64)
     }
 }
@@ -37,5 +37,21 @@ impl LogTime {
 impl fmt::Display for LogTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}.{:09}", self.0 / 1_000_000_000, self.0 % 1_000_000_000)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moment_and_any_number_of_seconds_is_on_the_time_line() {
+        assert_eq!(LogTime(5).plus_seconds(1.5), LogTime(1_500_000_005));
+        assert_eq!(LogTime(2_000_000_000).plus_seconds(-1.5), LogTime(500_000_000));
+        for (seconds, expected) in
+            [(1e300, LogTime::MAX), (f64::INFINITY, LogTime::MAX), (-1e300, LogTime::MIN), (f64::NAN, LogTime(7))]
+        {
+            assert_eq!(LogTime(7).plus_seconds(seconds), expected, "{seconds}");
+        }
     }
 }
