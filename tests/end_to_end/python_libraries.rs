@@ -63,3 +63,20 @@ fn python_libraries_read_every_message() {
         assert_eq!(read, counts(&bag.join(format!("{name}_0.mcap"))), "{name}");
     }
 }
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn the_package_of_messages_is_one_that_the_python_libraries_of_colcon_take() {
+    let folder = TempDir::new().unwrap();
+    let python = python(folder.path());
+    let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("../logs/msg/gridweave_msgs");
+    let read = output(&python, &[script("package.py").as_ref(), package.as_ref()]);
+    let read: serde_json::Value = serde_json::from_str(&read).unwrap();
+    let expected = serde_json::json!({
+        "name": "gridweave_msgs",
+        "build_type": "ament_cmake",
+        "build_depends": ["geometry_msgs", "std_msgs"],
+        "groups": ["rosidl_interface_packages"],
+    });
+    assert_eq!(read, expected);
+}
