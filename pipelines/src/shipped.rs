@@ -93,3 +93,15 @@ pub fn load(pipeline: &Path, overrides: &Overrides, registry: &Registry) -> Resu
 fn is_name(text: &str) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_of_every_kind_can_be_set_in_a_pipeline() {
+        let registry = registry([]);
+        assert!(registry.kinds().count() > 20);
+        assert_eq!(registry.shadowed_parameters(), Vec::<String>::new());
+    }
+}

@@ -4,10 +4,7 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::nearest::{nearest, quoted_list};
 use super::parameter_schema::{ParameterInfo, parameters_of};
-use crate::stage::{ParameterError, StageKind};
-
-/// The keys of a stage that are no parameters.
-pub(super) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth", "process", "overflow", "restart"];
+use crate::stage::{ParameterError, RESERVED_KEYS, StageKind};
 
 /// Reads the parameters of a stage of `kind` whose name stands at `stage_at`. Wrong ones are reported and left out.
 pub(super) fn read_parameters(

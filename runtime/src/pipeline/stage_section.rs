@@ -4,11 +4,11 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::live::{Mode, Overflow, Restart, check_is_live, read_overflow, read_word};
 use super::nearest::suggest;
-use super::parameters::{RESERVED_KEYS, out_of_range, read_parameters};
+use super::parameters::{out_of_range, read_parameters};
 use super::settings::{Settings, depth};
 use super::topics::{Topic, read_topics};
 use super::values::text;
-use crate::stage::{Asked, Registry, StageKind};
+use crate::stage::{Asked, RESERVED_KEYS, Registry, StageKind};
 use std::path::Path;
 
 /// The longest name of a stage, in bytes. It is part of the names of topics and of links.

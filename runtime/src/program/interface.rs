@@ -1,7 +1,7 @@
 //! What a program says of its stage: its ports and parameters.
 
 use super::header::CALL_VERSION;
-use crate::stage::{InputPort, OutputPort, PortType};
+use crate::stage::{InputPort, OutputPort, PortType, RESERVED_KEYS};
 use schemars::Schema;
 use serde::Deserialize;
 
@@ -88,6 +88,13 @@ impl Interface {
                 return Err(format!("two ports are called `{}`", ports[at].name));
             }
         }
+        let parameters = written.parameters.get("properties").and_then(serde_json::Value::as_object);
+        let mut names = parameters.into_iter().flat_map(serde_json::Map::keys);
+        if let Some(name) = names.find(|name| RESERVED_KEYS.contains(&name.as_str())) {
+            return Err(format!(
+                "it has a parameter `{name}`, which no pipeline can set: that key says something else of every stage"
+            ));
+        }
         let input = |port: WrittenPort| InputPort {
             name: port.name.leak(),
             port_type: PortType::Ros(port.ros_type.leak()),
@@ -148,6 +155,11 @@ mod tests {
             ("\"map\"", "\"Map\"", "`Map` is no name for a port"),
             ("a/msg/B", "a/B", "`a/B`, which is no ROS 2 type"),
             ("\"side\"", "\"out\"", "two ports are called `out`"),
+            (
+                "\"properties\": {}",
+                "\"properties\": { \"depth\": {} }",
+                "a parameter `depth`, which no pipeline can set",
+            ),
             (TEXT, "{}", "not understood"),
             (TEXT, "", "not understood"),
         ] {

@@ -12,6 +12,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+/// The keys of a stage's table in a pipeline that are no parameters.
+pub(crate) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth", "process", "overflow", "restart"];
+
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
 type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
 type AskFn = dyn Fn(&toml::Table, &Path) -> Result<Asked, ParameterError> + Send + Sync;
@@ -238,6 +241,15 @@ impl StageKind {
     /// The JSON schema of the parameters: names, types, defaults and the doc comments of the code.
     pub fn parameter_schema(&self) -> &Schema {
         &self.schema
+    }
+
+    /// The parameters whose names a stage's table in a pipeline has another meaning for, by name.
+    pub(crate) fn shadowed_parameters(&self) -> impl Iterator<Item = &str> {
+        let properties = self.schema.get("properties").and_then(serde_json::Value::as_object);
+        let mut names: Vec<&str> = properties.into_iter().flat_map(|all| all.keys().map(String::as_str)).collect();
+        names.retain(|name| RESERVED_KEYS.contains(name));
+        names.sort_unstable();
+        names.into_iter()
     }
 
     /// Checks parameters, any of which may be left out: an error if they do not have the right types, and otherwise

@@ -63,6 +63,7 @@ pub use context::{Context, InputWire, RobotTopics, TfFrames, frame_of_robot, mat
 pub use error::StageError;
 pub use initial_poses::{InitialPose, InitialPoses};
 pub use kind::{Asked, Source, StageKind};
+pub(crate) use kind::RESERVED_KEYS;
 pub use lone_stage::LoneStage;
 pub use node::Node;
 pub use output::{AnyMessage, Out, Output, OutputEnd, OutputPorts, OutputSink, Outputs};

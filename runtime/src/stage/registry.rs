@@ -15,6 +15,15 @@ impl Registry {
         Self { kinds: kinds.into_iter().map(|kind| (kind.name, kind)).collect() }
     }
 
+    /// The parameters of kinds that no pipeline can set, as a stage's table has a key of that name with a meaning of its own:
+    /// `KIND.PARAMETER`, by name. A program whose registry has any is wrong.
+    pub fn shadowed_parameters(&self) -> Vec<String> {
+        self.kinds
+            .values()
+            .flat_map(|kind| kind.shadowed_parameters().map(|name| format!("{}.{name}", kind.name)))
+            .collect()
+    }
+
     /// The kind of the given name.
     pub fn get(&self, name: &str) -> Option<&StageKind> {
         self.kinds.get(name)
@@ -23,5 +32,24 @@ impl Registry {
     /// All kinds, by name.
     pub fn kinds(&self) -> impl Iterator<Item = &StageKind> {
         self.kinds.values()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use schemars::json_schema;
+
+    #[test]
+    fn a_parameter_that_no_pipeline_can_set_is_named() {
+        let kind = |name, properties: serde_json::Value| {
+            StageKind::external::<()>(name, "")
+                .with_schema(json_schema!({ "type": "object", "properties": properties }))
+        };
+        let registry = Registry::new([
+            kind("good", serde_json::json!({ "depth_of_field": {} })),
+            kind("wrong", serde_json::json!({ "topics": {}, "size": {}, "depth": {} })),
+        ]);
+        assert_eq!(registry.shadowed_parameters(), ["wrong.depth", "wrong.topics"]);
     }
 }
