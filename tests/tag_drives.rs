@@ -1,15 +1,17 @@
-//! Drives past tags of which all is known: odometry that drifts, ranges with outliers, and tags that a camera sees.
+//! Drives past tags of which all is known: odometry that drifts, ranges and bearings with outliers, and tags that a
+//! camera sees.
 //!
 //! They have the shapes of public logs: that of UTIAS (Leung, Halpern, Barfoot and Liu, "The UTIAS multi-robot cooperative
 //! localization and mapping dataset", 2011), whose robots see landmarks in a hall by a camera, and that of Plaza (Djugash, Hamner and
 //! Roth, "Navigating with ranging radios", 2009), where radio ranges of tens of metres have outliers; both without maps.
 
 use crate::{LogBuilder, header};
-use gridweave_runtime::ros::{PoseStamped, TFMessage, Transform, TransformStamped, Vector3};
+use gridweave_runtime::ros::{PoseStamped, TFMessage, Transform, TransformStamped, Vector3, encode};
 use nalgebra::{Isometry2, Point2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Metres a second.
 const SPEED: f64 = 0.8;
@@ -24,6 +26,15 @@ pub enum Sense {
         /// Metres.
         stddev: f64,
         /// Share of all ranges.
+        outliers: f64,
+    },
+    /// It perceives in which direction they are by antennas that look to the left, with this standard deviation in radians; this share
+    /// of the bearings are any. A reading is a `sensor_msgs/msg/JointState` whose only joint is the tag, its position the bearing in
+    /// degrees and clockwise.
+    Bearings {
+        /// Radians.
+        stddev: f64,
+        /// Share of all bearings.
         outliers: f64,
     },
     /// It sees where they are, with this standard deviation per metre of distance: tags of the AprilTag family `tag36h11`.
@@ -68,6 +79,15 @@ impl TagDrive {
             };
             log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
         }
+        let antennas = Isometry2::new(Vector2::new(-0.2, 0.1), FRAC_PI_2);
+        if matches!(self.sense, Sense::Bearings { .. }) {
+            let mount = TransformStamped {
+                header: header(0.0, format!("{robot}/base_link")),
+                child_frame_id: format!("{robot}/antennas"),
+                transform: antennas.into(),
+            };
+            log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
+        }
         let mut place = Point2::from(self.start.translation.vector);
         let mut told = Isometry2::identity();
         let mut heading = self.start.rotation.angle();
@@ -96,6 +116,19 @@ impl TagDrive {
                                 if random.random::<f64>() < outliers { 5.0 * random.random::<f64>() } else { 0.0 };
                             let range = (distance + stddev * noise.sample(&mut random) + longer).max(0.01);
                             log.reading(seconds, robot, &format!("beacon{number}"), range);
+                        }
+                        Sense::Bearings { stddev, outliers } => {
+                            let from_antennas = antennas.inverse() * seen;
+                            let any = random.random::<f64>() < outliers;
+                            let turn =
+                                if any { TAU * random.random::<f64>() } else { stddev * noise.sample(&mut random) };
+                            let bearing = from_antennas.y.atan2(from_antennas.x) + turn;
+                            let header = header(seconds, format!("{robot}/antennas"));
+                            let none = Vec::<f64>::new();
+                            let name = vec![format!("tag{number}")];
+                            let reading = (header, name, vec![-bearing.to_degrees()], none.clone(), none);
+                            let bytes = encode(&reading).unwrap();
+                            log.raw(seconds, &format!("/{robot}/directions"), "sensor_msgs/msg/JointState", &bytes);
                         }
                         Sense::Camera { stddev } => {
                             let error = Vector2::new(noise.sample(&mut random), noise.sample(&mut random));

@@ -64,6 +64,7 @@ definitions![
         "Segments",
         "Sharpness",
         "SimulationTruth",
+        "TagBearing",
         "TagEstimate",
         "TagEstimates",
         "TagPosition",

@@ -1,13 +1,14 @@
 //! The tags of one robot.
 
 use super::{
-    GridSize, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups, RingProduct, Sighting, SightingGroups,
-    TagLocalizerParameters, TagMode, largest_variance, read_out,
+    Bearing, BearingGroups, GridSize, Likelihood, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups,
+    Sighting, SightingGroups, TagLocalizerParameters, TagMode, largest_variance, read_out,
 };
 use crate::geometry::Point2;
 use gridweave_runtime::message::LogTime;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::fmt;
 
 /// A range that exceeds the reach by less than this many standard deviations is noise.
@@ -19,6 +20,9 @@ const LEAST_ABSENCE: f64 = 1.0;
 const LEAST_SIGHTING_STDDEV: f64 = 0.01;
 /// No camera sees a tag farther off, metres.
 const FARTHEST: f64 = 1000.0;
+/// A tag of which nothing but bearings is known is looked for first on a grid that is so many times as wide: they do not say how far
+/// off it is.
+const WIDER: f64 = 4.0;
 
 /// Localizes all tags of one robot as its poses and readings come in.
 #[derive(Clone, Debug)]
@@ -49,6 +53,9 @@ enum Says {
     Range(f64),
     /// Where it is from the robot: metres ahead, and to the left.
     Place(Vector2<f64>),
+    /// In which direction it is, radians from straight ahead of the robot, with its standard deviation, seen from the sensor: metres
+    /// ahead of the robot, and to its left.
+    Bearing { sensor: Vector2<f64>, bearing: f64, stddev: f64 },
 }
 
 /// What is known of one tag.
@@ -58,6 +65,7 @@ struct Tag {
     first_place: Point2,
     groups: ReadingGroups,
     sightings: SightingGroups,
+    bearings: BearingGroups,
     /// When, where and how far off the tag was heard or seen last.
     last: (LogTime, Point2, f64),
     /// Standard deviation of the most exact reading, metres.
@@ -76,6 +84,8 @@ pub enum ReadingProblem {
     NoRange,
     /// The position is not finite.
     NoPlace,
+    /// The bearing, or where its sensor is, is not finite.
+    NoBearing,
     /// The range is beyond the reach of a tag.
     TooFar,
     /// It is older than all poses that are known.
@@ -90,6 +100,7 @@ impl fmt::Display for ReadingProblem {
             Self::NoId => "tag readings without a tag id are left out",
             Self::NoRange => "tag readings whose range is no positive number are left out",
             Self::NoPlace => "tag readings whose position is no finite number are left out",
+            Self::NoBearing => "tag readings whose bearing is no finite number are left out",
             Self::TooFar => "tag readings with a range beyond `reach` are left out",
             Self::NoPoseBefore => "tag readings before the robot's first pose are left out",
             Self::PoseTooOld => "tag readings whose last pose is older than `max_pose_age` are left out",
@@ -158,6 +169,31 @@ impl TagLocalizer {
         self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Place(place), stddev })
     }
 
+    /// Adds in which direction a tag is: radians, counterclockwise from straight ahead of the robot, with its standard deviation (0
+    /// or no number if it is not known). `sensor` is where the sensor is, metres ahead of the robot, and to its left.
+    pub fn add_bearing(
+        &mut self,
+        time: LogTime,
+        tag_id: &str,
+        sensor: Vector2<f64>,
+        bearing: f64,
+        stddev: f64,
+    ) -> Result<(), ReadingProblem> {
+        let TagLocalizerParameters { reach, bearing_stddev, .. } = self.parameters;
+        if tag_id.is_empty() {
+            return Err(ReadingProblem::NoId);
+        }
+        let distance = sensor.norm();
+        if !(bearing.is_finite() && distance.is_finite() && distance < FARTHEST) {
+            return Err(ReadingProblem::NoBearing);
+        }
+        // `max` takes the other value for one that is no number.
+        let stddev = bearing_stddev.max(stddev).min(bearing_stddev.max(PI));
+        let says = Says::Bearing { sensor, bearing, stddev };
+        // How far off the tag is it does not say: at the most as far as tags are perceived.
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says, stddev: stddev * reach })
+    }
+
     fn place_or_wait(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
         let time = reading.time;
         match self.track.latest_time().is_some_and(|latest| time <= latest) {
@@ -187,6 +223,7 @@ impl TagLocalizer {
         let (first_place, range) = match says {
             Says::Range(range) => (position.place, range),
             Says::Place(place) => (seen(place), place.norm()),
+            Says::Bearing { sensor, .. } => (seen(sensor), self.parameters.reach),
         };
         // A pose whose rotation is none says nothing of where the robot looks.
         if !first_place.iter().all(|value| value.is_finite()) {
@@ -196,6 +233,7 @@ impl TagLocalizer {
             first_place,
             groups: ReadingGroups::default(),
             sightings: SightingGroups::default(),
+            bearings: BearingGroups::default(),
             last: (time, position.place, range),
             least_stddev: stddev,
             changed: false,
@@ -205,6 +243,10 @@ impl TagLocalizer {
         match says {
             Says::Range(range) => tag.groups.add(&Reading { position, range, stddev }, min_travel),
             Says::Place(place) => tag.sightings.add(&Sighting { position, seen: seen(place), stddev }, min_travel),
+            Says::Bearing { sensor, bearing, stddev } => {
+                let position = Position { place: seen(sensor), ..position };
+                tag.bearings.add(&Bearing { position, bearing: position.yaw + bearing, stddev }, min_travel);
+            }
         }
         tag.last = (time, position.place, range);
         tag.least_stddev = tag.least_stddev.min(stddev);
@@ -252,17 +294,32 @@ impl TagLocalizer {
 
 impl Tag {
     fn readings(&self) -> u32 {
-        self.groups.readings().saturating_add(self.sightings.sightings())
+        self.groups.readings().saturating_add(self.sightings.sightings()).saturating_add(self.bearings.bearings())
     }
 
     fn locate(&self, parameters: &TagLocalizerParameters) -> Option<TagMode> {
-        let TagLocalizerParameters { pose_stddev, outlier_share, reach, resolution, readout, position_stddev, .. } =
-            *parameters;
-        let heading_stddev = parameters.heading_stddev;
+        let TagLocalizerParameters { pose_stddev, heading_stddev, outlier_share, reach, readout, .. } = *parameters;
+        let TagLocalizerParameters { resolution, position_stddev, .. } = *parameters;
         let rings = self.groups.rings(pose_stddev).chain(self.sightings.rings(pose_stddev, heading_stddev));
-        let product = RingProduct::new(rings, outlier_share, reach);
-        let grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
-        let mut mode = read_out(&Posterior::new(&product, grid)?, readout, parameters.window_cells(self.least_stddev))?;
+        let rays = self.bearings.rays(pose_stddev, heading_stddev);
+        let likelihood = Likelihood::new(rings, rays, outlier_share, reach);
+        let mut window = parameters.window_cells(self.least_stddev);
+        let mut grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
+        if self.readings() == self.bearings.bearings() {
+            let wide = GridSize { resolution: WIDER * resolution, ..grid };
+            let about = read_out(&Posterior::new(&likelihood, wide)?, readout, window)?.position;
+            let edge = 0.5 * (WIDER - 1.0) * grid.cells as f64 * resolution;
+            // Bearings that cross at the edge, or beyond, do not say where.
+            if (about - grid.centre).amax() > edge {
+                return None;
+            }
+            grid.centre = about;
+            // From farther off than the reach a direction says less of the place.
+            let nearest = self.bearings.rays(pose_stddev, heading_stddev).map(|ray| (about - ray.origin).norm());
+            let farther = nearest.fold(f64::INFINITY, f64::min) / reach;
+            window = parameters.window_cells(self.least_stddev * farther.max(1.0));
+        }
+        let mut mode = read_out(&Posterior::new(&likelihood, grid)?, readout, window)?;
         mode.covariance += self.shared_covariance(pose_stddev, heading_stddev);
         for axis in 0..2 {
             mode.covariance[(axis, axis)] += position_stddev * position_stddev;
@@ -270,15 +327,16 @@ impl Tag {
         Some(mode)
     }
 
-    /// The error that the poses of all readings may have in common.
+    /// The error that the poses of all readings may have in common: the mean over the ways in which the tag was read.
     fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
-        let of_ranges = self.groups.shared_covariance(pose_stddev);
-        let of_sightings = self.sightings.shared_covariance(pose_stddev, heading_stddev);
-        match (self.groups.readings(), self.sightings.sightings()) {
-            (_, 0) => of_ranges,
-            (0, _) => of_sightings,
-            _ => 0.5 * (of_ranges + of_sightings),
-        }
+        let ways = [
+            (self.groups.readings(), self.groups.shared_covariance(pose_stddev)),
+            (self.sightings.sightings(), self.sightings.shared_covariance(pose_stddev, heading_stddev)),
+            (self.bearings.bearings(), self.bearings.shared_covariance(heading_stddev)),
+        ];
+        let read = ways.iter().filter(|(readings, _)| *readings > 0);
+        let count = read.clone().count().max(1);
+        read.map(|(_, covariance)| covariance).sum::<Matrix2<f64>>() / count as f64
     }
 }
 

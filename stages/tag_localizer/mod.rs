@@ -1,5 +1,5 @@
-//! Where the radio tags are that a robot has heard, told from ranges alone (Tsardoulias et al., section 3), or where it
-//! has seen them.
+//! Where the radio tags are that a robot has heard, told from ranges alone (Tsardoulias et al., section 3), or where or in which
+//! direction it has seen them.
 //!
 //! Every reading says that the tag lies on a ring round the robot. The rings of all readings of one tag are multiplied
 //! on a grid; what is left after a while is one spot or, after a straight drive, two that mirror each other. The share
@@ -7,16 +7,21 @@
 //!
 //! - [`ReadingGroups`] joins the readings of one place into one ring, for they share the error of the pose.
 //! - [`SightingGroups`] does the same with positions at which a camera has seen the tag: rings of radius 0.
+//! - [`BearingGroups`] does the same with directions in which a tag was perceived: rays.
+//! - [`Likelihood`] is the product of all of them.
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
 //! - [`Posterior`] holds the product on the grid. It looks at cells from coarse to fine and drops what cannot matter.
 //! - [`read_out`] finds the window, and the mode that it lies in.
 //! - [`PoseTrack`] tells where the robot was at the time of a reading, and how exactly that is known.
 
+mod bearing_groups;
+mod likelihood;
 mod localizer;
 mod parameters;
 mod pose_covariance;
 mod pose_track;
 mod posterior;
+mod ray_product;
 mod read_out;
 mod reading_groups;
 mod ring_product;
@@ -25,11 +30,14 @@ mod stage;
 #[cfg(test)]
 mod stage_tests;
 
+pub use bearing_groups::{Bearing, BearingGroups};
+pub use likelihood::Likelihood;
 pub use localizer::{ReadingProblem, TagLocalizer};
 pub use parameters::{Readout, TagLocalizerParameters};
-pub use pose_covariance::{CovarianceProblem, largest_variance, position_covariance};
+pub use pose_covariance::{CovarianceProblem, heading_variance, largest_variance, position_covariance};
 pub use pose_track::{NoPose, PoseTrack, Position};
 pub use posterior::{GridSize, Leaf, Posterior};
+pub use ray_product::{Ray, RayProduct};
 pub use read_out::{TagMode, read_out};
 pub use reading_groups::{Reading, ReadingGroups};
 pub use ring_product::{Ring, RingProduct};

@@ -20,7 +20,8 @@ pub enum Readout {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TagLocalizerParameters {
-    /// Width and height of a tag's grid, metres; its centre is where the robot was at the first reading. The paper has
+    /// Width and height of a tag's grid, metres; its centre is where the robot was at the first reading or, of a tag of which
+    /// nothing but bearings is known, about where they cross. The paper has
     /// 6 m (300 px), which cuts off tags that are first heard at the full reach along an axis. At least twice `reach`.
     pub grid_size: f64,
     /// Width of a grid cell, metres. The paper has 0.02 m.
@@ -61,7 +62,11 @@ pub struct TagLocalizerParameters {
     /// and as much more as the tag is farther off.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub sighting_stddev: f64,
-    /// Standard deviation of the robot's heading, radians: the farther off a tag is seen, the more it moves it.
+    /// Least standard deviation of a bearing, radians: used where a reading brings none, or a smaller one.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub bearing_stddev: f64,
+    /// Standard deviation of the robot's heading, radians: the farther off a tag is seen, the more it moves it. For bearings it is
+    /// the least: they count with that of the pose where it says more.
     #[schemars(range(min = 0.0))]
     pub heading_stddev: f64,
     /// Least standard deviation of a tag's position, metres: what the grid cannot know, such as the bends of the map.
@@ -91,6 +96,7 @@ impl Default for TagLocalizerParameters {
             min_travel: 0.1,
             outlier_share: 0.02,
             sighting_stddev: 0.05,
+            bearing_stddev: 0.05,
             heading_stddev: 0.02,
             position_stddev: 0.02,
             timeout: 2.0,
@@ -163,6 +169,7 @@ mod tests {
             min_travel: f64::NAN,
             outlier_share: 0.6,
             sighting_stddev: 0.0,
+            bearing_stddev: -0.1,
             heading_stddev: f64::NAN,
             position_stddev: -1.0,
             timeout: 0.0,
@@ -181,6 +188,7 @@ mod tests {
             "min_travel",
             "outlier_share",
             "sighting_stddev",
+            "bearing_stddev",
             "heading_stddev",
             "position_stddev",
             "timeout",

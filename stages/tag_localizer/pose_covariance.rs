@@ -1,6 +1,7 @@
 //! How exactly a robot knows its position.
 
 use nalgebra::Matrix2;
+use std::f64::consts::PI;
 
 /// How far rounding may take a covariance away from a true one, relative to its variances.
 const ROUNDING: f64 = 1e-6;
@@ -37,6 +38,11 @@ pub fn position_covariance(rows: &[[f64; 6]; 2], reach: f64) -> (Matrix2<f64>, O
         true => (Matrix2::from_diagonal_element(most), Some(CovarianceProblem::Huge)),
         false => (position, None),
     }
+}
+
+/// The variance of a heading, square radians; 0 if it is not known, or is none. More than that of any heading says nothing more.
+pub fn heading_variance(variance: f64) -> f64 {
+    if variance.is_finite() && variance > 0.0 { variance.min(PI * PI / 3.0) } else { 0.0 }
 }
 
 /// The variance along the direction in which it is largest: the larger eigenvalue.
@@ -90,6 +96,14 @@ mod tests {
             assert_eq!(found, (Matrix2::from_diagonal_element(9.0), Some(CovarianceProblem::Huge)), "{huge}");
         }
         assert_eq!(position_covariance(&covariance(0.01, 0.0, 0.0, 8.9), REACH).1, None);
+    }
+
+    #[test]
+    fn a_variance_of_a_heading_that_is_none_counts_as_not_known() {
+        for none in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
+            assert_eq!(heading_variance(none), 0.0);
+        }
+        assert_eq!((heading_variance(0.01), heading_variance(1e9)), (0.01, PI * PI / 3.0));
     }
 
     proptest! {

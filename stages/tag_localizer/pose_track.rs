@@ -17,12 +17,14 @@ pub struct Position {
     pub covariance: Matrix2<f64>,
     /// Its heading, radians, map frame.
     pub yaw: f64,
+    /// Variance of its heading, square radians; 0 if it is not known.
+    pub yaw_variance: f64,
 }
 
 impl Position {
     /// A place of which nothing else is known.
     pub fn new(place: Point2) -> Self {
-        Self { place, covariance: Matrix2::zeros(), yaw: 0.0 }
+        Self { place, covariance: Matrix2::zeros(), yaw: 0.0, yaw_variance: 0.0 }
     }
 
     /// The position a share of the way from this one to another.
@@ -34,6 +36,7 @@ impl Position {
             place: self.place + (other.place - self.place) * share,
             covariance: self.covariance + (other.covariance - self.covariance) * share,
             yaw: self.yaw + wrap_angle(other.yaw - self.yaw) * share,
+            yaw_variance: self.yaw_variance + (other.yaw_variance - self.yaw_variance) * share,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The probability of a tag's place on its grid.
 
-use super::RingProduct;
+use super::Likelihood;
 use crate::geometry::Point2;
 use nalgebra::Vector2;
 
@@ -80,39 +80,39 @@ struct Level {
 }
 
 impl Posterior {
-    /// The product of rings on the grid, normalised.
+    /// A likelihood on the grid, normalised.
     ///
     /// It goes from squares of 32 x 32 cells to single cells by halves. A square is dropped when no place in it can come
     /// within 20 nats of the best place seen, so no mode is lost. Where the probability is so narrow that single
     /// cells do not resolve it, it goes on to parts of cells: otherwise the share of a mode would depend on where the
-    /// raster happens to lie. `None` if there is no ring.
-    pub fn new(product: &RingProduct, grid: GridSize) -> Option<Self> {
-        if product.is_empty() || grid.cells == 0 {
+    /// raster happens to lie. `None` if there is no reading.
+    pub fn new(likelihood: &Likelihood, grid: GridSize) -> Option<Self> {
+        if likelihood.is_empty() || grid.cells == 0 {
             return None;
         }
         let mut level = Level { grid, level: COARSEST };
         let mut nodes = level.all();
-        let mut summit = level.climb(product, &nodes)?;
+        let mut summit = level.climb(likelihood, &nodes)?;
         loop {
             for node in &nodes {
                 if let Some(place) = level.centre_on_grid(*node)
-                    && let Some(value) = product.log_likelihood(&place, summit.value)
+                    && let Some(value) = likelihood.log_likelihood(&place, summit.value)
                 {
                     summit = Summit { place, value };
                 }
             }
-            level.drop_negligible(&mut nodes, product, summit.value);
+            level.drop_negligible(&mut nodes, likelihood, summit.value);
             if level.level == 0 {
                 break;
             }
             (level, nodes) = level.halved(&nodes);
         }
-        let widest = RESOLVED * product.narrowest_stddev(&summit.place);
+        let widest = RESOLVED * likelihood.narrowest_stddev(&summit.place);
         while level.size() > widest && level.level > FINEST {
             (level, nodes) = level.halved(&nodes);
-            level.drop_negligible(&mut nodes, product, summit.value);
+            level.drop_negligible(&mut nodes, likelihood, summit.value);
         }
-        Self::normalised(grid, level.size(), level.leaves(product, &nodes))
+        Self::normalised(grid, level.size(), level.leaves(likelihood, &nodes))
     }
 
     /// Turns the log-likelihoods that the leaves carry into shares.
@@ -140,8 +140,8 @@ impl Level {
     /// The summit near the best of the nodes' centres, found by steps along the axes that are
     /// halved where none leads up. The better the best that is known, the more can be dropped while nodes are large.
     /// `None` if no centre lies on the grid.
-    fn climb(&self, product: &RingProduct, nodes: &[Node]) -> Option<Summit> {
-        let value_at = |place: &Point2| product.log_likelihood(place, f64::NEG_INFINITY);
+    fn climb(&self, likelihood: &Likelihood, nodes: &[Node]) -> Option<Summit> {
+        let value_at = |place: &Point2| likelihood.log_likelihood(place, f64::NEG_INFINITY);
         let centres = nodes.iter().filter_map(|node| self.centre_on_grid(*node));
         let values = centres.filter_map(|centre| Some((value_at(&centre)?, centre)));
         let (mut best, mut place) = values.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -162,19 +162,20 @@ impl Level {
     }
 
     /// Drops the nodes in which no place comes near the best.
-    fn drop_negligible(&self, nodes: &mut Vec<Node>, product: &RingProduct, best: f64) {
+    fn drop_negligible(&self, nodes: &mut Vec<Node>, likelihood: &Likelihood, best: f64) {
         let half_diagonal = self.size() * std::f64::consts::FRAC_1_SQRT_2;
-        let bound = |node: &Node| product.log_likelihood_within(&self.centre(*node), half_diagonal, best - NEGLIGIBLE);
+        let bound =
+            |node: &Node| likelihood.log_likelihood_within(&self.centre(*node), half_diagonal, best - NEGLIGIBLE);
         nodes.retain(|node| bound(node).is_some());
     }
 
     /// The nodes near the best of them as leaves, which carry their log-likelihood. The summit may be sharper than a node,
     /// so that only their middles count.
-    fn leaves(&self, product: &RingProduct, nodes: &[Node]) -> Vec<Leaf> {
+    fn leaves(&self, likelihood: &Likelihood, nodes: &[Node]) -> Vec<Leaf> {
         let mut best = f64::NEG_INFINITY;
         let leaf = |node: &Node| {
             let place = self.centre(*node);
-            let mass = product.log_likelihood(&place, best - NEGLIGIBLE)?;
+            let mass = likelihood.log_likelihood(&place, best - NEGLIGIBLE)?;
             best = best.max(mass);
             let (column, row) = self.cell(*node);
             Some(Leaf { place, column, row, mass })
@@ -227,16 +228,16 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    fn product(tag: Point2, positions: &[(f64, f64)], errors: &[f64], outlier_share: f64) -> RingProduct {
+    fn product(tag: Point2, positions: &[(f64, f64)], errors: &[f64], outlier_share: f64) -> Likelihood {
         let rings = positions.iter().zip(errors.iter().cycle()).map(|(&(x, y), error)| {
             let centre = Point2::new(x, y);
             Ring { centre, radius: (tag - centre).norm() + error, variance: 0.05 * 0.05 }
         });
-        RingProduct::new(rings.collect::<Vec<_>>().into_iter(), outlier_share, 3.0)
+        Likelihood::of_rings(rings.collect::<Vec<_>>().into_iter(), outlier_share, 3.0)
     }
 
     /// Every part of every cell of the grid, one by one.
-    fn plain(product: &RingProduct, grid: GridSize, leaf_size: f64) -> BTreeMap<(usize, usize), f64> {
+    fn plain(product: &Likelihood, grid: GridSize, leaf_size: f64) -> BTreeMap<(usize, usize), f64> {
         let parts = (grid.resolution / leaf_size).round() as usize;
         let corner = 0.5 * grid.cells as f64 * grid.resolution;
         let mut values = Vec::new();
@@ -257,7 +258,7 @@ mod tests {
         masses
     }
 
-    fn assert_equals_plain(product: &RingProduct, grid: GridSize) -> Posterior {
+    fn assert_equals_plain(product: &Likelihood, grid: GridSize) -> Posterior {
         let posterior = Posterior::new(product, grid).unwrap();
         let mut masses = plain(product, grid, posterior.leaf_size);
         for leaf in &posterior.leaves {
@@ -328,7 +329,7 @@ mod tests {
 
     #[test]
     fn no_rings_give_none() {
-        assert!(Posterior::new(&RingProduct::new(std::iter::empty(), 0.0, 3.0), GRID).is_none());
+        assert!(Posterior::new(&Likelihood::of_rings(std::iter::empty(), 0.0, 3.0), GRID).is_none());
     }
 
     proptest! {

@@ -183,7 +183,7 @@ impl CellMasses {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{GridSize, Leaf, Ring, RingProduct};
+    use super::super::{GridSize, Leaf, Likelihood, Ring};
     use super::*;
 
     const GRID: GridSize = GridSize { centre: Point2::new(0.0, 0.0), cells: 300, resolution: 0.02 };
@@ -193,7 +193,7 @@ mod tests {
             let centre = Point2::new(x, y);
             Ring { centre, radius: (tag - centre).norm(), variance: 0.05 * 0.05 }
         });
-        Posterior::new(&RingProduct::new(rings, 0.0, 3.0), GRID).unwrap()
+        Posterior::new(&Likelihood::of_rings(rings, 0.0, 3.0), GRID).unwrap()
     }
 
     fn round_drive() -> impl Iterator<Item = (f64, f64)> {

@@ -1,6 +1,5 @@
 //! The product of the rings of one tag, as a function of the place.
 
-use super::largest_variance;
 use crate::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
@@ -108,9 +107,8 @@ impl RingProduct {
 }
 
 impl RingProduct {
-    /// Standard deviation at a place of the tag along the direction in which the rings tell most, metres: from the Fisher
-    /// information of those that go through that place.
-    pub fn narrowest_stddev(&self, place: &Point2) -> f64 {
+    /// The Fisher information at a place of the rings that go through it, over x and y, one over square metres.
+    pub fn information(&self, place: &Point2) -> Matrix2<f64> {
         let mut information = Matrix2::zeros();
         for block in &self.blocks {
             let exponents = block.exponents(place, 0.0);
@@ -122,7 +120,7 @@ impl RingProduct {
                 information += along * along.transpose() * (-2.0 * share * block.scale[lane]);
             }
         }
-        largest_variance(&information).sqrt().recip()
+        information
     }
 }
 

@@ -1,10 +1,10 @@
 //! The stage `tag_localizer`.
 
-use super::{CovarianceProblem, Position, TagLocalizer, TagLocalizerParameters, position_covariance};
+use super::{CovarianceProblem, Position, TagLocalizer, TagLocalizerParameters, heading_variance, position_covariance};
 use crate::geometry::Point2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Header, PoseWithCovarianceStamped, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
+    Header, PoseWithCovarianceStamped, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
 };
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use nalgebra::{Matrix2, Vector2};
@@ -15,7 +15,7 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "tag_localizer",
         "Locates tags in each robot's map from range readings of radio tags (Tsardoulias et al., section 3), and from \
-         positions at which a camera sees visual ones. Sends all tags of a \
+         positions or directions in which a sensor perceives them. Sends all tags of a \
          robot whenever one of them gets out of reach, and at the end.",
         |parameters, _| Ok(TagLocalizerStage { parameters, robots: BTreeMap::new() }),
     )
@@ -29,6 +29,11 @@ pub fn kind() -> StageKind {
         "positions",
         "positions at which tags are seen from the robots",
         TagLocalizerStage::receive_position,
+    )
+    .optional_input(
+        "bearings",
+        "directions in which tags are perceived from the robots",
+        TagLocalizerStage::receive_bearing,
     )
     .finish(TagLocalizerStage::finish)
     .build()
@@ -91,6 +96,17 @@ impl TagLocalizerStage {
         Ok(())
     }
 
+    fn receive_bearing(
+        &mut self,
+        bearing: Received<'_, TagBearing>,
+        output: &Output<Estimates>,
+    ) -> Result<(), StageError> {
+        if let Some(robot) = self.robot(bearing.robot(), output) {
+            robot.add_bearing(&bearing, output);
+        }
+        Ok(())
+    }
+
     /// The robot of a name, new if nothing has come from it yet. There must be a name.
     fn robot(&mut self, name: &str, output: &Output<Estimates>) -> Option<&mut Robot> {
         if name.is_empty() {
@@ -138,7 +154,7 @@ impl Robot {
             output.warn("poses with a value that is no finite number are left out");
             return Ok(());
         }
-        let [x, y, ..] = pose.pose.covariance;
+        let [x, y, .., [.., yaw_variance]] = pose.pose.covariance;
         let (covariance, problem) = position_covariance(&[x, y], self.reach);
         match problem {
             Some(CovarianceProblem::Impossible) => output.warn(format!(
@@ -150,7 +166,8 @@ impl Robot {
             None => {}
         }
         let yaw = pose.pose.pose.planar().rotation.angle();
-        let position = Position { place, covariance, yaw };
+        let yaw_variance = heading_variance(yaw_variance);
+        let position = Position { place, covariance, yaw, yaw_variance };
         let time = time_of(header.stamp, pose.log_time());
         if !self.localizer.add_pose(time, position, |problem| output.warn(problem.to_string())) {
             output.warn("poses that are older than the one before are left out");
@@ -173,6 +190,15 @@ impl Robot {
         let [xx, xy, yx, yy] = seen.covariance;
         let (place, covariance) = (Vector2::new(seen.x, seen.y), Matrix2::new(xx, xy, yx, yy));
         if let Err(problem) = self.localizer.add_sighting(time, &seen.tag_id, place, &covariance) {
+            output.warn(problem.to_string());
+        }
+    }
+
+    fn add_bearing(&mut self, seen: &Received<'_, TagBearing>, output: &Output<Estimates>) {
+        let time = time_of(seen.header.stamp, seen.log_time());
+        let sensor = Vector2::new(seen.x, seen.y);
+        if let Err(problem) = self.localizer.add_bearing(time, &seen.tag_id, sensor, seen.bearing, seen.bearing_stddev)
+        {
             output.warn(problem.to_string());
         }
     }

@@ -13,7 +13,7 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Two simulated robots.
@@ -82,12 +82,16 @@ impl World {
 
     /// A pipeline as one that ships, with another section `[robots]`.
     fn pipeline(&self, name: &str, robots: &str) {
-        let text = fs::read_to_string(format!("{}/../pipelines/{name}.toml", env!("CARGO_MANIFEST_DIR"))).unwrap();
-        let (before, rest) = text.split_once("[robots]").unwrap();
-        let (_, after) = rest.split_once("[stages.log]").unwrap();
-        fs::write(self.folder.path().join("own.toml"), format!("{before}[robots]\n{robots}\n[stages.log]{after}"))
-            .unwrap();
+        own_pipeline(self.folder.path(), name, robots);
     }
+}
+
+/// Writes a pipeline as one that ships, with another section `[robots]`, as `own.toml`.
+fn own_pipeline(folder: &Path, name: &str, robots: &str) {
+    let text = fs::read_to_string(format!("{}/../pipelines/{name}.toml", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let (before, rest) = text.split_once("[robots]").unwrap();
+    let (_, after) = rest.split_once("[stages.log]").unwrap();
+    fs::write(folder.join("own.toml"), format!("{before}[robots]\n{robots}\n[stages.log]{after}")).unwrap();
 }
 
 /// `sensor_msgs/msg/Range`, named by its frame.
@@ -213,7 +217,15 @@ fn merged_drives(
         TagDrive { robot, start, corners, drift, reach, sense, seed }.write(&mut log, tags);
     }
     log.finish();
-    let run = ["run", "tag_frames", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
+    let robots = match sense {
+        Sense::Bearings { .. } => {
+            "tags = { topic = \"/{robot}/directions\", id_field = \"name[0]\", bearing_field = \"position[0]\", \
+             bearing_unit = -0.0174532925, bearing_stddev = 0.05 }"
+        }
+        _ => "",
+    };
+    own_pipeline(folder.path(), "tag_frames", robots);
+    let run = ["run", "own.toml", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
     gridweave(folder.path(), &[&run, args].concat()).assert(0, &["merged 2 of 2"]);
     let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
     let number = |field: &str| summary["frames"]["robot2"][field].as_f64().unwrap();
@@ -236,6 +248,14 @@ fn landmarks_that_cameras_see_place_drives_whose_odometry_drifts() {
         (0..15).map(|n| Point2::new(1.0 + 0.9 * f64::from(n), 1.0 + 6.0 * (0.37 * f64::from(n)).fract())).collect();
     let camera = Sense::Camera { stddev: 0.05 };
     assert_near(merged_drives([15.0, 8.0], 0.003, 4.0, camera, &tags, &[]), 0.35, 0.05);
+}
+
+#[test]
+fn directions_alone_place_drives_whose_odometry_drifts() {
+    let tags: Vec<Point2<f64>> =
+        (0..15).map(|n| Point2::new(1.0 + 0.9 * f64::from(n), 1.0 + 6.0 * (0.37 * f64::from(n)).fract())).collect();
+    let bearings = Sense::Bearings { stddev: 0.05, outliers: 0.05 };
+    assert_near(merged_drives([15.0, 8.0], 0.003, 4.0, bearings, &tags, &[]), 0.35, 0.05);
 }
 
 #[test]

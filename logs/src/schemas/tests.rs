@@ -32,6 +32,8 @@ fn pose() -> Pose {
 fn tag_messages_agree_with_their_definitions() {
     assert_agrees(&TagRange { header: header(), tag_id: "t".into(), range: 2.5, range_stddev: 0.05, rssi: -61.5 });
     let covariance = [3.0, 4.0, 5.0, 6.0];
+    let bearing = TagBearing { header: header(), tag_id: "tag1".into(), x: 0.1, y: -0.2, ..Default::default() };
+    assert_agrees(&TagBearing { bearing: 1.5, bearing_stddev: 0.02, ..bearing });
     assert_agrees(&TagPosition { header: header(), tag_id: "tag36h11:5".into(), x: 1.0, y: -2.0, covariance });
     let estimate = |tag_id: &str| TagEstimate {
         tag_id: tag_id.into(),

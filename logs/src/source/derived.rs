@@ -1,5 +1,5 @@
-//! What stages are told that no message of a log says as it is: poses out of transforms and odometry, readings and positions of
-//! tags out of messages of other types, and whole maps out of updates.
+//! What stages are told that no message of a log says as it is: poses out of transforms and odometry, readings, bearings and
+//! positions of tags out of messages of other types, and whole maps out of updates.
 
 use super::RobotMessages;
 use super::channel::Route;
@@ -241,7 +241,8 @@ impl Derived {
 
     /// Sends the poses and the positions of tags that transforms tell.
     fn send_of_tf(&mut self, route: &Route, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
-        if !output.pose.is_read() && !output.positions.is_read() && !output.scans.is_read() {
+        let (positions, bearings) = (output.positions.is_read(), output.bearings.is_read());
+        if !output.pose.is_read() && !positions && !bearings && !output.scans.is_read() && !output.odometry.is_read() {
             return Ok(());
         }
         let Ok(message) = decode::<TFMessage>(data) else {
@@ -312,6 +313,19 @@ impl Derived {
         }
         Ok(())
     }
+                Seen::Bearing { bearing, stddev } => {
+                    let Some(positions) = &self.tag_positions else { continue };
+                    let (frame, tag_id) = (&message.frame_id, &reading.tag_id);
+                    match positions.bearing(robot, tag_id, message.stamp, frame, (bearing, stddev)) {
+                        Ok(bearing) => {
+                            self.has_made_readings = true;
+                            output.bearings.send(robot, &bearing)?;
+                        }
+                        Err(Untied) => output.warn(format!(
+                            "bearings of tags {topic} were left out: tf does not tie their frame, `{frame}`, to the base of {robot}"
+                        )),
+                    }
+                }
 
     fn send_position(
         &mut self,

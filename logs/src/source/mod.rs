@@ -31,7 +31,7 @@ pub(crate) use tag_reader::TagReader;
 
 use crate::names::{Convention, Input, NameRules};
 use gridweave_runtime::ros::{
-    OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagPosition, TagRange, TopologicalMap,
+    OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
 };
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
@@ -123,6 +123,7 @@ pub struct RobotMessages {
     pub(crate) scans: Out<RangeScan>,
     pub(crate) odometry: Out<PoseWithCovarianceStamped>,
     pub(crate) other: Out<AnyMessage>,
+    pub(crate) bearings: Out<TagBearing>,
 }
 
 impl Outputs for RobotMessages {
@@ -149,6 +150,10 @@ impl Outputs for RobotMessages {
             scans: ports.output(
                 "scans",
                 "scans of robots that have no map, as the bases of these robots see them: made from the messages of lidars",
+            bearings: ports.output(
+                "bearings",
+                "directions in which tags are perceived, in the frames of their robots: made from messages with a bearing",
+            ),
             ),
             odometry: ports.output(
                 "odometry",

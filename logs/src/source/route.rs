@@ -81,7 +81,7 @@ pub(crate) struct RobotChannels {
     known: BTreeSet<String>,
     /// The known robots whose cameras see tags of which tf says where they are.
     tags_in_tf: BTreeSet<String>,
-    /// Whether any message says where tags are in the frame of a camera.
+    /// Whether any message says where, or in which direction, tags are in the frame of a camera or another sensor.
     has_cameras: bool,
     /// The robots with scans and without maps.
     scanned: BTreeSet<String>,
@@ -130,7 +130,12 @@ impl RobotChannels {
             roles.unposed = &asking - &with_poses;
         }
         for channel in channels {
-            roles.has_cameras |= roles.tag_fields(channel).is_some_and(|(_, fields)| fields.pose_field.is_some());
+            let is_mounted = |fields: &TagFields| fields.pose_field.is_some() || fields.bearing_field.is_some();
+            roles.has_cameras |= roles.tag_fields(channel).is_some_and(|(_, fields)| is_mounted(&fields));
+            if let Classified { role: Role::Odometry, robot, .. } = roles.classify(channel) {
+                let robot = robot.to_owned();
+                roles.with_odometry.insert(robot);
+            }
             if has_poses_in_tf(&full_type_name(&channel.schema_name))
                 && let Some(robot) = roles.known_robot(&channel.topic)
             {

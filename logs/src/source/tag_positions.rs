@@ -1,13 +1,13 @@
-//! From where a camera sees tags to where they are from the robot.
+//! From where, or in which direction, a sensor perceives tags to where they are from the robot.
 
 use super::mounts::{Mounts, Untied};
 use super::tag_reader::tag_of_frame;
-use gridweave_runtime::ros::{Header, TFMessage, TagPosition, Time};
+use gridweave_runtime::ros::{Header, TFMessage, TagBearing, TagPosition, Time};
 use gridweave_runtime::stage::frame_of_robot;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use std::collections::BTreeSet;
 
-/// Knows how cameras are mounted on their robots, by tf.
+/// Knows how cameras and other such sensors are mounted on their robots, by tf.
 #[derive(Debug)]
 pub(super) struct TagPositions {
     mounts: Mounts,
@@ -73,6 +73,29 @@ impl TagPositions {
         let header = Header { stamp, frame_id: base };
         Ok(TagPosition { header, tag_id: tag_id.to_owned(), x: place.x, y: place.y, covariance: [0.0; 4] })
     }
+
+    /// In which direction a robot perceives a tag whose direction a sensor tells: an angle about the z axis of `frame`, radians,
+    /// and its standard deviation.
+    pub(super) fn bearing(
+        &self,
+        robot: &str,
+        tag_id: &str,
+        stamp: Time,
+        frame: &str,
+        (bearing, bearing_stddev): (f64, f64),
+    ) -> Result<TagBearing, Untied> {
+        let (base, transform_base_frame) = self.mounts.mount(robot, frame)?;
+        let direction = transform_base_frame * Vector3::new(bearing.cos(), bearing.sin(), 0.0);
+        let sensor = transform_base_frame.translation;
+        Ok(TagBearing {
+            header: Header { stamp, frame_id: base },
+            tag_id: tag_id.to_owned(),
+            x: sensor.x,
+            y: sensor.y,
+            bearing: direction.y.atan2(direction.x),
+            bearing_stddev,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -109,6 +132,23 @@ mod tests {
             ("r1", "tag36h11:5", "r1/base_footprint")
         );
         assert!((seen.x - 2.2).abs() < 1e-9 && (seen.y + 0.4).abs() < 1e-9 && seen.header.stamp.sec == 7, "{seen:?}");
+    }
+
+    #[test]
+    fn a_bearing_turns_with_the_sensor_and_keeps_where_it_is() {
+        let mut positions = TagPositions::new(None, BTreeSet::new());
+        let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0);
+        let mount = edge("r1/base_link", "r1/antennas", [0.2, 0.1, 0.5], turned);
+        positions.transforms("", true, &TFMessage { transforms: vec![mount] });
+        let told = |frame: &str| positions.bearing("r1", "a", Time::default(), frame, (0.5, 0.05));
+        let seen = told("r1/antennas").unwrap();
+        assert_eq!(
+            (seen.header.frame_id.as_str(), seen.x, seen.y, seen.bearing_stddev),
+            ("r1/base_link", 0.2, 0.1, 0.05)
+        );
+        assert!((seen.bearing - 1.5).abs() < 1e-9, "{seen:?}");
+        assert!((told("r1/base_link").unwrap().bearing - 0.5).abs() < 1e-9);
+        assert_eq!(told("r1/other"), Err(Untied));
     }
 
     #[test]

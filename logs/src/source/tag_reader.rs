@@ -22,9 +22,21 @@ pub(crate) struct TagReader {
     unit: f64,
     pose: Option<FieldPath>,
 }
+    bearing: Option<Bearing>,
 
 /// What tells how far a tag is.
 #[derive(Debug)]
+/// What tells in which direction a tag is.
+#[derive(Debug)]
+struct Bearing {
+    path: FieldPath,
+    /// What one unit of it is in radians, counterclockwise.
+    unit: f64,
+    stddev: Option<FieldPath>,
+    /// Where no field tells it, radians.
+    usual_stddev: f64,
+}
+
 enum Distance {
     Range(FieldPath),
     Strength(FieldPath, PathLoss),
@@ -53,6 +65,9 @@ pub(crate) enum Seen {
     Range { range: f64, stddev: f64, rssi: f32 },
     /// Where it is in the frame of the message, metres.
     At(Point3<f64>),
+    /// The direction in which it is, radians about the z axis of the frame of the message, counterclockwise from its x axis, with
+    /// the standard deviation of that (0 if it is not known).
+    Bearing { bearing: f64, stddev: f64 },
 }
 
 /// Where readings are in messages of types that are known: a range of a sonar or a radio, named by its frame, and what the
@@ -109,7 +124,16 @@ impl TagReader {
             _ => None,
         };
         let pose = maybe(&fields.pose_field)?;
-        if distance.is_none() && pose.is_none() {
+        if distance.is_none() && bearing.is_none() && pose.is_none() {
+        let bearing = match maybe(&fields.bearing_field)? {
+            Some(path) => Some(Bearing {
+                path,
+                unit: fields.bearing_unit.unwrap_or(1.0),
+                stddev: maybe(&fields.bearing_stddev_field)?,
+                usual_stddev: fields.bearing_stddev.unwrap_or(0.0),
+            }),
+            None => None,
+        };
             return Err("nothing says which field tells where a tag is".to_owned());
         }
         Ok(Self {
@@ -124,6 +148,7 @@ impl TagReader {
         })
     }
 
+            bearing,
     /// The readings in a message of `robot`.
     ///
     /// # Errors
@@ -141,12 +166,14 @@ impl TagReader {
             Some(Value::Scalar(Scalar::Text(frame))) => (*frame).to_owned(),
             _ => String::new(),
         };
-        let readings = match &self.each {
-            None => vec![self.reading(robot, &message)?],
+        let mut readings = Vec::new();
+        match &self.each {
+            None => self.add_readings(robot, &message, &mut readings)?,
             Some(each) => match message.find(each).map_err(|error| error.to_string())? {
                 Value::Array(array) => {
-                    let elements = (0..array.len()).filter_map(|at| array.element(at));
-                    elements.map(|element| self.reading(robot, &element)).collect::<Result<_, _>>()?
+                    for element in (0..array.len()).filter_map(|at| array.element(at)) {
+                        self.add_readings(robot, &element, &mut readings)?;
+                    }
                 }
                 _ => return Err(format!("`{each}` is no array")),
             },
@@ -154,7 +181,8 @@ impl TagReader {
         Ok(TagMessage { stamp, frame_id, readings })
     }
 
-    fn reading(&self, robot: &str, of: &Value<'_>) -> Result<TagReading, String> {
+    /// What a message or an element says of a tag: its distance and its bearing, or else its place.
+    fn add_readings(&self, robot: &str, of: &Value<'_>, readings: &mut Vec<TagReading>) -> Result<(), String> {
         let find = |path: &FieldPath| of.find(path).map_err(|error| error.to_string());
         let a_number = |path: &FieldPath| number(&find(path)?).ok_or_else(|| format!("`{path}` is no number"));
         let mut id = Vec::new();
@@ -166,30 +194,36 @@ impl TagReader {
                 _ => return Err(format!("`{path}` is neither a text nor a whole number")),
             });
         }
-        let seen = match (&self.distance, &self.pose) {
-            (Some(distance), _) => {
-                let stddev = self.stddev.as_ref().map(a_number).transpose()?;
-                let stddev = stddev.map_or(self.usual_stddev, |stddev| stddev * self.unit);
-                match distance {
-                    Distance::Range(path) => Seen::Range { range: a_number(path)? * self.unit, stddev, rssi: 0.0 },
-                    Distance::Strength(path, model) => {
-                        let rssi = a_number(path)?;
-                        let (range, by_model) = model.distance(rssi);
-                        let stddev = if stddev > 0.0 { stddev } else { by_model };
-                        Seen::Range { range, stddev, rssi: rssi as f32 }
-                    }
+        let tag_id = id.join(":");
+        let mut add = |seen| readings.push(TagReading { tag_id: tag_id.clone(), seen });
+        if let Some(distance) = &self.distance {
+            let stddev = self.stddev.as_ref().map(a_number).transpose()?;
+            let variance = || number(&of.find(self.variance.as_ref()?).ok()?).filter(|variance| *variance > 0.0);
+            let told = stddev.map(|stddev| stddev * self.unit).or_else(|| Some(variance()?.sqrt() * self.unit));
+            let stddev = told.unwrap_or(self.usual_stddev);
+            add(match distance {
+                Distance::Range(path) => Seen::Range { range: a_number(path)? * self.unit, stddev, rssi: 0.0 },
+                Distance::Strength(path, model) => {
+                    let rssi = a_number(path)?;
+                    let (range, by_model) = model.distance(rssi);
+                    let stddev = if stddev > 0.0 { stddev } else { by_model };
+                    Seen::Range { range, stddev, rssi: rssi as f32 }
                 }
-            }
-            (None, Some(path)) => {
-                let pose = find(path)?;
-                let point = pose.field("position").unwrap_or(&pose);
-                let axis = |name: &str| number(point.field(name)?);
-                let place = || Some(Point3::new(axis("x")?, axis("y")?, axis("z")?));
-                Seen::At(place().ok_or_else(|| format!("`{path}` is neither a pose nor a point"))?)
-            }
-            (None, None) => return Err("nothing says which field tells where a tag is".to_owned()),
-        };
-        Ok(TagReading { tag_id: id.join(":"), seen })
+            });
+        }
+        if let Some(Bearing { path, unit, stddev, usual_stddev }) = &self.bearing {
+            let stddev = stddev.as_ref().map(a_number).transpose()?;
+            let stddev = stddev.map_or(*usual_stddev, |stddev| (stddev * unit).abs());
+            add(Seen::Bearing { bearing: a_number(path)? * unit, stddev });
+        }
+        if let Some(path) = self.pose.as_ref().filter(|_| self.distance.is_none() && self.bearing.is_none()) {
+            let pose = find(path)?;
+            let point = pose.field("position").unwrap_or(&pose);
+            let axis = |name: &str| number(point.field(name)?);
+            let place = || Some(Point3::new(axis("x")?, axis("y")?, axis("z")?));
+            add(Seen::At(place().ok_or_else(|| format!("`{path}` is neither a pose nor a point"))?));
+        }
+        Ok(())
     }
 }
 
@@ -281,6 +315,29 @@ mod tests {
     fn fields_that_are_not_there_are_named() {
         let range = |field: &str| {
             let field = field.to_owned();
+    #[test]
+    fn a_bearing_is_read_alone_or_beside_the_range() {
+        let degrees = |fields: &mut TagFields| {
+            fields.bearing_field = Some("dbm".into());
+            fields.bearing_unit = Some(-0.01);
+            fields.bearing_stddev_field = Some("deviation".into());
+        };
+        let found = read(&fields(degrees)).unwrap().readings;
+        let bearing =
+            |id: &str, bearing: f64, stddev| TagReading { tag_id: id.into(), seen: Seen::Bearing { bearing, stddev } };
+        assert_eq!(found, [bearing("7", 0.6, 0.2), bearing("8", 0.4, 0.3)]);
+        let both = |fields: &mut TagFields| {
+            degrees(fields);
+            fields.range_field = Some("distance_mm".into());
+            fields.range_unit = Some(0.001);
+            fields.bearing_stddev_field = None;
+            fields.bearing_stddev = Some(0.05);
+        };
+        let found = read(&fields(both)).unwrap().readings;
+        assert_eq!((found.len(), &found[1]), (4, &bearing("7", 0.6, 0.05)));
+        assert!(matches!(&found[2].seen, Seen::Range { range: 2.5, .. }), "{found:?}");
+    }
+
             read(&fields(|fields| fields.range_field = Some(field))).unwrap_err()
         };
         assert!(range("distance").contains("`distance`") && range("distance").contains("distance_mm"));
@@ -300,16 +357,41 @@ mod tests {
     fn a_sensors_range_is_named_by_its_frame_without_the_robot() {
         let name = "sensor_msgs/msg/Range";
         let range = (Header::new(LogTime(1), "robot1/tag7"), 1u8, 0.1f32, 0.1f32, 5.0f32, 1.25f32);
-        let reader = TagReader::new(&channel(name, ""), &known_fields(name).unwrap()).unwrap();
-        // Newer definitions have the variance behind it.
-        let mut bytes = encode(&range).unwrap();
-        if reader.read("robot1", &bytes).is_err() {
-            bytes = encode(&(range, 0.0f32)).unwrap();
+        // Up to ROS 2 Humble, whose logs may lack definitions; and since Iron, with the variance behind it.
+        let before = crate::schemas::schema_text(name).unwrap();
+        let since = before.replacen("float32 range\n", "float32 range\nfloat32 variance\n", 1);
+        assert_ne!(before, since);
+        let old = encode(&range).unwrap();
+        let new = |variance: f32| encode(&(range.clone(), variance)).unwrap();
+        let cases = [("", old.clone(), 0.0), (&before, old, 0.0), (&since, new(0.0), 0.0), (&since, new(0.25), 0.5)];
+        for (text, bytes, stddev) in cases {
+            let reader = TagReader::new(&channel(name, text), &known_fields(name).unwrap()).unwrap();
+            let found = reader.read("robot1", &bytes).unwrap();
+            let seen = Seen::Range { range: 1.25, stddev, rssi: 0.0 };
+            assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), seen }]);
+            assert!(reader.read("robot1", b"cut").is_err());
         }
         let found = reader.read("robot1", &bytes).unwrap();
-        let seen = Seen::Range { range: 1.25, stddev: 0.0, rssi: 0.0 };
-        assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), seen }]);
-        assert!(reader.read("robot1", b"cut").is_err());
+        let seen = |id: &str| TagReading { tag_id: id.into(), seen: Seen::At(Point3::new(0.5, -0.25, 2.0)) };
+        assert_eq!(found.readings, [seen("36h11:5"), seen("36h11:12")]);
+        assert_eq!((found.stamp, found.frame_id.as_str()), (Time { sec: 3, nanosec: 4 }, "camera"));
+    }
+
+    #[test]
+    fn tags_of_aruco_opencv_are_read_by_its_published_definition() {
+        let name = "aruco_opencv_msgs/msg/ArucoDetection";
+        let text = published(
+            "std_msgs/Header header\naruco_opencv_msgs/MarkerPose[] markers\naruco_opencv_msgs/BoardPose[] boards",
+            &[
+                ("aruco_opencv_msgs/MarkerPose", "uint16 marker_id\ngeometry_msgs/Pose pose\n"),
+                ("aruco_opencv_msgs/BoardPose", "string board_name\ngeometry_msgs/Pose pose\n"),
+            ],
+        );
+        let header = Header::new(LogTime(1), "camera");
+        let bytes = encode(&(header, vec![(7u16, POSE)], vec![("board", POSE)])).unwrap();
+        let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
+        let seen = Seen::At(Point3::new(0.5, -0.25, 2.0));
+        assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [TagReading { tag_id: "7".into(), seen }]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::document::{Entry, Item};
 use super::values::{entries, text, unknown_key, wrong_type};
 use crate::stage::{PathLoss, TagFields};
 
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 16] = [
     "topic",
     "each",
     "id_field",
@@ -18,6 +18,10 @@ const KEYS: [&str; 12] = [
     "stddev_field",
     "stddev",
     "pose_field",
+    "bearing_field",
+    "bearing_unit",
+    "bearing_stddev_field",
+    "bearing_stddev",
 ];
 const EXAMPLE: &str = "tags = { topic = \"/{robot}/uwb\", id_field = \"anchor_id\", range_field = \"distance\" }";
 
@@ -39,12 +43,20 @@ pub(super) fn read_tag_fields<'a>(
                 fields.id_field = text(key, item, problems).unwrap_or_default().to_owned();
                 continue;
             }
-            "each" | "range_field" | "rssi_field" | "stddev_field" | "pose_field" => {
+            "each"
+            | "range_field"
+            | "rssi_field"
+            | "stddev_field"
+            | "pose_field"
+            | "bearing_field"
+            | "bearing_stddev_field" => {
                 let field = match key.as_str() {
                     "each" => &mut fields.each,
                     "range_field" => &mut fields.range_field,
                     "rssi_field" => &mut fields.rssi_field,
                     "stddev_field" => &mut fields.stddev_field,
+                    "bearing_field" => &mut fields.bearing_field,
+                    "bearing_stddev_field" => &mut fields.bearing_stddev_field,
                     _ => &mut fields.pose_field,
                 };
                 *field = text(key, item, problems).map(str::to_owned);
@@ -52,6 +64,8 @@ pub(super) fn read_tag_fields<'a>(
             }
             "range_unit" => &mut fields.range_unit,
             "stddev" => &mut fields.stddev,
+            "bearing_unit" => &mut fields.bearing_unit,
+            "bearing_stddev" => &mut fields.bearing_stddev,
             "rssi_at_1m" => &mut rssi_at_1m,
             "path_loss_exponent" => &mut exponent,
             "rssi_stddev" => &mut stddev,
@@ -61,10 +75,16 @@ pub(super) fn read_tag_fields<'a>(
             }
         };
         let value = item.as_float().or_else(|| item.as_integer().map(|value| value as f64));
-        let is_good = |value: &f64| value.is_finite() && (key == "rssi_at_1m" || *value > 0.0);
+        let is_good = |value: &f64| match key.as_str() {
+            "rssi_at_1m" => value.is_finite(),
+            // Below 0 it counts clockwise.
+            "bearing_unit" => value.is_finite() && *value != 0.0,
+            _ => value.is_finite() && *value > 0.0,
+        };
         match value.filter(is_good) {
             Some(value) => *number = Some(value),
             None if key == "rssi_at_1m" => problems.push(wrong_type(key, item, "a number, dBm")),
+            None if key == "bearing_unit" => problems.push(wrong_type(key, item, "a number other than 0")),
             None => problems.push(wrong_type(key, item, "a number above 0")),
         }
     }
@@ -83,8 +103,12 @@ pub(super) fn read_tag_fields<'a>(
     if fields.id_field.is_empty() {
         lacks("id_field", "nothing says which tag a reading is of");
     }
-    if fields.range_field.is_none() && fields.rssi_field.is_none() && fields.pose_field.is_none() {
-        lacks("range_field", "a reading needs a range, a signal strength (`rssi_field`) or a pose (`pose_field`)");
+    let tells_where = [&fields.range_field, &fields.rssi_field, &fields.pose_field, &fields.bearing_field];
+    if tells_where.iter().all(|field| field.is_none()) {
+        lacks(
+            "range_field",
+            "a reading needs a range, a signal strength (`rssi_field`), a bearing (`bearing_field`) or a pose (`pose_field`)",
+        );
     }
     if fields.rssi_field.is_some() && fields.range_field.is_none() && fields.path_loss.is_none() {
         lacks("rssi_at_1m", "a signal strength says how far a tag is only if that at one metre is known");

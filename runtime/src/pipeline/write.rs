@@ -87,8 +87,8 @@ fn robots_table(robots: &RobotTopics, initial_poses: &InitialPoses) -> Table {
 }
 
 fn tag_fields_table(topic: &str, fields: &TagFields) -> Table {
-    let TagFields { each, id_field, range_field, range_unit, rssi_field, path_loss, stddev_field, stddev, pose_field } =
-        fields;
+    let TagFields { each, id_field, range_field, range_unit, rssi_field, path_loss, stddev_field, stddev, .. } = fields;
+    let TagFields { pose_field, bearing_field, bearing_unit, bearing_stddev_field, bearing_stddev, .. } = fields;
     let texts = [
         ("topic", Some(topic)),
         ("each", each.as_deref()),
@@ -97,10 +97,14 @@ fn tag_fields_table(topic: &str, fields: &TagFields) -> Table {
         ("rssi_field", rssi_field.as_deref()),
         ("stddev_field", stddev_field.as_deref()),
         ("pose_field", pose_field.as_deref()),
+        ("bearing_field", bearing_field.as_deref()),
+        ("bearing_stddev_field", bearing_stddev_field.as_deref()),
     ];
     let numbers = [
         ("range_unit", *range_unit),
         ("stddev", *stddev),
+        ("bearing_unit", *bearing_unit),
+        ("bearing_stddev", *bearing_stddev),
         ("rssi_at_1m", path_loss.map(|model| model.rssi_at_1m)),
         ("path_loss_exponent", path_loss.map(|model| model.exponent)),
         ("rssi_stddev", path_loss.map(|model| model.stddev)),

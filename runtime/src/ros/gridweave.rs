@@ -36,6 +36,23 @@ pub struct TagPosition {
     pub covariance: [f64; 4],
 }
 
+/// In which direction a robot perceives one tag, as a camera or an array of antennas does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TagBearing {
+    /// Time, and the frame of the robot's base.
+    pub header: Header,
+    /// Which tag.
+    pub tag_id: String,
+    /// Where the sensor is in that frame, metres ahead of the base.
+    pub x: f64,
+    /// Metres to its left.
+    pub y: f64,
+    /// The direction from the sensor to the tag, radians, counterclockwise from straight ahead of the base.
+    pub bearing: f64,
+    /// Standard deviation of the direction, radians; 0 if it is not known.
+    pub bearing_stddev: f64,
+}
+
 /// A scan of a lidar, seen from the base of its robot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RangeScan {
@@ -416,5 +433,5 @@ impl RobotFrames {
 ros_messages!(
     "gridweave_msgs":
     TagRange, TagEstimates, Segments, MapDirection, CommonTags, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement,
-    SimulationTruth, TagPosition, RangeScan
+    SimulationTruth, TagPosition, TagBearing, RangeScan
 );

@@ -24,8 +24,8 @@ pub use geometry::{
 };
 pub use gridweave::{
     Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RangeScan, RobotFrame,
-    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagEstimate, TagEstimates, TagPosition, TagRange,
-    TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
+    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagBearing, TagEstimate, TagEstimates, TagPosition,
+    TagRange, TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
 };
 pub use icp::IcpErrors;
 pub use map_msgs::OccupancyGridUpdate;

@@ -25,6 +25,15 @@ pub struct TagFields {
     pub stddev: Option<f64>,
     /// The pose or the point at which the tag is in the frame of the message's header, metres.
     pub pose_field: Option<String>,
+    /// The direction in which the tag is: the angle about the z axis of the frame of the message's header, from its x axis on and
+    /// counterclockwise.
+    pub bearing_field: Option<String>,
+    /// What one unit of the bearing is in radians: 0.01745 for degrees. Below 0 where it counts clockwise.
+    pub bearing_unit: Option<f64>,
+    /// The standard deviation of the bearing, in its unit.
+    pub bearing_stddev_field: Option<String>,
+    /// The standard deviation of the bearing where no field tells it, radians.
+    pub bearing_stddev: Option<f64>,
 }
 
 /// The log-distance model of how a radio signal gets weaker (Rappaport, "Wireless Communications", section 4.9):

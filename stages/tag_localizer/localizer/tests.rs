@@ -148,6 +148,76 @@ fn a_sighting_that_is_none_is_told() {
     assert_eq!(localizer.add_sighting(at(0.0), "tag", Vector2::zeros(), &odd), Ok(()));
 }
 
+/// Drives past the tag, and perceives the direction to it, on a way from 0.2 m ahead of its middle; a share of the directions are any.
+fn take_bearings(tag: Point2, outliers: f64, ranges: bool, way: f64) -> Option<TagMode> {
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let noise = Normal::new(0.0, 0.05).unwrap();
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+    // One that goes round with the robot sees from several places.
+    let sensor = Vector2::new(if way > 0.0 { 0.2 } else { 0.0 }, 0.0);
+    for step in 0..60 {
+        let (time, yaw) = (at(0.1 * f64::from(step)), 0.3 * f64::from(step));
+        let place = Point2::new(way / 60.0 * f64::from(step), 0.0);
+        localizer.add_pose(time, Position { yaw, ..Position::new(place) }, |problem| panic!("{problem}"));
+        let seen = Rotation2::new(-yaw) * (tag - place) - sensor;
+        let turn = match random.random::<f64>() < outliers {
+            true => 2.0 * PI * random.random::<f64>(),
+            false => noise.sample(&mut random),
+        };
+        localizer.add_bearing(time, "tag", sensor, seen.y.atan2(seen.x) + turn, 0.05).unwrap();
+        if ranges {
+            localizer.add_reading(time, "tag", (tag - place).norm() + noise.sample(&mut random), 0.05).unwrap();
+        }
+    }
+    localizer.read_out_all();
+    localizer.modes().next().map(|(_, mode, _)| *mode)
+}
+
+#[test]
+fn bearings_alone_locate_a_tag_and_a_straight_drive_leaves_no_mirror_image() {
+    // The second lies farther off than the first place's grid goes.
+    for tag in [TAG, Point2::new(2.0, 6.0)] {
+        let mode = take_bearings(tag, 0.0, false, 4.0).unwrap();
+        let error = mode.position - tag;
+        let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
+        assert!(mode.certainty > 0.4 && squared < 9.0, "{tag}: {mode:?} {squared}");
+    }
+    let near = take_bearings(TAG, 0.0, false, 4.0).unwrap();
+    assert!(near.certainty > 0.9, "{near:?}");
+    let both = take_bearings(TAG, 0.0, true, 4.0).unwrap();
+    assert!(both.covariance.trace() < near.covariance.trace() && both.certainty > 0.9, "{both:?} {near:?}");
+}
+
+#[test]
+fn a_fifth_of_bearings_that_are_wrong_does_not_lead_astray() {
+    let mode = take_bearings(TAG, 0.2, false, 4.0).unwrap();
+    assert!((mode.position - TAG).norm() < 0.1 && mode.certainty > 0.75, "{mode:?}");
+}
+
+#[test]
+fn bearings_from_one_place_do_not_say_where_a_tag_is() {
+    let mode = take_bearings(TAG, 0.0, false, 0.0);
+    assert!(mode.is_none_or(|mode| mode.certainty < 0.3), "{mode:?}");
+}
+
+#[test]
+fn a_bearing_that_is_none_is_told() {
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
+    localizer.add_pose(at(0.0), position(0.0, 0.0), |_| ());
+    let mut add = |id: &str, x: f64, bearing: f64, stddev: f64| {
+        localizer.add_bearing(at(0.0), id, Vector2::new(x, 0.0), bearing, stddev)
+    };
+    assert_eq!(add("", 0.0, 1.0, 0.1), Err(ReadingProblem::NoId));
+    for (x, bearing) in [(f64::NAN, 1.0), (1e200, 1.0), (0.0, f64::NAN), (0.0, f64::INFINITY)] {
+        assert_eq!(add("tag", x, bearing, 0.1), Err(ReadingProblem::NoBearing));
+    }
+    for stddev in [f64::NAN, -1.0, 0.0, f64::INFINITY, 1e300] {
+        assert_eq!(add("tag", 0.0, 1e6, stddev), Ok(()));
+    }
+    localizer.read_out_all();
+    assert!(localizer.modes().all(|(_, mode, _)| mode.covariance.iter().all(|value| value.is_finite())));
+}
+
 #[test]
 fn a_standard_deviation_that_is_no_number_is_replaced() {
     let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });

@@ -5,7 +5,7 @@ use super::drive::{Drive, REACH, READINGS};
 use super::trial::{Conditions, Likelihood, Recording};
 use anyhow::{Context, Result};
 use gridweave_stages::geometry::Point2;
-use gridweave_stages::tag_localizer::{GridSize, Posterior, Reading, ReadingGroups, Readout, RingProduct};
+use gridweave_stages::tag_localizer::{self, GridSize, Posterior, Reading, ReadingGroups, Readout};
 use image::{ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 
@@ -47,7 +47,8 @@ fn draw(image: &mut RgbImage, corner: (u32, u32), recording: &Recording, count: 
         let stddev = parameters.range_stddev;
         groups.add(&Reading { position, range, stddev }, parameters.min_travel);
     }
-    let product = RingProduct::new(groups.rings(parameters.pose_stddev), parameters.outlier_share, REACH);
+    let product =
+        tag_localizer::Likelihood::of_rings(groups.rings(parameters.pose_stddev), parameters.outlier_share, REACH);
     let grid = GridSize { centre: recording.readings[0].0.place, cells: CELLS, resolution: parameters.resolution };
     let mut masses = vec![0.0; CELLS * CELLS];
     for leaf in Posterior::new(&product, grid).iter().flat_map(|posterior| &posterior.leaves) {

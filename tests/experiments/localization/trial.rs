@@ -164,6 +164,7 @@ impl Recording {
                 place: place + error * conditions.pose_stddev,
                 covariance: Matrix2::from_diagonal_element(told),
                 yaw: 0.0,
+                yaw_variance: 0.0,
             };
             let is_reflected = random.random::<f64>() < conditions.reflections;
             let detour = random.random_range(DETOUR);

@@ -1,7 +1,7 @@
 //! Inputs of `tag_localizer`: drives past tags.
 
 use super::Case;
-use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagPosition, TagRange};
+use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagBearing, TagPosition, TagRange};
 use gridweave_stages::geometry::{Point2, pose};
 use gridweave_tests::{LogBuilder, header};
 use nalgebra::Vector2;
@@ -45,6 +45,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("few_readings", |log| Drive::past("tag", TAG).along(log, "robot1", circle(100).take(4))),
         case("no_readings", no_readings),
         case("seen_by_a_camera", seen_by_a_camera),
+        case("bearings_alone", bearings_alone),
     ]
 }
 
@@ -181,4 +182,24 @@ fn seen_by_a_camera(log: &mut LogBuilder) {
     let header = header(6.0, "robot1/base_link");
     let nowhere = TagPosition { header, tag_id: "tag".into(), x: f64::NAN, y: 0.0, covariance: [0.0; 4] };
     log.message(6.0, "/robot1/tag_positions", &nowhere);
+}
+
+/// A straight drive past a tag whose direction is perceived from half a metre ahead, with an error that goes round; one direction is
+/// wrong, and one is no number. Another tag is heard once.
+fn bearings_alone(log: &mut LogBuilder) {
+    for (step, place) in line(60).enumerate() {
+        let seconds = 0.1 * step as f64;
+        log.uncertain_pose(seconds, "robot1", place.x, place.y, 0.0);
+        let seen = TAG - place - Vector2::new(0.5, 0.0);
+        let bearing = match step {
+            20 => -2.0,
+            30 => f64::NAN,
+            _ => seen.y.atan2(seen.x) + 0.05 * (0.7 * step as f64).cos(),
+        };
+        let header = header(seconds, "robot1/base_link");
+        let bearing = TagBearing { header, tag_id: "tag".into(), x: 0.5, y: 0.0, bearing, bearing_stddev: 0.05 };
+        log.message(seconds, "/robot1/tag_bearings", &bearing);
+    }
+    // Of another tag, and too few to report it.
+    log.reading(6.0, "robot1", "heard", 1.0);
 }

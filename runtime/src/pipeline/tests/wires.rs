@@ -91,7 +91,8 @@ fn a_pipeline_written_out_is_the_same_when_read_again() {
     let frames = "[robots]\ntf = { map_frame = \"{robot}/map\", base_frame = \"{robot}/base_link\" }";
     let fields = "tags = { topic = \"/{robot}/uwb\", each = \"all\", id_field = \"a.id\", range_field = \"mm\", range_unit = 0.001, \
          rssi_field = \"dbm\", rssi_at_1m = -40, path_loss_exponent = 2.5, rssi_stddev = 3, stddev_field = \"s\", \
-         stddev = 0.1, pose_field = \"pose\" }";
+         stddev = 0.1, pose_field = \"pose\", bearing_field = \"b\", bearing_unit = -0.01, bearing_stddev_field = \"d\", \
+         bearing_stddev = 0.2 }";
     let text = changed("[robots]", &format!("{frames}\n{fields}"));
     let first = Pipeline::parse("walls.toml", &text, &registry(), &overrides).unwrap();
     let second = Pipeline::parse("other.toml", &first.to_toml(), &registry(), &Overrides::default()).unwrap();
