@@ -18,14 +18,14 @@ pub(crate) struct TagReader {
     stddev: Option<FieldPath>,
     /// Where no field tells it, metres.
     usual_stddev: f64,
+    /// The variance of the distance, which some versions of a type have; 0 if it is not known.
+    variance: Option<FieldPath>,
     /// What one unit of a distance is in metres.
     unit: f64,
+    bearing: Option<Bearing>,
     pose: Option<FieldPath>,
 }
-    bearing: Option<Bearing>,
 
-/// What tells how far a tag is.
-#[derive(Debug)]
 /// What tells in which direction a tag is.
 #[derive(Debug)]
 struct Bearing {
@@ -37,6 +37,8 @@ struct Bearing {
     usual_stddev: f64,
 }
 
+/// What tells how far a tag is.
+#[derive(Debug)]
 enum Distance {
     Range(FieldPath),
     Strength(FieldPath, PathLoss),
@@ -63,11 +65,11 @@ pub(crate) struct TagReading {
 pub(crate) enum Seen {
     /// How far it is, metres, with the standard deviation of that (0 if it is not known), and the signal strength, dBm.
     Range { range: f64, stddev: f64, rssi: f32 },
-    /// Where it is in the frame of the message, metres.
-    At(Point3<f64>),
     /// The direction in which it is, radians about the z axis of the frame of the message, counterclockwise from its x axis, with
     /// the standard deviation of that (0 if it is not known).
     Bearing { bearing: f64, stddev: f64 },
+    /// Where it is in the frame of the message, metres.
+    At(Point3<f64>),
 }
 
 /// Where readings are in messages of types that are known: a range of a sonar or a radio, named by its frame, and what the
@@ -123,8 +125,6 @@ impl TagReader {
             (None, Some(strength), Some(model)) => Some(Distance::Strength(strength, model)),
             _ => None,
         };
-        let pose = maybe(&fields.pose_field)?;
-        if distance.is_none() && bearing.is_none() && pose.is_none() {
         let bearing = match maybe(&fields.bearing_field)? {
             Some(path) => Some(Bearing {
                 path,
@@ -134,6 +134,8 @@ impl TagReader {
             }),
             None => None,
         };
+        let pose = maybe(&fields.pose_field)?;
+        if distance.is_none() && bearing.is_none() && pose.is_none() {
             return Err("nothing says which field tells where a tag is".to_owned());
         }
         Ok(Self {
@@ -143,12 +145,14 @@ impl TagReader {
             distance,
             stddev: maybe(&fields.stddev_field)?,
             usual_stddev: fields.stddev.unwrap_or(0.0),
+            // Since ROS 2 Iron.
+            variance: (type_name == "sensor_msgs/msg/Range").then(|| path("variance")).transpose()?,
             unit: fields.range_unit.unwrap_or(1.0),
+            bearing,
             pose,
         })
     }
 
-            bearing,
     /// The readings in a message of `robot`.
     ///
     /// # Errors
@@ -177,7 +181,7 @@ impl TagReader {
                 }
                 _ => return Err(format!("`{each}` is no array")),
             },
-        };
+        }
         Ok(TagMessage { stamp, frame_id, readings })
     }
 
@@ -312,10 +316,6 @@ mod tests {
     }
 
     #[test]
-    fn fields_that_are_not_there_are_named() {
-        let range = |field: &str| {
-            let field = field.to_owned();
-    #[test]
     fn a_bearing_is_read_alone_or_beside_the_range() {
         let degrees = |fields: &mut TagFields| {
             fields.bearing_field = Some("dbm".into());
@@ -338,6 +338,10 @@ mod tests {
         assert!(matches!(&found[2].seen, Seen::Range { range: 2.5, .. }), "{found:?}");
     }
 
+    #[test]
+    fn fields_that_are_not_there_are_named() {
+        let range = |field: &str| {
+            let field = field.to_owned();
             read(&fields(|fields| fields.range_field = Some(field))).unwrap_err()
         };
         assert!(range("distance").contains("`distance`") && range("distance").contains("distance_mm"));
@@ -371,6 +375,38 @@ mod tests {
             assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), seen }]);
             assert!(reader.read("robot1", b"cut").is_err());
         }
+    }
+
+    /// The published text of a message of a detector, and those of what it is made of.
+    fn published(text: &str, parts: &[(&str, &str)]) -> String {
+        let separator = "=".repeat(80);
+        let standard = ["geometry_msgs/PoseWithCovarianceStamped", "std_msgs/Header"].map(|name| {
+            let text = crate::schemas::schema_text(name).unwrap();
+            format!("\n{separator}\nMSG: {name}\n{text}")
+        });
+        let parts = parts.iter().map(|(name, text)| format!("\n{separator}\nMSG: {name}\n{text}"));
+        parts.chain(standard).fold(text.to_owned(), |whole, part| whole + &part)
+    }
+
+    /// A pose of which the position matters: x, y, z and a quaternion.
+    const POSE: [f64; 7] = [0.5, -0.25, 2.0, 0.0, 0.0, 0.0, 1.0];
+
+    #[test]
+    fn tags_of_isaac_ros_are_read_by_its_published_definition() {
+        let name = "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray";
+        let detection = "string family\nint32 id\ngeometry_msgs/Point center      # centre in (x,y) pixel coordinates\n\
+            geometry_msgs/Point[4] corners  # corners of tag ((x1,y1),(x2,y2),...)\n\
+            geometry_msgs/PoseWithCovarianceStamped pose\n";
+        let text = published(
+            "std_msgs/Header header\nAprilTagDetection[] detections\n",
+            &[("isaac_ros_apriltag_interfaces/AprilTagDetection", detection)],
+        );
+        let header = Header::new(LogTime(3_000_000_004), "camera");
+        let covariance = [[0.0f64; 6]; 6];
+        let of_tag =
+            |id: i32| ("36h11", id, [320.0f64, 240.0, 0.0], [[0.0f64; 3]; 4], (header.clone(), POSE, covariance));
+        let bytes = encode(&(header.clone(), vec![of_tag(5), of_tag(12)])).unwrap();
+        let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
         let found = reader.read("robot1", &bytes).unwrap();
         let seen = |id: &str| TagReading { tag_id: id.into(), seen: Seen::At(Point3::new(0.5, -0.25, 2.0)) };
         assert_eq!(found.readings, [seen("36h11:5"), seen("36h11:12")]);
