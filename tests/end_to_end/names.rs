@@ -19,6 +19,8 @@ struct World {
     folder: TempDir,
     log: PathBuf,
     truth: PathBuf,
+    /// Whether the logs say where the maps of robots lie.
+    is_placed: bool,
 }
 
 /// The topics of one robot, and what it calls its frames.
@@ -38,7 +40,7 @@ impl World {
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
         let (log, truth) = simulate(folder.path(), "simulated.mcap", &["--robots", "2", "--seed", "2"]);
-        Self { folder, log, truth }
+        Self { folder, log, truth, is_placed: false }
     }
 
     /// Writes a log of the robots, each by its convention.
@@ -46,7 +48,7 @@ impl World {
         let mut out = LogBuilder::new(&self.folder.path().join(name));
         let mut reader = LogReader::new(vec![LogFile::open(&self.log).unwrap()]);
         let files = reader.files().clone();
-        let mut started = BTreeSet::new();
+        let (mut started, mut has_started) = (BTreeSet::new(), BTreeSet::new());
         while let Some(message) = reader.next_message() {
             let channel = files[0].channel(message.channel).unwrap();
             let Some((robot, names)) =
@@ -57,7 +59,18 @@ impl World {
             let time = message.log_time;
             let seconds = time.seconds_since(LogTime(1_700_000_000_000_000_000));
             let header = |frame: &str| Header::new(time, format!("{}{frame}", names.frames[1]));
-            if started.insert(*robot) {
+            if started.insert(*robot) && self.is_placed {
+                // Somebody has recorded where the maps lie, as static transforms and again and again.
+                for (topic, parent) in [("/tf_static", "world"), ("/tf", "earth")] {
+                    let placed = Convention { frames: ["", ""], ..**names };
+                    out.message(
+                        seconds,
+                        topic,
+                        &placed.transform(time, parent, &format!("{robot}/map"), Default::default()),
+                    );
+                }
+            }
+            if has_started.insert(*robot) {
                 let tf = names.transform(time, "base_link", "laser", Default::default());
                 out.message(seconds, &format!("{}/tf_static", names.tf), &tf);
             }
@@ -181,6 +194,23 @@ fn a_log_for_each_robot_without_names_is_put_under_those_that_are_given() {
     world.run(&["info", "robot1=a.mcap", "robot2=b.mcap"]).assert(0, &["/robot1/map (logged as /map)", "of robot2"]);
     let args = ["merge", "robot1=a.mcap", "robot2=b.mcap", "-o", "a.mcap"];
     world.run(&args).assert(2, &["a.mcap is an input"]);
+}
+
+#[test]
+fn a_map_that_somebody_has_placed_already_is_placed_by_the_merge_alone() {
+    let world = World { is_placed: true, ..World::new() };
+    let [first, second] = ["robot1", "robot2"]
+        .map(|robot| [format!("/{robot}/map"), format!("/{robot}/pose"), format!("{robot}/"), format!("/{robot}")]);
+    fn named([map, pose, frames, others]: &[String; 4]) -> Convention<'_> {
+        Convention { map, pose, tf: "", frames: [frames, frames], others }
+    }
+    world.write("all.mcap", &[("robot1", &named(&first)), ("robot2", &named(&second))]);
+    let ended = world.merge(&["all.mcap"], ["robot1", "robot2"]);
+    let told = "transforms of the input that place the map of a robot were left out";
+    assert_eq!(ended.text().matches(told).count(), 1, "{ended:#?}");
+    // What a merge has written can be merged again.
+    world.run(&["merge", "out.mcap", "-o", "again.mcap"]).assert(0, &["merged 2 of 2", told]);
+    assert_is_one_tree(&world.folder.path().join("again.mcap"), ["robot1", "robot2"]);
 }
 
 #[test]

@@ -15,6 +15,7 @@
 
 mod close;
 mod error;
+pub(crate) mod given_frames;
 mod log_writer;
 mod provenance;
 mod rewrite;

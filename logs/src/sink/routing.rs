@@ -53,7 +53,8 @@ fn fits(template: &str, topic: &str) -> bool {
     template.replace("/{robot}", "") == topic || match_robot(template, topic).is_some()
 }
 
-fn is_tf(channel: &Channel) -> bool {
+/// Whether a channel carries transforms.
+pub(crate) fn is_tf(channel: &Channel) -> bool {
     channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME
 }
 

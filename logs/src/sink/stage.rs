@@ -1,10 +1,12 @@
 //! The stage around [`LogWriter`].
 
+use super::given_frames::GivenFrames;
 use super::provenance::{INPUTS_RECORD, InputHashes, RUN_RECORD, run_record};
-use super::routing::{ResultTopics, Route, result_channel};
+use super::routing::{ResultTopics, Route, is_tf, result_channel};
 use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
 use crate::supplement::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
+use gridweave_runtime::ros::{RosMessage, TFMessage};
 use gridweave_runtime::stage::{Context, Output, StageError, match_robot};
 use std::collections::BTreeMap;
 
@@ -20,6 +22,8 @@ struct Lane {
 /// Where the messages of an announced channel go.
 enum Target {
     Lane(usize),
+    /// They are transforms, of which those are left out that place frames of the run.
+    Transforms(usize),
     /// They are no messages, but what a log holds beside them.
     Supplement(SupplementKind),
     /// They are of no topic that is to be written.
@@ -44,6 +48,7 @@ pub(super) struct McapSink {
     only_topics: Vec<String>,
     result_topics: ResultTopics,
     input_types: Vec<String>,
+    given_frames: GivenFrames,
     /// None once it has ended, or cannot be written any more.
     log: Option<LogWriter>,
     /// Whether anything was written: there is no log of a run that could not begin.
@@ -79,6 +84,7 @@ impl McapSink {
             only_topics,
             result_topics: ResultTopics::new(context),
             input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
+            given_frames: GivenFrames::new(context),
             log: Some(log),
             begun: false,
             recorded_pipeline: Some(recorded_pipeline).filter(|text| !text.is_empty()),
@@ -125,7 +131,7 @@ impl McapSink {
         Ok(lane)
     }
 
-    fn write(&mut self, lane: usize, message: &Message) -> Result<(), StageError> {
+    fn write(&mut self, lane: usize, message: &Message, bytes: &[u8]) -> Result<(), StageError> {
         self.begin()?;
         let log = self.log.as_mut().ok_or_else(closed)?;
         let lane = &mut self.lanes[lane];
@@ -140,7 +146,7 @@ impl McapSink {
         };
         let (log_time, publish_time) = (header.log_time.0, header.publish_time);
         let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
-        log.write(&record, message.bytes()).map_err(failure)?;
+        log.write(&record, bytes).map_err(failure)?;
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }
@@ -196,6 +202,7 @@ impl McapSink {
         let target = match self.result_topics.route(channel) {
             _ if let Some(kind) = SupplementKind::of_channel(channel) => Target::Supplement(kind),
             _ if !self.is_wanted(&channel.topic) => Target::Unwanted,
+            Route::Write(channel) if is_tf(&channel) => Target::Transforms(self.lane(channel)),
             Route::Write(channel) => Target::Lane(self.lane(channel)),
             Route::LeaveOut(reason) => Target::LeaveOut(reason),
         };
@@ -214,12 +221,30 @@ impl McapSink {
 
     fn take(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let number = message.header().channel;
+        let mut rest = None;
         let lane = match number {
             0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
-            0 => self.result_lane(message, output)?,
+            0 => {
+                if self.input_types.get(message.wire()).is_some_and(|ros_type| ros_type == TFMessage::NAME) {
+                    self.given_frames.learn(message.bytes());
+                }
+                self.result_lane(message, output)?
+            }
             _ if !self.pass_input => return Ok(()),
             _ => match self.announced.get(&(message.wire(), number)) {
                 Some(Target::Lane(lane)) => *lane,
+                Some(Target::Transforms(lane)) => {
+                    if let Some((bytes, left_out)) = self.given_frames.without(message.bytes()) {
+                        for _ in 0..left_out {
+                            output.warn("transforms of the input that place the map of a robot were left out: this run places it");
+                        }
+                        if bytes.is_empty() {
+                            return Ok(());
+                        }
+                        rest = Some(bytes);
+                    }
+                    *lane
+                }
                 Some(Target::Supplement(kind)) => return self.write_supplement(*kind, message.bytes()),
                 Some(Target::Unwanted) => return Ok(()),
                 Some(Target::LeaveOut(reason)) => {
@@ -233,7 +258,7 @@ impl McapSink {
             },
         };
         output.count("messages", 1);
-        self.write(lane, message)
+        self.write(lane, message, rest.as_deref().unwrap_or(message.bytes()))
     }
 
     pub(super) fn abort(&mut self, reason: &str) {
