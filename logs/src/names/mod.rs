@@ -51,7 +51,8 @@ pub struct Names {
 pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<(LogReader, Names), NameError> {
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
     let (input_of, files): (Vec<usize>, Vec<PathBuf>) = log_files(&paths)?.into_iter().unzip();
-    let mut files: Vec<LogFile> = files.into_iter().map(LogFile::open).collect::<Result<_, _>>()?;
+    let mut files: Vec<LogFile> =
+        files.into_iter().map(|file| LogFile::open_as(file, rules.thresholds)).collect::<Result<_, _>>()?;
     clock::align(&mut files, &input_of, rules.align_start);
     let inputs = name_maps(&files, &input_of, inputs)?;
     let names = naming::name(&files, &input_of, &inputs, rules, robots)?;

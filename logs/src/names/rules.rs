@@ -1,6 +1,7 @@
 //! What is said of the names of topics and robots.
 
 use super::TopicRename;
+use crate::map_file::Thresholds;
 use gridweave_runtime::stage::match_robot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub struct NameRules {
     pub topics: Vec<String>,
     /// Whether the clocks of all logs are set so that they begin together.
     pub align_start: bool,
+    /// How the thresholds of map files are read.
+    pub thresholds: Thresholds,
 }
 
 /// Whether a topic is the one that is asked for, in which `{robot}` stands for any one part.

@@ -11,6 +11,7 @@ use super::ros1::{self, Bag};
 use super::sqlite::{self, Database};
 use super::storage::Storage;
 use super::summary::Statistics;
+use crate::map_file::Thresholds;
 use crate::supplement::SupplementKind;
 use gridweave_runtime::message::Channel;
 use mcap::MAGIC;
@@ -38,6 +39,11 @@ pub struct LogFile {
 impl LogFile {
     /// Opens a file and finds out what it consists of. Only what its own index leaves open is read through.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, ReadError> {
+        Self::open_as(path, Thresholds::ByPicture)
+    }
+
+    /// The same, with the thresholds of a map file read so.
+    pub fn open_as(path: impl Into<PathBuf>, thresholds: Thresholds) -> Result<Self, ReadError> {
         let path = path.into();
         let packed = FileBytes::open(&path).map_err(|error| ReadError::io(&path, error))?;
         let size = packed.len() as u64;
@@ -45,7 +51,8 @@ impl LogFile {
         let is_map = map::is_called_so(&path);
         let (storage, layout) = match is_packed {
             false if is_map => {
-                let log = map::as_log(&path).map_err(|cause| ReadError::Map { path: path.clone(), cause })?;
+                let log =
+                    map::as_log(&path, thresholds).map_err(|cause| ReadError::Map { path: path.clone(), cause })?;
                 open_storage(&path, None, log)?
             }
             false => open_storage(&path, None, packed)?,

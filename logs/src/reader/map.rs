@@ -20,9 +20,9 @@ pub(crate) fn is_called_so(path: &Path) -> bool {
     is_yaml && path.file_name().is_some_and(|name| name != "metadata.yaml")
 }
 
-/// A log (MCAP) that holds the map, in a temporary file without a name.
-pub(crate) fn as_log(path: &Path) -> Result<FileBytes, String> {
-    let (map, _) = load_as(path, Thresholds::ByPicture).map_err(|error| error.to_string())?;
+/// A log (MCAP) that holds the map, whose thresholds are read so, in a temporary file without a name.
+pub(crate) fn as_log(path: &Path, thresholds: Thresholds) -> Result<FileBytes, String> {
+    let (map, _) = load_as(path, thresholds).map_err(|error| error.to_string())?;
     let header = Header::new(TIME, "map");
     let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };
     let bytes = encode(&message).map_err(|error| error.to_string())?;

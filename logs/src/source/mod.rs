@@ -29,6 +29,7 @@ pub(crate) use route::{Classified, PoseSource, RobotChannels, Role};
 pub use stage::McapSource;
 pub(crate) use tag_reader::TagReader;
 
+use crate::map_file::Thresholds;
 use crate::names::{Convention, Input, NameRules};
 use gridweave_runtime::ros::{
     OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
@@ -57,6 +58,8 @@ pub struct SourceParameters {
     /// Whether the clocks of all logs, and the stamps in their messages, are set so that they begin when the first one does: for
     /// robots whose clocks have nothing in common.
     pub align_start: bool,
+    /// Whether the thresholds of map files beside logs are taken as they stand; see `map_file_source`.
+    pub literal_thresholds: bool,
     /// Seconds from the first message of the logs at which to begin. The last map of each robot before that, and other
     /// latched messages, are sent at the beginning.
     #[schemars(range(min = 0.0))]
@@ -78,7 +81,8 @@ impl SourceParameters {
     fn rules(&self) -> Result<NameRules, String> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let (robots, topics) = (self.only_robots.clone(), self.only_topics.clone());
-        Ok(NameRules { convention: self.names, renames, robots, topics, align_start: self.align_start })
+        let thresholds = if self.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
+        Ok(NameRules { convention: self.names, renames, robots, topics, align_start: self.align_start, thresholds })
     }
 }
 
@@ -119,11 +123,11 @@ pub struct RobotMessages {
     pub(crate) pose: Out<PoseWithCovarianceStamped>,
     pub(crate) tags: Out<TagRange>,
     pub(crate) positions: Out<TagPosition>,
+    pub(crate) bearings: Out<TagBearing>,
     pub(crate) topology: Out<TopologicalMap>,
     pub(crate) scans: Out<RangeScan>,
     pub(crate) odometry: Out<PoseWithCovarianceStamped>,
     pub(crate) other: Out<AnyMessage>,
-    pub(crate) bearings: Out<TagBearing>,
 }
 
 impl Outputs for RobotMessages {
@@ -146,14 +150,14 @@ impl Outputs for RobotMessages {
                 "positions",
                 "positions at which cameras see tags, in the frames of their robots: made from the messages of detectors, or tf",
             ),
-            topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
-            scans: ports.output(
-                "scans",
-                "scans of robots that have no map, as the bases of these robots see them: made from the messages of lidars",
             bearings: ports.output(
                 "bearings",
                 "directions in which tags are perceived, in the frames of their robots: made from messages with a bearing",
             ),
+            topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
+            scans: ports.output(
+                "scans",
+                "scans of robots that have no map, as the bases of these robots see them: made from the messages of lidars",
             ),
             odometry: ports.output(
                 "odometry",

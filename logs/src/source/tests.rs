@@ -356,3 +356,20 @@ fn a_name_that_is_too_long_is_warned_of_where_nobody_needs_it() {
         run.warnings.iter().filter(|(text, _)| text.contains("at most 128 fit")).map(|(_, count)| *count).collect();
     assert_eq!(warned, [2], "{:?}", run.warnings);
 }
+
+#[test]
+fn the_thresholds_of_a_map_beside_logs_are_read_as_the_user_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("robot1.yaml");
+    let info = MapMetaData { resolution: 0.05, width: 3, height: 1, ..Default::default() };
+    crate::map_file::save(&file, &crate::map_file::GridMap { info, cells: vec![0, 100, -1] }).unwrap();
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("free_thresh: 0.196"), "{text}");
+    std::fs::write(&file, text.replace("free_thresh: 0.196", "free_thresh: 0.25")).unwrap();
+    for (more, unknown) in [("", 255), ("literal_thresholds = true", 0)] {
+        let run = try_run(vec![file.clone()], more, RobotTopics::default()).unwrap();
+        let maps = run.on("map");
+        let map: OccupancyGrid<'_> = maps[0].decode().unwrap();
+        assert_eq!(map.data, [0, 100, unknown], "{more}");
+    }
+}

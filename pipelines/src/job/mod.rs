@@ -183,7 +183,8 @@ impl Job<'_> {
             overrides.set_for_kind(LOG_SINK, "file", text_of(&file)?);
         }
         if self.options.literal_thresholds {
-            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "literal_thresholds", true);
+            let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { Inputs::of(self.inputs)? };
+            overrides.set_for_kind(inputs.source_kind(), "literal_thresholds", true);
         }
         if self.options.results_only {
             overrides.set_for_kind(LOG_SINK, "pass_input", false);

@@ -67,6 +67,6 @@ impl NamingOptions {
     pub(crate) fn rules(&self, convention: Convention) -> Result<NameRules, BadUse> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>().map_err(BadUse)?;
         let (robots, topics) = (self.robots.clone(), self.topics.clone());
-        Ok(NameRules { convention, renames, robots, topics, align_start: self.align_start })
+        Ok(NameRules { convention, renames, robots, topics, align_start: self.align_start, ..Default::default() })
     }
 }
