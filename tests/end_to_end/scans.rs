@@ -70,8 +70,9 @@ fn scans_of_robots_of_which_nothing_says_where_they_were_give_no_map() {
     merge(folder).assert(1, &["nothing says where it was"]);
 }
 
-/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted askew.
-fn with_odometry(log: &Path, to: &Path) {
+/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted askew. The
+/// odometry is in tf alone if `in_tf`.
+fn with_odometry(log: &Path, to: &Path, in_tf: bool) {
     const ASKEW: f64 = 0.3;
     let bytes = std::fs::read(log).unwrap();
     let mut written = LogBuilder::new(to);
@@ -90,6 +91,12 @@ fn with_odometry(log: &Path, to: &Path) {
                 let PoseStamped { mut header, mut pose } = decode(&message.data).unwrap();
                 header.frame_id = format!("{robot}/odom");
                 (pose.position.x, pose.position.y) = (1.03 * pose.position.x, 1.03 * pose.position.y);
+                if in_tf {
+                    let (child_frame_id, transform) = (format!("{robot}/base_link"), pose.planar().into());
+                    let moved = TransformStamped { header, child_frame_id, transform };
+                    written.message(seconds, "/tf", &TFMessage { transforms: vec![moved] });
+                    continue;
+                }
                 let mut odometry = Odometry { header, ..Default::default() };
                 odometry.pose.pose = pose;
                 written.message(seconds, &format!("/{robot}/odom"), &odometry);
@@ -113,8 +120,11 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     let world = ["--robots", "2", "--seed", "2", "--set", "overlap=0.9", "--set", "drift=0", "--set", "scans=true"];
     let small = ["--set", "width=12", "--set", "height=10", "--set", "tags=0", "--set", "map_offset=0"];
     simulate(folder, "in.mcap", &[&world[..], &small].concat());
-    with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"));
-    gridweave(folder, &["info", "scans.mcap"]).assert(0, &["each matched with those before it along `/robot1/odom`"]);
-    merge(folder).assert(0, &["no map of robot1, robot2 was logged: drawn from scans", "merged 2 of 2"]);
-    assert_eq!(judged(folder), [1, 0].map(Value::from));
+    for (in_tf, along) in [(false, "`/robot1/odom`"), (true, "tf (robot1/odom to robot1/base_link)")] {
+        with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf);
+        let told = format!("each matched with those before it along {along}");
+        gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&told]);
+        merge(folder).assert(0, &["no map of robot1, robot2 was logged: drawn from scans", "merged 2 of 2"]);
+        assert_eq!(judged(folder), [1, 0].map(Value::from));
+    }
 }

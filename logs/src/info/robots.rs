@@ -181,6 +181,7 @@ impl RobotSurvey {
             *self.unreadable.entry(topic.to_owned()).or_default() += 1;
             return;
         };
+        self.inferred.odometry(prefix, is_static(topic), &message);
         let (poses, _) = match &mut self.tf {
             Some(tf) => tf.update(prefix, is_static(topic), &message),
             None => self.inferred.transforms(prefix, is_static(topic), &message),
@@ -260,12 +261,13 @@ impl RobotSurvey {
     /// How the map of a robot would be drawn that has none.
     fn drawing(&self, name: &str, robot: &RobotInfo) -> String {
         let poses = robot.poses_from.clone().or_else(|| self.inferred.origin(name)).filter(|_| robot.poses > 0);
-        let how = match (poses, self.odometry.get(name)) {
+        let by_topic = self.odometry.get(name).map(|topic| format!("`{topic}`"));
+        let how = match (poses, by_topic.or_else(|| self.inferred.odometry_origin(name))) {
             (Some(poses), _) => {
                 format!("draws one from its {} scans, at the poses of {poses}; a SLAM does better", robot.scans)
             }
             (None, Some(odometry)) => format!(
-                "draws one from its {} scans, each matched with those before it along `{odometry}`: it drifts, and a full SLAM \
+                "draws one from its {} scans, each matched with those before it along {odometry}: it drifts, and a full SLAM \
                  is better",
                 robot.scans
             ),

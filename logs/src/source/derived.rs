@@ -81,6 +81,7 @@ impl Derived {
             && let Ok(transforms) = decode::<TFMessage>(data)
         {
             self.poses_of_tf(route, &transforms);
+            self.odometry_of_tf(route, &transforms);
             self.tags_of_tf(route, &transforms);
             self.mounts_of_tf(route, &transforms);
         }
@@ -258,6 +259,10 @@ impl Derived {
             self.has_inferred_poses = true;
             output.pose.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
         }
+        for (robot, pose) in self.odometry_of_tf(route, &message) {
+            self.has_odometry = true;
+            output.odometry.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
+        }
         for (robot, position) in self.tags_of_tf(route, &message) {
             self.send_position(&robot, "of an AprilTag", position, output)?;
         }
@@ -271,6 +276,11 @@ impl Derived {
             Some(tf) => tf.update(robot, is_static(&channel.topic), message),
             None => self.inferred.transforms(robot, is_static(&channel.topic), message),
         }
+    }
+
+    /// Where robots with scans are by odometry that a message of transforms tells.
+    fn odometry_of_tf(&mut self, route: &Route, message: &TFMessage) -> Vec<(String, PoseStamped)> {
+        self.inferred.odometry(&route.robot, is_static(&route.channel.topic), message)
     }
 
     /// The tags that are seen in a message of transforms.
@@ -303,16 +313,6 @@ impl Derived {
                     let tag_id = reading.tag_id;
                     output.tags.send(robot, &TagRange { header, tag_id, range, range_stddev: stddev, rssi })?;
                 }
-                Seen::At(point) => {
-                    let Some(positions) = &self.tag_positions else { continue };
-                    let frame = &message.frame_id;
-                    let position = positions.position(robot, &reading.tag_id, message.stamp, frame, &point);
-                    self.send_position(robot, &topic, position, output)?;
-                }
-            }
-        }
-        Ok(())
-    }
                 Seen::Bearing { bearing, stddev } => {
                     let Some(positions) = &self.tag_positions else { continue };
                     let (frame, tag_id) = (&message.frame_id, &reading.tag_id);
@@ -326,6 +326,16 @@ impl Derived {
                         )),
                     }
                 }
+                Seen::At(point) => {
+                    let Some(positions) = &self.tag_positions else { continue };
+                    let frame = &message.frame_id;
+                    let position = positions.position(robot, &reading.tag_id, message.stamp, frame, &point);
+                    self.send_position(robot, &topic, position, output)?;
+                }
+            }
+        }
+        Ok(())
+    }
 
     fn send_position(
         &mut self,

@@ -8,6 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The names that the frame of a robot's base has, behind that of the robot. The first that is tied to the map counts.
 pub(super) const BASES: [&str; 4] = ["/base_link", "/base_footprint", "_base_link", "_base_footprint"];
 
+/// What the frame of a robot's odometry is called, behind the robot's name.
+const ODOMETRY_FRAME: &str = "odom";
+
 /// Where the poses of a robot come from that has no topic for them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Origin {
@@ -23,6 +26,10 @@ enum Origin {
 #[derive(Debug, Default)]
 pub(crate) struct InferredPoses {
     tf: TfPoses,
+    /// Where the bases of robots that have scans, and no odometry on a topic, are by tf in the frame of odometry.
+    odometry: TfPoses,
+    /// The robots of which tf has told that.
+    with_odometry: BTreeSet<String>,
     origins: BTreeMap<String, Origin>,
     /// The robots whose map was seen, so that its frame is known.
     mapped: BTreeSet<String>,
@@ -45,6 +52,28 @@ impl InferredPoses {
             bases: BASES.map(|base| format!("{robot}{base}")).to_vec(),
         };
         self.tf.set_robots(channels.unposed().map(|robot| (robot.to_owned(), ends(robot))).collect());
+        let by_tf = channels.scanned().filter(|robot| channels.unposed().any(|unposed| unposed == *robot));
+        let by_tf = by_tf.filter(|robot| !channels.has_odometry(robot));
+        let in_odometry = |robot: &str| Ends { map: format!("{robot}/{ODOMETRY_FRAME}"), ..ends(robot) };
+        self.odometry.set_robots(by_tf.map(|robot| (robot.to_owned(), in_odometry(robot))).collect());
+    }
+
+    /// Where robots with scans are in the frames of their odometry, by a message of transforms: for those that have no topic for it.
+    pub(crate) fn odometry(
+        &mut self,
+        prefix: &str,
+        is_static: bool,
+        message: &TFMessage,
+    ) -> Vec<(String, PoseStamped)> {
+        let (poses, _) = self.odometry.update(prefix, is_static, message);
+        self.with_odometry.extend(poses.iter().map(|(robot, _)| robot.clone()));
+        poses
+    }
+
+    /// Where the odometry of a robot comes from, as in "tf (robot1/odom to robot1/base_link)"; `None` if tf has told none.
+    pub(crate) fn odometry_origin(&self, robot: &str) -> Option<String> {
+        let base = self.odometry.base_of(robot).filter(|_| self.with_odometry.contains(robot))?;
+        Some(format!("tf ({} to {base})", self.odometry.map_frame(robot)?))
     }
 
     /// Whether the frame of a robot's map is asked for and not known.

@@ -85,6 +85,8 @@ pub(crate) struct RobotChannels {
     has_cameras: bool,
     /// The robots with scans and without maps.
     scanned: BTreeSet<String>,
+    /// The robots with a topic for odometry.
+    with_odometry: BTreeSet<String>,
 }
 
 impl RobotChannels {
@@ -100,6 +102,7 @@ impl RobotChannels {
             tags_in_tf: BTreeSet::new(),
             has_cameras: false,
             scanned: BTreeSet::new(),
+            with_odometry: BTreeSet::new(),
         };
         let (mut asking, mut with_poses) = (BTreeSet::new(), BTreeSet::new());
         let channels: Vec<&Channel> = channels.collect();
@@ -184,6 +187,11 @@ impl RobotChannels {
     /// The robots with scans and without maps, by name.
     pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
         self.scanned.iter().map(String::as_str)
+    }
+
+    /// Whether a robot without a topic for poses has one for odometry.
+    pub(crate) fn has_odometry(&self, robot: &str) -> bool {
+        self.with_odometry.contains(robot)
     }
 
     /// The robots whose tags are frames in tf.
