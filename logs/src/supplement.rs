@@ -40,7 +40,7 @@ impl SupplementKind {
     }
 
     /// What passes on a channel; none if these are messages.
-    pub(crate) fn of_channel(channel: &Channel) -> Option<Self> {
+    pub fn of_channel(channel: &Channel) -> Option<Self> {
         [Self::Attachment, Self::Metadata].into_iter().find(|kind| *channel == kind.channel())
     }
 }

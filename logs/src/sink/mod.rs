@@ -28,7 +28,7 @@ pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
 pub use provenance::InputFile;
 pub(crate) use provenance::{INPUTS_RECORD, RUN_RECORD};
-pub use rewrite::{RecoverError, Recovery, recover};
+pub use rewrite::{RecoverError, Recovery, recover, write_supplement};
 pub use routing::result_channel;
 
 use gridweave_runtime::stage::{Output, Parameters, StageKind};

@@ -120,7 +120,10 @@ pub(super) fn rewrite(reader: &mut LogReader, log: &mut LogWriter) -> Result<Rec
 }
 
 /// Writes an attachment or a metadata record as it was; `false` if it is damaged.
-fn write_supplement(log: &mut LogWriter, kind: SupplementKind, body: &[u8]) -> Result<bool, LogWriteError> {
+///
+/// # Errors
+/// The log cannot be written.
+pub fn write_supplement(log: &mut LogWriter, kind: SupplementKind, body: &[u8]) -> Result<bool, LogWriteError> {
     match kind {
         SupplementKind::Attachment => match read_attachment(body) {
             Some(attachment) => log.attachment(&attachment).map(|()| true),

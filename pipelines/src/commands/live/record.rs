@@ -9,8 +9,9 @@ use crate::terminal::print_line;
 use anyhow::{Result, bail};
 use clap::Args;
 use gridweave_logs::file::check_writable;
+use gridweave_logs::reader::SupplementKind;
 use gridweave_logs::schemas::schema_text;
-use gridweave_logs::sink::{LogOptions, LogWriter, Outcome};
+use gridweave_logs::sink::{LogOptions, LogWriter, Outcome, write_supplement};
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{PortType, Registry};
@@ -71,7 +72,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
         thread::sleep(LOOK_INTERVAL);
     }
     let missed: u64 = recorders.iter().map(|recorder| recorder.link.missed()).sum();
-    let untyped: u64 = recorders.iter().map(|recorder| recorder.untyped).sum();
+    let untyped: u64 = recorders.iter().map(|recorder| recorder.lanes.untyped).sum();
     let reason = match (missed, untyped) {
         (0, 0) => None,
         (missed, 0) => Some(format!("{missed} messages were missed, as the recorder was too slow for them")),
@@ -88,13 +89,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
 /// One link that is recorded.
 struct Recorder {
     link: WatchedLink,
-    /// The type of its messages, but for those that come on channels of their own.
-    port_type: Option<&'static str>,
-    announced: BTreeMap<u32, Channel>,
-    /// The channels of the log: by the number that was announced, and the topic.
-    channels: BTreeMap<(u32, String), u16>,
-    /// Messages on channels that were announced before it began, which it cannot write.
-    untyped: u64,
+    lanes: Lanes,
 }
 
 impl Recorder {
@@ -104,7 +99,7 @@ impl Recorder {
             PortType::Any => None,
         };
         let link = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
-        Ok(Self { link, port_type, announced: BTreeMap::new(), channels: BTreeMap::new(), untyped: 0 })
+        Ok(Self { link, lanes: Lanes { port_type, ..Lanes::default() } })
     }
 
     /// Writes what has passed. Gives how many messages these were.
@@ -113,16 +108,35 @@ impl Recorder {
         self.link.take(|_, message| passed.push(message))?;
         let mut count = 0;
         for message in &passed {
-            count += u64::from(self.write(message, writer)?);
+            count += u64::from(self.lanes.write(message, writer)?);
         }
         Ok(count)
     }
+}
 
-    /// `false` if it is the announcement of a channel, or of no known type.
+/// On which channels of the log the messages of a link go.
+#[derive(Default)]
+struct Lanes {
+    /// The type of its messages, but for those that come on channels of their own.
+    port_type: Option<&'static str>,
+    announced: BTreeMap<u32, Channel>,
+    /// The channels of the log: by the number that was announced, and the topic.
+    channels: BTreeMap<(u32, String), u16>,
+    /// Messages on channels that were announced before it began, which it cannot write.
+    untyped: u64,
+}
+
+impl Lanes {
+    /// `false` if it is the announcement of a channel, an attachment or a metadata record, or of no known type.
     fn write(&mut self, message: &Message, writer: &mut LogWriter) -> Result<bool> {
         let header = message.header();
         if header.flags.contains(MessageFlags::CHANNEL) {
             self.announced.insert(header.channel, Channel::decode(message.bytes())?);
+            return Ok(false);
+        }
+        if let Some(kind) = self.announced.get(&header.channel).and_then(SupplementKind::of_channel) {
+            // One that is damaged was told of where it was read.
+            write_supplement(writer, kind, message.bytes())?;
             return Ok(false);
         }
         let topic = header.topic.as_str();
@@ -158,5 +172,45 @@ impl Recorder {
             schema: schema_text(name)?.into_bytes(),
             ..Default::default()
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_logs::reader::LogFile;
+    use gridweave_runtime::message::{FixedText, LogTime, MessageHeader as Header};
+
+    fn message(flags: MessageFlags, channel: u32, topic: &str, bytes: Vec<u8>) -> Message {
+        let topic = FixedText::new(topic).unwrap();
+        Message::from_vec(Header { flags, channel, topic, log_time: LogTime(5), ..Default::default() }, bytes)
+    }
+
+    /// The body of a metadata record, as the MCAP specification has it.
+    fn metadata() -> Vec<u8> {
+        let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+        let pairs = [text("weather"), text("rain")].concat();
+        [text("drive"), (pairs.len() as u32).to_le_bytes().to_vec(), pairs].concat()
+    }
+
+    #[test]
+    fn what_lies_beside_the_messages_of_the_input_is_recorded_as_that_and_not_as_messages() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.mcap");
+        let mut writer = LogWriter::create(&path, LogOptions::default()).unwrap();
+        let mut lanes = Lanes::default();
+        let beside = Channel { topic: "metadata".into(), message_encoding: "mcap_record".into(), ..Default::default() };
+        let scan = Channel { topic: "/robot1/scan".into(), message_encoding: "cdr".into(), ..Default::default() };
+        let mut write = |message: Message| lanes.write(&message, &mut writer).unwrap();
+        for (number, channel) in [(1, &beside), (2, &scan)] {
+            assert!(!write(message(MessageFlags::CHANNEL, number, "", channel.encode().unwrap())));
+        }
+        assert!(!write(message(MessageFlags::DATA, 1, "metadata", metadata())));
+        assert!(write(message(MessageFlags::DATA, 2, "/robot1/scan", b"scan".to_vec())));
+        writer.finish(Outcome::Complete).unwrap();
+        let file = LogFile::open(&path).unwrap();
+        assert_eq!(file.metadata("drive").unwrap()["weather"], "rain");
+        assert_eq!(file.statistics().unwrap().messages, 1);
+        assert_eq!(lanes.untyped, 0);
     }
 }
