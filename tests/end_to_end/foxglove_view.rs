@@ -1,7 +1,7 @@
 //! A live run is shown to the Foxglove app, and not slowed by it.
 
 use crate::python_libraries::{python, script};
-use crate::support::{LOG, Run, gridweave};
+use crate::support::{LOG, RECEIVE, Run, gridweave};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
@@ -24,6 +24,17 @@ fn a_port_that_is_taken_ends_the_run_and_is_told() {
     run.assert(1, &[&format!("serve Foxglove on 127.0.0.1:{port}"), "in use", "choose another"]);
     let wrong = gridweave(folder.path(), &["run", "live_merge", "-o", "out.mcap", "--view=nowhere"]);
     wrong.assert(2, &["`--view=nowhere` is no address"]);
+}
+
+#[test]
+fn a_port_that_the_system_chooses_is_told() {
+    let run = Run::start(RECEIVE, &["--view=127.0.0.1:0"]);
+    run.top();
+    let done = run.interrupt();
+    done.assert_done();
+    let told = done.ended.text();
+    let port: String = told.split_once("ws://127.0.0.1:").unwrap().1.chars().take_while(char::is_ascii_digit).collect();
+    assert_ne!(port.parse::<u16>().unwrap(), 0, "{told}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::status::BadUse;
 use gridweave_runtime::pipeline::Pipeline;
 use gridweave_runtime::stage::Registry;
 use std::collections::BTreeSet;
+use std::net::TcpListener;
 
 /// The kind of stage that serves it.
 const VIEW: &str = "foxglove_sink";
@@ -18,6 +19,7 @@ pub(crate) const STANDARD_VIEW: &str = "127.0.0.1:8765";
 /// The address is none, or this program has no such stage.
 pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str) -> Result<String, BadUse> {
     let (host, port) = parse(address)?;
+    let port = if port == 0 { free_port(host) } else { port };
     let kind = registry.get(VIEW).ok_or_else(|| {
         BadUse("this program was built without its view for Foxglove: build it with the feature `foxglove`".to_owned())
     })?;
@@ -37,6 +39,13 @@ pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str
     parameters.insert("port".to_owned(), i64::from(port).into());
     pipeline.attach(kind, parameters, VIEW, |_, from, output| shown.contains(&(from.name.clone(), output.name)));
     Ok(format!("ws://{host}:{port}"))
+}
+
+/// A port of the host that is free: the stage, which may be in a process of its own, takes the one that is told here. 0 if there is
+/// none, or no such host, which the stage tells of.
+fn free_port(host: &str) -> u16 {
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    TcpListener::bind((host, 0)).and_then(|listener| listener.local_addr()).map_or(0, |address| address.port())
 }
 
 /// HOST:PORT, or PORT on this machine.
