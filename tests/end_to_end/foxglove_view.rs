@@ -58,13 +58,16 @@ fn a_client_with_python_libraries_that_comes_late_gets_the_last_of_all_that_is_l
     BufReader::new(halted.stdout.take().unwrap()).read_line(&mut said).unwrap();
     assert_eq!(said.trim(), "halted");
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &[]);
-    let wanted = ["/map", "/robot1/map", "/tf_static", "/markers/graph", "/robot_frames"];
+    let wanted = ["/map", "/robot1/map", "/tf_static", "/markers/graph", "/robot_frames", "/gridweave/stages"];
     let shown = client(port, &wanted).output().unwrap();
     assert!(shown.status.success(), "{}", String::from_utf8_lossy(&shown.stderr));
     let shown: Value = serde_json::from_slice(&shown.stdout).unwrap();
     assert_eq!(shown["/map"]["frame"], "world", "{shown}");
     assert!(shown["/map"]["known"].as_u64().unwrap() > 1000, "{shown}");
     assert!(shown["/tf_static"]["frames"].as_array().unwrap().contains(&"robot1/map".into()), "{shown}");
+    let stages = shown["/gridweave/stages"]["stages"].as_array().unwrap();
+    let tags = stages.iter().find(|stage| stage["name"] == "tags").unwrap();
+    assert!(tags["messages_in"].as_u64().unwrap() > 100 && tags["busy_ms"].as_f64().unwrap() > 0.0, "{tags}");
     let done = run.interrupt();
     halted.kill().unwrap();
     halted.wait().unwrap();

@@ -6,9 +6,13 @@
 //! Foxglove's protocol keeps nothing for those who come late. So the last message of each latched topic is kept here, and sent
 //! to whoever subscribes to it; of `/tf_static` all transforms are, the last to each frame. A viewer that is too slow
 //! gets fewer messages, the oldest of those that wait for it being dropped; nothing of the run waits for it.
+//!
+//! What the stages of the run have done so far is told on a topic of its own, `/gridweave/stages`, once a second, as JSON with a schema;
+//! not with the engine `single`, which does not count while it runs.
 
 mod kept;
 mod stage;
+mod statistics;
 
 use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;

@@ -2,15 +2,18 @@
 
 use super::FoxgloveParameters;
 use super::kept::KeptMessages;
+use super::statistics::Statistics;
 use crate::qos::is_transient_local;
+use crate::sink::given_frames::GivenFrames;
 use crate::sink::result_channel;
-use crate::sink::routing::{ResultTopics, Route};
+use crate::sink::routing::{ResultTopics, Route, is_tf};
 use crate::supplement::SupplementKind;
 use foxglove::{ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::stage::{Context, Output, StageError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// A topic that is shown.
 struct Shown {
@@ -26,7 +29,9 @@ pub(super) struct FoxgloveSink {
     /// The channels that are served. They go with it.
     context: Arc<foxglove::Context>,
     kept: KeptMessages,
+    statistics: Statistics,
     result_topics: ResultTopics,
+    given_frames: GivenFrames,
     input_types: Vec<String>,
     shown: Vec<Shown>,
     /// By wire and number: numbers are given by each source for itself. None is not shown.
@@ -50,9 +55,11 @@ impl FoxgloveSink {
         tracing::info!("Foxglove can open ws://{host}:{}", server.port());
         Ok(Self {
             server: Some(server),
+            statistics: Statistics::start(context.statistics.clone(), &channels, kept.clone()),
             context: channels,
             kept,
             result_topics: ResultTopics::new(context),
+            given_frames: GivenFrames::new(context),
             input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
             shown: Vec::new(),
             announced: BTreeMap::new(),
@@ -92,9 +99,20 @@ impl FoxgloveSink {
             0 => self.result(message),
             number => self.announced.get(&(message.wire(), number)).copied().flatten(),
         };
-        if let Some(Shown { raw, is_latched, .. }) = shown.and_then(|place| self.shown.get(place)) {
+        if let Some(Shown { channel, raw, is_latched }) = shown.and_then(|place| self.shown.get(place)) {
+            let mut bytes = std::borrow::Cow::Borrowed(message.bytes());
+            if is_tf(channel) && header.channel == 0 {
+                self.given_frames.learn(&bytes);
+            } else if is_tf(channel) {
+                match self.given_frames.without(&bytes) {
+                    Some((rest, _)) if rest.is_empty() => return Ok(()),
+                    Some((rest, _)) => bytes = rest.into(),
+                    None => {}
+                }
+            }
             output.count("messages", 1);
-            self.kept.send(raw, *is_latched, header.log_time.0, message.bytes());
+            self.kept.send(raw, *is_latched, header.log_time.0, &bytes);
+            self.statistics.log_time.store(header.log_time.0, Ordering::Relaxed);
         }
         Ok(())
     }
@@ -113,6 +131,7 @@ impl FoxgloveSink {
 
     /// Ends the connections of all viewers.
     pub(super) fn close(&mut self) {
+        self.statistics.end();
         if let Some(server) = self.server.take() {
             // Without waiting for them: one that does not read could keep the run from its end.
             drop(server.stop());

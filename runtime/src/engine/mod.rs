@@ -13,6 +13,7 @@ mod run_prefix;
 mod runner;
 mod single;
 mod stage_thread;
+mod statistics;
 mod threads;
 mod user_folder;
 mod watch;
@@ -23,6 +24,7 @@ pub use feed::{Feed, FeedStopper};
 pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
+pub use statistics::stage_statistics;
 pub use watch::{WatchedLink, watch_stages};
 
 use crate::link::RunNames;

@@ -7,7 +7,7 @@ use super::{Failure, StageReport};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
 use crate::pipeline::{Pipeline, Wire};
-use crate::stage::{Node, OutputEnd, OutputSink, StageError};
+use crate::stage::{Context, Node, OutputEnd, OutputSink, RunStatistics, StageError};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,14 +24,16 @@ pub(super) struct Runner {
 }
 
 impl Runner {
-    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it.
+    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it. `statistics`
+    /// tell what all stages have done, if that is known.
     pub(super) fn new(
         pipeline: &Pipeline,
         stage: usize,
+        statistics: Option<RunStatistics>,
         mut sink: impl FnMut(usize) -> Option<Box<dyn OutputSink>>,
     ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
-        let context = pipeline.context(stage);
+        let context = Context { statistics, ..pipeline.context(stage) };
         let ends =
             spec.topics.iter().enumerate().map(|(port, topic)| OutputEnd { topic: topic.clone(), sink: sink(port) });
         let ends = ends.collect();

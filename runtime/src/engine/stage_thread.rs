@@ -2,6 +2,7 @@
 
 use super::links::Links;
 use super::runner::Runner;
+use super::statistics::run_statistics;
 use super::work::Work;
 use super::{Failure, StageReport};
 use crate::link::{
@@ -94,7 +95,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let sink = |port: usize| Some(Outputs::sink(&outputs, ports.binary_search(&port).ok()?));
         let mut work = Work::new(board.clone(), Rc::clone(&sleeper));
         work.begin();
-        let runner = Runner::new(pipeline, stage, sink)?;
+        let runner = Runner::new(pipeline, stage, Some(run_statistics(pipeline, links.board)), sink)?;
         work.note();
         work.end();
         board.set_state(StageState::Running);

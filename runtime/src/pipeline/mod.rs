@@ -186,6 +186,7 @@ impl Pipeline {
             initial_poses: self.initial_poses.clone(),
             inputs: spec.inputs.iter().map(|wire| self.input_wire(spec, wire)).collect(),
             stall_timeout: self.stall_timeout,
+            statistics: None,
         }
     }
 

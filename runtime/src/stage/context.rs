@@ -1,6 +1,6 @@
 //! What a stage is told when it is made.
 
-use super::{InitialPoses, TagFields};
+use super::{InitialPoses, RunStatistics, TagFields};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Duration;
@@ -22,6 +22,8 @@ pub struct Context {
     pub inputs: Vec<InputWire>,
     /// For how long a stage may work on one message; none for ever.
     pub stall_timeout: Option<Duration>,
+    /// Tells what the stages of the run have done so far, for a stage that shows it; none where the engine does not know.
+    pub statistics: Option<RunStatistics>,
 }
 
 impl Context {

@@ -23,6 +23,9 @@ async def subscribe(socket, channels):
 
 def decode(channel, data):
     name, encoding = channel["schemaName"], channel["encoding"]
+    if encoding == "json":
+        assert channel["schemaEncoding"] == "jsonschema" and json.loads(channel["schema"])["title"] == name, channel
+        return json.loads(bytes(data))
     assert (encoding, channel["schemaEncoding"]) == ("cdr", "ros2msg"), channel
     decoders = generate_dynamic(name, channel["schema"])
     decoder = decoders.get(name) or decoders[name.replace("/msg/", "/")]
@@ -30,6 +33,8 @@ def decode(channel, data):
 
 
 def told(message):
+    if isinstance(message, dict):
+        return message
     if hasattr(message, "info"):
         known = sum(1 for cell in message.data if cell >= 0)
         return {"frame": message.header.frame_id, "cells": len(message.data), "known": known}

@@ -13,9 +13,9 @@ use crate::status::Status;
 use crate::terminal::{print_line, say};
 use anyhow::Result;
 use clap::Args;
-use gridweave_runtime::engine::watch_stages;
-use gridweave_runtime::link::{StageBoard, StageNumber, WireNumber};
-use gridweave_runtime::stage::Registry;
+use gridweave_runtime::engine::{stage_statistics, watch_stages};
+use gridweave_runtime::link::StageBoard;
+use gridweave_runtime::stage::{Registry, StageStatistics};
 use serde_json::{Map, Value, json};
 use server::PageServer;
 use std::net::SocketAddr;
@@ -80,22 +80,19 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
 
 /// What the stages have done so far, in the form of the summary of a run.
 fn summary(running: &Running, boards: &[StageBoard]) -> Value {
-    let stage = |board: &StageBoard| {
-        let dropped: u64 = (0..board.wires()).map(|wire| board.get_wire(wire, WireNumber::Dropped)).sum();
-        let sent: u64 = (0..board.ports()).map(|port| board.sent(port)).sum();
+    let stage = |done: StageStatistics| {
         let mut stage = json!({
-            "messages_in": board.get(StageNumber::MessagesIn),
-            "messages_out": sent,
-            "busy_ms": board.get(StageNumber::Busy) as f64 * 1e-6,
-            "dropped": dropped,
-            "restarts": board.get(StageNumber::Restarts),
+            "messages_in": done.messages_in,
+            "messages_out": done.messages_out,
+            "busy_ms": done.busy_ms,
+            "dropped": done.dropped,
+            "restarts": done.restarts,
         });
-        if let warnings @ 1.. = board.get(StageNumber::Warnings) {
-            stage["warnings"] = json!({ "the run tells of it when it ends": warnings });
+        if done.warnings > 0 {
+            stage["warnings"] = json!({ "the run tells of it when it ends": done.warnings });
         }
-        stage
+        (done.name, stage)
     };
-    let stages = running.pipeline.stages.iter().zip(boards);
-    let stages: Map<String, Value> = stages.map(|(spec, board)| (spec.name.clone(), stage(board))).collect();
+    let stages: Map<String, Value> = stage_statistics(&running.pipeline, boards).into_iter().map(stage).collect();
     json!({ "stages": stages })
 }
