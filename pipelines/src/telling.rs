@@ -71,8 +71,7 @@ impl TellingArgs {
 
     /// Events as lines: warnings, or all that `RUST_LOG` or the user asks for.
     fn lines<S: Subscriber + for<'a> LookupSpan<'a>>(&self) -> impl Layer<S> {
-        let level = ["warn", "info", "debug"].get(usize::from(self.verbose)).copied().unwrap_or("trace");
-        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual_filter(self.verbose)));
         let lines = tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
@@ -109,6 +108,12 @@ impl TellingArgs {
         let is_work = filter_fn(|what| what.is_span() && *what.level() <= Level::DEBUG);
         Ok(Some((layer.with_filter(is_work), guard)))
     }
+}
+
+/// Which events are told where `RUST_LOG` says nothing, by how often the user has asked for more.
+fn usual_filter(verbose: u8) -> &'static str {
+    // Without a router, which nobody needs, Zenoh warns of what it has waited for in vain.
+    ["warn,zenoh=error", "info", "debug"].get(usize::from(verbose)).copied().unwrap_or("trace")
 }
 
 /// The file of a trace. What cannot be written is told once and left out: the run goes on.
@@ -183,4 +188,40 @@ impl Visit for StageField {
     }
 
     fn record_debug(&mut self, _: &Field, _: &dyn std::fmt::Debug) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::{Arc, Mutex};
+
+    struct Lines(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Lines {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn zenoh_tells_errors_alone_until_the_user_asks_for_more() {
+        let told = |verbose: u8| {
+            let lines = Arc::new(Mutex::new(Vec::new()));
+            let (writer, filter) = (Arc::clone(&lines), EnvFilter::new(usual_filter(verbose)));
+            let layer = tracing_subscriber::fmt::layer().with_writer(move || Lines(Arc::clone(&writer)));
+            tracing::subscriber::with_default(tracing_subscriber::registry().with(layer.with_filter(filter)), || {
+                tracing::warn!(target: "zenoh::net::runtime::orchestrator", "scouting");
+                tracing::error!(target: "zenoh::net::runtime", "gone");
+                tracing::warn!(target: "gridweave_logs::sink", "own");
+            });
+            let text = String::from_utf8(lines.lock().unwrap().clone()).unwrap();
+            ["scouting", "gone", "own"].map(|word| text.contains(word))
+        };
+        assert_eq!(told(0), [false, true, true]);
+        assert_eq!(told(1), [true, true, true]);
+    }
 }
