@@ -71,7 +71,7 @@ impl Connection {
     fn config(&self) -> Result<Config, String> {
         let of_environment = || std::env::var_os(CONFIGURATION_VARIABLE).filter(|path| !path.is_empty());
         if let Some(path) = self.zenoh_config.clone().or_else(|| of_environment().map(PathBuf::from)) {
-            return of_file(&path);
+            return file_config(&path);
         }
         let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
         let mut config = Config::default();
@@ -98,7 +98,11 @@ impl Connection {
     }
 }
 
-fn of_file(path: &Path) -> Result<Config, String> {
+/// Reads a configuration file of Zenoh.
+///
+/// # Errors
+/// It cannot be read, or says what Zenoh does not know.
+pub(crate) fn file_config(path: &Path) -> Result<Config, String> {
     Config::from_file(path).map_err(|error| format!("{}: {}", path.display(), in_words(&error)))
 }
 
@@ -123,7 +127,7 @@ mod tests {
 
     #[test]
     fn an_error_of_zenoh_is_told_without_the_place_in_its_code() {
-        let missing = of_file(Path::new("/there/is/no/such/file.json5")).err().unwrap();
+        let missing = file_config(Path::new("/there/is/no/such/file.json5")).err().unwrap();
         assert!(missing.starts_with("/there/is/no/such/file.json5: No such file"), "{missing}");
         assert!(!missing.contains(".rs:"), "{missing}");
     }

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub mod attachment;
+pub mod bridge;
 mod connection;
 mod definitions;
 mod inbox;
@@ -32,5 +33,6 @@ use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of this crate.
 pub fn kinds() -> Vec<StageKind> {
-    vec![source::kind(), sink::kind()]
+    let ros = [source::kind(), sink::kind()];
+    ros.into_iter().chain(bridge::kinds()).collect()
 }

@@ -197,8 +197,10 @@ impl Pipeline {
             true => String::new(),
             false => from.topics.get(wire.from_port).cloned().unwrap_or_default(),
         };
-        let ros_type = from.kind.outputs[wire.from_port].port_type.name().to_owned();
-        InputWire { port: spec.kind.inputs[wire.port].name, from: from.name.clone(), ros_type, topic }
+        let output = &from.kind.outputs[wire.from_port];
+        let ros_type = output.port_type.name().to_owned();
+        let port = spec.kind.inputs[wire.port].name;
+        InputWire { port, from: from.name.clone(), output: output.name, ros_type, topic }
     }
 }
 

@@ -40,6 +40,8 @@ pub struct InputWire {
     pub port: &'static str,
     /// The stage that the output belongs to.
     pub from: String,
+    /// The name of the output.
+    pub output: &'static str,
     /// The ROS 2 type of its messages; empty for any.
     pub ros_type: String,
     /// The topic that its messages get in a log, with `{robot}` for the robot's name; empty if they bring topics of their

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod bridge;
+mod network_namespaces;
 mod python_robots;
 mod stages;
 mod wire;

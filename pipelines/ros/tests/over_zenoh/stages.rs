@@ -67,6 +67,7 @@ fn sink(router: &Router, wires: &[(&'static str, &str)]) -> LoneStage {
         from: "a".into(),
         ros_type: (*ros_type).to_owned(),
         topic: (*topic).to_owned(),
+        ..Default::default()
     };
     let context = Context { stage: "ros".into(), inputs: wires.iter().map(wire).collect(), ..Default::default() };
     LoneStage::with_context(&gridweave_ros::sink::kind(), &router.parameters(), &context).unwrap()

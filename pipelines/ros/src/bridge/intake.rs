@@ -1,0 +1,170 @@
+//! What a receiver has taken of its senders.
+//!
+//! It knows no network. Of each sender it takes the batches in their order, each once, and makes of them the messages as they were
+//! given to the sender.
+
+use super::difference::message;
+use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};
+use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What a sender has sent, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Item {
+    /// The messages of this link with the header's channel were logged on this one.
+    Channel { link: Arc<Link>, number: u32, channel: Channel },
+    /// A message.
+    Message { link: Arc<Link>, header: MessageHeader, bytes: Vec<u8> },
+}
+
+/// What was taken.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Taken {
+    /// Who has sent it; empty if that cannot be read.
+    pub(super) sender: String,
+    pub(super) session: u64,
+    /// What is new.
+    pub(super) items: Vec<Item>,
+    /// How many messages the sender has dropped since it told last.
+    pub(super) dropped: u64,
+    /// By how much the clock of the sender differs, if it was told that just now that it does, or no longer; nanoseconds.
+    pub(super) clock: Option<i64>,
+    /// Whether the sender has just said that nothing follows.
+    pub(super) is_end: bool,
+    /// What cannot be read.
+    pub(super) wrong: Option<String>,
+}
+
+/// What the receiver knows of its senders.
+#[derive(Debug)]
+pub(super) struct Intake {
+    receiver: u64,
+    /// Clocks may differ by so much, nanoseconds.
+    tolerance: i64,
+    /// By session.
+    senders: BTreeMap<u64, Sender>,
+}
+
+#[derive(Debug, Default)]
+struct Sender {
+    links: Vec<Arc<Link>>,
+    /// Which greeting of the sender this is since.
+    greeting: u64,
+    /// The number of the next batch.
+    next: u64,
+    /// What is added to the times of the sender, nanoseconds.
+    correction: i64,
+    dropped: u64,
+    /// By link and topic: the last message of those that are told by what they have new.
+    known: BTreeMap<(u32, String), Vec<u8>>,
+}
+
+impl Intake {
+    pub(super) fn new(receiver: u64, tolerance: i64) -> Self {
+        Self { receiver, tolerance, senders: BTreeMap::new() }
+    }
+
+    /// Forgets a sender that is gone for good.
+    pub(super) fn forget(&mut self, session: u64) {
+        self.senders.remove(&session);
+    }
+
+    /// Takes a batch, and says what to answer once that was passed on.
+    pub(super) fn take(&mut self, bytes: &[u8]) -> (Taken, Answer) {
+        let receiver = self.receiver;
+        let answer = |number, outcome, text: &str| Answer {
+            receiver,
+            number,
+            outcome,
+            came: 0,
+            answered: 0,
+            text: text.to_owned(),
+        };
+        let batch: Batch = match from_bytes(bytes) {
+            Ok(batch) => batch,
+            Err(wrong) => {
+                let answer = answer(0, Outcome::Unreadable, &wrong);
+                return (Taken { wrong: Some(wrong), ..Default::default() }, answer);
+            }
+        };
+        let number = batch.number;
+        let mut told = Taken { sender: batch.sender.clone(), session: batch.session, ..Default::default() };
+        let known = self.senders.get(&batch.session).map(|sender| (sender.greeting, sender.next));
+        // What comes late was taken, or told anew, before.
+        if known.is_some_and(|known| (batch.greeting, number) < known) {
+            return (told, answer(number, Outcome::Taken, ""));
+        }
+        if number == 0 {
+            let links = batch.links.into_iter().map(Arc::new).collect();
+            let before = self.senders.remove(&batch.session).unwrap_or_default();
+            let Sender { correction, dropped, .. } = before;
+            let known = BTreeMap::new();
+            let sender = Sender { links, greeting: batch.greeting, next: 1, correction, dropped, known };
+            self.senders.insert(batch.session, sender);
+            return (told, answer(number, Outcome::Taken, ""));
+        }
+        let is_next = known == Some((batch.greeting, number)) && batch.receiver == self.receiver;
+        let Some(sender) = self.senders.get_mut(&batch.session).filter(|_| is_next) else {
+            return (told, answer(number, Outcome::Unknown, ""));
+        };
+        let (dropped, is_end, offset) = (batch.dropped, batch.is_end, batch.clock_offset);
+        if offset.saturating_sub(sender.correction).saturating_abs() > self.tolerance {
+            sender.correction = if offset.saturating_abs() > self.tolerance { offset } else { 0 };
+            told.clock = Some(sender.correction);
+        }
+        match sender.items(batch.entries) {
+            Ok(items) => {
+                sender.next += 1;
+                (told.items, told.is_end) = (items, is_end);
+                told.dropped = dropped.saturating_sub(std::mem::replace(&mut sender.dropped, dropped));
+                (told, answer(number, Outcome::Taken, ""))
+            }
+            Err(wrong) => {
+                // What is known of it is no longer whole.
+                self.senders.remove(&batch.session);
+                let answer = answer(number, Outcome::Unreadable, &wrong);
+                told.wrong = Some(wrong);
+                (told, answer)
+            }
+        }
+    }
+}
+
+impl Sender {
+    fn items(&mut self, entries: Vec<Entry>) -> Result<Vec<Item>, String> {
+        entries.into_iter().map(|entry| self.item(entry)).collect()
+    }
+
+    fn item(&mut self, entry: Entry) -> Result<Item, String> {
+        let link = self.links.get(entry.link as usize).cloned();
+        let link = link.ok_or_else(|| format!("it has no link {}", entry.link))?;
+        let text = |error: &dyn std::fmt::Display| format!("a message on `{}`: {error}", entry.topic);
+        if entry.form == Form::Channel {
+            let channel = Channel::decode(&entry.bytes).map_err(|error| text(&error))?;
+            return Ok(Item::Channel { link, number: entry.channel, channel });
+        }
+        let corrected = |time: u64| time.saturating_add_signed(self.correction);
+        let header = MessageHeader {
+            log_time: LogTime(corrected(entry.log_time)),
+            publish_time: corrected(entry.publish_time),
+            channel: entry.channel,
+            log_sequence: entry.log_sequence,
+            robot: FixedText::new(&entry.robot).map_err(|error| text(&error))?,
+            topic: FixedText::new(&entry.topic).map_err(|error| text(&error))?,
+            ..Default::default()
+        };
+        let nothing = Vec::new();
+        let key = (entry.link, entry.topic.clone());
+        let known = match entry.form {
+            Form::Difference => self.known.get(&key).ok_or_else(|| text(&"what it builds upon is not known"))?,
+            Form::Whole | Form::Beginning | Form::Channel => &nothing,
+        };
+        if entry.form == Form::Whole {
+            return Ok(Item::Message { link, header, bytes: entry.bytes });
+        }
+        let bytes = message(known, &entry.bytes).map_err(|error| text(&error))?;
+        self.known.insert(key, bytes.clone());
+        Ok(Item::Message { link, header, bytes })
+    }
+}

@@ -1,0 +1,180 @@
+//! How the ends of a bridge find each other, and whom they let in.
+
+use crate::connection::{file_config, in_words};
+use gridweave_runtime::stage::{ParameterError, StageError};
+use std::net::IpAddr;
+use std::path::PathBuf;
+use zenoh::config::EndPoint;
+use zenoh::{Config, Session, Wait};
+
+/// Where a receiver listens, and a sender looks for it, where nothing else is said.
+pub(super) const BASE: &str = "tcp/localhost:7448";
+/// The protocols of Zenoh that encrypt.
+const ENCRYPTED: [&str; 2] = ["tls", "quic"];
+
+/// What the parameters of a stage say of the network.
+#[derive(Clone, Debug)]
+pub(super) struct Network {
+    pub(super) bridge: String,
+    pub(super) connect: Vec<String>,
+    pub(super) listen: Vec<String>,
+    pub(super) discover: bool,
+    pub(super) zenoh_config: Option<PathBuf>,
+    pub(super) insecure: bool,
+}
+
+impl Network {
+    /// What is wrong with it.
+    pub(super) fn check(&self) -> Vec<ParameterError> {
+        let mut errors = Vec::new();
+        if !is_part_of_key(&self.bridge) {
+            errors.push(ParameterError::new("bridge", "must be letters, digits, `_`, `-` and `.`"));
+        }
+        for (key, endpoints) in [("connect", &self.connect), ("listen", &self.listen)] {
+            for endpoint in endpoints {
+                match endpoint.parse::<EndPoint>() {
+                    Err(_) => {
+                        let text = format!("`{endpoint}` is none; write it as `tcp/HOST:PORT`");
+                        errors.push(ParameterError::new(key, text));
+                    }
+                    Ok(_) if !self.insecure && is_open(endpoint) => {
+                        errors.push(ParameterError::new(key, open(endpoint)))
+                    }
+                    Ok(_) => {}
+                }
+            }
+        }
+        if self.discover && !self.insecure && self.zenoh_config.is_none() {
+            let text = "asks everybody on the network, and what is sent to who answers is not encrypted: name the other end, use \
+                        TLS by `zenoh_config`, or set `insecure = true` on a network that you trust";
+            errors.push(ParameterError::new("discover", text));
+        }
+        errors
+    }
+
+    /// Joins the network.
+    ///
+    /// # Errors
+    /// The configuration file is wrong, or opens what is not to be open; or nothing can listen where it is to.
+    pub(super) fn open(&self) -> Result<Session, StageError> {
+        let doing = "join the Zenoh network";
+        let config = self.config().map_err(|cause| StageError::new(doing, cause))?;
+        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
+    }
+
+    fn config(&self) -> Result<Config, String> {
+        if let Some(path) = &self.zenoh_config {
+            let config = file_config(path)?;
+            let endpoints = ["connect/endpoints", "listen/endpoints"].map(|key| endpoints_of(&config, key));
+            return match endpoints.iter().flatten().find(|endpoint| !self.insecure && is_open(endpoint)) {
+                Some(endpoint) => Err(format!("{}: {}", path.display(), open(endpoint))),
+                None => Ok(config),
+            };
+        }
+        let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
+        let mut config = Config::default();
+        for (key, value) in [
+            ("mode", "\"peer\""),
+            ("connect/endpoints", &list(&self.connect)?),
+            ("listen/endpoints", &list(&self.listen)?),
+            ("scouting/multicast/enabled", if self.discover { "true" } else { "false" }),
+            // Senders have nothing to say to each other.
+            ("scouting/gossip/autoconnect", "{ router: [], peer: [], client: [] }"),
+        ] {
+            config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
+        }
+        Ok(config)
+    }
+
+    /// Where the other end is looked for, as words.
+    pub(super) fn others(&self) -> String {
+        match (&self.zenoh_config, self.connect.is_empty()) {
+            (Some(path), _) => format!("where {} says", path.display()),
+            (None, true) => "anywhere".to_owned(),
+            (None, false) => self.connect.join(" or "),
+        }
+    }
+}
+
+/// What the name of a bridge or a sender may be.
+pub(super) fn is_part_of_key(name: &str) -> bool {
+    let is_usual = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    !name.is_empty() && name.len() <= 100 && name.chars().all(is_usual)
+}
+
+/// Whether what goes there leaves this machine, and can be read on its way.
+fn is_open(endpoint: &str) -> bool {
+    let Some((protocol, rest)) = endpoint.split_once('/') else { return true };
+    let address = rest.split(['?', '#']).next().unwrap_or(rest);
+    let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    let is_loopback = host == "localhost" || host.parse().is_ok_and(|address: IpAddr| address.is_loopback());
+    !is_loopback && !ENCRYPTED.contains(&protocol)
+}
+
+fn open(endpoint: &str) -> String {
+    format!(
+        "`{endpoint}` is not this machine, and what goes there is not encrypted: use TLS by `zenoh_config`, or set `insecure = true` \
+         on a network that you trust"
+    )
+}
+
+/// All endpoints that a configuration has under a key, for whatever mode.
+fn endpoints_of(config: &Config, key: &str) -> Vec<String> {
+    fn strings(value: &serde_json::Value, found: &mut Vec<String>) {
+        match value {
+            serde_json::Value::String(text) if text.contains('/') => found.push(text.clone()),
+            serde_json::Value::Array(values) => values.iter().for_each(|value| strings(value, found)),
+            serde_json::Value::Object(values) => values.values().for_each(|value| strings(value, found)),
+            _ => {}
+        }
+    }
+    let mut found = Vec::new();
+    let value = config.get_json(key).ok().and_then(|text| serde_json::from_str(&text).ok());
+    strings(&value.unwrap_or_default(), &mut found);
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn network(connect: &[&str], listen: &[&str]) -> Network {
+        let owned = |list: &[&str]| list.iter().map(|&text| text.to_owned()).collect();
+        let (connect, listen) = (owned(connect), owned(listen));
+        Network { bridge: "base".into(), connect, listen, discover: false, zenoh_config: None, insecure: false }
+    }
+
+    #[test]
+    fn what_leaves_the_machine_is_encrypted_or_told_to_be_open() {
+        for closed in ["tcp/localhost:7448", "tcp/127.0.0.1:0", "tcp/[::1]:7448", "tls/10.0.0.1:7448", "quic/base:1"] {
+            assert_eq!(network(&[closed], &[closed]).check(), [], "{closed}");
+        }
+        for open in ["tcp/0.0.0.0:7448", "tcp/[::]:0", "tcp/base:7448", "udp/10.0.0.1:7448", "tcp/1.2.3.4:5#iface=lo"] {
+            let errors = network(&[], &[open]).check();
+            assert!(errors.len() == 1 && errors[0].to_string().contains("insecure = true"), "{open} {errors:?}");
+            assert_eq!(network(&[open], &[]).check().len(), 1, "{open}");
+            assert_eq!(Network { insecure: true, ..network(&[open], &[open]) }.check(), []);
+        }
+        assert_eq!(Network { discover: true, ..network(&[], &[]) }.check()[0].field, "discover");
+        assert!(network(&["nonsense"], &[]).check()[0].problem.contains("tcp/HOST:PORT"));
+        assert_eq!(Network { bridge: "a/**".into(), ..network(&[], &[]) }.check()[0].field, "bridge");
+    }
+
+    #[test]
+    fn a_configuration_file_does_not_open_what_is_not_told_to_be_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("zenoh.json5");
+        let config = |listen: &str| {
+            std::fs::write(&path, format!("{{ mode: 'peer', listen: {{ endpoints: {listen} }} }}")).unwrap();
+            Network { zenoh_config: Some(path.clone()), ..network(&[], &[]) }
+        };
+        assert!(config("['tls/0.0.0.0:7448']").config().is_ok());
+        assert!(config("{ peer: ['tcp/127.0.0.1:0'] }").config().is_ok());
+        for open in ["['tcp/0.0.0.0:7448']", "{ peer: ['tcp/10.0.0.1:0'] }"] {
+            let error = config(open).config().err().unwrap();
+            assert!(error.contains("zenoh.json5") && error.contains("insecure = true"), "{error}");
+            assert!(Network { insecure: true, ..config(open) }.config().is_ok());
+        }
+    }
+}

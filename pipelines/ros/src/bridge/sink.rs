@@ -1,0 +1,227 @@
+//! The stage `bridge_sink`: sends links of a live run to another machine.
+
+use super::clock::Clock;
+use super::network::{BASE, Network, is_part_of_key};
+use super::outbox::{Limits, Totals};
+use super::sender::{Sender, Settings};
+use super::wire::Link;
+use gridweave_runtime::message::{Channel, FixedText, Message};
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage, encode};
+use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, StageError, StageKind, frame_of_robot};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The parameters of `bridge_sink`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SinkParameters {
+    /// The name of the bridge, which the `bridge_source` at its other end has, too.
+    pub bridge: String,
+    /// What the other end calls this one; the name of the machine if it is not given.
+    pub sender: Option<String>,
+    /// The robot that messages about none in particular are sent as: a base that sends its merged map to another is one. Its
+    /// topics and map frames get its name.
+    pub robot: Option<String>,
+    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    pub connect: Vec<String>,
+    /// Where others may connect, as `tcp/HOST:PORT`. Nothing is listened to if none are given.
+    pub listen: Vec<String>,
+    /// Look for the other end on the local network, by multicast.
+    pub discover: bool,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen` and `discover`: for TLS, for example.
+    pub zenoh_config: Option<PathBuf>,
+    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    pub insecure: bool,
+    /// So many messages of a topic wait to be sent before the oldest is dropped.
+    #[schemars(range(min = 1))]
+    pub keep_last: usize,
+    /// So many of a topic whose last message is all that holds, such as a map, wait before all of them go for the next.
+    #[schemars(range(min = 1))]
+    pub keep_maps: usize,
+    /// At least so many seconds from one batch of messages to the next.
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub interval: f64,
+    /// For so many seconds the end of the run waits until the other end has taken what was sent last.
+    #[schemars(range(min = 0.0, max = 86400.0))]
+    pub linger: f64,
+}
+
+impl Default for SinkParameters {
+    fn default() -> Self {
+        Self {
+            bridge: "base".to_owned(),
+            sender: None,
+            robot: None,
+            connect: vec![BASE.to_owned()],
+            listen: Vec::new(),
+            discover: false,
+            zenoh_config: None,
+            insecure: false,
+            keep_last: 6000,
+            keep_maps: 100,
+            interval: 0.05,
+            linger: 30.0,
+        }
+    }
+}
+
+impl SinkParameters {
+    fn network(&self) -> Network {
+        let Self { bridge, connect, listen, discover, zenoh_config, insecure, .. } = self.clone();
+        Network { bridge, connect, listen, discover, zenoh_config, insecure }
+    }
+
+    fn settings(&self, clock: Clock) -> Settings {
+        let seconds = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        Settings {
+            network: self.network(),
+            name: self.sender.clone().unwrap_or_else(machine),
+            limits: Limits { messages: self.keep_last, states: self.keep_maps },
+            interval: seconds(self.interval),
+            clock,
+        }
+    }
+}
+
+/// The name of this machine, as far as it can be the name of a sender.
+fn machine() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let name = name.trim().replace(|c: char| !is_part_of_key(&c.to_string()), "_");
+    if name.is_empty() { "sender".to_owned() } else { name }
+}
+
+impl Parameters for SinkParameters {
+    fn check_together(&self) -> Vec<ParameterError> {
+        let mut errors = self.network().check();
+        if self.sender.as_ref().is_some_and(|sender| !is_part_of_key(sender)) {
+            errors.push(ParameterError::new("sender", "must be letters, digits, `_`, `-` and `.`"));
+        }
+        if self.robot.as_ref().is_some_and(|robot| robot.is_empty() || robot.contains('/') || robot.len() > 60) {
+            errors.push(ParameterError::new(
+                "robot",
+                "must be the name of a robot, without a slash and not above 60 bytes",
+            ));
+        }
+        errors
+    }
+}
+
+/// The kind `bridge_sink`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "bridge_sink",
+        "Sends what it is given to the `bridge_source` of a run on another machine, over Zenoh: each message once and in order, \
+         however bad the link. What is new of a map is sent, not the whole map. While the link is broken messages wait; those for \
+         which there is no room are dropped, and counted",
+        |parameters, context| BridgeSink::new(parameters, context, Clock::default()),
+    )
+    .any_inputs("in", "what to send: outputs of any stage", BridgeSink::receive)
+    .announce(BridgeSink::announce)
+    .finish(BridgeSink::finish)
+    .build()
+}
+
+/// Sends what it is given.
+pub(super) struct BridgeSink {
+    sender: Sender,
+    links: Vec<Link>,
+    robot: Option<String>,
+    linger: Duration,
+    /// What was counted.
+    counted: Totals,
+}
+
+impl BridgeSink {
+    pub(super) fn new(parameters: SinkParameters, context: &Context, clock: Clock) -> Result<Self, StageError> {
+        let link = |wire: &gridweave_runtime::stage::InputWire| Link {
+            port: wire.output.to_owned(),
+            ros_type: wire.ros_type.clone(),
+        };
+        let links: Vec<Link> = context.inputs.iter().map(link).collect();
+        let settings = parameters.settings(clock);
+        Ok(Self {
+            sender: Sender::start(settings, links.clone())?,
+            links,
+            robot: parameters.robot,
+            linger: Duration::try_from_secs_f64(parameters.linger).unwrap_or_default(),
+            counted: Totals::default(),
+        })
+    }
+
+    pub(super) fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+        let bytes = channel.encode();
+        let bytes = bytes.map_err(|error| StageError::new(format!("announce the channel {}", channel.topic), error))?;
+        self.sender.announce(wire, number, bytes);
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        match &self.robot {
+            Some(robot) if message.robot().is_empty() && message.header().channel == 0 => {
+                let (header, bytes) = self.as_robot(robot, message)?;
+                self.sender.push(message.wire(), &header, bytes.as_deref().unwrap_or(message.bytes()))?;
+            }
+            _ => self.sender.push(message.wire(), message.header(), message.bytes())?,
+        }
+        self.tell(output);
+        Ok(())
+    }
+
+    /// A message about no robot as one about the given one, and its bytes if they are others then.
+    fn as_robot(
+        &self,
+        robot: &str,
+        message: &Message,
+    ) -> Result<(gridweave_runtime::message::MessageHeader, Option<Vec<u8>>), StageError> {
+        let failed = |cause: &dyn std::fmt::Display| StageError::new(format!("send a message as of `{robot}`"), cause);
+        let mut header = *message.header();
+        header.robot = FixedText::new(robot).map_err(|error| failed(&error))?;
+        let topic = header.topic;
+        header.topic = FixedText::new(&format!("/{robot}{}", topic.as_str())).map_err(|error| failed(&error))?;
+        let is_grid = self.links.get(message.wire()).is_some_and(|link| link.ros_type == OccupancyGrid::NAME);
+        let bytes = match message.decode::<OccupancyGrid<'_>>() {
+            Ok(mut grid) if is_grid => {
+                grid.header.frame_id = frame_of_robot(robot, &grid.header.frame_id).into_owned();
+                Some(encode(&grid).map_err(|error| failed(&error))?)
+            }
+            _ => None,
+        };
+        Ok((header, bytes))
+    }
+
+    pub(super) fn finish(&mut self, output: &Output<()>) -> Result<(), StageError> {
+        let untaken = self.sender.end(self.linger);
+        self.tell(output);
+        if let Some(messages) = untaken {
+            let seconds = self.linger.as_secs_f64();
+            let text = format!("the other end of the bridge has not taken the end within {seconds} s");
+            tracing::warn!("{text}; {messages} messages were not taken");
+            output.warn(text);
+            output.count("messages that were not taken before the end", messages as u64);
+        }
+        Ok(())
+    }
+
+    /// Counts what has been done since the last time, and tells what has happened.
+    fn tell(&mut self, output: &Output<()>) {
+        let now = self.sender.totals();
+        let before = std::mem::replace(&mut self.counted, now);
+        for (what, more) in [
+            ("messages taken by the other end", now.sent - before.sent),
+            ("batches", now.batches - before.batches),
+            ("bytes sent", now.bytes - before.bytes),
+            ("bytes of the messages in them", now.message_bytes - before.message_bytes),
+            ("messages dropped because the bridge does not keep up", now.dropped - before.dropped),
+        ] {
+            if more > 0 {
+                output.count(what, more);
+            }
+        }
+        if now.dropped > before.dropped {
+            output.warn("messages were dropped because the bridge does not keep up");
+        }
+        self.sender.take_notices().into_iter().for_each(|notice| output.warn(notice));
+    }
+}

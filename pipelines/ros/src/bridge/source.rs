@@ -1,0 +1,330 @@
+//! The stage `bridge_source`: takes what other machines send over a bridge into a live pipeline.
+
+use super::clock::Clock;
+use super::intake::{Intake, Item, Taken};
+use super::network::{BASE, Network, is_part_of_key};
+use super::presence::{Presence, Role, watch};
+use super::wire::{Link, to_bytes};
+use crate::connection::in_words;
+use gridweave_logs::schemas::schema_text;
+use gridweave_logs::source::live_kind;
+use gridweave_runtime::message::{Channel, MessageHeader};
+use gridweave_runtime::stage::{
+    AnyMessage, Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, PortType, Source, StageError,
+    StageKind,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
+
+/// So many batches are handled at a time.
+const BATCHES: usize = 16;
+
+/// The parameters of `bridge_source`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SourceParameters {
+    /// The name of the bridge, which the `bridge_sink`s at its other ends have, too.
+    pub bridge: String,
+    /// What the other ends call this one.
+    pub receiver: String,
+    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    pub connect: Vec<String>,
+    /// Where others may connect, as `tcp/HOST:PORT`. Nothing else is listened to.
+    pub listen: Vec<String>,
+    /// Let the other ends find this one on the local network, by multicast.
+    pub discover: bool,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen` and `discover`: for TLS, for example.
+    pub zenoh_config: Option<PathBuf>,
+    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    pub insecure: bool,
+    /// The times of a sender whose clock differs from the one here by more than so many seconds are corrected by that.
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub clock_tolerance: f64,
+    /// When so many senders have said that nothing follows, the run ends; never if it is not given.
+    #[schemars(range(min = 1))]
+    pub end_after: Option<usize>,
+}
+
+impl Default for SourceParameters {
+    fn default() -> Self {
+        Self {
+            bridge: "base".to_owned(),
+            receiver: "base".to_owned(),
+            connect: Vec::new(),
+            listen: vec![BASE.to_owned()],
+            discover: false,
+            zenoh_config: None,
+            insecure: false,
+            clock_tolerance: 1.0,
+            end_after: None,
+        }
+    }
+}
+
+impl SourceParameters {
+    fn network(&self) -> Network {
+        let Self { bridge, connect, listen, discover, zenoh_config, insecure, .. } = self.clone();
+        Network { bridge, connect, listen, discover, zenoh_config, insecure }
+    }
+}
+
+impl Parameters for SourceParameters {
+    fn check_together(&self) -> Vec<ParameterError> {
+        let mut errors = self.network().check();
+        if !is_part_of_key(&self.receiver) {
+            errors.push(ParameterError::new("receiver", "must be letters, digits, `_`, `-` and `.`"));
+        }
+        errors
+    }
+}
+
+/// The kind `bridge_source`.
+pub fn kind() -> StageKind {
+    StageKind::source(
+        "bridge_source",
+        "Takes what the `bridge_sink`s of runs on other machines send into a live pipeline, over Zenoh: each message once, and those \
+         of a sender in order. Says when a sender comes, ends, or is gone, and what it has dropped",
+        BridgeSource::new,
+    )
+    .live_only()
+}
+
+/// The outputs: those that every source of what robots send has.
+pub(super) struct Ports(Vec<Port>);
+
+struct Port {
+    name: &'static str,
+    port_type: PortType,
+    out: Out<AnyMessage>,
+}
+
+impl Outputs for Ports {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let port = |port: gridweave_runtime::stage::OutputPort| Port {
+            name: port.name,
+            port_type: port.port_type,
+            out: ports.encoded_port(port),
+        };
+        Self(live_kind().outputs.into_iter().map(port).collect())
+    }
+}
+
+impl Ports {
+    /// The port of the same name and type, or else that for all other messages.
+    fn of(&self, link: &Link) -> Option<(usize, &Port)> {
+        let ports = || self.0.iter().enumerate();
+        let same = ports().find(|(_, port)| port.name == link.port && port.port_type.name() == link.ros_type);
+        same.or_else(|| ports().find(|(_, port)| port.port_type == PortType::Any))
+    }
+}
+
+enum Event {
+    Sender(Presence, bool),
+    Batch(Query, i64),
+}
+
+/// Takes what senders send.
+pub(super) struct BridgeSource {
+    intake: Intake,
+    events: Receiver<Event>,
+    /// What has come and was not looked at.
+    waiting: VecDeque<Event>,
+    key: String,
+    clock: Clock,
+    /// The senders that are there.
+    senders: BTreeSet<Presence>,
+    /// The sessions of those that have said their end.
+    ended: BTreeSet<u64>,
+    end_after: Option<usize>,
+    /// The numbers that channels have here: by port, sender, number there, and topic.
+    channels: BTreeMap<(usize, u64, u32, String), u32>,
+    _token: LivelinessToken,
+    _queryable: Queryable<()>,
+    _session: Session,
+}
+
+impl BridgeSource {
+    pub(super) fn new(parameters: SourceParameters, _: &Context) -> Result<Self, StageError> {
+        let network = parameters.network();
+        let session = network.open()?;
+        let number = Presence::number_of(&session);
+        let me = Presence { name: parameters.receiver, number };
+        let key = me.key(&network.bridge, Role::Receiver);
+        let clock = Clock::default();
+        let (to, events) = channel();
+        let batches = to.clone();
+        // What comes while the stage goes is answered by nobody, and sent again to the next.
+        let take = move |query: Query| drop(batches.send(Event::Batch(query, clock.nanoseconds())));
+        let queryable = session.declare_queryable(key.clone()).callback(take).wait();
+        let queryable = queryable.map_err(|error| StageError::new("receive over the bridge", in_words(&error)))?;
+        watch(&session, &network.bridge, Role::Sender, move |sender, is_there| {
+            drop(to.send(Event::Sender(sender, is_there)));
+        })?;
+        let token = me.declare(&session, &network.bridge, Role::Receiver)?;
+        let tolerance = (parameters.clock_tolerance * 1e9) as i64;
+        Ok(Self {
+            intake: Intake::new(number, tolerance),
+            events,
+            waiting: VecDeque::new(),
+            key,
+            clock,
+            senders: BTreeSet::new(),
+            ended: BTreeSet::new(),
+            end_after: parameters.end_after,
+            channels: BTreeMap::new(),
+            _token: token,
+            _queryable: queryable,
+            _session: session,
+        })
+    }
+
+    fn note_sender(&mut self, sender: Presence, is_there: bool, output: &Output<Ports>) {
+        let name = sender.name.clone();
+        if is_there {
+            let is_other =
+                |other: &Presence| other.name == name && *other != sender && !self.ended.contains(&other.number);
+            if self.senders.iter().any(is_other) {
+                warn(output, format!("two senders are called `{name}`: give one of them another name by `sender`"));
+            }
+            tracing::info!("the sender `{name}` is there");
+            output.count("times that a sender came", 1);
+            self.senders.insert(sender);
+            return;
+        }
+        self.senders.remove(&sender);
+        match self.ended.contains(&sender.number) {
+            true => self.intake.forget(sender.number),
+            false => warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows")),
+        }
+    }
+
+    fn take_batch(&mut self, query: &Query, came: i64, output: &Output<Ports>) -> Result<(), StageError> {
+        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+        let (taken, answer) = self.intake.take(&bytes);
+        let sender = taken.sender.clone();
+        self.tell(&taken, output);
+        for item in taken.items {
+            self.send(taken.session, item, output)?;
+        }
+        if taken.is_end {
+            tracing::info!("the sender `{sender}` has ended");
+            output.count("senders that have ended", 1);
+            self.ended.insert(taken.session);
+        }
+        // What was passed on is answered, and not what has only come.
+        let answer = super::wire::Answer { came, answered: self.clock.nanoseconds(), ..answer };
+        let answered = to_bytes(&answer).and_then(|bytes| {
+            let replied = query.reply(self.key.as_str(), bytes).wait();
+            replied.map_err(|error| in_words(&error))
+        });
+        if let Err(wrong) = answered {
+            warn(output, format!("the sender `{sender}` could not be answered: {wrong}"));
+        }
+        Ok(())
+    }
+
+    fn tell(&self, taken: &Taken, output: &Output<Ports>) {
+        let sender = &taken.sender;
+        if let Some(wrong) = &taken.wrong {
+            warn(output, format!("what the sender `{sender}` has sent cannot be read: {wrong}"));
+        }
+        if taken.dropped > 0 {
+            warn(output, format!("the sender `{sender}` has dropped messages for want of room"));
+            output.count("messages that senders have dropped", taken.dropped);
+        }
+        match taken.clock {
+            Some(0) => tracing::info!("the clock of the sender `{sender}` is right"),
+            Some(offset) => {
+                let (seconds, way) = (offset.unsigned_abs() as f64 * 1e-9, if offset < 0 { "ahead" } else { "behind" });
+                warn(
+                    output,
+                    format!("the clock of the sender `{sender}` is {seconds:.0} s {way}: its times are corrected"),
+                );
+            }
+            None => {}
+        }
+    }
+
+    fn send(&mut self, sender: u64, item: Item, output: &Output<Ports>) -> Result<(), StageError> {
+        match item {
+            Item::Channel { link, number, channel } => {
+                let Some((index, port)) = output.of(&link) else { return Ok(()) };
+                let here = self.number(index, sender, number, "");
+                port.out.announce(here, &channel)
+            }
+            Item::Message { link, header, bytes } => {
+                let Some((index, port)) = output.of(&link) else { return Ok(()) };
+                output.set_log_time(header.log_time);
+                let topic = header.topic.as_str();
+                let (channel, is_announced) = match header.channel {
+                    // What a stage has made comes without a channel.
+                    0 => {
+                        let is_announced = self.channels.contains_key(&(index, sender, 0, topic.to_owned()));
+                        (self.number(index, sender, 0, topic), is_announced)
+                    }
+                    number => (self.number(index, sender, number, ""), true),
+                };
+                if !is_announced {
+                    port.out.announce(channel, &channel_of(topic, &link.ros_type))?;
+                }
+                output.count("messages taken", 1);
+                port.out.send_encoded(MessageHeader { channel, ..header }, &bytes)
+            }
+        }
+    }
+
+    /// The number that a channel of a sender has here. Announced anew it keeps its number.
+    fn number(&mut self, port: usize, sender: u64, number: u32, topic: &str) -> u32 {
+        let next = u32::try_from(self.channels.len()).unwrap_or(u32::MAX - 1) + 1;
+        *self.channels.entry((port, sender, number, topic.to_owned())).or_insert(next)
+    }
+}
+
+/// The channel of the results of a stage.
+fn channel_of(topic: &str, ros_type: &str) -> Channel {
+    let schema = schema_text(ros_type).unwrap_or_default();
+    let encoding = if schema.is_empty() { "" } else { "ros2msg" };
+    Channel {
+        topic: topic.to_owned(),
+        message_encoding: "cdr".to_owned(),
+        schema_name: ros_type.to_owned(),
+        schema_encoding: encoding.to_owned(),
+        schema: schema.as_bytes().to_vec(),
+        metadata: gridweave_logs::qos::offered(gridweave_logs::qos::is_latched_result(topic, ros_type)),
+    }
+}
+
+fn warn(output: &Output<Ports>, text: String) {
+    tracing::warn!("{text}");
+    output.warn(text);
+}
+
+impl Source for BridgeSource {
+    type Outputs = Ports;
+
+    fn wait(&mut self, longest: Duration) {
+        if self.waiting.is_empty()
+            && let Ok(event) = self.events.recv_timeout(longest)
+        {
+            self.waiting.push_back(event);
+        }
+    }
+
+    fn next(&mut self, output: &Output<Ports>) -> Result<bool, StageError> {
+        for _ in 0..BATCHES {
+            let Some(event) = self.waiting.pop_front().or_else(|| self.events.try_recv().ok()) else { break };
+            match event {
+                Event::Sender(sender, is_there) => self.note_sender(sender, is_there, output),
+                Event::Batch(query, came) => self.take_batch(&query, came, output)?,
+            }
+        }
+        Ok(self.end_after.is_none_or(|senders| self.ended.len() < senders))
+    }
+}
