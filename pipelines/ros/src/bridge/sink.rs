@@ -110,12 +110,17 @@ impl Parameters for SinkParameters {
 
 /// The kind `bridge_sink`.
 pub fn kind() -> StageKind {
+    kind_with(Clock::default())
+}
+
+/// The same on a machine with the given clock.
+pub(super) fn kind_with(clock: Clock) -> StageKind {
     StageKind::stage(
         "bridge_sink",
         "Sends what it is given to the `bridge_source` of a run on another machine, over Zenoh: each message once and in order, \
          however bad the link. What is new of a map is sent, not the whole map. While the link is broken messages wait; those for \
          which there is no room are dropped, and counted",
-        |parameters, context| BridgeSink::new(parameters, context, Clock::default()),
+        move |parameters, context| BridgeSink::new(parameters, context, clock),
     )
     .any_inputs("in", "what to send: outputs of any stage", BridgeSink::receive)
     .announce(BridgeSink::announce)

@@ -1,11 +1,16 @@
 //! An outbox and an intake with a network between them that loses, repeats and delays.
 
+use super::clock::Clock;
 use super::intake::{Intake, Item, Taken};
 use super::outbox::{Limits, Outbox};
 use super::wire::{Answer, Link, Outcome};
-use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
+use super::{sink, source};
+use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage};
+use gridweave_runtime::stage::{Context, InputWire, LoneStage};
 use proptest::prelude::*;
+use std::net::TcpListener;
+use std::time::{Duration, Instant};
 
 const MAPS: usize = 0;
 const POSES: usize = 1;
@@ -120,6 +125,41 @@ fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
         let taken = carry(&mut outbox, &mut intake, offset);
         assert_eq!((messages(&taken.items)[0].0, taken.clock), (expected, told), "{offset}");
     }
+}
+
+#[test]
+fn a_clock_that_is_off_by_an_hour_is_seen_when_the_ends_meet() {
+    const HOUR: u64 = 3600 * SECOND as u64;
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let mut source = LoneStage::new(&source::kind(), &format!("listen = [\"tcp/127.0.0.1:{port}\"]")).unwrap();
+    let wire = InputWire { port: "in", output: "map", ros_type: OccupancyGrid::NAME.to_owned(), ..Default::default() };
+    let context = Context { inputs: vec![wire], ..Default::default() };
+    let mut sink = |name: &str, ahead: u64| {
+        let parameters = format!("connect = [\"tcp/127.0.0.1:{port}\"]\nsender = \"{name}\"");
+        let kind = sink::kind_with(Clock { ahead: ahead as i64 });
+        let mut sink = LoneStage::with_context(&kind, &parameters, &context).unwrap();
+        let now = Clock::default().nanoseconds() as u64;
+        let message = Message::from_vec(header("/robot1/map", now + ahead), vec![1; 30]);
+        sink.give_message("in", message).unwrap();
+        let (mut came, until) = (Vec::new(), Instant::now() + Duration::from_secs(60));
+        while came.is_empty() {
+            assert!(Instant::now() < until, "{:?}", source.warnings());
+            source.node().wait(Duration::from_millis(20));
+            source.node().advance().unwrap();
+            let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
+            came.extend(source.take_messages("map").into_iter().filter(is_data));
+        }
+        assert_eq!(came[0].bytes(), [1; 30]);
+        (
+            came[0].header().log_time.0.abs_diff(now),
+            source.warnings().keys().any(|text| text.contains("its times are corrected")),
+        )
+    };
+    // By loopback the measured offset is right to far below a minute, however busy the machine.
+    let (difference, is_told) = sink("right", 0);
+    assert!(difference < HOUR / 60 && !is_told, "{difference}");
+    let (difference, is_told) = sink("ahead", HOUR);
+    assert!(difference < HOUR / 60 && is_told, "{difference}");
 }
 
 #[test]
