@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -36,7 +36,7 @@ const MAPS: u32 = DURATION / 5;
 const AFTERWARDS: Duration = Duration::from_secs(20);
 /// The columns of the table.
 const HEAD: &str = "robots,bases,sent_mb,messages_mb,kbit_per_s_robot,maps_sent,merged_maps,latency_p50_s,latency_p95_s,cells_known,\
-                    memory_mb,cores,dropped_on_the_way,dropped_in_the_base";
+                    memory_mb,busy_stages,dropped_on_the_way,dropped_in_the_base";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -110,13 +110,13 @@ fn port() -> Result<u16> {
 struct Base {
     child: Child,
     name: String,
+    log: PathBuf,
 }
 
 impl Base {
     /// Merges what comes to the port `listen`, and sends the merged map to the port `to`, as the map of the robot `name`.
     fn start(folder: &Path, name: &str, listen: u16, to: u16) -> Result<Self> {
         let text = include_str!("../bridge_base.toml");
-        let (text, _) = text.split_once("\n# A log that was begun anew").context("the pipeline has no output")?;
         let text = text.replace("tcp/localhost:7448", &format!("tcp/127.0.0.1:{listen}"));
         let text = text.replace("name = \"bridge_base\"", &format!("name = \"{name}\""));
         let sink = format!(
@@ -125,17 +125,24 @@ impl Base {
         );
         let file = folder.join(format!("{name}.toml"));
         std::fs::write(&file, format!("{text}\n{sink}"))?;
-        let log = std::fs::File::create(folder.join(format!("{name}.log")))?;
+        let path = folder.join(format!("{name}.log"));
+        let log = std::fs::File::create(&path)?;
         let program = std::env::current_exe()?;
-        let child = Command::new(program).arg("run").arg(&file).stdout(log.try_clone()?).stderr(log).spawn()?;
-        Ok(Self { child, name: name.to_owned() })
+        let output = folder.join(format!("{name}.mcap"));
+        let mut command = Command::new(program);
+        command.arg("run").arg(&file).arg("--output").arg(output);
+        let child = command.stdout(log.try_clone()?).stderr(log).spawn()?;
+        Ok(Self { child, name: name.to_owned(), log: path })
     }
 
     /// What its stages take: memory in bytes, processor time a second, and what they have dropped.
     fn look(&self) -> Result<(f64, f64, f64)> {
         let args = ["top", "--once", "--json", "--interval", "2", "--run", &self.name];
         let top = Command::new(std::env::current_exe()?).args(args).stderr(Stdio::null()).output()?;
-        let seen: Value = serde_json::from_slice(&top.stdout).context("the base is not there any more")?;
+        let seen: Value = serde_json::from_slice(&top.stdout).with_context(|| {
+            let said = std::fs::read_to_string(&self.log).unwrap_or_default();
+            format!("the base `{}` is not there any more: {said}", self.name)
+        })?;
         let stages = seen["stages"].as_array().cloned().unwrap_or_default();
         let sum = |key: &str| stages.iter().filter_map(|stage| stage[key].as_f64()).sum::<f64>();
         Ok((sum("memory"), sum("busy"), sum("dropped")))
@@ -274,7 +281,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
         })
         .collect();
     let (mut latencies, mut merged, mut cells) = (Vec::new(), 0, 0);
-    let (mut memory, mut cores, mut dropped) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut memory, mut busy, mut dropped) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut next_look = start + Duration::from_secs(u64::from(DURATION) / 2);
     let end = start + Duration::from_secs(DURATION.into()) + AFTERWARDS;
     while Instant::now() < end {
@@ -297,7 +304,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
             let seen: Vec<_> = bases.iter().map(Base::look).collect::<Result<_>>()?;
             let sum = |of: fn(&(f64, f64, f64)) -> f64| seen.iter().map(of).sum::<f64>();
             memory = memory.max(sum(|seen| seen.0));
-            cores = cores.max(sum(|seen| seen.1));
+            busy = busy.max(sum(|seen| seen.1));
             dropped = dropped.max(sum(|seen| seen.2));
         }
     }
@@ -317,7 +324,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
     let count = |what: &str| all.counts.get(what).copied().unwrap_or_default() as f64;
     let sent = count("bytes sent");
     Ok(format!(
-        "{robots},{},{:.2},{:.2},{:.1},{},{merged},{},{},{cells},{:.0},{cores:.2},{},{dropped}",
+        "{robots},{},{:.2},{:.2},{:.1},{},{merged},{},{},{cells},{:.0},{busy:.2},{},{dropped}",
         if floors == 1 { 1 } else { floors + 1 },
         sent * 1e-6,
         count("bytes of the messages in them") * 1e-6,
