@@ -77,12 +77,12 @@ fn write(path: &Path, compression: Compression, messages: &[Vec<u8>], count: usi
 
 /// The same with the bare writer.
 fn write_bare(path: &Path, compression: Compression, messages: &[Vec<u8>], count: usize) {
-    let compression = match compression {
-        Compression::None => None,
-        Compression::Lz4 => Some(mcap::Compression::Lz4),
-        Compression::Zstd => Some(mcap::Compression::Zstd),
+    let (compression, level) = match compression {
+        Compression::None => (None, 0),
+        Compression::Lz4 => (Some(mcap::Compression::Lz4), 0),
+        // As logs have it.
+        Compression::Zstd => (Some(mcap::Compression::Zstd), 1),
     };
-    let level = if compression == Some(mcap::Compression::Zstd) { 1 } else { 0 };
     let options = mcap::WriteOptions::new().profile("ros2").chunk_size(Some(CHUNK_SIZE)).compression(compression);
     let options = options.compression_level(level).compression_threads(0);
     let mut writer = options.create(BufWriter::new(File::create(path).unwrap())).unwrap();
