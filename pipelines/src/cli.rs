@@ -70,6 +70,8 @@ enum Command {
     Top(live::TopArgs),
     /// Show in a browser what a run that is going on has found so far.
     View(live::ViewArgs),
+    /// Carry links of a run that is going on to a run on another machine (with `gridweave-ros`).
+    Bridge(live::BridgeArgs),
     /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
     Clean,
     /// Print the completions of a shell, or write the manual pages.
@@ -99,6 +101,7 @@ impl Command {
                 | Self::Tap(_)
                 | Self::Top(_)
                 | Self::View(_)
+                | Self::Bridge(_)
         )
     }
 }
@@ -133,6 +136,7 @@ impl Cli {
             Command::Tap(args) => live::tap(&args, registry),
             Command::Top(args) => live::top(&args, registry),
             Command::View(args) => live::view(&args, registry),
+            Command::Bridge(args) => live::bridge(&args, registry),
             Command::Clean => processes::clean(),
             Command::Shell(args) => shell::shell(&args, &Self::command()),
             Command::Stage(args) => processes::stage(&args, registry),

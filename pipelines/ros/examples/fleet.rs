@@ -75,12 +75,12 @@ struct Robot {
 }
 
 /// What each robot of a simulation sends, by log time.
-fn simulate(robots: usize, registry: &Registry) -> Result<Vec<Robot>> {
+fn simulate(robots: usize, overlap: f64, registry: &Registry) -> Result<Vec<Robot>> {
     let kind = registry.get("simulator").context("there is no simulator")?;
     // As much floor for each robot, whatever the number.
     let scale = (robots as f64 / 3.0).sqrt().max(1.0);
     let parameters = format!(
-        "robots = {robots}\nduration = {DURATION}.0\nsnapshots = {MAPS}\nwidth = {:.1}\nheight = {:.1}\noverlap = 0.3",
+        "robots = {robots}\nduration = {DURATION}.0\nsnapshots = {MAPS}\nwidth = {:.1}\nheight = {:.1}\noverlap = {overlap}",
         (20.0 * scale).min(300.0),
         (15.0 * scale).min(300.0)
     );
@@ -135,7 +135,7 @@ impl Base {
         Ok(Self { child, name: name.to_owned(), log: path })
     }
 
-    /// What its stages take: memory in bytes, processor time a second, and what they have dropped.
+    /// What its stages take: memory in bytes, how many of them work at a time (or wait for a processor to), and what they have dropped.
     fn look(&self) -> Result<(f64, f64, f64)> {
         let args = ["top", "--once", "--json", "--interval", "2", "--run", &self.name];
         let top = Command::new(std::env::current_exe()?).args(args).stderr(Stdio::null()).output()?;
@@ -223,6 +223,7 @@ fn draw(from: &Path, to: &Path) -> Result<()> {
         ("latency of 95 of 100, s", "latency_p95_s"),
         ("memory of the base, GB", "memory_mb"),
         ("to the base, Mbit/s", "sent_mb"),
+        ("maps that the base drops, share of those sent", "dropped_in_the_base"),
     ];
     let series = curves.map(|(name, column_name)| {
         let scale = match column_name {
@@ -230,13 +231,17 @@ fn draw(from: &Path, to: &Path) -> Result<()> {
             "sent_mb" => 8.0 / f64::from(DURATION),
             _ => 1.0,
         };
-        let points = column(column_name)?.into_iter().map(|(x, y)| (x, y * scale)).collect();
-        Ok(plot::Series::new(name, points))
+        let points = column(column_name)?.into_iter().map(|(x, y)| match column_name {
+            // Each robot sends as many maps.
+            "dropped_in_the_base" => (x, y / (x * f64::from(MAPS))),
+            _ => (x, y * scale),
+        });
+        Ok(plot::Series::new(name, points.collect()))
     });
     let plot = plot::Plot {
         title: "Robots that send to one base".to_owned(),
         x: plot::Axis::new("robots").logarithmic(),
-        y: plot::Axis::new("see the curves").logarithmic(),
+        y: plot::Axis::new("s, GB, Mbit/s, share").logarithmic(),
         shape: plot::Shape::Lines(series.into_iter().collect::<Result<_>>()?),
     };
     std::fs::write(to, plot.to_svg()?).with_context(|| format!("cannot write {}", to.display()))
@@ -245,7 +250,9 @@ fn draw(from: &Path, to: &Path) -> Result<()> {
 /// One row of the table.
 fn measure(robots: usize, floors: usize) -> Result<String> {
     let registry = gridweave::shipped::registry(gridweave_ros::kinds());
-    let mut fleet = simulate(robots, &registry)?;
+    // A map of a floor is merged with another only where both show enough of the same.
+    let overlap = if floors == 1 { 0.3 } else { 0.65 };
+    let mut fleet = simulate(robots, overlap, &registry)?;
     // Robots differ in when they send: with one time for all, maps could not be told apart.
     for (number, robot) in fleet.iter_mut().enumerate() {
         robot.messages.iter_mut().for_each(|(_, _, time, _)| *time += number as u64);
@@ -314,7 +321,10 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
             Err(_) => bail!("a robot has failed"),
         }
     }
+    let last = bases.first().map(|base| base.log.clone()).unwrap_or_default();
     drop(bases);
+    let said = std::fs::read_to_string(last).unwrap_or_default();
+    writeln!(std::io::stderr(), "{said}")?;
     latencies.sort_by(f64::total_cmp);
     let quantile = |share: f64| {
         let at = ((latencies.len() as f64 - 1.0) * share).round().max(0.0) as usize;

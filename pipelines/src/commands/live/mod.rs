@@ -1,5 +1,6 @@
-//! Commands that meet a run that is going on: play into it, record and print what passes, show what it does.
+//! Commands that meet a run that is going on: play into it, record, print and carry elsewhere what passes, show what it does.
 
+mod bridge;
 mod link_choice;
 mod play;
 mod record;
@@ -8,6 +9,7 @@ mod tap;
 mod top;
 mod view;
 
+pub(crate) use bridge::{BridgeArgs, bridge};
 pub(crate) use play::{PlayArgs, play};
 pub(crate) use record::{RecordArgs, record};
 pub(crate) use tap::{TapArgs, tap};

@@ -1,0 +1,147 @@
+//! `gridweave bridge`: carries links of a run to a run on another machine.
+
+use super::link_choice::named_links;
+use super::running::{RunChoice, find_run};
+use super::tap::LOOK_INTERVAL;
+use crate::interrupt::stop_on_interrupt;
+use crate::status::{BadUse, Status};
+use crate::terminal::{print_line, say};
+use anyhow::{Result, bail};
+use clap::Args;
+use gridweave_runtime::engine::WatchedLink;
+use gridweave_runtime::message::{Channel, Message, MessageFlags};
+use gridweave_runtime::stage::{Context, InputWire, Registry};
+use std::sync::atomic::Ordering;
+use std::thread;
+
+/// What `gridweave bridge` is told.
+#[derive(Debug, Args)]
+pub(crate) struct BridgeArgs {
+    /// Which links: STAGE.PORT, or STAGE for all its outputs.
+    #[arg(required = true, value_name = "LINK")]
+    pub(crate) links: Vec<String>,
+    /// Where the other machine listens, as tcp/HOST:PORT; its run has a `bridge_source`.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub(crate) to: Vec<String>,
+    /// Set a parameter of the bridge; `kinds bridge_sink` lists them.
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
+    #[command(flatten)]
+    pub(crate) run: RunChoice,
+}
+
+/// The kind of stage that is the near end of a bridge.
+const SINK: &str = "bridge_sink";
+
+/// Carries links.
+pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
+    let Some(kind) = registry.get(SINK) else {
+        bail!("this program has no bridge: `gridweave-ros` has one (cargo install --path pipelines/ros)");
+    };
+    let parameters = parameters(args)?;
+    match kind.check_parameters(&parameters) {
+        Err(wrong) => return Err(BadUse(wrong.message().to_owned()).into()),
+        Ok(wrong) => {
+            if let Some(wrong) = wrong.first() {
+                return Err(BadUse(wrong.to_string()).into());
+            }
+        }
+    }
+    let running = find_run(&args.run, registry)?;
+    let mut links = Vec::new();
+    for name in &args.links {
+        links.extend(named_links(name, &running.pipeline)?);
+    }
+    links.sort_by_key(|link| (link.stage, link.port));
+    links.dedup();
+    let port = kind.inputs.first().map_or("", |input| input.name);
+    let wires = links.iter().map(|link| {
+        let stage = &running.pipeline.stages[link.stage];
+        let output = &stage.kind.outputs[link.port];
+        let ros_type = output.port_type.name().to_owned();
+        InputWire { port, from: stage.name.clone(), output: output.name, ros_type, ..Default::default() }
+    });
+    let context = Context { stage: "bridge".to_owned(), inputs: wires.collect(), ..Default::default() };
+    let stop = stop_on_interrupt("what is on its way is sent");
+    let mut near = kind.make(parameters, &context, Vec::new())?;
+    let open =
+        |link: &super::link_choice::Link| WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port);
+    let mut watched = links.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    let mut messages = 0;
+    loop {
+        // What has passed before the run ended is still there after it.
+        let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
+        for (wire, link) in watched.iter_mut().enumerate() {
+            let mut passed: Vec<Message> = Vec::new();
+            link.take(|_, message| passed.push(message))?;
+            for message in passed {
+                let flags = message.header().flags;
+                if flags.contains(MessageFlags::CHANNEL) {
+                    near.announce(wire, message.header().channel, &Channel::decode(message.bytes())?)?;
+                } else if flags.contains(MessageFlags::DATA) {
+                    near.set_log_time(message.header().log_time);
+                    near.receive(0, &message.on_wire(wire))?;
+                    messages += 1;
+                }
+            }
+        }
+        if is_last_look {
+            break;
+        }
+        thread::sleep(LOOK_INTERVAL);
+    }
+    near.finish()?;
+    for (warning, count) in near.warnings() {
+        say(format_args!("warning: {warning} ({count} times)"));
+    }
+    let counts = near.counts();
+    let count = |what: &str| counts.get(what).copied().unwrap_or_default();
+    let (taken, bytes) = (count("messages taken by the other end"), count("bytes sent"));
+    print_line(format_args!("carried {taken} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
+    let missed: u64 = watched.iter().map(WatchedLink::missed).sum();
+    if missed > 0 {
+        bail!("{missed} messages were missed, as the bridge was too slow for them");
+    }
+    Ok(if taken < messages { Status::Failed } else { Status::Done })
+}
+
+/// What the bridge is told.
+fn parameters(args: &BridgeArgs) -> Result<toml::Table> {
+    let mut parameters = toml::Table::new();
+    if !args.to.is_empty() {
+        parameters.insert("connect".into(), args.to.clone().into());
+    }
+    for setting in &args.set {
+        let wrong = || BadUse(format!("`{setting}` is no setting: write it as PARAMETER=VALUE"));
+        let (name, value) = setting.split_once('=').ok_or_else(wrong)?;
+        // A word needs no quotes.
+        let read = format!("{name} = {value}").parse::<toml::Table>();
+        let read = read.or_else(|_| format!("{name} = {}", toml::Value::from(value)).parse()).map_err(|_| wrong())?;
+        parameters.extend(read);
+    }
+    Ok(parameters)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(to: &[&str], set: &[&str]) -> BridgeArgs {
+        let owned = |texts: &[&str]| texts.iter().map(|&text| text.to_owned()).collect();
+        BridgeArgs { links: Vec::new(), to: owned(to), set: owned(set), run: RunChoice::default() }
+    }
+
+    #[test]
+    fn settings_are_values_or_words() {
+        let read = parameters(&args(&["tcp/base:7448"], &["insecure=true", "sender=robot1", "linger=2.5"])).unwrap();
+        let expected = "connect = [\"tcp/base:7448\"]\ninsecure = true\nsender = \"robot1\"\nlinger = 2.5";
+        assert_eq!(read, expected.parse().unwrap());
+        assert!(parameters(&args(&[], &["insecure"])).is_err());
+    }
+
+    #[test]
+    fn a_program_without_a_bridge_says_which_has_one() {
+        let error = bridge(&args(&[], &[]), &Registry::default()).unwrap_err().to_string();
+        assert!(error.contains("gridweave-ros"), "{error}");
+    }
+}
