@@ -13,7 +13,9 @@ mod map_msgs;
 mod nav;
 mod sensor;
 mod std_msgs;
+mod tags;
 mod topological;
+mod truth;
 mod visualization;
 
 pub use codec::{DecodeError, EncodeError, decode, encode, encode_into};
@@ -23,16 +25,17 @@ pub use geometry::{
     TransformStamped, Vector3,
 };
 pub use gridweave::{
-    Alignment, CommonPlace, CommonTag, CommonTags, Evidence, MapAgreement, MapDirection, RangeScan, RobotFrame,
-    RobotFrames, RobotGroup, Segment, Segments, SimulationTruth, TagBearing, TagEstimate, TagEstimates, TagPosition,
-    TagRange, TrueFrame, TrueTag, UnmergedRobot, Verdict, Verdicts,
+    Alignment, Evidence, MapAgreement, MapDirection, RangeScan, RobotFrame, RobotFrames, RobotGroup, Segment, Segments,
+    UnmergedRobot, Verdict, Verdicts,
 };
 pub use icp::IcpErrors;
 pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};
 pub use std_msgs::{Header, Time};
+pub use tags::{CommonTag, CommonTags, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange};
 pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};
+pub use truth::{CommonPlace, SimulationTruth, TrueFrame, TrueTag};
 pub use visualization::{ColorRGBA, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UVCoordinate};
 
 use serde::{Deserialize, Serialize};
