@@ -15,6 +15,7 @@ mod few_tags;
 mod hough;
 mod localization;
 mod log;
+mod map_pairs;
 mod methods;
 mod noise;
 mod plot;
@@ -51,6 +52,8 @@ enum Experiment {
     FewTags(few_tags::FewTagsArgs),
     /// Merging by the maps alone: random pairs, pairs of two buildings, buildings whose parts are alike, and teams.
     Align(align::AlignArgs),
+    /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
+    MapPairs(map_pairs::MapPairsArgs),
     /// The energy of the Radon transform over the angle, of the maps of a log (Saeedi et al., "Group mapping").
     Radon(radon::RadonArgs),
     /// The Hough spectra of the maps of a log (Carpin, "Fast and accurate map merging").
@@ -71,6 +74,7 @@ fn main() -> Result<()> {
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::Align(args) => align::run(args, &registry, &mut results),
+        Experiment::MapPairs(args) => map_pairs::run(args, &registry, &mut results),
         Experiment::Radon(args) => radon::run(args, &mut results),
         Experiment::Hough(args) => hough::run(args, &mut results),
         Experiment::Edges(args) => edges::run(args, &mut results),

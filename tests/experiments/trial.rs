@@ -15,9 +15,9 @@ use tempfile::TempDir;
 const SIMULATE: &str = "simulate";
 
 /// Logs of robots, and what is true of them. Simulated logs are gone with it.
-pub(super) struct World {
+pub(crate) struct World {
     /// The log.
-    pub(super) log: PathBuf,
+    pub(crate) log: PathBuf,
     /// Its truth.
     pub(super) truth: PathBuf,
     /// What the merges of this world write to.

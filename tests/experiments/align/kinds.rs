@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 
 /// A kind of building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Flat,
     Office,
     Corridor,
@@ -17,7 +17,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::Flat,
         Self::Office,
         Self::Corridor,
@@ -29,11 +29,11 @@ impl Kind {
     ];
 
     /// The kind of a world, by its number: each comes as often as any other.
-    pub(super) fn of(number: u64) -> Self {
+    pub(crate) fn of(number: u64) -> Self {
         Self::ALL[(number % Self::ALL.len() as u64) as usize]
     }
 
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Flat => "flats",
             Self::Office => "offices",

@@ -10,11 +10,11 @@
 //! The parameters and weights of the stages were chosen on the tuning seeds. What is published is measured on others.
 
 mod calibration;
-mod kinds;
+pub(crate) mod kinds;
 mod pairs;
 mod team;
 mod trial;
-mod worlds;
+pub(crate) mod worlds;
 
 use super::results::Results;
 use anyhow::Result;

@@ -9,6 +9,7 @@ use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
+use gridweave_stages::geometry::{Pose2, pose};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -118,21 +119,29 @@ fn is_place_right(evaluation: &Evaluation) -> bool {
     }
 }
 
+impl PairWorld {
+    /// Whether robot b lies rightly to robot a at `T_a_b`, by the world's truth.
+    pub(crate) fn is_right(&self, [a, b]: [&str; 2], transform_a_b: &Pose2) -> Result<bool> {
+        let (x, y, yaw) = (transform_a_b.translation.x, transform_a_b.translation.y, transform_a_b.rotation.angle());
+        let placed = Frame { x, y, yaw, ..Default::default() };
+        let frames = BTreeMap::from([(a.to_owned(), Frame::default()), (b.to_owned(), placed)]);
+        let placed = Summary { reference: Some(a.to_owned()), frames, ..Default::default() };
+        Ok(is_place_right(&evaluate_summary(&placed, &self.world.truth)?))
+    }
+}
+
 /// What the verifier has said of the only pair, and whether its best hypothesis is right, even where it was refused.
 fn judged(pair: &PairWorld, summary: &Summary) -> Result<Option<Judged>> {
     let mut last = None;
     read_messages(&pair.world.output(), Evidence::NAME, |_, data| last = decode::<Evidence>(data).ok())?;
     let Some((evidence, best)) = last.zip(summary.alignments.first()) else { return Ok(None) };
-    let placed = Frame { x: best.x, y: best.y, yaw: best.yaw, ..Default::default() };
-    let frames = BTreeMap::from([(best.a.clone(), Frame::default()), (best.b.clone(), placed)]);
-    let placed = Summary { reference: Some(best.a.clone()), frames, ..Default::default() };
-    let evaluation = evaluate_summary(&placed, &pair.world.truth)?;
+    let is_right = pair.is_right([&best.a, &best.b], &pose(best.x, best.y, best.yaw))?;
     Ok(Some(Judged {
         score: best.score,
         wall_on_wall: evidence.wall_on_wall,
         wall_on_free: evidence.wall_on_free,
         evidence_elsewhere: evidence.evidence_elsewhere,
-        is_right: is_place_right(&evaluation),
+        is_right,
     }))
 }
 

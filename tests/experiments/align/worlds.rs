@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 /// Which seeds worlds are made from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Seeds {
+pub(crate) enum Seeds {
     /// Those on which parameters and weights were chosen.
     Tuning,
     /// Those that nothing was chosen on.
@@ -42,16 +42,16 @@ const VARIED: u64 = 5;
 pub(super) const TEAM: u64 = 4;
 
 /// The two robots of simulated worlds.
-const ROBOTS: [&str; 2] = ["robot1", "robot2"];
+pub(crate) const ROBOTS: [&str; 2] = ["robot1", "robot2"];
 
 /// A log of two robots or more, and how it was made.
-pub(super) struct PairWorld {
-    pub(super) name: String,
-    pub(super) world: World,
+pub(crate) struct PairWorld {
+    pub(crate) name: String,
+    pub(crate) world: World,
     /// Standard deviation of the poses' drift after one metre, if it is known.
     pub(super) drift: Option<f64>,
     /// The kind of building, where there are many.
-    pub(super) kind: Option<Kind>,
+    pub(crate) kind: Option<Kind>,
     /// Holds logs that were put together.
     _folder: Option<TempDir>,
 }
@@ -111,7 +111,7 @@ fn of_two(first: &World, second: &World, name: String) -> Result<PairWorld> {
 }
 
 /// Two robots in a building of any kind. `None` if the robots find no way or see nothing there.
-pub(super) fn varied(seeds: Seeds, number: u64, registry: &Registry) -> Option<PairWorld> {
+pub(crate) fn varied(seeds: Seeds, number: u64, registry: &Registry) -> Option<PairWorld> {
     let seed = seeds.seed(VARIED, number);
     let kind = Kind::of(number);
     let settings = kind.settings(&mut ChaCha8Rng::seed_from_u64(seed));

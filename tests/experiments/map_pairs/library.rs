@@ -1,0 +1,160 @@
+//! Maps of many buildings, and parts of them.
+
+use crate::align::kinds::Kind;
+use crate::align::worlds::{self, PairWorld, Seeds};
+use crate::log::last_maps;
+use anyhow::{Context, Result};
+use gridweave_logs::map_file::{GridMap, load};
+use gridweave_runtime::stage::Registry;
+use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, pose};
+use nalgebra::Point2;
+use rand::{Rng, RngExt};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+/// The share of a map's known part that is cut out, along x and along y.
+const SHARE: (f64, f64) = (0.4, 1.0);
+/// Cells become wider by at most this.
+const MOST_WIDER: f64 = 1.3;
+
+/// A map, and which building it is of.
+#[derive(Clone, Debug)]
+pub(super) struct MapOfBuilding {
+    pub(super) building: String,
+    pub(super) name: String,
+    geometry: GridGeometry,
+    cells: Vec<i8>,
+}
+
+impl MapOfBuilding {
+    fn new(name: String, map: GridMap) -> Self {
+        let building = name.split(['_', '-']).next().unwrap_or(&name).to_owned();
+        Self { building, name, geometry: GridGeometry::from(&map.info), cells: map.cells }
+    }
+
+    /// The map in a file.
+    pub(super) fn of_file(yaml: &Path) -> Result<Self> {
+        let map = load(yaml).with_context(|| format!("cannot read {}", yaml.display()))?;
+        Ok(Self::new(yaml.file_stem().unwrap_or_default().to_string_lossy().into_owned(), map))
+    }
+
+    /// Its cells.
+    pub(super) fn grid(&self) -> Result<Grid<'_>> {
+        Grid::new(self.geometry, &self.cells).with_context(|| format!("the map {} cannot be used", self.name))
+    }
+
+    /// A part of it, turned, in other cells.
+    pub(super) fn part(&self, random: &mut impl Rng) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+        let (width, height) = (self.geometry.width, self.geometry.height);
+        let known = (0..self.cells.len()).filter(|index| is_known(self.cells[*index]));
+        let bounds = known.fold([width, 0, height, 0], |[left, right, low, high], index| {
+            let (column, row) = (index % width, index / width);
+            [left.min(column), right.max(column + 1), low.min(row), high.max(row + 1)]
+        });
+        let [left, right, low, high] = bounds.map(|bound| bound as f64);
+        let mut window = |from: f64, to: f64| {
+            let share = between(SHARE.0, SHARE.1);
+            let start = from + between(0.0, 1.0) * (1.0 - share) * (to - from);
+            (start, start + share * (to - from))
+        };
+        let (columns, rows) = (window(left, right), window(low, high));
+        let (yaw, wider) = (between(0.0, TAU), between(1.0, MOST_WIDER));
+        // The part, turned about its middle, in a square that holds it.
+        let middle = Point2::new(0.5 * (columns.0 + columns.1), 0.5 * (rows.0 + rows.1));
+        let diagonal = (columns.1 - columns.0).hypot(rows.1 - rows.0);
+        let side = (diagonal / wider).ceil() as usize + 2;
+        let transform_part_map = pose(0.0, 0.0, yaw);
+        let cells = (0..side * side).map(|index| {
+            let place = |number: usize| (number as f64 + 0.5 - 0.5 * side as f64) * wider;
+            let place = middle + transform_part_map.inverse() * nalgebra::Vector2::new(place(index % side), place(index / side));
+            let is_inside = (columns.0..columns.1).contains(&place.x) && (rows.0..rows.1).contains(&place.y);
+            if is_inside { self.cells[place.y as usize * width + place.x as usize] } else { UNKNOWN }
+        });
+        let resolution = self.geometry.resolution * wider;
+        let geometry = GridGeometry { width: side, height: side, resolution, origin: pose(0.0, 0.0, 0.0) };
+        Self { cells: cells.collect(), geometry, ..self.clone() }
+    }
+}
+
+/// Maps of many buildings.
+pub(super) struct Library {
+    pub(super) maps: Vec<MapOfBuilding>,
+}
+
+impl Library {
+    /// The map files of folders, and the last maps of their logs.
+    pub(super) fn of_folders(folders: &[PathBuf]) -> Result<Self> {
+        let mut maps = Vec::new();
+        for folder in folders {
+            let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+            let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
+            files.sort();
+            for file in files {
+                match file.extension().and_then(|extension| extension.to_str()) {
+                    Some("yaml") => maps.push(MapOfBuilding::of_file(&file)?),
+                    Some("mcap") => {
+                        let log = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                        let last = last_maps(&file)?.into_iter();
+                        maps.extend(last.map(|(topic, map)| MapOfBuilding::new(format!("{log}{topic}"), map)));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(Self { maps })
+    }
+
+    /// The maps of simulated worlds, each of which is a building of its own.
+    pub(super) fn of_worlds(pairs: Vec<SimulatedPair>) -> Self {
+        Self { maps: pairs.into_iter().flat_map(|pair| pair.maps).collect() }
+    }
+
+    /// Whether there are maps of two buildings.
+    pub(super) fn has_two_buildings(&self) -> bool {
+        self.maps.iter().any(|map| map.building != self.maps[0].building)
+    }
+
+    /// Any two maps of different buildings, of which there are two.
+    pub(super) fn two_buildings(&self, random: &mut impl Rng) -> [&MapOfBuilding; 2] {
+        let first = &self.maps[random.random_range(0..self.maps.len())];
+        let others: Vec<&MapOfBuilding> = self.maps.iter().filter(|map| map.building != first.building).collect();
+        [first, others[random.random_range(0..others.len())]]
+    }
+}
+
+/// The last maps of the two robots of a simulated world.
+pub(super) struct SimulatedPair {
+    pub(super) world: PairWorld,
+    pub(super) maps: [MapOfBuilding; 2],
+}
+
+impl SimulatedPair {
+    fn of(world: PairWorld, number: u64) -> Option<Self> {
+        let last = last_maps(&world.world.log).ok()?.into_iter();
+        let mut maps = last.map(|(topic, map)| MapOfBuilding::new(format!("{number}-{}{topic}", world.name), map));
+        let maps = [maps.next()?, maps.next()?];
+        Some(Self { world, maps })
+    }
+
+    /// The kind of building.
+    pub(super) fn kind(&self) -> &'static str {
+        self.world.kind.map_or("", Kind::name)
+    }
+
+    /// Whether `T_a_b` lays what both robots have seen on each other.
+    pub(super) fn is_right(&self, transform_a_b: &Pose2) -> bool {
+        self.world.is_right(worlds::ROBOTS, transform_a_b).unwrap_or(false)
+    }
+}
+
+/// The robots of so many simulated worlds, of one kind if that is named. Worlds in which robots find no way are left out.
+pub(super) fn simulated_pairs(count: u64, kind: Option<&str>, seeds: Seeds, registry: &Registry) -> Vec<SimulatedPair> {
+    let is_wanted = |number: &u64| kind.is_none_or(|kind| Kind::of(*number).name() == kind);
+    // A kind that there is not makes no worlds, and must not be looked for without end.
+    let kinds = Kind::ALL.len() as u64;
+    let numbers: Vec<u64> = (0..count.saturating_mul(kinds)).filter(is_wanted).take(count as usize).collect();
+    let pair = |number: u64| SimulatedPair::of(worlds::varied(seeds, number, registry)?, number);
+    numbers.into_par_iter().filter_map(pair).collect()
+}

@@ -1,0 +1,205 @@
+//! Merging pairs of map files by the maps alone, with the stages of `map_merge`: cleaned, searched, registered, judged.
+//!
+//! - **Pairs with a truth**: those that `pairs.json` of a folder names.
+//! - **Pairs of different buildings**: parts of two maps, each cut out and turned at random; all that are merged are wrong.
+//! - **Simulated ones**: of two worlds of any kind.
+//!
+//! No log is written, so that thousands of pairs are done in an hour.
+
+mod judging;
+mod library;
+mod truth;
+
+use super::align::worlds::Seeds;
+use super::results::Results;
+use anyhow::{Result, bail};
+use clap::Args;
+use gridweave::table::Table;
+use gridweave_runtime::stage::Registry;
+use judging::Judged;
+use library::{Library, SimulatedPair};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// What the experiment `map-pairs` is told.
+#[derive(Debug, Args)]
+pub(super) struct MapPairsArgs {
+    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), of which the last maps are taken. What two
+    /// names have in common up to the first `_` or `-` is one building, which is never paired with itself.
+    folders: Vec<PathBuf>,
+    /// Pairs of parts of maps of different buildings.
+    #[arg(long, default_value_t = 1000)]
+    unrelated: u64,
+    /// Simulated worlds of any kind: the maps of both robots, and with those of other worlds.
+    #[arg(long, default_value_t = 0)]
+    worlds: u64,
+    /// Simulated worlds of this kind only, as `align` calls it: flats, symmetric, ...
+    #[arg(long)]
+    kind: Option<String>,
+    /// Use the simulated worlds on which parameters were chosen.
+    #[arg(long)]
+    tuning: bool,
+    /// Pairs of maps of different simulated worlds.
+    #[arg(long, default_value_t = 0)]
+    simulated: u64,
+    /// What pairs, parts and turns are drawn from.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Leave out the pairs with a truth.
+    #[arg(long)]
+    only_unrelated: bool,
+    /// Compare the maps at every hypothesis as they are bent, too, which takes longer, and write all of them to
+    /// `map_pairs_hypotheses.csv`.
+    #[arg(long)]
+    hypotheses: bool,
+}
+
+/// What came out of a pair.
+struct Trial {
+    set: String,
+    pair: String,
+    /// Whether the place is right, by the truth of the pair; of maps of different buildings none is.
+    is_right: bool,
+    /// Whether the maps have nothing in common.
+    is_unrelated: bool,
+    judged: Judged,
+    /// Whether each hypothesis is right.
+    right: Vec<bool>,
+}
+
+impl Trial {
+    fn outcome(&self) -> &'static str {
+        match (self.judged.is_merged(), self.is_right) {
+            (true, true) => "right",
+            (true, false) => "wrong",
+            (false, _) if self.is_unrelated => "rightly refused",
+            (false, _) => "refused",
+        }
+    }
+}
+
+/// Does the experiment.
+pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Results) -> Result<()> {
+    if args.folders.is_empty() && args.worlds == 0 {
+        bail!("name a folder of maps, or a number of worlds (--worlds)");
+    }
+    let mut trials = Vec::new();
+    if !args.only_unrelated {
+        for folder in &args.folders {
+            trials.extend(with_truth(folder, args.hypotheses)?);
+        }
+    }
+    let files = Library::of_folders(&args.folders)?;
+    trials.extend(of_different_buildings("different buildings", &files, args.unrelated, true, args)?);
+    let seeds = if args.tuning { Seeds::Tuning } else { Seeds::HeldOut };
+    let pairs = library::simulated_pairs(args.worlds, args.kind.as_deref(), seeds, registry);
+    if !args.only_unrelated {
+        trials.extend(pairs.par_iter().map(|pair| of_one_world(pair, args.hypotheses)).collect::<Vec<_>>());
+    }
+    // The sets by name, each in the order of its worlds.
+    trials.sort_by(|one, other| one.set.cmp(&other.set));
+    let worlds = Library::of_worlds(pairs);
+    trials.extend(of_different_buildings("different simulated buildings", &worlds, args.simulated, false, args)?);
+    report(&trials, results)
+}
+
+/// The pairs that a folder has a truth of.
+fn with_truth(folder: &std::path::Path, with_bends: bool) -> Result<Vec<Trial>> {
+    let pairs = truth::pairs(folder)?;
+    let set = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let trial = |pair: &truth::Pair| -> Result<Trial> {
+        let [a, b] = pair.maps(folder)?;
+        let judged = judging::judge_maps(&a, &b, with_bends);
+        Ok(Trial {
+            set: set.clone(),
+            pair: pair.name().to_owned(),
+            is_right: judged.place().is_some_and(|place| pair.is_right(place)),
+            is_unrelated: pair.is_unrelated(),
+            right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
+            judged,
+        })
+    };
+    pairs.par_iter().map(trial).collect()
+}
+
+/// The two robots of a simulated world.
+fn of_one_world(pair: &SimulatedPair, with_bends: bool) -> Trial {
+    let [a, b] = &pair.maps;
+    let judged = judging::judge_maps(a, b, with_bends);
+    Trial {
+        set: format!("simulated: {}", pair.kind()),
+        pair: pair.world.name.clone(),
+        is_right: judged.place().is_some_and(|place| pair.is_right(place)),
+        is_unrelated: false,
+        right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
+        judged,
+    }
+}
+
+/// Pairs of maps of different buildings; `in_parts` takes a part of each, turned.
+fn of_different_buildings(
+    set: &str,
+    library: &Library,
+    count: u64,
+    in_parts: bool,
+    args: &MapPairsArgs,
+) -> Result<Vec<Trial>> {
+    if count > 0 && !library.has_two_buildings() {
+        bail!("there are no maps of two buildings to make {count} pairs of {set}");
+    }
+    let trial = |number: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(args.seed.wrapping_mul(1 << 32).wrapping_add(number));
+        let maps = library.two_buildings(&mut random);
+        let names = maps.map(|map| map.name.as_str());
+        let [a, b] = maps.map(|map| if in_parts { map.part(&mut random) } else { map.clone() });
+        let judged = judging::judge_maps(&a, &b, args.hypotheses);
+        Trial {
+            set: set.to_owned(),
+            pair: format!("{number}: {} and {}", names[0], names[1]),
+            is_right: false,
+            is_unrelated: true,
+            right: vec![false; judged.hypotheses.len()],
+            judged,
+        }
+    };
+    Ok((0..count).into_par_iter().map(trial).collect())
+}
+
+fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
+    let mut sets: Vec<&str> = trials.iter().map(|trial| trial.set.as_str()).collect();
+    sets.dedup();
+    let mut table =
+        Table::new(["set", "pairs", "right", "wrong", "refused", "rightly refused", "right place among hypotheses"]);
+    for set in sets {
+        let of_set: Vec<&Trial> = trials.iter().filter(|trial| trial.set == set).collect();
+        let count = |outcome: &str| of_set.iter().filter(|trial| trial.outcome() == outcome).count();
+        let proposed = of_set.iter().filter(|trial| trial.right.contains(&true)).count();
+        let counts =
+            [of_set.len(), count("right"), count("wrong"), count("refused"), count("rightly refused"), proposed];
+        table.row([set.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
+    }
+    results.table("map_pairs", "Merging pairs of map files", &table)?;
+    let mut runs = Table::new(["set", "pair", "outcome", "probability", "refusal"]);
+    let mut hypotheses =
+        Table::new(["set", "pair", "outcome", "hypothesis", "is right"].into_iter().chain(judging::HEADS));
+    for trial in trials {
+        let Trial { set, pair, judged, right, .. } = trial;
+        let outcome = trial.outcome().to_owned();
+        runs.row([
+            set.clone(),
+            pair.clone(),
+            outcome.clone(),
+            format!("{:.6}", judged.probability),
+            judged.refusal.clone().unwrap_or_default(),
+        ]);
+        for (number, (one, right)) in judged.hypotheses.iter().zip(right).enumerate() {
+            let of_pair =
+                [set.clone(), pair.clone(), outcome.clone(), (number + 1).to_string(), right.to_string()];
+            hypotheses.row(of_pair.into_iter().chain(one.cells()));
+        }
+    }
+    results.data("map_pairs_runs", &runs)?;
+    results.data("map_pairs_hypotheses", &hypotheses)
+}
