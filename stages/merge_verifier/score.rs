@@ -7,9 +7,11 @@
 //!   by extreme value theory the best of many alike leads the next by as many units of their spread as an exponential variable
 //!   has, so that a lead of `t` has the probability `exp(-t)` by chance (Gumbel 1958); and the evidence of walls in places that
 //!   do not depend on each other counts against it.
-//! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
+//! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well; or it looks the same
+//!   after half a turn, and as much speaks for the place that is turned, whatever the maps share there.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
-//!   search over all places has come to this one, agreement must clearly be more than half; of much wall, three quarters, as parts
+//!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one leads all
+//!   others by far more than chance does; of much wall, three quarters, as parts
 //!   of one building that are alike agree on much and contradict each other on as much; and where the maps share no more
 //!   than a room, nearly all: rooms of other buildings have the same corners and sizes, while a map is right in every room,
 //!   however it is bent as a whole. Where one map was bent onto the other they must agree in more: a bend lays what is of one
@@ -46,6 +48,10 @@ const WORSE_AGREEMENT: (f64, f64) = (0.1, 0.25);
 
 /// The share of the walls that agree at which a place that a search has found is as likely to be half of it only.
 const AGREEMENT_OF_HALVES: f64 = 0.5;
+/// The same where the place leads all others as chance brings about in one of twenty thousand pairs: it is one building then, and
+/// what contradicts is a bend, or was moved. And from which lead on that begins to count, and from which on it counts in full.
+const AGREEMENT_OF_HALVES_IF_FAR_AHEAD: f64 = 0.4;
+const FAR_AHEAD: (f64, f64) = (5.0, 10.0);
 /// The same where much wall was seen: what was moved and drawn roughly has evened out, and what is left speaks against it.
 const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.7;
 /// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
@@ -149,14 +155,15 @@ impl Odds {
         let worse = (wall_agreement - agreement_elsewhere - from) / (most - from);
         let halves = match origin {
             Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
-            Origin::Search { .. } => {
+            Origin::Search { lead } => {
                 let share_of_room = 1.0 - share_of_way(overlap, ROOM);
-                let of_much = share_of_way(wall_seen, MUCH_WALL);
+                let of_little =
+                    between(AGREEMENT_OF_HALVES, AGREEMENT_OF_HALVES_IF_FAR_AHEAD, share_of_way(lead, FAR_AHEAD));
                 let in_rooms = match bend_cost {
                     Some(_) => AGREEMENT_OF_HALVES_IF_BENT,
-                    None => AGREEMENT_OF_HALVES + of_much * (AGREEMENT_OF_HALVES_OF_MUCH_WALL - AGREEMENT_OF_HALVES),
+                    None => between(of_little, AGREEMENT_OF_HALVES_OF_MUCH_WALL, share_of_way(wall_seen, MUCH_WALL)),
                 };
-                in_rooms + share_of_room * (AGREEMENT_OF_HALVES_IN_A_ROOM - in_rooms)
+                between(in_rooms, AGREEMENT_OF_HALVES_IN_A_ROOM, share_of_room)
             }
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
         };
@@ -178,6 +185,11 @@ impl Odds {
 /// How far a value has come from the first of two to the second, 0 to 1.
 fn share_of_way(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+/// The value at so large a share of the way from one to another.
+fn between(from: f64, to: f64, share: f64) -> f64 {
+    from + share * (to - from)
 }
 
 #[cfg(test)]
@@ -238,8 +250,11 @@ mod tests {
         let with = |wall_agreement: f64, origin: Origin| {
             Odds::new(&Grounds { origin, wall_agreement, ..GROUNDS }).probability()
         };
-        let searched = Origin::Search { lead: 20.0 };
+        let searched = Origin::Search { lead: 5.0 };
         assert!(with(0.5, searched) < 0.6 && with(0.6, searched) > 0.999);
+        let far_ahead = Origin::Search { lead: 20.0 };
+        assert!(with(0.4, far_ahead) < 0.6 && with(0.46, far_ahead) > 0.999);
+        assert!(with(0.46, Origin::Search { lead: 7.0 }) < 0.9);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
     }
 

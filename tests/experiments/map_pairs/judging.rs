@@ -75,7 +75,8 @@ impl Hypothesis {
         let place = &self.transform_a_b;
         let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
         let number = |value: f64| format!("{value:.3}");
-        let bent = |value: fn(&BentPlace) -> f64| self.bent.as_ref().map_or_else(String::new, |bent| number(value(bent)));
+        let bent =
+            |value: fn(&BentPlace) -> f64| self.bent.as_ref().map_or_else(String::new, |bent| number(value(bent)));
         vec![
             number(x),
             number(y),
@@ -154,7 +155,9 @@ pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding, with_bends: bool)
         }
     });
     let hypotheses: Vec<Hypothesis> = hypotheses.collect();
-    let Some(verdict) = verdict else { return Judged { hypotheses, ..Judged::refused("no place was proposed".into()) } };
+    let Some(verdict) = verdict else {
+        return Judged { hypotheses, ..Judged::refused("no place was proposed".into()) };
+    };
     Judged {
         merged: verdict.refusal.is_none().then(|| verdict.candidate.transform_a_b()),
         probability: verdict.score,

@@ -68,7 +68,8 @@ impl MapOfBuilding {
         let transform_part_map = pose(0.0, 0.0, yaw);
         let cells = (0..side * side).map(|index| {
             let place = |number: usize| (number as f64 + 0.5 - 0.5 * side as f64) * wider;
-            let place = middle + transform_part_map.inverse() * nalgebra::Vector2::new(place(index % side), place(index / side));
+            let place = middle
+                + transform_part_map.inverse() * nalgebra::Vector2::new(place(index % side), place(index / side));
             let is_inside = (columns.0..columns.1).contains(&place.x) && (rows.0..rows.1).contains(&place.y);
             if is_inside { self.cells[place.y as usize * width + place.x as usize] } else { UNKNOWN }
         });
@@ -89,7 +90,8 @@ impl Library {
         let mut maps = Vec::new();
         for folder in folders {
             let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-            let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
+            let mut files: Vec<PathBuf> =
+                entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
             files.sort();
             for file in files {
                 match file.extension().and_then(|extension| extension.to_str()) {

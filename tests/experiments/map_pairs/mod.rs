@@ -195,8 +195,7 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
             judged.refusal.clone().unwrap_or_default(),
         ]);
         for (number, (one, right)) in judged.hypotheses.iter().zip(right).enumerate() {
-            let of_pair =
-                [set.clone(), pair.clone(), outcome.clone(), (number + 1).to_string(), right.to_string()];
+            let of_pair = [set.clone(), pair.clone(), outcome.clone(), (number + 1).to_string(), right.to_string()];
             hypotheses.row(of_pair.into_iter().chain(one.cells()));
         }
     }

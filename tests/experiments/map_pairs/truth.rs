@@ -52,9 +52,10 @@ impl Pair {
     /// Whether `T_a_b` lays the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond what the
     /// best rigid transform leaves.
     pub(super) fn is_right(&self, transform_a_b: &Pose2) -> bool {
-        let errors = self.common.iter().map(|[x_b, y_b, x_a, y_a]| {
-            (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm()
-        });
+        let errors = self
+            .common
+            .iter()
+            .map(|[x_b, y_b, x_a, y_a]| (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm());
         let errors: Vec<f64> = errors.collect();
         !errors.is_empty()
             && quantile(&errors, 0.5) < 0.5 + self.rigid_median
