@@ -7,15 +7,14 @@
 //!   by extreme value theory the best of many alike leads the next by as many units of their spread as an exponential variable
 //!   has, so that a lead of `t` has the probability `exp(-t)` by chance (Gumbel 1958); and the evidence of walls in places that
 //!   do not depend on each other counts against it.
-//! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well; or it looks the same
-//!   after half a turn, and as much speaks for the place that is turned, whatever the maps share there.
+//! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one leads all
-//!   others by far more than chance does; of much wall, three quarters, as parts
-//!   of one building that are alike agree on much and contradict each other on as much; and where the maps share no more
-//!   than a room, nearly all: rooms of other buildings have the same corners and sizes, while a map is right in every room,
-//!   however it is bent as a whole. Where one map was bent onto the other they must agree in more: a bend lays what is of one
-//!   place on each other, and changes little elsewhere. Tags have not looked at walls, and ask for more of them.
+//!   others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree on much
+//!   and contradict each other on as much; and where the maps share no more than a room, nearly all: rooms of other buildings
+//!   have the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent
+//!   onto the other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags
+//!   have not looked at walls, and ask for more of them.
 //!
 //! How unlikely a bend is counts against chance like evidence: bends and walls are measured in the same units.
 //!
