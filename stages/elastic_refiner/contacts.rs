@@ -5,7 +5,7 @@ use super::equations::Equations;
 use crate::deformation::{Corners, Deformation, node_jacobian};
 use crate::geometry::Point2;
 use crate::walls::{CORRELATION_LENGTH, DEVIATION, stride};
-use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector2};
+use nalgebra::{RowVector3, SMatrix, SVector, Vector2};
 use std::collections::BTreeMap;
 
 /// Points of the walls of a map that are looked up in another, at most.
@@ -85,16 +85,20 @@ pub(super) fn apart<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iter
 
 impl Contacts {
     /// Adds what they say to the equations.
-    pub(super) fn add_to(&self, equations: &mut Equations) {
+    pub(super) fn add_to(&self, equations: &mut Equations<'_>) {
         for Sum { nodes, information, vector } in &self.sums {
             for (i, &row) in nodes.iter().enumerate() {
                 equations.add_vector(row, &vector.fixed_rows::<3>(3 * i).into_owned());
                 for (j, &column) in nodes.iter().enumerate() {
-                    let block: Matrix3<f64> = information.fixed_view::<3, 3>(3 * i, 3 * j).into_owned();
-                    equations.add(row, column, &block);
+                    equations.add(row, column, || information.fixed_view::<3, 3>(3 * i, 3 * j).into_owned());
                 }
             }
         }
+    }
+
+    /// The nodes that each equation is about, by their numbers.
+    pub(super) fn nodes(&self) -> impl Iterator<Item = &[usize; NODES]> {
+        self.sums.iter().map(|sum| &sum.nodes)
     }
 }
 

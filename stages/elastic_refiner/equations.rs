@@ -1,14 +1,11 @@
 //! The normal equations of all nodes of all maps, and their solution.
 
 use super::ElasticRefinerParameters;
+use super::block_cholesky::{BlockCholesky, Columns, SelectedInverse};
 use super::body::Body;
-use super::selected_inverse::SelectedInverse;
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
-use nalgebra::{DVector, Matrix3, Vector2, Vector3};
-use nalgebra_sparse::factorization::CscCholesky;
-use nalgebra_sparse::{CooMatrix, CscMatrix};
-use std::collections::BTreeMap;
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
 /// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
@@ -16,25 +13,26 @@ const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
 /// The same of a map that is not to be bent: as good as nothing.
 const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 
-/// Normal equations, node by node.
+/// Normal equations, node by node. The nodes of all bodies are numbered one after the other.
 #[derive(Clone, Debug)]
-pub(super) struct Equations {
-    blocks: BTreeMap<(usize, usize), Matrix3<f64>>,
+pub(super) struct Equations<'a> {
+    /// Where each node stands in the order in which nodes are eliminated.
+    places: &'a [usize],
+    columns: Columns,
     vector: Vec<Vector3<f64>>,
 }
 
-impl Equations {
-    /// What is known of the nodes of the bodies without looking at walls. The nodes of all bodies are numbered one after
-    /// the other.
-    pub(super) fn of_bends(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Self {
-        let nodes: usize = bodies.iter().map(|body| body.lattice.len()).sum();
-        let mut equations = Self { blocks: BTreeMap::new(), vector: vec![Vector3::zeros(); nodes] };
+impl<'a> Equations<'a> {
+    /// What is known of the nodes of the bodies without looking at walls.
+    pub(super) fn of_bends(bodies: &[Body<'_>], places: &'a [usize], parameters: &ElasticRefinerParameters) -> Self {
+        let mut equations =
+            Self { places, columns: vec![Vec::new(); places.len()], vector: vec![Vector3::zeros(); places.len()] };
         let mut first = 0;
         for body in bodies {
             let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
             let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
             for node in first..first + body.lattice.len() {
-                equations.add(node, node, &Matrix3::from_diagonal(&of_frame));
+                equations.add(node, node, || Matrix3::from_diagonal(&of_frame));
             }
             for (i, j) in body.lattice.edges() {
                 let (at_i, at_j) = (body.lattice.position(i), body.lattice.position(j));
@@ -56,37 +54,29 @@ impl Equations {
         let edge = Edge::new(&(at_j - at_i), parameters);
         for (row, by_row) in [(i, edge.by_i), (j, edge.by_j)] {
             for (column, by_column) in [(i, edge.by_i), (j, edge.by_j)] {
-                self.add(row, column, &(by_row.transpose() * edge.information * by_column));
+                self.add(row, column, || by_row.transpose() * edge.information * by_column);
             }
         }
     }
 
-    pub(super) fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
-        *self.blocks.entry((row, column)).or_insert_with(Matrix3::zeros) += block;
+    /// Adds a block for two nodes. They are symmetric: what is told of two nodes is to be added both ways round.
+    pub(super) fn add(&mut self, row: usize, column: usize, block: impl FnOnce() -> Matrix3<f64>) {
+        let (row, column) = (self.places[row], self.places[column]);
+        if row >= column {
+            self.columns[column].push((row, block()));
+        }
     }
 
     pub(super) fn add_vector(&mut self, node: usize, part: &Vector3<f64>) {
-        self.vector[node] += part;
+        self.vector[self.places[node]] += part;
     }
 
-    /// Solves them with the nodes taken in the given order. Along that order, nodes that have to do with each other must
-    /// lie near each other: the factor is as wide as they are far apart. `None` if they have no solution.
-    pub(super) fn solve(&self, order: &[usize]) -> Option<Solution> {
-        let mut place = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(to, &node)| place[node] = to);
-        let size = 3 * order.len();
-        let mut matrix = CooMatrix::zeros(size, size);
-        for (&(row, column), block) in &self.blocks {
-            matrix.push_matrix(3 * place[row], 3 * place[column], block);
-        }
-        let factor = CscCholesky::factor(&CscMatrix::from(&matrix)).ok()?;
-        let mut right = DVector::zeros(size);
-        for (node, part) in self.vector.iter().enumerate() {
-            right.fixed_rows_mut::<3>(3 * place[node]).copy_from(part);
-        }
-        let solved = factor.solve(&right);
-        let moves = place.iter().map(|&place| solved.fixed_view::<3, 1>(3 * place, 0).into_owned()).collect();
-        Some(Solution { moves, place, factor })
+    /// Solves them. `None` if they have no solution.
+    pub(super) fn solve(&self) -> Option<Solution<'a>> {
+        let factor = BlockCholesky::factor(&self.columns)?;
+        let solved = factor.solve(&self.vector);
+        let moves = self.places.iter().map(|&place| solved[place]).collect();
+        Some(Solution { moves, places: self.places, factor })
     }
 }
 
@@ -124,30 +114,29 @@ pub(super) fn bend_cost(bend: &Deformation, parameters: &ElasticRefinerParameter
 }
 
 /// What the nodes do.
-pub(super) struct Solution {
+pub(super) struct Solution<'a> {
     /// Displacement and turn of each node.
     pub(super) moves: Vec<Vector3<f64>>,
-    place: Vec<usize>,
-    factor: CscCholesky<f64>,
+    places: &'a [usize],
+    factor: BlockCholesky,
 }
 
-impl Solution {
+impl Solution<'_> {
     /// How uncertain the nodes are.
     pub(super) fn covariances(&self) -> Covariances<'_> {
-        Covariances { place: &self.place, inverse: SelectedInverse::of(self.factor.l()) }
+        Covariances { places: self.places, inverse: self.factor.selected_inverse() }
     }
 }
 
 /// How uncertain nodes are, alone and together with those beside them.
 pub(super) struct Covariances<'a> {
-    place: &'a [usize],
+    places: &'a [usize],
     inverse: SelectedInverse<'a>,
 }
 
 impl Covariances<'_> {
     /// The covariance of what two nodes do that are one or lie side by side.
     pub(super) fn of(&self, one: usize, other: usize) -> Matrix3<f64> {
-        let (one, other) = (3 * self.place[one], 3 * self.place[other]);
-        Matrix3::from_fn(|row, column| self.inverse.at(one + row, other + column))
+        self.inverse.at(self.places[one], self.places[other])
     }
 }

@@ -16,13 +16,14 @@
 //! (Sumner et al. 2007). That walls are drawn onto walls of the other map everywhere at once, and not region by region, is
 //! the optimisation of Shahbandi, Magnusson and Iagnemma (2018), with points and lines in place of a distance map's gradient.
 
+mod block_cholesky;
 mod body;
 mod contacts;
+mod dissection;
 mod drift;
 mod equations;
 mod parameters;
 mod refine;
-mod selected_inverse;
 mod sharpness;
 mod stage;
 #[cfg(test)]

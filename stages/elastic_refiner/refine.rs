@@ -3,6 +3,7 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::contacts::{Bent, Contacts, contacts};
+use super::dissection::dissected;
 use super::drift::{Drift, drift};
 use super::equations::{Equations, Solution, bend_cost};
 use crate::deformation::Deformation;
@@ -34,8 +35,6 @@ pub struct Bend {
 /// are so large that the equations have no solution.
 pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Vec<Bend>> {
     let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
-    let of_bends = Equations::of_bends(bodies, parameters);
-    let order = order(bodies);
     let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
     let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
     let meet = |a: usize, b: usize| {
@@ -45,14 +44,22 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         (0..bodies.len()).flat_map(|a| (0..bodies.len()).map(move |b| (a, b))).filter(|&(a, b)| meet(a, b)).collect();
     let firsts: Vec<usize> =
         bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
-    let mut last: Option<(Solution, Vec<f64>)> = None;
-    for share in ROUNDS {
+    let find = |bends: &[Deformation], share: f64| -> Vec<Contacts> {
         let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };
-        let found: Vec<Contacts> =
-            pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect();
+        pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect()
+    };
+    let mut found = find(&bends, ROUNDS[0]);
+    // Those of the first round are between the nodes of nearly all others.
+    let places = places(bodies, &firsts, &found);
+    let of_bends = Equations::of_bends(bodies, &places, parameters);
+    let mut last: Option<(Solution<'_>, Vec<f64>)> = None;
+    for (round, share) in ROUNDS.into_iter().enumerate() {
+        if round > 0 {
+            found = find(&bends, share);
+        }
         let mut equations = of_bends.clone();
         found.iter().for_each(|contacts| contacts.add_to(&mut equations));
-        let solution = equations.solve(&order)?;
+        let solution = equations.solve()?;
         let mut matched = vec![0.0; bodies.len()];
         pairs.iter().zip(&found).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
         for (bend, &first) in bends.iter_mut().zip(&firsts) {
@@ -83,20 +90,28 @@ fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     Some([low - margin, high + margin])
 }
 
-/// The nodes of all bodies, by where they lie along the longer side of the world: those that have to do with each other
-/// lie near each other in this order.
-fn order(bodies: &[Body<'_>]) -> Vec<usize> {
+/// Where each node of all bodies stands in the order in which they are eliminated.
+fn places(bodies: &[Body<'_>], firsts: &[usize], found: &[Contacts]) -> Vec<usize> {
     let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
-    let places: Vec<Point2> =
+    let at: Vec<Point2> =
         bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
-    let Some(first) = places.first() else { return Vec::new() };
-    let (low, high) = places.iter().fold((*first, *first), |(low, high), place| (low.inf(place), high.sup(place)));
-    let is_wide = high.x - low.x > high.y - low.y;
-    let along = |node: usize| if is_wide { (places[node].x, places[node].y) } else { (places[node].y, places[node].x) };
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    order.sort_by(|&one, &other| {
-        let (one_at, other_at) = (along(one), along(other));
-        one_at.0.total_cmp(&other_at.0).then(one_at.1.total_cmp(&other_at.1)).then(one.cmp(&other))
-    });
-    order
+    let mut neighbours = vec![Vec::new(); at.len()];
+    for (body, first) in bodies.iter().zip(firsts) {
+        for (i, j) in body.lattice.edges() {
+            neighbours[first + i].push(first + j);
+            neighbours[first + j].push(first + i);
+        }
+    }
+    for nodes in found.iter().flat_map(Contacts::nodes) {
+        for &one in nodes {
+            neighbours[one].extend(nodes.iter().filter(|&&other| other != one));
+        }
+    }
+    for of_node in &mut neighbours {
+        of_node.sort_unstable();
+        of_node.dedup();
+    }
+    let mut places = vec![0; at.len()];
+    dissected(&at, &neighbours).into_iter().enumerate().for_each(|(place, node)| places[node] = place);
+    places
 }

@@ -1,6 +1,7 @@
 //! The map of a building of any size, for benches.
 
 use gridweave_stages::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use nalgebra::Vector2;
 
 const RESOLUTION: f64 = 0.05;
 /// Mean width of a room, metres.
@@ -10,15 +11,29 @@ const HALF_WALL: f64 = 0.06;
 const HALF_DOOR: f64 = 0.5;
 
 /// The map of a robot that has seen a square of `known` metres of a building, all of it, its frame turned by `yaw`.
+#[allow(dead_code, reason = "not every bench draws such a map")]
 pub(crate) fn draw(cells: usize, known: f64, yaw: f64) -> (GridGeometry, Vec<i8>) {
+    draw_bent(cells, known, &pose(0.0, 0.0, yaw), 0.0)
+}
+
+/// The map of a robot that has seen a square of `known` metres around the origin of its frame, and that displaces what it shows by
+/// up to `most` metres along x and along y, in waves that are longer than a building.
+pub(crate) fn draw_bent(
+    cells: usize,
+    known: f64,
+    transform_building_map: &Pose2,
+    most: f64,
+) -> (GridGeometry, Vec<i8>) {
     let half = 0.5 * cells as f64 * RESOLUTION;
     let origin = Pose2::translation(-half, -half);
     let geometry = GridGeometry { width: cells, height: cells, resolution: RESOLUTION, origin };
-    let transform_building_map = pose(0.0, 0.0, yaw);
+    let middle = transform_building_map * Point2::origin();
     let values = (0..cells * cells).map(|index| {
         let cell = Cell { column: index % cells, row: index / cells };
-        let point = transform_building_map * geometry.centre(cell);
-        let is_inside = point.x.abs().max(point.y.abs()) < 0.5 * known;
+        let shown = geometry.centre(cell);
+        let point =
+            transform_building_map * (shown + most * Vector2::new((shown.y / 7.0).sin(), (shown.x / 13.0).sin()));
+        let is_inside = (point.x - middle.x).abs().max((point.y - middle.y).abs()) < 0.5 * known;
         if is_inside { value(&point) } else { UNKNOWN }
     });
     let values = values.collect();

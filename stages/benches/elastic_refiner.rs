@@ -1,0 +1,88 @@
+//! How long it takes to bend the maps of two robots, and of a team, beside what it takes to find how two maps lie.
+//!
+//!     cargo bench -p gridweave-stages --bench elastic_refiner
+
+// A bench that cannot go on has nothing better to do than to stop.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+mod building;
+
+use building::draw_bent;
+use gridweave_stages::elastic_refiner::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
+use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, pose};
+use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
+use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
+use std::time::Instant;
+
+const RUNS: usize = 7;
+/// Cells along a side, and metres of the building that a robot has seen.
+const CELLS: usize = 800;
+const KNOWN: f64 = 38.0;
+/// Metres from robot to robot of a team: neighbours share half of what they see.
+const APART: f64 = 19.0;
+
+/// A map, where it lies, and its walls.
+struct Placed {
+    map: (GridGeometry, Vec<i8>),
+    walls: WallMap,
+    transform_building_map: Pose2,
+}
+
+impl Placed {
+    fn new(transform_building_map: Pose2, most: f64) -> Self {
+        let map = draw_bent(CELLS, KNOWN, &transform_building_map, most);
+        let walls = WallMap::new(&Grid::new(map.0, &map.1).unwrap(), NORMAL_RADIUS);
+        Self { map, walls, transform_building_map }
+    }
+
+    fn grid(&self) -> Grid<'_> {
+        Grid::new(self.map.0, &self.map.1).unwrap()
+    }
+}
+
+fn main() {
+    let aligned = time(|| {
+        let maps = [0.0, 0.35].map(|yaw| draw_bent(CELLS, KNOWN, &pose(0.0, 0.0, yaw), 0.0));
+        let [a, b] = ["a", "b"].map(str::to_owned);
+        let grids = [Grid::new(maps[0].0, &maps[0].1).unwrap(), Grid::new(maps[1].0, &maps[1].1).unwrap()];
+        let (a, b) = (NamedMap { robot: &a, grid: grids[0] }, NamedMap { robot: &b, grid: grids[1] });
+        let start = Instant::now();
+        align_maps(&a, &b, &MapAlignerParameters::default()).unwrap();
+        start.elapsed().as_secs_f64()
+    });
+    println!("To find how two maps of {CELLS} x {CELLS} cells lie takes {:.0} ms.\n", 1000.0 * aligned);
+    println!("| robots | bent, m | nodes | median, ms | by that |\n| --- | --- | --- | --- | --- |");
+    for (robots, bent) in [(2, 0.0), (2, 0.2), (16, 0.0), (16, 0.2)] {
+        let side = if robots > 2 { 4 } else { 1 };
+        let placed: Vec<Placed> = (0..robots)
+            .map(|robot| {
+                let (column, row) = if robots > 2 { (robot % side, robot / side) } else { (0, 0) };
+                let yaw = 0.35 * f64::from(robot);
+                let most = if robot % 2 == 1 { bent } else { 0.0 };
+                Placed::new(pose(APART * f64::from(column), APART * f64::from(row), yaw), most)
+            })
+            .collect();
+        let parameters = ElasticRefinerParameters::default();
+        let mut nodes = 0;
+        let seconds = time(|| {
+            let start = Instant::now();
+            let bodies: Vec<Body<'_>> = placed
+                .iter()
+                .map(|map| Body::new(&map.grid(), &map.walls, map.transform_building_map, parameters.spacing))
+                .collect();
+            let bends: Vec<Bend> = refine(&bodies, &parameters).unwrap();
+            sharpness(&bodies, &bends, &parameters);
+            let seconds = start.elapsed().as_secs_f64();
+            nodes = bends.iter().map(|bend| bend.deformation.moves.len()).sum();
+            seconds
+        });
+        println!("| {robots} | {bent} | {nodes} | {:.0} | {:.2} |", 1000.0 * seconds, seconds / aligned);
+    }
+}
+
+/// The median of some runs, seconds.
+fn time(mut run: impl FnMut() -> f64) -> f64 {
+    let mut times: Vec<f64> = (0..RUNS).map(|_| run()).collect();
+    times.sort_by(f64::total_cmp);
+    times[RUNS / 2]
+}
