@@ -3,7 +3,8 @@
 use gridweave_logs::summary::{Bend, Frame, Summary};
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
 use gridweave_stages::deformation::Deformation;
-use nalgebra::{Isometry2, Point2};
+use gridweave_stages::geometry::{PointPair, fit_rigid};
+use nalgebra::{Isometry2, Matrix3, Point2, Vector2, Vector3};
 use serde::Serialize;
 use std::fmt;
 
@@ -19,6 +20,23 @@ pub struct CommonPlaces {
     pub rigid: Distances,
     /// As the bent maps lie in these frames; none if no map is bent.
     pub bent: Option<Distances>,
+    /// How far the rigid frames lie from those that lay the places on each other best; none if the places lie all in one.
+    pub from_best: Option<FromBest>,
+}
+
+/// How far the frames of two robots lie from those that lay places on each other best. Where maps are bent, no rigid frame lays
+/// all of them rightly, and this one is what a merge can be measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FromBest {
+    /// At the middle of the places, metres.
+    pub metres: f64,
+    /// Of the direction, degrees, 0 to 180.
+    pub degrees: f64,
+    /// The squared error in x, y and yaw by the covariance that the run tells; none if the first robot is not the reference, or
+    /// there is no covariance. Of frames whose covariance is right 95 % are below 7.81, and the mean is 3.
+    pub normalised_error_squared: Option<f64>,
+    /// How far apart the places lie by those best frames.
+    pub best: Distances,
 }
 
 /// Distances between places that should be one.
@@ -48,7 +66,34 @@ pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[Commo
         places: places.len(),
         rigid: distances(false)?,
         bent: if is_bent { distances(true) } else { None },
+        from_best: from_best(run, [first, second], places),
     })
+}
+
+fn from_best(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) -> Option<FromBest> {
+    let (frame_a, frame_b) = (run.frames.get(first)?, run.frames.get(second)?);
+    let found = pose(frame_a).inverse() * pose(frame_b);
+    let of_both = |&[x2, y2, x1, y1]: &CommonPlace| (Point2::new(x1, y1), Point2::new(x2, y2));
+    let pairs: Vec<PointPair> = places.iter().map(of_both).map(|(a, b)| PointPair { a, b, weight: 1.0 }).collect();
+    let best = fit_rigid(&pairs)?.transform_a_b;
+    let middle: Point2<f64> =
+        (pairs.iter().fold(Vector2::zeros(), |sum, pair| sum + pair.b.coords) / pairs.len() as f64).into();
+    let is_reference = run.reference.as_deref() == Some(first);
+    Some(FromBest {
+        metres: (found * middle - best * middle).norm(),
+        degrees: best.rotation.angle_to(&found.rotation).abs().to_degrees(),
+        normalised_error_squared: if is_reference { normalised_error_squared(frame_b, &best) } else { None },
+        best: Distances::of(pairs.iter().map(|pair| (pair.a - best * pair.b).norm()).collect())?,
+    })
+}
+
+/// The squared error of a frame by its covariance. `None` if it has none.
+pub(crate) fn normalised_error_squared(found: &Frame, expected: &Isometry2<f64>) -> Option<f64> {
+    let turned = (expected.rotation.inverse() * pose(found).rotation).angle();
+    let moved = pose(found).translation.vector - expected.translation.vector;
+    let error = Vector3::new(moved.x, moved.y, turned);
+    let covariance = Matrix3::from_row_slice(&found.covariance).cholesky()?;
+    Some(error.dot(&covariance.solve(&error)))
 }
 
 /// A map in the world.
@@ -126,8 +171,32 @@ mod tests {
             near(measured.rigid.median_m, 0.5) && near(measured.rigid.p90_m, 0.9) && near(measured.rigid.most_m, 1.0)
         );
         assert!(near(measured.bent.unwrap().most_m, 0.5), "{measured}");
+        assert!(measured.from_best.is_none(), "all places of the second are one");
         assert_eq!(measure(&summary(&[]), ["robot1", "robot2"], &places).unwrap().bent, None);
         assert_eq!(measure(&summary(&[]), ["robot1", "robot3"], &places), None);
         assert_eq!(measure(&summary(&[]), ["robot1", "robot2"], &[]), None);
+    }
+
+    #[test]
+    fn frames_are_measured_against_those_that_lay_the_places_best() {
+        // The second map shows all 0.2 m farther along x, and half of it 0.1 m up, half down.
+        let place = |i: i32| {
+            let (x, y) = (f64::from(i % 5), f64::from(i / 5));
+            [x + 0.2, y + if i % 2 == 0 { 0.1 } else { -0.1 }, x + 10.0, y]
+        };
+        let places: Vec<CommonPlace> = (0..20).map(place).collect();
+        let mut run = summary(&[]);
+        run.reference = Some("robot1".into());
+        let covariance = [0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.01];
+        run.frames.get_mut("robot2").unwrap().covariance = covariance;
+        let from_best = measure(&run, ["robot1", "robot2"], &places).unwrap().from_best.unwrap();
+        assert!((from_best.metres - 0.2).abs() < 0.01 && from_best.degrees < 1.0, "{from_best:?}");
+        assert!((0.09..0.11).contains(&from_best.best.median_m), "{from_best:?}");
+        assert!((from_best.normalised_error_squared.unwrap() - 1.0).abs() < 0.3, "{from_best:?}");
+        run.reference = Some("robot2".into());
+        assert_eq!(
+            measure(&run, ["robot1", "robot2"], &places).unwrap().from_best.unwrap().normalised_error_squared,
+            None
+        );
     }
 }

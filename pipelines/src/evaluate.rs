@@ -6,25 +6,25 @@
 //! robot is wrong. The reference robot is not counted.
 //!
 //! Where the truth knows places that two robots have both seen (`common`), it is measured how far apart the merge has them,
-//! as the rigid frames lay them and as the maps are bent.
+//! as the rigid frames lay them and as the maps are bent, and how far the frames lie from those that lay these places best.
 
-use crate::common_places::{self, CommonPlace, CommonPlaces, pose};
+use crate::common_places::{self, CommonPlace, CommonPlaces, normalised_error_squared, pose};
 use crate::merge_text::short;
 use crate::prose::broken;
 use crate::table::Table;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::input_file;
-use nalgebra::{Isometry2, Matrix3, Point2, Vector3};
+use nalgebra::{Isometry2, Point2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Metres. A robot is right below this error at the middle of its map.
-const RIGHT_METRES: f64 = 0.5;
+pub const RIGHT_METRES: f64 = 0.5;
 /// Degrees. A robot is right below this error of its direction.
-const RIGHT_DEGREES: f64 = 1.0;
+pub const RIGHT_DEGREES: f64 = 1.0;
 
 /// What became of one robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -175,7 +175,9 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
             outcome,
             error_m: errors.map(|(metres, _)| metres),
             error_deg: errors.map(|(_, degrees)| degrees),
-            normalised_error_squared: frame.zip(expected).and_then(|(frame, expected)| normalised(frame, &expected)),
+            normalised_error_squared: frame
+                .zip(expected)
+                .and_then(|(frame, expected)| normalised_error_squared(frame, &expected)),
             reason,
             transform_true_found: found.zip(expected).map(|(found, expected)| expected.inverse() * found),
         }
@@ -194,15 +196,6 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
         refused: count(&[RobotOutcome::Refused, RobotOutcome::RightlyRefused]),
         robots,
     })
-}
-
-/// The squared error of a frame by its covariance. `None` if it has none.
-fn normalised(found: &Frame, expected: &Isometry2<f64>) -> Option<f64> {
-    let turned = (expected.rotation.inverse() * pose(found).rotation).angle();
-    let moved = pose(found).translation.vector - expected.translation.vector;
-    let error = Vector3::new(moved.x, moved.y, turned);
-    let covariance = Matrix3::from_row_slice(&found.covariance).cholesky()?;
-    Some(error.dot(&covariance.solve(&error)))
 }
 
 impl RobotOutcome {

@@ -2,7 +2,8 @@
 //!
 //! Two robots explore one simulated building; one property of the world at a time is varied, all others keep the
 //! simulator's defaults. A merge is right below 0.5 m and 1 degree, wrong above, and refused if the robots were not
-//! merged.
+//! merged. That is measured against where the robots' map frames are. Where poses drift, maps are bent, and another rigid frame lays
+//! the places that both have driven through nearer to each other: the error against the best such frame is told as well.
 
 use super::plot::{Axis, Plot, Series, Shape};
 use super::results::Results;
@@ -10,8 +11,8 @@ use super::statistics::{median, quantile, wilson_interval};
 use super::trial::World;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use gridweave::common_places::CommonPlaces;
-use gridweave::evaluate::RobotOutcome;
+use gridweave::common_places::{CommonPlaces, FromBest};
+use gridweave::evaluate::{RIGHT_DEGREES, RIGHT_METRES, RobotOutcome};
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
@@ -169,10 +170,23 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         "90 %",
         "bent: median",
         "90 %",
+        "wrong by the best rigid frame",
+        "deg from it, median",
+        "95 %",
+        "within the covariance's 95 % of it",
     ];
     let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
-    let mut data =
-        Table::new([sweep.axis, "seed", "outcome", "error m", "error deg", "normalised error squared", "reason"]);
+    let mut data = Table::new([
+        sweep.axis,
+        "seed",
+        "outcome",
+        "error m",
+        "error deg",
+        "normalised error squared",
+        "m from the best rigid frame",
+        "deg from it",
+        "reason",
+    ]);
     let mut shares: [Vec<(f64, f64)>; 3] = Default::default();
     let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
@@ -198,6 +212,13 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         let common = common_parts.map(|part| {
             median(&trials.iter().filter_map(|trial| trial.common.as_ref().map(part)).collect::<Vec<f64>>())
         });
+        let from_best: Vec<FromBest> =
+            trials.iter().filter_map(|trial| trial.common.as_ref().and_then(|common| common.from_best)).collect();
+        let wrong_by_best =
+            from_best.iter().filter(|best| best.metres >= RIGHT_METRES || best.degrees >= RIGHT_DEGREES);
+        let degrees_from_best: Vec<f64> = from_best.iter().map(|best| best.degrees).collect();
+        let of_best: Vec<f64> = from_best.iter().filter_map(|best| best.normalised_error_squared).collect();
+        let within_best = of_best.iter().filter(|error| **error < NORMALISED_95).count();
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
         table.row(
             [format!("{value}")]
@@ -208,11 +229,15 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
                     [median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number),
                 )
                 .chain([format!("{within} of {}", normalised.len())])
-                .chain(common.map(number)),
+                .chain(common.map(number))
+                .chain([wrong_by_best.count().to_string()])
+                .chain([median(&degrees_from_best), quantile(&degrees_from_best, 0.95)].map(number))
+                .chain([format!("{within_best} of {}", of_best.len())]),
         );
         for trial in trials {
             let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-            let Trial { seed, outcome, error_m, error_deg, normalised, reason, .. } = trial;
+            let Trial { seed, outcome, error_m, error_deg, normalised, reason, common } = trial;
+            let from_best = common.and_then(|common| common.from_best);
             let words = outcome.words().to_owned();
             data.row([
                 value.to_string(),
@@ -221,6 +246,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
                 number(error_m),
                 number(error_deg),
                 number(normalised),
+                number(from_best.map(|best| best.metres)),
+                number(from_best.map(|best| best.degrees)),
                 reason,
             ]);
         }

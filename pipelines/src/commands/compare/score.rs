@@ -4,7 +4,6 @@ use crate::common_places::{self, CommonPlace};
 use crate::evaluate::{RobotOutcome, evaluate, read_summary};
 use anyhow::Result;
 use gridweave_logs::summary::Summary;
-use gridweave_stages::geometry::{Point2, PointPair, fit_rigid};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -74,25 +73,16 @@ impl Truth {
 impl PairTruth {
     /// What became of map b, and its error in metres and degrees.
     fn score(&self, run: &Summary, a: &str, b: &str) -> (RobotOutcome, Option<(f64, f64)>) {
-        let merged = run.frames.get(a).zip(run.frames.get(b));
-        let Some((frame_a, frame_b)) = merged else {
+        if !(run.frames.contains_key(a) && run.frames.contains_key(b)) {
             let refused = if self.common.is_empty() { RobotOutcome::RightlyRefused } else { RobotOutcome::Refused };
             return (refused, None);
-        };
+        }
         let Some(measured) = common_places::measure(run, [a, b], &self.common) else {
             return (RobotOutcome::Wrong, None);
         };
         let (median, p90) = (measured.rigid.median_m, measured.rigid.p90_m);
         let is_right = median < RIGHT_MEDIAN + self.rigid_median && p90 < RIGHT_P90 + self.rigid_p90;
-        let found = common_places::pose(frame_a).inverse() * common_places::pose(frame_b);
-        let pair = |[x_b, y_b, x_a, y_a]: &CommonPlace| PointPair {
-            a: Point2::new(*x_a, *y_a),
-            b: Point2::new(*x_b, *y_b),
-            weight: 1.0,
-        };
-        let best = fit_rigid(&self.common.iter().map(pair).collect::<Vec<_>>());
-        let degrees =
-            best.map_or(f64::NAN, |best| best.transform_a_b.rotation.angle_to(&found.rotation).abs().to_degrees());
+        let degrees = measured.from_best.map_or(f64::NAN, |from_best| from_best.degrees);
         (if is_right { RobotOutcome::Right } else { RobotOutcome::Wrong }, Some((median, degrees)))
     }
 }
