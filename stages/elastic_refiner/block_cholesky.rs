@@ -206,7 +206,7 @@ mod tests {
     /// A matrix of blocks with holes, and the same as a dense one.
     fn matrix(seed: &[f64], holes: usize) -> (Columns, DMatrix<f64>) {
         let sparse = DMatrix::from_fn(3 * BLOCKS, 3 * BLOCKS, |row, column| {
-            let is_there = (row / 3 * 7 + column / 3 * 5 + holes) % 4 == 0;
+            let is_there = (row / 3 * 7 + column / 3 * 5 + holes).is_multiple_of(4);
             if is_there { seed[row * 3 * BLOCKS + column] } else { 0.0 }
         });
         let matrix = &sparse * sparse.transpose() + DMatrix::identity(3 * BLOCKS, 3 * BLOCKS);
