@@ -63,9 +63,7 @@ impl Connection {
     /// # Errors
     /// The configuration file is wrong, or nothing can listen where it is to.
     pub(crate) fn open(&self) -> Result<Session, StageError> {
-        let doing = "join the Zenoh network";
-        let config = self.config().map_err(|cause| StageError::new(doing, cause))?;
-        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
+        join(self.config())
     }
 
     fn config(&self) -> Result<Config, String> {
@@ -73,20 +71,13 @@ impl Connection {
         if let Some(path) = self.zenoh_config.clone().or_else(|| of_environment().map(PathBuf::from)) {
             return file_config(&path);
         }
-        let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
-        let mut config = Config::default();
-        for (key, value) in [
-            ("mode", "\"peer\""),
-            ("connect/endpoints", &list(&self.connect)?),
-            ("listen/endpoints", &list(&self.listen)?),
+        let settings = [
             ("scouting/multicast/enabled", "false"),
             ("scouting/gossip/enabled", "true"),
             // What is kept for those who come later is sorted by time.
             ("timestamping/enabled", "true"),
-        ] {
-            config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
-        }
-        Ok(config)
+        ];
+        peer_config(&self.connect, &self.listen, &settings)
     }
 
     /// Where a router is looked for, as words.
@@ -96,6 +87,31 @@ impl Connection {
             false => self.connect.join(" or "),
         }
     }
+}
+
+/// Opens a session.
+///
+/// # Errors
+/// There is no configuration, or nothing can listen where it is to.
+pub(crate) fn join(config: Result<Config, String>) -> Result<Session, StageError> {
+    let doing = "join the Zenoh network";
+    let config = config.map_err(|cause| StageError::new(doing, cause))?;
+    zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
+}
+
+/// A program that connects to some endpoints and listens at others, with some more settings of Zenoh as JSON5.
+///
+/// # Errors
+/// Zenoh takes something of it for wrong.
+pub(crate) fn peer_config(connect: &[String], listen: &[String], settings: &[(&str, &str)]) -> Result<Config, String> {
+    let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
+    let mut config = Config::default();
+    let (connect, listen) = (list(connect)?, list(listen)?);
+    let own = [("mode", "\"peer\""), ("connect/endpoints", &*connect), ("listen/endpoints", &*listen)];
+    for (key, value) in own.iter().chain(settings) {
+        config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
+    }
+    Ok(config)
 }
 
 /// Reads a configuration file of Zenoh.

@@ -1,11 +1,11 @@
 //! How the ends of a bridge find each other, and whom they let in.
 
-use crate::connection::{file_config, in_words};
+use crate::connection::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::net::IpAddr;
 use std::path::PathBuf;
 use zenoh::config::EndPoint;
-use zenoh::{Config, Session, Wait};
+use zenoh::{Config, Session};
 
 /// Where a receiver listens, and a sender looks for it, where nothing else is said.
 pub(super) const BASE: &str = "tcp/localhost:7448";
@@ -57,9 +57,7 @@ impl Network {
     /// # Errors
     /// The configuration file is wrong, or opens what is not to be open; or nothing can listen where it is to.
     pub(super) fn open(&self) -> Result<Session, StageError> {
-        let doing = "join the Zenoh network";
-        let config = self.config().map_err(|cause| StageError::new(doing, cause))?;
-        zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
+        join(self.config())
     }
 
     fn config(&self) -> Result<Config, String> {
@@ -71,19 +69,12 @@ impl Network {
                 None => Ok(config),
             };
         }
-        let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
-        let mut config = Config::default();
-        for (key, value) in [
-            ("mode", "\"peer\""),
-            ("connect/endpoints", &list(&self.connect)?),
-            ("listen/endpoints", &list(&self.listen)?),
+        let settings = [
             ("scouting/multicast/enabled", if self.discover { "true" } else { "false" }),
             // Senders have nothing to say to each other.
             ("scouting/gossip/autoconnect", "{ router: [], peer: [], client: [] }"),
-        ] {
-            config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
-        }
-        Ok(config)
+        ];
+        peer_config(&self.connect, &self.listen, &settings)
     }
 
     /// Where the other end is looked for, as words.
