@@ -192,6 +192,11 @@ impl Deformation {
     /// Where a point of the map belongs, map frame.
     pub fn apply(&self, point: &Point2) -> Point2 {
         let Some(corners) = self.lattice.corners(point) else { return *point };
+        self.apply_at(point, &corners)
+    }
+
+    /// The same for a point whose corners are known.
+    pub fn apply_at(&self, point: &Point2, corners: &Corners) -> Point2 {
         point
             + corners.iter().filter(|(_, weight)| *weight > 0.0).fold(Vector2::zeros(), |sum, &(node, weight)| {
                 let arm = point - self.lattice.position(node);

@@ -8,7 +8,7 @@
 mod building;
 
 use building::draw_bent;
-use gridweave_stages::elastic_refiner::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
+use gridweave_stages::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
 use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, pose};
 use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
@@ -70,7 +70,7 @@ fn main() {
                 .iter()
                 .map(|map| Body::new(&map.grid(), &map.walls, map.transform_building_map, parameters.spacing))
                 .collect();
-            let bends: Vec<Bend> = refine(&bodies, &parameters).unwrap();
+            let bends = refine(&bodies, &parameters).unwrap().if_likelier();
             sharpness(&bodies, &bends, &parameters);
             let seconds = start.elapsed().as_secs_f64();
             nodes = bends.iter().map(|bend| bend.deformation.moves.len()).sum();

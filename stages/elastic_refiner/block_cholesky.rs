@@ -74,6 +74,12 @@ impl BlockCholesky {
         self.rows[places.clone()].iter().copied().zip(&self.blocks[places])
     }
 
+    /// The logarithm of the matrix's determinant.
+    pub(super) fn log_determinant(&self) -> f64 {
+        let diagonals = self.starts.iter().take(self.inverses.len()).map(|&own| self.blocks[own].diagonal());
+        diagonals.map(|diagonal| 2.0 * diagonal.map(f64::ln).sum()).sum()
+    }
+
     /// What the matrix takes to `right`.
     pub(super) fn solve(&self, right: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut solution = right.to_vec();
@@ -221,13 +227,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_solved_and_the_blocks_of_the_inverse_are_those_of_the_dense_matrix(
+        fn what_is_solved_and_the_determinant_and_the_blocks_of_the_inverse_are_those_of_the_dense_matrix(
             seed in prop::collection::vec(-1.0..1.0f64, 9 * BLOCKS * BLOCKS),
             holes in 0..100_usize,
         ) {
             let (columns, dense) = matrix(&seed, holes);
             let factor = BlockCholesky::factor(&columns).unwrap();
             let inverse = dense.clone().try_inverse().unwrap();
+            prop_assert!((factor.log_determinant() - dense.determinant().ln()).abs() < 1e-9);
             let right = DVector::from_fn(3 * BLOCKS, |row, _| seed[row]);
             let expected = &inverse * &right;
             let blocks: Vec<Vector3<f64>> =

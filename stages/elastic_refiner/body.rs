@@ -1,6 +1,6 @@
 //! A placed map, as it is bent: its walls with the side that they are seen from, and its lattice.
 
-use crate::deformation::Lattice;
+use crate::deformation::{Corners, Lattice};
 use crate::geometry::{Grid, Point2, Pose2, is_free};
 use crate::walls::{LEAST_NORMAL_AGREEMENT, WallMap, before_wall};
 use nalgebra::Vector2;
@@ -14,6 +14,10 @@ pub struct Body<'a> {
     pub(super) seen: Vec<Sides>,
     /// Its nodes.
     pub(super) lattice: Lattice,
+    /// For each point of the walls, the nodes around it.
+    pub(super) corners: Vec<Option<Corners>>,
+    /// The least and the greatest corner of the rectangle that holds the walls, map frame; none without walls.
+    pub(super) bounds: Option<[Point2; 2]>,
     /// `T_world_map`.
     pub(super) transform_world_map: Pose2,
     /// Whether it stays as it is.
@@ -38,7 +42,11 @@ impl<'a> Body<'a> {
         let seen = points
             .map(|(point, normal)| Sides { ahead: is_seen(point, normal, 1.0), behind: is_seen(point, normal, -1.0) })
             .collect();
-        Self { walls, seen, lattice: Lattice::over(grid, spacing), transform_world_map, is_kept: false }
+        let lattice = Lattice::over(grid, spacing);
+        let corners = walls.walls.points().iter().map(|point| lattice.corners(point)).collect();
+        let grow = |[low, high]: [Point2; 2], point: &Point2| [low.inf(point), high.sup(point)];
+        let bounds = walls.walls.points().first().map(|first| walls.walls.points().iter().fold([*first; 2], grow));
+        Self { walls, seen, lattice, corners, bounds, transform_world_map, is_kept: false }
     }
 
     /// The same map, which is not bent, while others are bent onto it.

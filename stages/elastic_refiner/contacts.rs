@@ -42,8 +42,18 @@ pub(super) struct Bent<'a> {
 }
 
 impl Bent<'_> {
-    fn in_world(&self, point: &Point2) -> Point2 {
-        self.body.transform_world_map * self.bend.apply(point)
+    /// Where a point of the walls lies, world, and the nodes around it.
+    fn in_world(&self, index: usize) -> Option<(Point2, Corners)> {
+        let corners = self.body.corners[index]?;
+        let point = self.body.walls.walls.points()[index];
+        Some((self.body.transform_world_map * self.bend.apply_at(&point, &corners), corners))
+    }
+
+    /// The rectangle that holds what lies within `reach` of the walls, wherever they are bent to: least and greatest corner, map
+    /// frame.
+    fn bounds(&self, reach: f64) -> Option<[Point2; 2]> {
+        let margin = Vector2::repeat(reach + self.bend.largest_move());
+        self.body.bounds.map(|[low, high]| [low - margin, high + margin])
     }
 }
 
@@ -85,7 +95,7 @@ pub(super) fn apart<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iter
 
 impl Contacts {
     /// Adds what they say to the equations.
-    pub(super) fn add_to(&self, equations: &mut Equations<'_>) {
+    pub(super) fn add_to(&self, equations: &mut Equations) {
         for Sum { nodes, information, vector } in &self.sums {
             for (i, &row) in nodes.iter().enumerate() {
                 equations.add_vector(row, &vector.fixed_rows::<3>(3 * i).into_owned());
@@ -120,28 +130,40 @@ fn find_all<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Ite
     let points = b.body.walls.walls.points();
     let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
     let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
+    let bounds = a.bounds(reach);
     let found = points.iter().enumerate().step_by(every);
-    let found = found.filter_map(move |(index, point)| Some((*point, find(a, b, index, point, reach)?)));
+    let found = found.filter_map(move |(index, point)| Some((*point, find((a, &bounds?), b, index, point, reach)?)));
     (every as f64 * b.body.walls.spacing, found)
 }
 
-fn find(a: Bent<'_>, b: Bent<'_>, index: usize, point: &Point2, reach: f64) -> Option<Contact> {
+/// What a point of the walls of map b meets within `reach` on map a, near whose walls nothing lies outside of the rectangle.
+fn find(
+    (a, [low, high]): (Bent<'_>, &[Point2; 2]),
+    b: Bent<'_>,
+    index: usize,
+    point: &Point2,
+    reach: f64,
+) -> Option<Contact> {
     let (of_a_world, of_b_world) = (&a.body.transform_world_map, &b.body.transform_world_map);
-    let in_world = b.in_world(point);
-    let in_a = a.bend.inverse(&of_a_world.inverse_transform_point(&in_world));
-    let partner = a.body.walls.walls.nearest(&in_a, reach)?.index;
+    let (in_world, of_b) = b.in_world(index)?;
+    let in_a = of_a_world.inverse_transform_point(&in_world);
+    if !(*low <= in_a && in_a <= *high) {
+        return None;
+    }
+    let partner = a.body.walls.walls.nearest(&a.bend.inverse(&in_a), reach)?.index;
     let normal = of_a_world * a.body.walls.normals[partner];
     let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
     if !a.body.seen[partner].fit(b.body.seen[index], cosine) {
         return None;
     }
     let place = a.body.walls.walls.points()[partner];
+    let (place_in_world, of_a) = a.in_world(partner)?;
     Some(Contact {
-        of_a: a.body.lattice.corners(&place)?,
-        of_b: b.body.lattice.corners(point)?,
+        of_a,
+        of_b,
         partner: place,
         normal,
-        residual: normal.dot(&(in_world - a.in_world(&place))),
+        residual: normal.dot(&(in_world - place_in_world)),
         target: normal.dot(&(of_a_world * place - of_b_world * point)),
     })
 }

@@ -6,6 +6,7 @@ use super::body::Body;
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
 use nalgebra::{Matrix3, Vector2, Vector3};
+use std::sync::Arc;
 
 /// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
 /// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
@@ -15,18 +16,21 @@ const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 
 /// Normal equations, node by node. The nodes of all bodies are numbered one after the other.
 #[derive(Clone, Debug)]
-pub(super) struct Equations<'a> {
+pub(super) struct Equations {
     /// Where each node stands in the order in which nodes are eliminated.
-    places: &'a [usize],
+    pub(super) places: Arc<[usize]>,
     columns: Columns,
     vector: Vec<Vector3<f64>>,
 }
 
-impl<'a> Equations<'a> {
+impl Equations {
     /// What is known of the nodes of the bodies without looking at walls.
-    pub(super) fn of_bends(bodies: &[Body<'_>], places: &'a [usize], parameters: &ElasticRefinerParameters) -> Self {
-        let mut equations =
-            Self { places, columns: vec![Vec::new(); places.len()], vector: vec![Vector3::zeros(); places.len()] };
+    pub(super) fn of_bends(bodies: &[Body<'_>], places: &Arc<[usize]>, parameters: &ElasticRefinerParameters) -> Self {
+        let mut equations = Self {
+            places: Arc::clone(places),
+            columns: vec![Vec::new(); places.len()],
+            vector: vec![Vector3::zeros(); places.len()],
+        };
         let mut first = 0;
         for body in bodies {
             let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
@@ -72,11 +76,17 @@ impl<'a> Equations<'a> {
     }
 
     /// Solves them. `None` if they have no solution.
-    pub(super) fn solve(&self) -> Option<Solution<'a>> {
+    pub(super) fn solve(&self) -> Option<Solution> {
         let factor = BlockCholesky::factor(&self.columns)?;
         let solved = factor.solve(&self.vector);
         let moves = self.places.iter().map(|&place| solved[place]).collect();
-        Some(Solution { moves, places: self.places, factor })
+        let explained = self.vector.iter().zip(&solved).map(|(part, by)| part.dot(by)).sum();
+        Some(Solution { moves, explained, places: Arc::clone(&self.places), factor })
+    }
+
+    /// The logarithm of the determinant of their matrix. `None` if they have no solution.
+    pub(super) fn log_determinant(&self) -> Option<f64> {
+        Some(BlockCholesky::factor(&self.columns)?.log_determinant())
     }
 }
 
@@ -114,17 +124,24 @@ pub(super) fn bend_cost(bend: &Deformation, parameters: &ElasticRefinerParameter
 }
 
 /// What the nodes do.
-pub(super) struct Solution<'a> {
+pub(super) struct Solution {
     /// Displacement and turn of each node.
     pub(super) moves: Vec<Vector3<f64>>,
-    places: &'a [usize],
+    /// By how much the moves lessen the sum of all squares, in variances.
+    pub(super) explained: f64,
+    places: Arc<[usize]>,
     factor: BlockCholesky,
 }
 
-impl Solution<'_> {
+impl Solution {
+    /// The logarithm of the determinant of the equations' matrix.
+    pub(super) fn log_determinant(&self) -> f64 {
+        self.factor.log_determinant()
+    }
+
     /// How uncertain the nodes are.
     pub(super) fn covariances(&self) -> Covariances<'_> {
-        Covariances { places: self.places, inverse: self.factor.selected_inverse() }
+        Covariances { places: &self.places, inverse: self.factor.selected_inverse() }
     }
 }
 

@@ -11,6 +11,8 @@
 //!   the map is rigid in itself;
 //! - frames: the maps lie about where the rigid frames have them.
 //!
+//! Maps stay rigid where that is likelier than a bend: where it explains the walls as well as the noise of cells does.
+//!
 //! Nodes that are rigid pieces tied by what drift allows are the submaps of Atlas (Bosse et al. 2004) and Cartographer (Hess
 //! et al. 2016), on a lattice as in Kimera-Multi's deformation graphs (Tian et al. 2022) and in the embedded deformation
 //! (Sumner et al. 2007). That walls are drawn onto walls of the other map everywhere at once, and not region by region, is
@@ -22,6 +24,7 @@ mod contacts;
 mod dissection;
 mod drift;
 mod equations;
+mod evidence;
 mod parameters;
 mod refine;
 mod sharpness;
@@ -32,7 +35,7 @@ mod tests;
 pub use body::Body;
 pub use drift::Drift;
 pub use parameters::ElasticRefinerParameters;
-pub use refine::{Bend, refine};
+pub use refine::{Bend, Bends, refine};
 pub use sharpness::sharpness;
 
 use gridweave_runtime::stage::StageKind;
@@ -42,10 +45,11 @@ use stage::ElasticRefiner;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "elastic_refiner",
-        "Bends the maps of all placed robots, so that walls that several have seen lie on each other. What is sent for each \
-         robot is a lattice of small displacements and turns with their covariances, and how sharp its walls come out; the rigid frames stay as they are. The \
-         bends are estimated when other robots are placed, when a frame has changed by more than `min_move` or `min_turn` or a map has grown by more \
-         than `min_growth`, and at the end if anything has changed since.",
+        "Bends the maps of all placed robots, so that walls that several have seen lie on each other; they stay as they are where \
+         that is likelier. What is sent for each robot is a lattice of small displacements and turns with their covariances, and how \
+         sharp its walls come out; the rigid frames stay as they are. The bends are estimated when other robots are placed, when a \
+         frame has changed by more than `min_move` or `min_turn` or a map has grown by more than `min_growth`, and at the end if \
+         anything has changed since.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)

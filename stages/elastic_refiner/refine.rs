@@ -6,14 +6,16 @@ use super::contacts::{Bent, Contacts, contacts};
 use super::dissection::dissected;
 use super::drift::{Drift, drift};
 use super::equations::{Equations, Solution, bend_cost};
+use super::evidence::gain;
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// How far walls may lie apart from round to round, as shares of the reach: wide at first, when the maps lie where the rigid
 /// frames have them, and at the end about as far as a wall is drawn wrong.
-const ROUNDS: [f64; 11] = [1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.45, 0.35, 0.25, 0.18, 0.15];
+const ROUNDS: [f64; 8] = [1.0, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.15];
 
 /// How one map is bent.
 #[derive(Clone, Debug)]
@@ -31,9 +33,44 @@ pub struct Bend {
     pub drift: Option<Drift>,
 }
 
-/// Bends placed maps, so that walls that several show lie on each other: for each body how it is bent. `None` if numbers
-/// are so large that the equations have no solution.
-pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Vec<Bend>> {
+/// How all maps are bent.
+#[derive(Clone, Debug)]
+pub struct Bends {
+    /// Of each body.
+    pub bends: Vec<Bend>,
+    /// How much likelier what the walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm.
+    /// Not above 0 the maps are rather not bent, and what is in `bends` is the walls' noise.
+    pub gain: f64,
+}
+
+impl Bends {
+    /// The bends if they are likelier than none; else none, as uncertain as they are.
+    #[must_use]
+    pub fn if_likelier(self) -> Vec<Bend> {
+        if self.gain > 0.0 { self.bends } else { self.bends.into_iter().map(Bend::unbent).collect() }
+    }
+}
+
+impl Bend {
+    fn unbent(self) -> Self {
+        let deformation = Deformation::none(self.deformation.lattice);
+        Self { deformation, cost: 0.0, drift: None, ..self }
+    }
+}
+
+/// What was found in one round.
+pub(super) struct Round {
+    /// What the walls say, pair by pair.
+    pub(super) walls: Vec<Contacts>,
+    /// What is known without looking at walls.
+    pub(super) of_bends: Equations,
+    /// What follows from both.
+    pub(super) solution: Solution,
+}
+
+/// Bends placed maps, so that walls that several show lie on each other. `None` if numbers are so large that the equations have
+/// no solution.
+pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Bends> {
     let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
     let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
     let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
@@ -48,28 +85,26 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };
         pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect()
     };
-    let mut found = find(&bends, ROUNDS[0]);
-    // Those of the first round are between the nodes of nearly all others.
-    let places = places(bodies, &firsts, &found);
-    let of_bends = Equations::of_bends(bodies, &places, parameters);
-    let mut last: Option<(Solution<'_>, Vec<f64>)> = None;
-    for (round, share) in ROUNDS.into_iter().enumerate() {
-        if round > 0 {
-            found = find(&bends, share);
-        }
+    let mut last: Option<Round> = None;
+    for share in ROUNDS {
+        let walls = find(&bends, share);
+        // What is tied to what changes from round to round, and with it the order that leaves the factor sparse.
+        let places = places(bodies, &firsts, &walls);
+        let of_bends = Equations::of_bends(bodies, &places, parameters);
         let mut equations = of_bends.clone();
-        found.iter().for_each(|contacts| contacts.add_to(&mut equations));
+        walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         let solution = equations.solve()?;
-        let mut matched = vec![0.0; bodies.len()];
-        pairs.iter().zip(&found).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
         for (bend, &first) in bends.iter_mut().zip(&firsts) {
             let count = bend.moves.len();
             bend.moves.copy_from_slice(&solution.moves[first..first + count]);
         }
-        last = Some((solution, matched));
+        last = Some(Round { walls, of_bends, solution });
     }
-    let (solution, matched) = last?;
-    let covariances = solution.covariances();
+    let last = last?;
+    let gain = gain(bodies, &last, parameters)?;
+    let mut matched = vec![0.0; bodies.len()];
+    pairs.iter().zip(&last.walls).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
+    let covariances = last.solution.covariances();
     let bend = |((deformation, wall_matched), &first): ((Deformation, f64), &usize)| Bend {
         covariances: (first..first + deformation.moves.len()).map(|node| covariances.of(node, node)).collect(),
         cost: bend_cost(&deformation, parameters),
@@ -78,20 +113,20 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         wall_matched,
     };
     let is_finite = bends.iter().flat_map(|bend| &bend.moves).all(|by| by.iter().all(|value| value.is_finite()));
-    is_finite.then(|| bends.into_iter().zip(matched).zip(&firsts).map(bend).collect())
+    is_finite.then(|| Bends { bends: bends.into_iter().zip(matched).zip(&firsts).map(bend).collect(), gain })
 }
 
 /// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.
 fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     let mut points = body.walls.walls.points().iter().map(|point| body.transform_world_map * point);
     let first = points.next()?;
-    let (low, high) = points.fold((first, first), |(low, high), point| (low.inf(&point), high.sup(&point)));
+    let [low, high] = points.fold([first; 2], |[low, high], point| [low.inf(&point), high.sup(&point)]);
     let margin = nalgebra::Vector2::repeat(reach);
     Some([low - margin, high + margin])
 }
 
 /// Where each node of all bodies stands in the order in which they are eliminated.
-fn places(bodies: &[Body<'_>], firsts: &[usize], found: &[Contacts]) -> Vec<usize> {
+fn places(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Arc<[usize]> {
     let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
     let at: Vec<Point2> =
         bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
@@ -102,7 +137,7 @@ fn places(bodies: &[Body<'_>], firsts: &[usize], found: &[Contacts]) -> Vec<usiz
             neighbours[first + j].push(first + i);
         }
     }
-    for nodes in found.iter().flat_map(Contacts::nodes) {
+    for nodes in walls.iter().flat_map(Contacts::nodes) {
         for &one in nodes {
             neighbours[one].extend(nodes.iter().filter(|&&other| other != one));
         }
@@ -113,5 +148,5 @@ fn places(bodies: &[Body<'_>], firsts: &[usize], found: &[Contacts]) -> Vec<usiz
     }
     let mut places = vec![0; at.len()];
     dissected(&at, &neighbours).into_iter().enumerate().for_each(|(place, node)| places[node] = place);
-    places
+    places.into()
 }

@@ -10,12 +10,12 @@ use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, Stag
 use std::collections::BTreeMap;
 
 /// What the stage sends.
-pub(super) struct Bends {
+pub(super) struct Deformations {
     deformation: Out<MapDeformation>,
     frames: Out<RobotFrames>,
 }
 
-impl Outputs for Bends {
+impl Outputs for Deformations {
     fn declare(ports: &mut OutputPorts) -> Self {
         Self {
             deformation: ports.output("deformation", "How the map of each placed robot is bent."),
@@ -65,7 +65,7 @@ impl ElasticRefiner {
     pub(super) fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
-        output: &Output<Bends>,
+        output: &Output<Deformations>,
     ) -> Result<(), StageError> {
         self.maps.keep(&map, output, |_| WallsOnDemand::new());
         Ok(())
@@ -74,14 +74,14 @@ impl ElasticRefiner {
     pub(super) fn receive_frames(
         &mut self,
         frames: Received<'_, RobotFrames>,
-        output: &Output<Bends>,
+        output: &Output<Deformations>,
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
         // What changes little waits for the end: bends are told in the map's own frame, and hold in a frame that lies beside.
         if self.is_near() { output.frames.send("", &self.frames) } else { self.bend(output) }
     }
 
-    pub(super) fn finish(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
+    pub(super) fn finish(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
         let numbers = self.bent_maps.iter().map(|(robot, map)| (robot, map.number));
         let is_bent = self.frames.frames == self.bent_frames.frames
             && self.placed().map(|(robot, map)| (robot, map.number)).eq(numbers);
@@ -114,7 +114,7 @@ impl ElasticRefiner {
         placed.into_iter()
     }
 
-    fn bend(&mut self, output: &Output<Bends>) -> Result<(), StageError> {
+    fn bend(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
         self.bent_frames = self.frames.clone();
         let spacing = self.parameters.spacing;
         let of_map = |(robot, map): (&String, &RobotMap<WallsOnDemand>)| {
@@ -138,6 +138,7 @@ impl ElasticRefiner {
                 .collect();
             match refine(&bodies, &self.parameters) {
                 Some(bends) => {
+                    let bends = bends.if_likelier();
                     let sharpness = sharpness(&bodies, &bends, &self.parameters);
                     for (((frame, map), bend), sharpness) in placed.iter().zip(&bends).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());

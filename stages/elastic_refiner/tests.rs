@@ -1,6 +1,6 @@
 //! What bends do to made-up maps.
 
-use super::{Bend, Body, ElasticRefinerParameters, kind, refine};
+use super::{Bend, Bends, Body, ElasticRefinerParameters, kind, refine};
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, pose};
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
@@ -47,7 +47,8 @@ fn a_bent_map_is_laid_on_a_straight_one() {
                 drift: None,
             })
             .collect();
-        let bends = refine(&bodies, &PARAMETERS()).unwrap();
+        let Bends { bends, gain } = refine(&bodies, &PARAMETERS()).unwrap();
+        assert!(gain > 10.0, "{most}: {gain}");
         let (before, after) = (apart(&rigid, &bodies, most, &places()), apart(&bends, &bodies, most, &places()));
         assert!(before.1 > 0.9 * most, "{before:?}");
         assert!(after.0 < 0.02 && after.1 < 0.06, "{most}: {before:?} before, {after:?} after");
@@ -72,7 +73,7 @@ fn a_map_that_is_kept_stays_and_the_other_does_all() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let bent = map.bent(0.2);
     let bodies = [body(&map, Pose2::identity()).kept(), body(&bent, Pose2::identity())];
-    let bends = refine(&bodies, &PARAMETERS()).unwrap();
+    let bends = refine(&bodies, &PARAMETERS()).unwrap().bends;
     assert!(bends[0].deformation.largest_move() < 1e-3);
     assert!(apart(&bends, &bodies, 0.2, &places()).1 < 0.06);
 }
@@ -83,8 +84,14 @@ fn maps_that_are_not_bent_stay_as_they_are() {
     let a = office.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(0.0, 0.0, 0.0));
     let b = office.draw(seen(4.0, -1.0, 21.0, 13.0), drawing(3.0, 1.0, 0.7));
     let bodies = [body(&a, a.transform_world_map), body(&b, b.transform_world_map)];
-    for bend in refine(&bodies, &PARAMETERS()).unwrap() {
+    let bends = refine(&bodies, &PARAMETERS()).unwrap();
+    for bend in &bends.bends {
         assert!(bend.deformation.moves.iter().all(|by| by.xy().norm() < 0.02 && by.z.abs() < 0.005), "{bend:?}");
+    }
+    assert!(bends.gain < 0.0, "{}", bends.gain);
+    for bend in bends.if_likelier() {
+        assert!(bend.deformation.largest_move() == 0.0 && bend.cost == 0.0 && bend.drift.is_none(), "{bend:?}");
+        assert!(bend.wall_matched > 50.0 && bend.covariances.iter().all(|covariance| covariance[(0, 0)] > 0.0));
     }
 }
 
@@ -93,8 +100,8 @@ fn the_order_of_the_maps_does_not_matter() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let bent = map.bent(0.2);
     let (a, b) = (body(&map, Pose2::identity()), body(&bent, Pose2::identity()));
-    let one = refine(&[a.clone(), b.clone()], &PARAMETERS()).unwrap();
-    let other = refine(&[b, a], &PARAMETERS()).unwrap();
+    let one = refine(&[a.clone(), b.clone()], &PARAMETERS()).unwrap().bends;
+    let other = refine(&[b, a], &PARAMETERS()).unwrap().bends;
     for (one, other) in one.iter().zip(other.iter().rev()) {
         let pairs = one.deformation.moves.iter().zip(&other.deformation.moves);
         assert!(pairs.into_iter().all(|(one, other)| (one - other).norm() < 1e-9));
@@ -108,7 +115,7 @@ fn where_nobody_else_knows_the_place_the_map_is_rigid_and_less_is_known_of_it() 
     let part = office.draw(seen(-1.0, -1.0, 6.0, 13.0), drawing(0.0, 0.0, 0.0));
     let whole = office.draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let bodies = [body(&part, Pose2::identity()), body(&whole, pose(0.1, 0.0, 0.0))];
-    let bend = refine(&bodies, &PARAMETERS()).unwrap().remove(1);
+    let bend = refine(&bodies, &PARAMETERS()).unwrap().bends.remove(1);
     let move_at = |x: f64, y: f64| bend.deformation.apply(&Point2::new(x, y)) - Point2::new(x, y);
     assert!((move_at(19.0, 6.0) - move_at(9.0, 6.0)).norm() < 0.02, "{} {}", move_at(19.0, 6.0), move_at(9.0, 6.0));
     let deviation = |x: f64| {
@@ -129,12 +136,16 @@ fn numbers_without_bounds_are_refused_or_bounded() {
     let cells = vec![UNKNOWN; map.cells.len()];
     let walls = WallMap::new(&Grid::new(map.geometry, &cells).unwrap(), NORMAL_RADIUS);
     let unknown = DrawnMap { cells, walls, ..map };
-    assert!(refine(&[], &PARAMETERS()).is_some_and(|bends| bends.is_empty()));
+    assert!(refine(&[], &PARAMETERS()).is_some_and(|bends| bends.bends.is_empty()));
     for transform in [pose(f64::NAN, 0.0, 0.0), pose(f64::INFINITY, 0.0, 0.0), pose(1e300, 0.0, 0.0)] {
         let bodies = [body(&map, Pose2::identity()), body(&map, transform), body(&unknown, transform)];
         let bends = refine(&bodies, &PARAMETERS());
         assert!(
-            bends.is_none_or(|bends| bends.iter().flat_map(|bend| &bend.deformation.moves).all(|by| by.norm() < 0.1))
+            bends.is_none_or(|bends| bends
+                .bends
+                .iter()
+                .flat_map(|bend| &bend.deformation.moves)
+                .all(|by| by.norm() < 0.1))
         );
     }
     for (field, value) in [("spacing", "0.0"), ("bend", "nan"), ("turn", "-1.0"), ("reach", "inf")] {

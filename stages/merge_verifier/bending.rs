@@ -47,7 +47,7 @@ impl BentPlace {
             Body::new(&a.grid, a.walls, Pose2::identity(), elastic.spacing).kept(),
             Body::new(&b.grid, b.walls, *transform_a_b, elastic.spacing),
         ];
-        let bend = refine(&bodies, &elastic)?.pop()?;
+        let bend = refine(&bodies, &elastic)?.bends.pop()?;
         let walls = b.walls.bent(&bend.deformation);
         let bent = MapView { grid: b.grid, walls: &walls, bend: Some(&bend.deformation) };
         let nearest = nearest_rigid(a, b.walls, transform_a_b, &bend.deformation)?;
