@@ -1,4 +1,5 @@
-//! Draws the maps of robots from the scans of their lidars: for logs of robots that were localised, and whose maps were not logged.
+//! Draws the maps of robots from the scans of their lidars: for robots that are localised, or have odometry, and whose
+//! maps nobody logs or sends.
 //!
 //! A cell's occupancy is kept in log-odds (Moravec and Elfes 1985; Thrun, Burgard and Fox, "Probabilistic Robotics", table 9.1): a
 //! beam makes free what it passes, and occupied where it ends. What a scan sees is laid where the robot was:

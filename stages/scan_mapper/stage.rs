@@ -7,20 +7,27 @@ use crate::tag_localizer::time_of;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The stage kind `scan_mapper`.
 pub fn kind() -> StageKind {
     StageKind::stage(
         "scan_mapper",
-        "Draws the maps of robots from the scans of their lidars, for logs without maps: at the poses that a localizer has found, or, \
-         where there is odometry only, each scan matched with those before it. It closes no loops: where a SLAM can be run, its map \
-         is better.",
-        |parameters: ScanMapperParameters, _| Ok(ScanMapper { parameters, robots: BTreeMap::new() }),
+        "Draws the maps of robots from the scans of their lidars, for robots without maps: at the poses that a localizer has found, \
+         or, where there is odometry only, each scan matched with those before it. It closes no loops: where a SLAM can be run, its \
+         map is better.",
+        |parameters: ScanMapperParameters, _| {
+            Ok(ScanMapper { parameters, robots: BTreeMap::new(), with_map: BTreeSet::new() })
+        },
     )
     .optional_input("pose", "poses of the robots in their maps", ScanMapper::receive_pose)
     .optional_input("odometry", "where odometry has robots without poses", ScanMapper::receive_odometry)
     .input("scan", "scans, seen from the bases of the robots", ScanMapper::receive_scan)
+    .optional_input(
+        "map",
+        "maps that robots have sent themselves: none is drawn for these from there on",
+        ScanMapper::receive_map,
+    )
     .finish(ScanMapper::finish)
     .build()
 }
@@ -28,6 +35,8 @@ pub fn kind() -> StageKind {
 struct ScanMapper {
     parameters: ScanMapperParameters,
     robots: BTreeMap<String, Robot>,
+    /// The robots that have sent a map of their own.
+    with_map: BTreeSet<String>,
 }
 
 struct Drawn {
@@ -113,10 +122,33 @@ impl ScanMapper {
         self.draw_and_send(message.robot(), false, output)
     }
 
-    /// The robot of a name, new if nothing has come from it yet. There must be a name.
+    /// A robot has a map of its own: whoever lays maps on each other must not get another one in its place.
+    fn receive_map(
+        &mut self,
+        message: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Drawn>,
+    ) -> Result<(), StageError> {
+        let name = message.robot();
+        if self.with_map.contains(name) {
+            return Ok(());
+        }
+        self.with_map.insert(name.to_owned());
+        if self.robots.remove(name).is_some_and(|robot| robot.sent_until.is_some()) {
+            output.warn(format!(
+                "{name} has sent a map after one was drawn from its scans: from there on its own counts. What was found with the \
+                 drawn one holds only if both are in one frame"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The robot of a name, new if nothing has come from it yet. There must be a name. `None` as well if it has a map of its own.
     fn robot(&mut self, name: &str, output: &Output<Drawn>) -> Option<&mut Robot> {
         if name.is_empty() {
             output.warn("scans and poses without a robot are left out");
+            return None;
+        }
+        if self.with_map.contains(name) {
             return None;
         }
         Some(self.robots.entry(name.to_owned()).or_insert_with(|| Robot::new(&self.parameters)))

@@ -309,6 +309,31 @@ fn a_robot_of_which_nothing_says_where_it_was_has_no_map() {
 }
 
 #[test]
+fn a_robot_that_sends_a_map_of_its_own_has_none_drawn_from_there_on() {
+    let mut bench = Bench::new("interval = 1");
+    let give = |bench: &mut Bench, ticks: std::ops::Range<u32>| {
+        for tick in ticks {
+            let seconds = 0.1 * f64::from(tick);
+            bench.scan(seconds, &scan(seconds));
+            bench.pose("pose", "robot1/map", seconds, truth(seconds));
+        }
+    };
+    give(&mut bench, 0..15);
+    assert_eq!(bench.0.take_messages("map").len(), 1);
+    for robot in ["robot2", "robot1"] {
+        assert!(bench.0.warnings().is_empty(), "{:?}", bench.0.warnings());
+        bench.0.give::<OccupancyGrid<'static>>("map", robot, at(1.5), &OccupancyGrid::default()).unwrap();
+    }
+    give(&mut bench, 15..60);
+    assert_eq!(bench.map(6.0).1, 0, "not at the end either");
+    let warnings = bench.0.warnings();
+    assert!(
+        warnings.keys().all(|text| text.starts_with("robot1 has sent a map")) && warnings.len() == 1,
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn parameters_that_cannot_be_are_refused() {
     for wrong in [
         "resolution = 0",

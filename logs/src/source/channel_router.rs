@@ -35,7 +35,7 @@ impl ChannelRouter {
     /// For channels that become known later, and whole maps of updates.
     pub(super) fn live(robots: RobotTopics) -> Self {
         let mut router = Self::new(robots, std::iter::empty(), true);
-        router.derived.expect_tags();
+        router.derived.expect_sensors();
         router
     }
 

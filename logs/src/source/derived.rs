@@ -33,7 +33,7 @@ pub(super) struct Derived {
     tag_positions: Option<TagPositions>,
     /// Whether readings of tags were made from other messages.
     has_made_readings: bool,
-    /// Where lidars are mounted; `None` if nobody has scans and no maps.
+    /// Where lidars are mounted; `None` if nobody has, or will have, scans and no maps.
     scans: Option<Scans>,
     /// The robots with scans and without maps.
     scanned: BTreeSet<String>,
@@ -64,15 +64,17 @@ impl Derived {
     /// There are other channels from here on. What is known of frames and maps stays.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         self.inferred.set_channels(roles);
+        self.scanned = roles.scanned().map(str::to_owned).collect();
         if let Some(positions) = &mut self.tag_positions {
             positions.set_robots(roles.tags_in_tf().clone());
         }
     }
 
-    /// Learns how cameras are mounted before it is known whether there are any.
-    pub(super) fn expect_tags(&mut self) {
+    /// Learns how cameras and lidars are mounted before it is known whether there are any.
+    pub(super) fn expect_sensors(&mut self) {
         let base_frame = self.base_frame.as_deref();
         self.tag_positions.get_or_insert_with(|| TagPositions::new(base_frame, BTreeSet::new()));
+        self.scans.get_or_insert_with(|| Scans::new(base_frame));
     }
 
     /// Learns from a message before the start: frames, and maps with their updates.

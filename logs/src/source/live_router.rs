@@ -60,12 +60,20 @@ impl LiveRouter {
 
     /// Whether anything is made of the messages of a channel: others need not be asked for.
     pub fn is_of_use(&self, number: usize) -> bool {
-        self.channels.get(number).is_some_and(|channel| {
-            let fits = |topic: &String| {
-                *topic == channel.original.topic || match_robot(topic, &channel.original.topic).is_some()
-            };
-            self.role(channel) != Role::Other || self.also.iter().any(fits)
-        })
+        let is_of_use =
+            |channel: &LiveChannel| self.role(channel) != Role::Other || self.is_asked_for(&channel.original);
+        self.channels.get(number).is_some_and(is_of_use)
+    }
+
+    /// Whether the messages of a channel are passed on even if nothing is made of them.
+    pub fn is_asked_for(&self, channel: &Channel) -> bool {
+        let fits = |topic: &String| *topic == channel.topic || match_robot(topic, &channel.topic).is_some();
+        self.also.iter().any(fits)
+    }
+
+    /// The robot whose scans a channel holds. They are of use as long as no channel with maps of the robot was added.
+    pub fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
+        self.router.roles().scanning_robot(channel)
     }
 
     /// Why a channel is not what its topic lets one expect.
@@ -80,12 +88,12 @@ impl LiveRouter {
 
     /// Whether a channel tells of one robot alone, so that two programs that send on it are two robots of one name.
     pub fn is_of_one_robot(&self, number: usize) -> bool {
-        let of_one = |role| matches!(role, Role::Map | Role::MapUpdate | Role::Pose(_) | Role::Odometry);
+        let of_one = |role| matches!(role, Role::Map | Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::Scan);
         self.channels.get(number).is_some_and(|channel| of_one(self.role(channel)))
     }
 
     /// Sends a message of a channel. The output's log time is the message's. One that does not fit its type is left out, and
-    /// counted as a warning.
+    /// counted as a warning; one of a channel that is of no use any more is left out as well.
     ///
     /// # Errors
     /// The link has failed.
@@ -95,7 +103,7 @@ impl LiveRouter {
         message: LiveMessage<'_>,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let Some(channel) = self.channels.get(number) else { return Ok(()) };
+        let Some(channel) = self.channels.get(number).filter(|_| self.is_of_use(number)) else { return Ok(()) };
         let role = self.role(channel);
         let data = match channel.named.rename_frames(message.data, &mut self.renamed) {
             Renamed::Copied => &self.renamed,
@@ -127,7 +135,7 @@ impl LiveRouter {
             let classified = self.router.roles().classify(&channel.original);
             let is_map = matches!(classified.role, Role::Map | Role::MapUpdate);
             let is_robots = is_map
-                || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage)
+                || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan)
                 || tf_topic(&channel.original).is_some();
             let robot = if is_robots { tf_topic(&channel.original).unwrap_or(classified.robot) } else { "" };
             let mut named = channel.original.clone();

@@ -130,6 +130,13 @@ pub struct RobotMessages {
     pub(crate) other: Out<AnyMessage>,
 }
 
+impl RobotMessages {
+    /// Whether anything reads the scans of robots that have no map.
+    pub fn takes_scans(&self) -> bool {
+        self.scans.is_read()
+    }
+}
+
 impl Outputs for RobotMessages {
     fn declare(ports: &mut OutputPorts) -> Self {
         Self {

@@ -178,8 +178,8 @@ impl RobotChannels {
         TagReader::new(channel, &fields).ok()
     }
 
-    /// The robot whose scans a channel would hold.
-    fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
+    /// The robot whose scans a channel holds, or would hold if the robot had no map.
+    pub(crate) fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
         let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
         match_robot(&self.topics.scan, &channel.topic).filter(|_| holds_scans)
     }

@@ -49,6 +49,10 @@ pub struct SourceParameters {
     /// So many messages of a topic wait to be taken before the oldest is dropped. Of a map it is the last.
     #[schemars(range(min = 1))]
     pub keep_last: usize,
+    /// So long after its scans were seen first a robot may take to publish a map, seconds. Then its scans are taken, if a stage reads
+    /// `scans`. If it publishes a map later than that, its scans are taken no longer.
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub wait_for_map: f64,
 }
 
 impl Default for SourceParameters {
@@ -62,6 +66,7 @@ impl Default for SourceParameters {
             also: Vec::new(),
             definitions: Vec::new(),
             keep_last: 100,
+            wait_for_map: 10.0,
         }
     }
 }
@@ -84,8 +89,8 @@ pub fn kind() -> StageKind {
     StageKind::source(
         "ros_source",
         "Takes what robots publish in ROS 2 into a live pipeline while it runs, over Zenoh as `rmw_zenoh_cpp` speaks it: maps and \
-         their updates, poses, transforms and readings of tags, on the topics that `[robots]` names. Robots come and go as they \
-         like",
+         their updates, poses, transforms and readings of tags, and scans of robots without a map, on the topics that `[robots]` \
+         names. Robots come and go as they like",
         RosSource::new,
     )
     .live_only()
@@ -100,7 +105,10 @@ pub struct RosSource {
     keep_last: usize,
     /// The topics that were ever seen.
     topics: BTreeMap<Topic, Seen>,
-    /// Those of them that are heard.
+    /// Publishers of scans of robots that may yet publish a map, and since when they are known.
+    waiting_scans: Vec<(Instant, Entity)>,
+    wait_for_map: Duration,
+    /// Those of the topics that are heard.
     subscribers: BTreeMap<Topic, Subscriber>,
     /// What was told already.
     told: BTreeSet<String>,
@@ -125,6 +133,7 @@ impl RosSource {
     /// It cannot be joined.
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
         let node = Node::start(parameters.connection(), &context.stage)?;
+        let wait_for_map = Duration::try_from_secs_f64(parameters.wait_for_map).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
         node.watch(move |entity, is_there| events.push(Event::Entity(entity, is_there), 0))?;
@@ -135,6 +144,8 @@ impl RosSource {
             definitions: Definitions::new(&parameters.definitions),
             keep_last: parameters.keep_last,
             topics: BTreeMap::new(),
+            waiting_scans: Vec::new(),
+            wait_for_map,
             subscribers: BTreeMap::new(),
             told: BTreeSet::new(),
             waiting_since: Some(Instant::now()),
@@ -154,11 +165,48 @@ impl RosSource {
             return Ok(());
         }
         if !is_there {
+            self.waiting_scans.retain(|(_, waiting)| *waiting != entity);
             if let Some(seen) = self.topics.get_mut(&topic) {
                 seen.publishers.remove(&entity);
             }
             return Ok(());
         }
+        if !self.topics.contains_key(&topic) {
+            let channel = self.channel(&topic, qos);
+            if self.router.scanning_robot(&channel).is_some() {
+                if output.takes_scans() {
+                    self.waiting_scans.push((Instant::now(), entity));
+                    return Ok(());
+                }
+                if !self.router.is_asked_for(&channel) {
+                    return Ok(());
+                }
+            }
+        }
+        self.add_publisher(topic, qos, entity, output)
+    }
+
+    /// Takes up the topics with scans of robots that had time enough to publish a map.
+    fn end_waiting(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let has_waited = |since: &Instant| since.elapsed() >= self.wait_for_map;
+        let (ready, waiting) =
+            std::mem::take(&mut self.waiting_scans).into_iter().partition(|(since, _)| has_waited(since));
+        self.waiting_scans = waiting;
+        for (_, entity) in ready {
+            let Kind::Publisher(topic, qos) = entity.kind.clone() else { continue };
+            self.add_publisher(topic, qos, entity, output)?;
+        }
+        Ok(())
+    }
+
+    /// Takes up what publishes a topic.
+    fn add_publisher(
+        &mut self,
+        topic: Topic,
+        qos: Qos,
+        entity: Entity,
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
         let number = match self.topics.get_mut(&topic) {
             Some(seen) => {
                 seen.publishers.insert(entity);
@@ -175,8 +223,17 @@ impl RosSource {
         self.subscribe(output)
     }
 
-    /// Subscribes to all topics that are of use and can be read.
+    /// Subscribes to all topics that are of use and can be read, and to no others.
     fn subscribe(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        // Scans of a robot that has a map after all, for example.
+        let (topics, router) = (&self.topics, &self.router);
+        self.subscribers.retain(|topic, _| {
+            let is_of_use = topics.get(topic).is_some_and(|seen| router.is_of_use(seen.number));
+            if !is_of_use {
+                tracing::info!("takes no more messages of {} on `{}`", topic.ros_type, topic.name);
+            }
+            is_of_use
+        });
         let mut wrong = Vec::new();
         for (topic, seen) in &self.topics {
             let number = seen.number;
@@ -308,6 +365,7 @@ impl Source for RosSource {
 
     fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         self.look_for_router(output);
+        self.end_waiting(output)?;
         for _ in 0..BATCH {
             match self.inbox.take() {
                 None => break,

@@ -5,5 +5,6 @@
 mod bridge;
 mod network_namespaces;
 mod python_robots;
+mod scans;
 mod stages;
 mod wire;

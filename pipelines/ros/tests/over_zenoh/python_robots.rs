@@ -89,23 +89,39 @@ fn python(folder: &Path) -> PathBuf {
 #[test]
 #[ignore = "needs python3 with venv, and the network"]
 fn robots_and_a_viewer_of_others_have_one_map() {
+    one_map("live_ros.toml", "/{robot}/map,/{robot}/pose,/{robot}/tag_ranges", &[]);
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn robots_with_scans_and_without_maps_have_one_map() {
+    let wait = ["--set", "robots.wait_for_map=1"];
+    one_map("live_ros_scans.toml", "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges", &wait);
+}
+
+/// Plays two simulated robots, which publish these topics, to a pipeline, and holds what a viewer sees and what was found against the
+/// truth.
+fn one_map(pipeline: &str, topics: &str, more: &[&str]) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     let python = python(folder);
     let gridweave = Path::new(env!("CARGO_BIN_EXE_gridweave-ros"));
-    let building = ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60"];
+    let building =
+        ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60", "scans=true"];
     let building = building.into_iter().flat_map(|setting| ["--set", setting]);
     let simulate: Vec<&str> = ["simulate", "-o", "in.mcap", "--robots", "2"].into_iter().chain(building).collect();
     run(gridweave, &simulate, folder);
+    run(gridweave, &["filter", "in.mcap", "-o", "robots.mcap", "--topics", topics], folder);
 
     let router = Router::start();
     let connect =
         [format!("robots.connect=[\"{}\"]", router.endpoint()), format!("ros.connect=[\"{}\"]", router.endpoint())];
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("live_ros.toml");
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join(pipeline);
     let arguments: Vec<&OsStr> = ["run".as_ref(), pipeline.as_os_str()]
         .into_iter()
         .chain(["--summary".as_ref(), "summary.json".as_ref()])
         .chain(connect.iter().flat_map(|set| ["--set".as_ref(), OsStr::new(set.as_str())]))
+        .chain(more.iter().map(OsStr::new))
         .collect();
     let mut merging = Running::start(gridweave, &arguments, folder, "merging.log");
     let words =
@@ -113,7 +129,7 @@ fn robots_and_a_viewer_of_others_have_one_map() {
 
     let robots = script("robots.py");
     let play = |log: &str| {
-        let args = [robots.as_os_str(), router.endpoint().as_ref(), "in.mcap".as_ref(), "4".as_ref()];
+        let args = [robots.as_os_str(), router.endpoint().as_ref(), "robots.mcap".as_ref(), "4".as_ref()];
         Running::start(&python, &args, folder, log)
     };
     let mut playing = play("robots.log");

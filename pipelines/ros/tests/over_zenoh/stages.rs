@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{
 use gridweave_runtime::stage::{Context, InputWire, LoneStage};
 use std::time::{Duration, Instant};
 
-fn map(robot: &str, occupied: u8) -> Vec<u8> {
+pub(crate) fn map(robot: &str, occupied: u8) -> Vec<u8> {
     let info = MapMetaData { width: 2, height: 1, resolution: 0.05, ..Default::default() };
     let header = Header::new(LogTime(1_000_000_000), format!("{robot}map"));
     encode(&OccupancyGrid { header, info, data: &[0, occupied] }).unwrap()
@@ -23,7 +23,7 @@ fn source(router: &Router) -> LoneStage {
 
 /// Lets a source go on until it has sent so many messages on an output, and gives them.
 #[track_caller]
-fn sent(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
+pub(crate) fn sent(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
     let (mut messages, until) = (Vec::new(), Instant::now() + WATCHDOG);
     while messages.len() < count {
         assert!(Instant::now() < until, "{} of {count} came on {output}: {:?}", messages.len(), source.warnings());
@@ -38,7 +38,7 @@ fn sent(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
 
 /// Lets a source go on until it hears what is published.
 #[track_caller]
-fn wait_until_heard(source: &mut LoneStage, sender: &Sender) {
+pub(crate) fn wait_until_heard(source: &mut LoneStage, sender: &Sender) {
     let until = Instant::now() + WATCHDOG;
     while !sender.is_heard() {
         assert!(Instant::now() < until, "the source does not subscribe");
@@ -290,6 +290,7 @@ fn a_robot_with_a_tree_of_its_own_is_told_there_where_its_frame_lies() {
 fn a_pipeline_with_robots_is_a_live_one() {
     let registry = gridweave::shipped::registry(gridweave_ros::kinds());
     let parse = |text: &str| Pipeline::parse("live_ros.toml", text, &registry, &Overrides::default());
+    assert_eq!(parse(include_str!("../../live_ros_scans.toml")).unwrap().mode, Mode::Live);
     let text = include_str!("../../live_ros.toml");
     assert_eq!(parse(text).unwrap().mode, Mode::Live);
     let error = parse(&text.replace("mode = \"live\"", "")).err().unwrap().to_string();
