@@ -16,12 +16,15 @@
 #![forbid(unsafe_code)]
 
 pub mod attachment;
+mod audience;
 pub mod bridge;
+mod changed_part;
 mod connection;
 mod definitions;
 mod inbox;
 pub mod key_expression;
 pub mod liveliness;
+mod map_topics;
 mod node;
 mod own_trees;
 pub mod qos;

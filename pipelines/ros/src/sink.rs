@@ -2,6 +2,7 @@
 
 use super::connection::{Connection, LISTEN, ROUTER};
 use super::key_expression::Topic;
+use super::map_topics::{MapTopics, Sent};
 use super::node::{Node, Publisher};
 use super::own_trees::{OwnTrees, in_own_tree};
 use super::qos::Qos;
@@ -10,7 +11,7 @@ use gridweave_logs::names::TopicRename;
 use gridweave_logs::qos;
 use gridweave_logs::tf::is_static;
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{RobotFrames, RosMessage, TFMessage, TransformStamped, encode};
+use gridweave_runtime::ros::{OccupancyGrid, RobotFrames, RosMessage, TFMessage, TransformStamped, encode};
 use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,10 @@ pub struct SinkParameters {
     /// Topics that get other names than they would have in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` stands for one part
     /// of both.
     pub rename: Vec<String>,
+    /// Whether parts of a map that have changed are published on its topic with `_updates` behind (`map_msgs/msg/OccupancyGridUpdate`)
+    /// while every node that hears the map hears these as well. The whole map follows where anybody does not, when another one comes,
+    /// and once updates would have brought as many cells as the map has.
+    pub map_updates: bool,
 }
 
 impl Default for SinkParameters {
@@ -49,6 +54,7 @@ impl Default for SinkParameters {
             zenoh_config: None,
             node: None,
             rename: Vec::new(),
+            map_updates: true,
         }
     }
 }
@@ -90,16 +96,19 @@ pub fn kind() -> StageKind {
         "ros_sink",
         "Publishes what it is given in ROS 2, over Zenoh as `rmw_zenoh_cpp` speaks it, on the topics that it would have in a log. \
          What holds until it is sent again, such as maps and static transforms, is kept for those who come later (transient \
-         local). A frame is told anew only where it has moved by more than it is uncertain, by the covariances in \
+         local); of a map the part that has changed is sent, where everybody hears that. A frame is told anew only where it has moved by more than it is uncertain, by the covariances in \
          `gridweave_msgs/msg/RobotFrames` where these are given, too",
         RosSink::new,
     )
     .any_inputs("in", "what to publish: outputs of any stage but a source", RosSink::receive)
+    .finish(RosSink::finish)
     .build()
 }
 
 /// Publishes what it is given.
 struct RosSink {
+    /// `None` if maps are always sent whole.
+    maps: Option<MapTopics>,
     node: Node,
     renames: Vec<TopicRename>,
     /// The type of each wire's messages.
@@ -123,6 +132,7 @@ impl RosSink {
         let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
         let node = Node::start(parameters.connection(), &context.stage)?;
         Ok(Self {
+            maps: parameters.map_updates.then(|| MapTopics::watch(&node)).transpose()?,
             trees: OwnTrees::watch(&node)?,
             told_in_trees: BTreeMap::new(),
             node,
@@ -151,7 +161,39 @@ impl RosSink {
                 }
             };
         }
+        if ros_type == OccupancyGrid::NAME && self.maps.is_some() && is_topic(&self.name(&topic)) {
+            return self.publish_map(&topic, message, output);
+        }
         self.publish(&topic, &ros_type, message.bytes(), output)
+    }
+
+    fn finish(&mut self, _: &Output<()>) -> Result<(), StageError> {
+        self.maps.as_ref().map_or(Ok(()), MapTopics::send_updated)
+    }
+
+    /// Publishes a map, or what has changed in it.
+    fn publish_map(&mut self, topic: &str, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        let (name, Some(maps)) = (self.name(topic), &self.maps) else { return Ok(()) };
+        let sent = match message.decode::<OccupancyGrid<'_>>() {
+            Ok(map) => maps.send(&mut self.node, &name, &map, message.bytes())?,
+            Err(_) => None,
+        };
+        match sent {
+            Some(Sent::Whole) => output.count("messages published", 1),
+            Some(Sent::Update { saved }) => {
+                output.count("messages published", 1);
+                output.count("map updates published", 1);
+                output.count("bytes saved by map updates", saved as u64);
+            }
+            Some(Sent::Nothing) => output.count("maps without a change, not published", 1),
+            None => output.warn(format!("maps on `{name}` were left out: they do not hold as many cells as they say")),
+        }
+        Ok(())
+    }
+
+    /// The name that a topic gets.
+    fn name(&self, topic: &str) -> String {
+        self.renames.iter().find_map(|rename| rename.apply(topic)).unwrap_or_else(|| topic.to_owned())
     }
 
     /// Publishes the static transforms of all frames, those that have settled as they were. A publisher keeps its last message
@@ -195,7 +237,7 @@ impl RosSink {
     }
 
     fn publish(&mut self, topic: &str, ros_type: &str, bytes: &[u8], output: &Output<()>) -> Result<(), StageError> {
-        let name = self.renames.iter().find_map(|rename| rename.apply(topic)).unwrap_or_else(|| topic.to_owned());
+        let name = self.name(topic);
         let publisher = match self.publishers.get_mut(&name) {
             Some(publisher) => publisher,
             None => {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod bridge;
+mod map_updates;
 mod network_namespaces;
 mod python_robots;
 mod scans;

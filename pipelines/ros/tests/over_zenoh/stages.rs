@@ -61,7 +61,8 @@ fn warned(source: &mut LoneStage, of: &str) -> String {
     }
 }
 
-fn sink(router: &Router, wires: &[(&'static str, &str)]) -> LoneStage {
+/// A sink with wires that carry messages of these types on these topics.
+pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> LoneStage {
     let wire = |(ros_type, topic): &(&str, &str)| InputWire {
         port: "in",
         from: "a".into(),
@@ -70,10 +71,10 @@ fn sink(router: &Router, wires: &[(&'static str, &str)]) -> LoneStage {
         ..Default::default()
     };
     let context = Context { stage: "ros".into(), inputs: wires.iter().map(wire).collect(), ..Default::default() };
-    LoneStage::with_context(&gridweave_ros::sink::kind(), &router.parameters(), &context).unwrap()
+    LoneStage::with_context(&gridweave_ros::sink::kind(), parameters, &context).unwrap()
 }
 
-fn give(sink: &mut LoneStage, wire: usize, topic: &str, bytes: Vec<u8>) {
+pub(crate) fn give(sink: &mut LoneStage, wire: usize, topic: &str, bytes: Vec<u8>) {
     let topic = FixedText::new(topic).unwrap();
     let message = Message::from_vec(MessageHeader { topic, ..Default::default() }, bytes);
     sink.give_message("in", message.on_wire(wire)).unwrap();
@@ -198,7 +199,7 @@ fn the_merged_map_is_there_for_those_who_come_late_and_after_a_restart() {
     let topic = topic("/map", OccupancyGrid::NAME);
     let early = viewer.subscribe(&topic, Qos::latched(1));
     let sink = |value| {
-        let mut sink = sink(&router, &[(OccupancyGrid::NAME, "/map")]);
+        let mut sink = sink(&router.parameters(), &[(OccupancyGrid::NAME, "/map")]);
         give(&mut sink, 0, "/map", map("", value));
         sink
     };
@@ -215,7 +216,7 @@ fn the_merged_map_is_there_for_those_who_come_late_and_after_a_restart() {
 #[test]
 fn programs_that_ask_see_the_node_and_its_topics() {
     let router = Router::start();
-    let mut sink = sink(&router, &[(MarkerArray::NAME, "/markers/graph")]);
+    let mut sink = sink(&router.parameters(), &[(MarkerArray::NAME, "/markers/graph")]);
     give(&mut sink, 0, "/markers/graph", encode(&MarkerArray::default()).unwrap());
     let viewer = Robot::start(&router, "viewer");
     let graph = topic("/markers/graph", MarkerArray::NAME).type_hash;
@@ -236,7 +237,7 @@ fn world_to(child: &str, x: f64) -> TransformStamped {
 #[test]
 fn frames_are_told_together_and_do_not_jump() {
     let router = Router::start();
-    let mut sink = sink(&router, &[(RobotFrames::NAME, "/robot_frames"), (TFMessage::NAME, "/tf_static")]);
+    let mut sink = sink(&router.parameters(), &[(RobotFrames::NAME, "/robot_frames"), (TFMessage::NAME, "/tf_static")]);
     let viewer = Robot::start(&router, "viewer");
     let heard = viewer.subscribe(&topic("/tf_static", TFMessage::NAME), Qos::latched(1));
     let mut tell = |robot: &str, x| {
@@ -270,7 +271,8 @@ fn a_robot_with_a_tree_of_its_own_is_told_there_where_its_frame_lies() {
     let robot = Robot::start(&router, "slam_toolbox");
     let _tree = robot.publish(&topic("/robot2/tf", TFMessage::NAME), Qos::reliable(10));
     let heard = robot.subscribe(&topic("/robot2/tf_static", TFMessage::NAME), Qos::latched(1));
-    let mut sink = sink(&router, &[(TFMessage::NAME, "/tf_static"), (MarkerArray::NAME, "/markers/graph")]);
+    let mut sink =
+        sink(&router.parameters(), &[(TFMessage::NAME, "/tf_static"), (MarkerArray::NAME, "/markers/graph")]);
     let transforms = vec![world_to("robot1/map", 1.0), world_to("robot2/map", 2.0)];
     give(&mut sink, 0, "/tf_static", encode(&TFMessage { transforms }).unwrap());
     // The robot may become known only now.

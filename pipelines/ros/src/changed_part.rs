@@ -1,0 +1,265 @@
+//! Which part of a map has changed since the whole of it was sent.
+//!
+//! Whoever has the last whole map has the map after any of the updates that follow, whether or not the ones between have come: an update
+//! covers all cells that differ from the whole map, and those that an earlier update has covered. So what is kept of the whole map for
+//! those who come late is what the next update applies to.
+
+use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
+
+/// A rectangle of cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Rectangle {
+    /// The first column and the first row.
+    low: [usize; 2],
+    /// The column and the row behind the last ones.
+    high: [usize; 2],
+}
+
+impl Rectangle {
+    fn cell_count(&self) -> usize {
+        (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
+    }
+
+    /// The smallest that holds both.
+    fn with(self, other: Self) -> Self {
+        let both = |a: [usize; 2], b: [usize; 2], of: fn(usize, usize) -> usize| [of(a[0], b[0]), of(a[1], b[1])];
+        Self { low: both(self.low, other.low, usize::min), high: both(self.high, other.high, usize::max) }
+    }
+}
+
+/// A map as it was sent: the last whole one, and what has changed since.
+#[derive(Debug)]
+pub(crate) struct SentMap {
+    prefix: GridPrefix,
+    /// The cells of the last whole map.
+    whole: Vec<u8>,
+    /// The cells as they are.
+    cells: Vec<u8>,
+    /// What the last update has covered; `None` if there was none after the whole map.
+    covered: Option<Rectangle>,
+    /// How many cells all updates after the whole map have brought.
+    brought: usize,
+}
+
+/// What is to be sent of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// All of it.
+    Whole,
+    /// This part of it.
+    Update(Rectangle),
+    /// Nothing: no cell has changed.
+    Nothing,
+}
+
+impl SentMap {
+    /// A map that is sent as a whole; `None` if it does not hold as many cells as it says.
+    pub(crate) fn new(map: &OccupancyGrid<'_>) -> Option<Self> {
+        let prefix = GridPrefix { header: map.header.clone(), info: map.info };
+        let is_whole = prefix.cell_count() == map.data.len();
+        let cells = map.data.to_vec();
+        is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, brought: 0 })
+    }
+
+    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for that,
+    /// and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
+    pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>) -> Part {
+        let (before, info) = (&self.prefix.info, &map.info);
+        let lies_alike = self.prefix.header.frame_id == map.header.frame_id
+            && (before.resolution, before.width, before.height, before.origin)
+                == (info.resolution, info.width, info.height, info.origin)
+            && self.cells.len() == map.data.len();
+        if lies_alike && self.cells == map.data {
+            return Part::Nothing;
+        }
+        self.prefix = GridPrefix { header: map.header.clone(), info: map.info };
+        self.cells.clear();
+        self.cells.extend_from_slice(map.data);
+        let changed = difference(&self.whole, map.data, info.width as usize).filter(|_| lies_alike);
+        let part = match (changed, self.covered) {
+            (Some(changed), Some(covered)) => Some(changed.with(covered)),
+            (changed, covered) => changed.or(covered),
+        };
+        match part.filter(|part| lies_alike && self.brought.saturating_add(part.cell_count()) < self.cells.len()) {
+            Some(part) => {
+                self.covered = Some(part);
+                self.brought += part.cell_count();
+                Part::Update(part)
+            }
+            None => {
+                self.set_whole();
+                Part::Whole
+            }
+        }
+    }
+
+    /// Whether updates have been sent after the last whole map.
+    pub(crate) fn is_updated(&self) -> bool {
+        self.covered.is_some()
+    }
+
+    /// The whole map as it is, which counts as sent from here on.
+    pub(crate) fn whole(&mut self) -> OccupancyGrid<'_> {
+        self.set_whole();
+        OccupancyGrid { header: self.prefix.header.clone(), info: self.prefix.info, data: &self.cells }
+    }
+
+    /// What changes next is sent with all of the map.
+    pub(crate) fn owe_whole(&mut self) {
+        self.brought = self.cells.len();
+    }
+
+    fn set_whole(&mut self) {
+        self.whole.clone_from(&self.cells);
+        (self.covered, self.brought) = (None, 0);
+    }
+
+    /// The header of an update with a part of the map, and the cells of that, which `cells` is filled with.
+    pub(crate) fn update<'a>(&self, part: Rectangle, cells: &'a mut Vec<u8>) -> OccupancyGridUpdate<'a> {
+        let Rectangle { low: [left, low], high: [right, high] } = part;
+        cells.clear();
+        for row in self.cells.chunks_exact(self.prefix.info.width.max(1) as usize).take(high).skip(low) {
+            cells.extend_from_slice(row.get(left..right).unwrap_or_default());
+        }
+        let Header { stamp, frame_id } = self.prefix.header.clone();
+        OccupancyGridUpdate {
+            header: Header { stamp, frame_id },
+            x: left as i32,
+            y: low as i32,
+            width: (right - left) as u32,
+            height: (high - low) as u32,
+            data: cells,
+        }
+    }
+}
+
+/// The smallest rectangle that holds all cells in which two maps of one size differ; `None` if they do not.
+fn difference(before: &[u8], after: &[u8], width: usize) -> Option<Rectangle> {
+    let rows = before.chunks_exact(width.max(1)).zip(after.chunks_exact(width.max(1))).enumerate();
+    let changed = rows.filter_map(|(row, (before, after))| {
+        if before == after {
+            return None;
+        }
+        let differs = |(before, after): (&u8, &u8)| before != after;
+        let first = before.iter().zip(after).position(differs)?;
+        let last = before.iter().zip(after).rposition(differs)?;
+        Some(Rectangle { low: [first, row], high: [last + 1, row + 1] })
+    });
+    changed.reduce(Rectangle::with)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::MapMetaData;
+    use proptest::prelude::*;
+
+    fn map(width: u32, height: u32, data: &[u8]) -> OccupancyGrid<'_> {
+        let info = MapMetaData { width, height, resolution: 0.05, ..Default::default() };
+        OccupancyGrid { header: Header { frame_id: "world".into(), ..Default::default() }, info, data }
+    }
+
+    fn part(low: [usize; 2], high: [usize; 2]) -> Part {
+        Part::Update(Rectangle { low, high })
+    }
+
+    #[test]
+    fn an_update_holds_what_differs_from_the_whole_map_and_what_updates_have_changed_before() {
+        let mut cells = vec![0; 40];
+        let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
+        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Nothing);
+        assert!(!sent.is_updated());
+        (cells[9], cells[18]) = (1, 2);
+        assert_eq!(sent.take(&map(8, 5, &cells)), part([1, 1], [3, 3]));
+        // What was told is taken back: whoever has the update must be told.
+        (cells[9], cells[18], cells[12]) = (0, 0, 7);
+        assert_eq!(sent.take(&map(8, 5, &cells)), part([1, 1], [5, 3]));
+        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Nothing);
+        assert!(sent.is_updated());
+        let Part::Update(rectangle) = part([1, 1], [5, 3]) else { panic!() };
+        let mut buffer = Vec::new();
+        let update = sent.update(rectangle, &mut buffer);
+        assert_eq!((update.x, update.y, update.width, update.height), (1, 1, 4, 2));
+        assert_eq!((update.data, update.header.frame_id.as_str()), (&[0, 0, 0, 7, 0, 0, 0, 0][..], "world"));
+        assert_eq!(sent.whole().data, cells);
+        assert!(!sent.is_updated());
+    }
+
+    #[test]
+    fn the_whole_map_is_sent_once_updates_would_have_brought_as_much() {
+        let mut cells = vec![0; 40];
+        let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
+        let mut parts = Vec::new();
+        for value in 1..8 {
+            cells[..12].fill(value);
+            parts.push(sent.take(&map(8, 5, &cells)));
+        }
+        let update = part([0, 0], [8, 2]);
+        assert_eq!(parts, [update, update, Part::Whole, update, update, Part::Whole, update]);
+        cells.fill(9);
+        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Whole);
+        cells[0] = 1;
+        sent.owe_whole();
+        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Whole);
+        cells[0] = 2;
+        assert_eq!(sent.take(&map(8, 5, &cells)), part([0, 0], [1, 1]));
+    }
+
+    #[test]
+    fn a_map_of_another_place_size_or_frame_is_sent_as_a_whole() {
+        let mut cells = vec![0; 40];
+        let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
+        assert_eq!(sent.take(&map(5, 8, &cells)), Part::Whole);
+        let mut moved = map(5, 8, &cells);
+        moved.info.origin.position.x = 0.05;
+        assert_eq!(sent.take(&moved), Part::Whole);
+        moved.header.frame_id = "world/robot2".into();
+        assert_eq!(sent.take(&moved), Part::Whole);
+        moved.header.stamp.sec = 7;
+        assert_eq!(sent.take(&moved), Part::Nothing, "a later stamp is no change");
+        cells.truncate(35);
+        assert_eq!(sent.take(&map(5, 7, &cells)), Part::Whole);
+        assert!(SentMap::new(&map(8, 5, &cells)).is_none() && SentMap::new(&map(0, 0, &[])).is_some());
+    }
+
+    /// A listener that has a map.
+    fn apply(to: &mut [u8], width: usize, update: &OccupancyGridUpdate<'_>) {
+        for (row, cells) in update.data.chunks_exact(update.width as usize).enumerate() {
+            let start = (update.y as usize + row) * width + update.x as usize;
+            to[start..start + cells.len()].copy_from_slice(cells);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn whoever_has_the_last_whole_map_has_the_map_after_any_updates(
+            maps in prop::collection::vec(prop::collection::vec((0..30_usize, 0..3_u8), 0..4), 1..20),
+            misses in prop::collection::vec(any::<bool>(), 20),
+        ) {
+            let (width, height) = (6, 5);
+            let mut cells = vec![0; 30];
+            let mut sent = SentMap::new(&map(width, height, &cells)).unwrap();
+            // One who hears everything, and one who misses updates, but for the last.
+            let (mut all, mut some) = (cells.clone(), cells.clone());
+            for (changes, is_missed) in maps.iter().zip(misses) {
+                for (cell, value) in changes {
+                    cells[*cell] = *value;
+                }
+                let mut buffer = Vec::new();
+                match sent.take(&map(width, height, &cells)) {
+                    Part::Nothing => {}
+                    Part::Whole => (all, some) = (cells.clone(), cells.clone()),
+                    Part::Update(part) => {
+                        let update = sent.update(part, &mut buffer);
+                        apply(&mut all, 6, &update);
+                        if !is_missed {
+                            apply(&mut some, 6, &update);
+                            prop_assert_eq!(&some, &cells);
+                        }
+                    }
+                }
+                prop_assert_eq!(&all, &cells);
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! What programs have of a map whose changes the sink publishes, over a router on this machine.
+
+use crate::stages::{give, sink};
+use crate::wire::{Hearer, Robot, Router, WATCHDOG, topic};
+use gridweave_ros::qos::Qos;
+use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
+use gridweave_runtime::stage::LoneStage;
+use std::time::Instant;
+
+const WIDTH: usize = 40;
+const CELLS: usize = 40 * 30;
+
+/// Publishes maps of which each differs in one cell from the one before.
+struct Merge {
+    sink: LoneStage,
+    cells: Vec<u8>,
+    sent: usize,
+}
+
+impl Merge {
+    fn start(router: &Router, more: &str) -> Self {
+        let parameters = format!("{}\n{more}", router.parameters());
+        Self { sink: sink(&parameters, &[(OccupancyGrid::NAME, "/map")]), cells: vec![0; CELLS], sent: 0 }
+    }
+
+    fn send_next(&mut self) {
+        let cell = 5 * WIDTH + 7 + self.sent % 3;
+        self.cells[cell] = self.cells[cell].wrapping_add(1) % 100;
+        self.sent += 1;
+        let info = MapMetaData { width: WIDTH as u32, height: 30, resolution: 0.05, ..Default::default() };
+        let header = Header { frame_id: "world".into(), ..Default::default() };
+        give(&mut self.sink, 0, "/map", encode(&OccupancyGrid { header, info, data: &self.cells }).unwrap());
+    }
+}
+
+/// A program that shows a map, as RViz does.
+struct Viewer {
+    maps: Hearer,
+    updates: Option<Hearer>,
+    cells: Vec<u8>,
+    /// How many whole maps and how many updates have come.
+    heard: [usize; 2],
+    _robot: Robot,
+}
+
+impl Viewer {
+    fn start(router: &Router, name: &str, hears_updates: bool, qos: Qos) -> Self {
+        let robot = Robot::start(router, name);
+        let updates = || robot.subscribe(&topic("/map_updates", OccupancyGridUpdate::NAME), Qos::reliable(5));
+        let maps = robot.subscribe(&topic("/map", OccupancyGrid::NAME), qos);
+        Self { maps, updates: hears_updates.then(updates), cells: Vec::new(), heard: [0; 2], _robot: robot }
+    }
+
+    /// Takes what has come.
+    fn look(&mut self) {
+        while let Some(message) = self.maps.try_next() {
+            self.cells = decode::<OccupancyGrid<'_>>(&message).unwrap().data.to_vec();
+            self.heard[0] += 1;
+        }
+        while let Some(message) = self.updates.as_ref().and_then(Hearer::try_next) {
+            let update: OccupancyGridUpdate<'_> = decode(&message).unwrap();
+            assert_eq!(update.header.frame_id, "world");
+            self.heard[1] += 1;
+            for (row, cells) in update.data.chunks_exact(update.width as usize).enumerate() {
+                let start = (update.y as usize + row) * WIDTH + update.x as usize;
+                if let Some(part) = self.cells.get_mut(start..start + cells.len()) {
+                    part.copy_from_slice(cells);
+                }
+            }
+        }
+    }
+}
+
+/// Lets maps be sent until something holds.
+#[track_caller]
+fn send_until(merge: &mut Merge, what: &str, mut holds: impl FnMut(&Merge) -> bool) {
+    let until = Instant::now() + WATCHDOG;
+    while !holds(merge) {
+        assert!(Instant::now() < until, "{what}");
+        merge.send_next();
+        std::thread::yield_now();
+    }
+}
+
+/// Waits until a viewer has the map as it is, without another one being sent.
+#[track_caller]
+fn wait_until_seen(merge: &Merge, viewer: &mut Viewer) {
+    let until = Instant::now() + WATCHDOG;
+    while viewer.cells != merge.cells {
+        assert!(Instant::now() < until, "{:?}", viewer.heard);
+        viewer.look();
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn who_hears_updates_has_the_map_by_them_and_who_comes_late_has_it_at_once() {
+    let router = Router::start();
+    let mut merge = Merge::start(&router, "");
+    let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));
+    send_until(&mut merge, "no update comes", |_| {
+        viewer.look();
+        viewer.heard[1] >= 3
+    });
+    wait_until_seen(&merge, &mut viewer);
+    // Nothing is sent any more.
+    let mut late = Viewer::start(&router, "late", true, Qos::latched(1));
+    wait_until_seen(&merge, &mut late);
+    let mut volatile = Viewer::start(&router, "volatile", true, Qos::reliable(1));
+    wait_until_seen(&merge, &mut volatile);
+    merge.send_next();
+    wait_until_seen(&merge, &mut viewer);
+    wait_until_seen(&merge, &mut late);
+    wait_until_seen(&merge, &mut volatile);
+    assert!(merge.sink.counts()["bytes saved by map updates"] > 1000, "{:?}", merge.sink.counts());
+}
+
+#[test]
+fn where_somebody_hears_the_map_alone_all_maps_are_whole() {
+    let router = Router::start();
+    let mut merge = Merge::start(&router, "");
+    let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));
+    send_until(&mut merge, "no update comes", |_| {
+        viewer.look();
+        viewer.heard[1] >= 1
+    });
+    let mut alone = Viewer::start(&router, "nav2", false, Qos::latched(1));
+    wait_until_seen(&merge, &mut alone);
+    for _ in 0..10 {
+        merge.send_next();
+        wait_until_seen(&merge, &mut alone);
+    }
+    wait_until_seen(&merge, &mut viewer);
+    drop(alone);
+    let before = viewer.heard[1];
+    send_until(&mut merge, "no update comes any more", |_| {
+        viewer.look();
+        viewer.heard[1] > before
+    });
+}
+
+#[test]
+fn at_the_end_the_map_is_whole() {
+    let router = Router::start();
+    let mut merge = Merge::start(&router, "");
+    let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));
+    let updates = |merge: &Merge| merge.sink.counts().get("map updates published").copied().unwrap_or_default();
+    send_until(&mut merge, "no update is sent", |merge| updates(merge) > 0);
+    wait_until_seen(&merge, &mut viewer);
+    let whole = viewer.heard[0];
+    merge.sink.finish(Default::default()).unwrap();
+    let until = Instant::now() + WATCHDOG;
+    while viewer.heard[0] == whole {
+        assert!(Instant::now() < until, "no whole map comes");
+        viewer.look();
+        std::thread::yield_now();
+    }
+    assert_eq!(viewer.cells, merge.cells);
+}
+
+#[test]
+fn without_updates_every_map_is_whole() {
+    let router = Router::start();
+    let mut merge = Merge::start(&router, "map_updates = false");
+    let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));
+    for _ in 0..30 {
+        merge.send_next();
+        wait_until_seen(&merge, &mut viewer);
+    }
+    assert_eq!(viewer.heard[1], 0);
+}
