@@ -1,5 +1,5 @@
 //! The whole command between programs that others have written: robots and a viewer in Python, by `eclipse-zenoh` and `rosbags`, which
-//! have type hashes and an encoding of their own.
+//! have type hashes and an encoding of their own; and by `zenoh-ros2-sdk`, which has keys, tokens and attachments of its own, too.
 
 use crate::wire::Router;
 use std::ffi::OsStr;
@@ -89,19 +89,27 @@ fn python(folder: &Path) -> PathBuf {
 #[test]
 #[ignore = "needs python3 with venv, and the network"]
 fn robots_and_a_viewer_of_others_have_one_map() {
-    one_map("live_ros.toml", "/{robot}/map,/{robot}/pose,/{robot}/tag_ranges", &[]);
+    one_map("live_ros.toml", "/{robot}/map,/{robot}/pose,/{robot}/tag_ranges", ["robots.py", "viewer.py"], &[]);
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn robots_and_a_viewer_of_zenoh_ros2_sdk_have_one_map() {
+    let topics = "/{robot}/map,/{robot}/pose,/{robot}/tag_ranges";
+    one_map("live_ros.toml", topics, ["sdk_robots.py", "sdk_viewer.py"], &[]);
 }
 
 #[test]
 #[ignore = "needs python3 with venv, and the network"]
 fn robots_with_scans_and_without_maps_have_one_map() {
     let wait = ["--set", "robots.wait_for_map=1"];
-    one_map("live_ros_scans.toml", "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges", &wait);
+    let topics = "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges";
+    one_map("live_ros_scans.toml", topics, ["robots.py", "viewer.py"], &wait);
 }
 
 /// Plays two simulated robots, which publish these topics, to a pipeline, and holds what a viewer sees and what was found against the
-/// truth.
-fn one_map(pipeline: &str, topics: &str, more: &[&str]) {
+/// truth. The scripts are that of the robots and that of the viewer.
+fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     let python = python(folder);
@@ -127,9 +135,11 @@ fn one_map(pipeline: &str, topics: &str, more: &[&str]) {
     let words =
         |what: &str| format!("{what}: {}", std::fs::read_to_string(folder.join("merging.log")).unwrap_or_default());
 
-    let robots = script("robots.py");
+    let [robots, viewer] = scripts.map(script);
+    let definitions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../logs/msg");
     let play = |log: &str| {
-        let args = [robots.as_os_str(), router.endpoint().as_ref(), "robots.mcap".as_ref(), "4".as_ref()];
+        let (endpoint, definitions) = (router.endpoint().as_ref(), definitions.as_os_str());
+        let args = [robots.as_os_str(), endpoint, "robots.mcap".as_ref(), "4".as_ref(), definitions];
         Running::start(&python, &args, folder, log)
     };
     let mut playing = play("robots.log");
@@ -138,9 +148,9 @@ fn one_map(pipeline: &str, topics: &str, more: &[&str]) {
     assert_eq!(line, "all is sent\n", "{}", std::fs::read_to_string(folder.join("robots.log")).unwrap());
 
     // One who comes when all was sent sees the map and the frames all the same, and so does one who comes later still.
-    let viewer = script("viewer.py");
     for _ in 0..2 {
-        let args = [viewer.as_os_str(), router.endpoint().as_ref(), "2".as_ref(), "200".as_ref()];
+        let (endpoint, definitions) = (router.endpoint().as_ref(), definitions.as_os_str());
+        let args = [viewer.as_os_str(), endpoint, "2".as_ref(), "200".as_ref(), definitions];
         let (status, seen) = Running::start(&python, &args, folder, "viewer.log").end();
         let errors = std::fs::read_to_string(folder.join("viewer.log")).unwrap();
         assert_eq!(status, 0, "{}", words(&errors));
