@@ -225,15 +225,7 @@ impl RosSource {
 
     /// Subscribes to all topics that are of use and can be read, and to no others.
     fn subscribe(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
-        // Scans of a robot that has a map after all, for example.
-        let (topics, router) = (&self.topics, &self.router);
-        self.subscribers.retain(|topic, _| {
-            let is_of_use = topics.get(topic).is_some_and(|seen| router.is_of_use(seen.number));
-            if !is_of_use {
-                tracing::info!("takes no more messages of {} on `{}`", topic.ros_type, topic.name);
-            }
-            is_of_use
-        });
+        self.leave_topics();
         let mut wrong = Vec::new();
         for (topic, seen) in &self.topics {
             let number = seen.number;
@@ -269,6 +261,23 @@ impl RosSource {
         }
         wrong.into_iter().for_each(|wrong| self.tell_once(wrong, output));
         Ok(())
+    }
+
+    /// Hears no more of topics that are of no use any longer, as another one has taken their place.
+    fn leave_topics(&mut self) {
+        let (topics, router) = (&self.topics, &self.router);
+        let is_left = |topic: &&Topic| topics.get(*topic).is_none_or(|seen| !router.is_of_use(seen.number));
+        let left: Vec<Topic> = self.subscribers.keys().filter(is_left).cloned().collect();
+        for topic in left {
+            self.subscribers.remove(&topic);
+            let channel = self.channel(&topic, Qos::reliable(1));
+            match self.router.scanning_robot(&channel) {
+                Some(robot) => {
+                    tracing::warn!("takes no more scans on `{}`: {robot} publishes a map after all", topic.name)
+                }
+                None => tracing::info!("takes no more messages of {} on `{}`", topic.ros_type, topic.name),
+            }
+        }
     }
 
     /// Two programs that publish the map or the pose of one robot are two robots of one name.
