@@ -1,9 +1,10 @@
-//! Loads blocks ahead of their use, in threads of their own, within a bound of memory.
+//! Loads blocks ahead of their use, in threads of their own, within a bound of memory. Those that are only read are loaded when they
+//! are asked for: the system reads ahead by itself, and memory that was used before is faster than a thread with memory of its own.
 
-use super::block::{Block, LoadedBlock};
+use super::block::{Block, LoadedBlock, Memory};
 use super::damage::ChunkFault;
 use super::file::LogFile;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -31,6 +32,10 @@ pub(crate) struct Ahead {
     begun: VecDeque<Begun>,
     begun_bytes: u64,
     depth: usize,
+    /// Memory of blocks that have been given out: to touch fresh memory takes longer than to read into it.
+    spare: Vec<Memory>,
+    /// The files in which messages were compressed each by itself.
+    unpacked: BTreeSet<usize>,
 }
 
 struct Begun {
@@ -54,7 +59,16 @@ impl Ahead {
             .collect();
         order.sort_by_key(|id| (files[id.file].layout.blocks[id.block].first_time, *id));
         let threads = std::thread::available_parallelism().map_or(1, usize::from).min(8);
-        Self { files, order, next: 0, begun: VecDeque::new(), begun_bytes: 0, depth: threads + 1 }
+        Self {
+            files,
+            order,
+            next: 0,
+            begun: VecDeque::new(),
+            begun_bytes: 0,
+            depth: threads + 1,
+            spare: Vec::new(),
+            unpacked: BTreeSet::new(),
+        }
     }
 
     /// Leaves all blocks out but the first and the last `count` of each file, and those in which a channel begins.
@@ -83,12 +97,31 @@ impl Ahead {
             // A thread that has failed has found something in the block that no reader can handle.
             Loading::Thread(thread) => thread.join().unwrap_or(Err(ChunkFault::Records)),
             Loading::Later => {
+                let memory = self.memory_for(size);
                 let file = &self.files[id.file];
-                self.block(id)?.load(&file.storage, &file.layout.definitions)
+                self.block(id)?.load(&file.storage, &file.layout.definitions, memory)
             }
         };
+        if load.as_ref().is_ok_and(|block| block.is_unpacked) {
+            self.unpacked.insert(id.file);
+        }
         self.begin();
         Some((id, size, load))
+    }
+
+    /// Takes the memory of a block that has been given out.
+    pub(crate) fn give_back(&mut self, memory: Memory) {
+        self.spare.push(memory);
+        let mut size: u64 = self.spare.iter().map(Memory::size).sum();
+        while self.spare.len() > self.depth || size > AHEAD_BYTES {
+            size -= self.spare.remove(0).size();
+        }
+    }
+
+    /// Memory for a block of some size. A small block takes none of a large one, which would be missing from the bound.
+    fn memory_for(&mut self, size: u64) -> Memory {
+        let fits = |memory: &Memory| (size..=size.saturating_mul(2)).contains(&memory.size());
+        self.spare.iter().rposition(fits).map(|at| self.spare.remove(at)).unwrap_or_default()
     }
 
     fn block(&self, id: BlockId) -> Option<&Block> {
@@ -104,20 +137,43 @@ impl Ahead {
         {
             self.next += 1;
             self.begun_bytes += size;
-            self.begun.push_back(Begun { id, size, load: self.start(id, size) });
+            let load = self.start(id, size);
+            self.begun.push_back(Begun { id, size, load });
         }
     }
 
-    fn start(&self, id: BlockId, size: u64) -> Loading {
-        if size < WORTH_A_THREAD {
+    fn start(&mut self, id: BlockId, size: u64) -> Loading {
+        let is_work = self.unpacked.contains(&id.file) || self.block(id).is_some_and(Block::is_work);
+        if size < WORTH_A_THREAD || !is_work {
             return Loading::Later;
         }
-        let files = Arc::clone(&self.files);
+        let (files, memory) = (Arc::clone(&self.files), self.memory_for(size));
         let load = move || {
             let file = &files[id.file];
-            file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions)
+            file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions, memory)
         };
         // Without a thread to be had the block is loaded when its turn comes.
         std::thread::Builder::new().name("log block".into()).spawn(load).map_or(Loading::Later, Loading::Thread)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_goes_to_blocks_of_about_its_size_and_little_of_it_is_kept() {
+        let mut ahead = Ahead::new(Vec::new().into());
+        let memory = |size: u64| Memory::with_room_for(size);
+        ahead.give_back(memory(1 << 20));
+        assert_eq!(ahead.memory_for((1 << 20) + 1).size(), 0);
+        assert_eq!(ahead.memory_for((1 << 19) - 1).size(), 0);
+        assert_eq!(ahead.memory_for(1 << 19).size(), 1 << 20);
+        assert_eq!(ahead.memory_for(1 << 19).size(), 0);
+        for size in [1, AHEAD_BYTES + 1, 3, 4 << 20, 4 << 20, AHEAD_BYTES - 5, 8 << 20].repeat(3) {
+            ahead.give_back(memory(size));
+            assert!(ahead.spare.len() <= ahead.depth);
+            assert!(ahead.spare.iter().map(Memory::size).sum::<u64>() <= AHEAD_BYTES);
+        }
     }
 }

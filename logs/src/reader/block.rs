@@ -50,14 +50,26 @@ impl Block {
         }
     }
 
-    /// The block's records, uncompressed.
-    pub(crate) fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
+    /// Whether it takes more to load it than to read it.
+    pub(crate) fn is_work(&self) -> bool {
+        match &self.records {
+            Records::Bare(_) => false,
+            Records::Chunk(chunk) => !chunk.compression.is_empty(),
+            Records::Rows(_) | Records::Ros1(_) => true,
+        }
+    }
+
+    /// The block's records, uncompressed, in `memory` in place of what that holds.
+    fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
         match &self.records {
             Records::Bare(range) if range.len() as u64 > LARGEST => {
                 Err(ChunkFault::TooMuch { size: range.len() as u64 })
             }
-            Records::Bare(range) => file.read(range.clone()).ok_or(ChunkFault::Records),
-            Records::Chunk(chunk) => chunk.contents(file),
+            Records::Bare(range) => {
+                let mut records = memory;
+                file.read_into(range.clone(), &mut records).then_some(records).ok_or(ChunkFault::Records)
+            }
+            Records::Chunk(chunk) => chunk.contents(file, memory),
             // Databases and bags have no records of MCAP.
             Records::Rows(_) | Records::Ros1(_) => Err(ChunkFault::Records),
         }
@@ -68,26 +80,31 @@ impl Block {
         matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
     }
 
-    /// Makes the block's messages ready to be given out. `definitions` are those of its file.
-    pub(crate) fn load(&self, storage: &Storage, definitions: &Definitions) -> Result<LoadedBlock, ChunkFault> {
+    /// Makes the block's messages ready to be given out, in memory that another has left. `definitions` are those of its file.
+    pub(crate) fn load(
+        &self,
+        storage: &Storage,
+        definitions: &Definitions,
+        memory: Memory,
+    ) -> Result<LoadedBlock, ChunkFault> {
         let (records, lost) = match (&self.records, storage) {
             (Records::Rows(rows), Storage::Sqlite(database)) => rows.contents(database)?,
             (Records::Ros1(chunk), Storage::Ros1(bag)) => chunk.messages(bag)?,
-            (_, Storage::Mcap(file)) => (self.contents(file)?, 0),
+            (_, Storage::Mcap(file)) => (self.contents(file, memory.records)?, 0),
             _ => return Err(ChunkFault::Records),
         };
-        let index = Index::of(&records, self.may_be_cut())?;
+        let index = Index::of(&records, self.may_be_cut(), memory.messages)?;
         if !index.may_be_packed {
-            return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0 });
+            return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0, is_unpacked: false });
         }
         let records = unpack_messages(&records, definitions)?;
-        let messages = Index::of(&records, self.may_be_cut())?.messages;
-        Ok(LoadedBlock { records, messages, lost, later: 0 })
+        let messages = Index::of(&records, self.may_be_cut(), index.messages)?.messages;
+        Ok(LoadedBlock { records, messages, lost, later: 0, is_unpacked: true })
     }
 
     /// Reads the block through for what its header does not say, or does not say reliably.
     pub(crate) fn survey(&self, file: &FileBytes) -> Result<Survey, ChunkFault> {
-        let contents = self.contents(file)?;
+        let contents = self.contents(file, Vec::new())?;
         let mut survey = Survey { times: None, definitions: Definitions::default() };
         let mut position = 0;
         while let Some(record) = record_at(&contents, position) {
@@ -116,6 +133,25 @@ pub(crate) struct Survey {
     pub(crate) definitions: Definitions,
 }
 
+/// What a block that has been given out leaves to one that comes.
+#[derive(Default)]
+pub(crate) struct Memory {
+    records: Vec<u8>,
+    messages: Vec<MessagePlace>,
+}
+
+impl Memory {
+    #[cfg(test)]
+    pub(crate) fn with_room_for(size: u64) -> Self {
+        Self { records: Vec::with_capacity(size as usize), messages: Vec::new() }
+    }
+
+    /// How many bytes it takes.
+    pub(crate) fn size(&self) -> u64 {
+        (self.records.capacity() + self.messages.capacity() * size_of::<MessagePlace>()) as u64
+    }
+}
+
 /// A block whose messages can be given out.
 pub(crate) struct LoadedBlock {
     records: Vec<u8>,
@@ -125,6 +161,8 @@ pub(crate) struct LoadedBlock {
     pub(crate) lost: u64,
     /// By how much its clock is set later, nanoseconds.
     later: i64,
+    /// Whether it had messages that may have been compressed each by itself.
+    pub(crate) is_unpacked: bool,
 }
 
 /// Where a message lies in its block.
@@ -143,8 +181,11 @@ struct Index {
 }
 
 impl Index {
-    fn of(records: &[u8], may_be_cut: bool) -> Result<Self, ChunkFault> {
-        let mut index = Self { messages: Vec::with_capacity(records.len() / 256), may_be_packed: false };
+    /// In `memory` in place of what that holds.
+    fn of(records: &[u8], may_be_cut: bool, memory: Vec<MessagePlace>) -> Result<Self, ChunkFault> {
+        let mut index = Self { messages: memory, may_be_packed: false };
+        index.messages.clear();
+        index.messages.reserve(records.len() / 256);
         let mut position = 0;
         while let Some(record) = record_at(records, position) {
             if record.opcode == op::MESSAGE {
@@ -165,6 +206,11 @@ impl Index {
 }
 
 impl LoadedBlock {
+    /// Its memory, when all its messages have been given out.
+    pub(crate) fn into_memory(self) -> Memory {
+        Memory { records: self.records, messages: self.messages }
+    }
+
     /// Sets the times of its messages later, or earlier where `later` is negative.
     pub(crate) fn set_later(&mut self, later: i64) {
         self.later = later;

@@ -14,6 +14,9 @@ use std::path::Path;
 /// So much is read at least where records are walked over.
 const WINDOW: usize = 64 << 10;
 
+/// So much is read at once of a part whose checksum is taken: it is still in the processor's cache then.
+const PIECE: usize = 256 << 10;
+
 /// A file that is read from several places at once.
 #[derive(Debug)]
 pub(crate) struct FileBytes {
@@ -53,8 +56,35 @@ impl FileBytes {
         self.read_into(part, &mut bytes).then_some(bytes)
     }
 
+    /// The same in `memory`, in place of what that holds, and with the CRC-32 of the bytes.
+    pub(crate) fn read_with_checksum(&self, part: Range<usize>, memory: Vec<u8>) -> Option<(Vec<u8>, u32)> {
+        if part.start > part.end || part.end > self.length {
+            return None;
+        }
+        let mut bytes = memory;
+        bytes.truncate(part.len());
+        bytes.try_reserve_exact(part.len() - bytes.len()).ok()?;
+        let (mut position, mut checksum) = (0, crc32fast::Hasher::new());
+        while position < part.len() {
+            let end = (position + PIECE).min(part.len());
+            if bytes.len() < end {
+                bytes.resize(end, 0);
+            }
+            match pread(&self.file, &mut bytes[position..end], (part.start + position) as u64) {
+                Ok(0) => return None,
+                Ok(count) => {
+                    checksum.update(&bytes[position..position + count]);
+                    position += count;
+                }
+                Err(Errno::INTR) => {}
+                Err(_) => return None,
+            }
+        }
+        Some((bytes, checksum.finalize()))
+    }
+
     /// Puts the bytes of a part of it in place of what `bytes` holds; `false` as [`read`](Self::read) gives none.
-    fn read_into(&self, part: Range<usize>, bytes: &mut Vec<u8>) -> bool {
+    pub(crate) fn read_into(&self, part: Range<usize>, bytes: &mut Vec<u8>) -> bool {
         bytes.clear();
         if part.start > part.end || part.end > self.length || bytes.try_reserve_exact(part.len()).is_err() {
             return false;
@@ -163,6 +193,23 @@ mod tests {
         assert_eq!(file.read(2..4).unwrap(), b"23");
         assert!(Window::new(&file).bytes(0, 10).is_none());
         assert!(FileBytes::open(folder.path()).is_err());
+    }
+
+    #[test]
+    fn bytes_and_their_checksum_are_the_same_whatever_memory_they_are_put_into() {
+        let bytes: Vec<u8> = (0..3 * PIECE + 17).map(|byte| ((byte * 31) >> 4) as u8).collect();
+        let (folder, file) = file(&bytes);
+        for part in [0..bytes.len(), 5..5, 7..PIECE, 1..PIECE + 1, PIECE..3 * PIECE, bytes.len() - 1..bytes.len()] {
+            for before in [0, 10, PIECE - 7, 2 * PIECE, 5 * PIECE] {
+                let (read, checksum) = file.read_with_checksum(part.clone(), vec![9; before]).unwrap();
+                assert!(read == bytes[part.clone()], "{part:?} in {before}");
+                assert_eq!(checksum, crc32fast::hash(&bytes[part.clone()]), "{part:?} in {before}");
+            }
+        }
+        assert!(file.read_with_checksum(0..bytes.len() + 1, Vec::new()).is_none());
+        File::options().write(true).open(folder.path().join("file")).unwrap().set_len(PIECE as u64).unwrap();
+        assert!(file.read_with_checksum(0..PIECE + 1, vec![9; 2 * PIECE]).is_none());
+        assert!(file.read_with_checksum(0..PIECE, Vec::new()).is_some());
     }
 
     #[test]

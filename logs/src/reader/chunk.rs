@@ -58,8 +58,9 @@ impl Chunk {
         Some((Self { first_time, last_time, compression, size, checksum, data: data..data, cut: false }, length))
     }
 
-    /// The chunk's records, uncompressed and checked. Those of a chunk that is cut: as far as they go, unchecked.
-    pub(crate) fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
+    /// The chunk's records, uncompressed and checked, in `memory` in place of what that holds. Those of a chunk that is cut: as
+    /// far as they go, unchecked.
+    pub(crate) fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
         let most = match self.size {
             // What recorders write before a chunk is whole.
             0 | u64::MAX if self.cut => LARGEST_UNTOLD,
@@ -80,16 +81,19 @@ impl Chunk {
             };
         }
         let data = || file.read(self.data.clone()).ok_or(ChunkFault::Records);
-        let contents = match self.compression.as_str() {
-            "" => data()?,
-            "zstd" => decompress_zstd(&data()?, self.size)?,
-            "lz4" => decompress_lz4(&data()?, self.size)?,
+        let (contents, checksum) = match self.compression.as_str() {
+            "" => {
+                let read = file.read_with_checksum(self.data.clone(), memory);
+                read.map(|(contents, checksum)| (contents, Some(checksum))).ok_or(ChunkFault::Records)?
+            }
+            "zstd" => (decompress_zstd(&data()?, self.size, memory)?, None),
+            "lz4" => (decompress_lz4(&data()?, self.size, memory)?, None),
             other => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };
         if contents.len() as u64 != self.size {
             return Err(ChunkFault::Decompression);
         }
-        if self.checksum != 0 && crc32fast::hash(&contents) != self.checksum {
+        if self.checksum != 0 && checksum.unwrap_or_else(|| crc32fast::hash(&contents)) != self.checksum {
             return Err(ChunkFault::Checksum);
         }
         Ok(contents)
@@ -99,18 +103,20 @@ impl Chunk {
 /// A byte of a log rarely stands for more.
 const USUAL_RATIO: u64 = 256;
 
-/// An empty buffer with room for `size` bytes, or for what `data` can be expected to become. The size is the file's word
+/// `memory`, emptied, with room for `size` bytes, or for what `data` can be expected to become. The size is the file's word
 /// only, so it may be absurd.
-fn reserve(size: u64, data: &[u8]) -> Result<Vec<u8>, ChunkFault> {
-    let mut buffer = Vec::new();
+fn reserve(size: u64, data: &[u8], memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = memory;
+    buffer.clear();
     let size = usize::try_from(size.min(USUAL_RATIO * data.len() as u64)).map_err(|_| ChunkFault::TooLarge)?;
     buffer.try_reserve_exact(size).map_err(|_| ChunkFault::TooLarge)?;
     Ok(buffer)
 }
 
-/// The contents of one or more frames of zstd, at most `size` bytes and one more.
-pub(crate) fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
-    let mut buffer = reserve(size, data)?;
+/// The contents of one or more frames of zstd, in `memory` in place of what that holds: at most `size` bytes and one more, or as
+/// many as `memory` has room for.
+pub(crate) fn decompress_zstd(data: &[u8], size: u64, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = reserve(size, data, memory)?;
     if buffer.capacity() as u64 >= size {
         let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
         decompressor.decompress_to_buffer(data, &mut buffer).map_err(|_| ChunkFault::Decompression)?;
@@ -122,9 +128,9 @@ pub(crate) fn decompress_zstd(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFa
     Ok(buffer)
 }
 
-/// The contents of one or more frames of lz4, at most `size` bytes and one more.
-pub(crate) fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
-    let mut buffer = reserve(size, data)?;
+/// The contents of one or more frames of lz4, at most `size` bytes and one more, in `memory` in place of what that holds.
+pub(crate) fn decompress_lz4(data: &[u8], size: u64, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+    let mut buffer = reserve(size, data, memory)?;
     let mut rest = data;
     // The data may be several frames; a decoder reads one, and stops behind it.
     while !rest.is_empty() {
@@ -138,7 +144,7 @@ pub(crate) fn decompress_lz4(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFau
 
 /// The contents of one or more streams of bzip2, at most `size` bytes and one more.
 pub(crate) fn decompress_bz2(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
-    let mut buffer = reserve(size, data)?;
+    let mut buffer = reserve(size, data, Vec::new())?;
     let decoder = bzip2::read::MultiBzDecoder::new(data);
     decoder.take(size.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
     Ok(buffer)
@@ -171,7 +177,7 @@ mod tests {
         let path = folder.path().join("chunk");
         std::fs::write(&path, &data).unwrap();
         let file = FileBytes::open(&path).unwrap();
-        let length = |chunk: &Chunk| chunk.contents(&file).map(|contents| contents.len() as u64);
+        let length = |chunk: &Chunk| chunk.contents(&file, Vec::new()).map(|contents| contents.len() as u64);
         assert_eq!(length(&chunk(1 << 20, true)), Ok(1 << 20));
         for untold in [0, u64::MAX] {
             assert_eq!(length(&chunk(untold, true)), Ok(LARGEST_UNTOLD));

@@ -144,7 +144,8 @@ impl LogReader {
         match active.block.time(active.index) {
             Some(time) => active.time = time,
             None => {
-                PeekMut::pop(top);
+                let Reverse(Active { block, .. }) = PeekMut::pop(top);
+                self.ahead.give_back(block.into_memory());
             }
         }
     }

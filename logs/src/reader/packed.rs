@@ -37,7 +37,7 @@ fn unpack(data: &[u8], room: u64) -> Result<Option<Vec<u8>>, ChunkFault> {
     // A frame says how long its contents are, unless it was written bit by bit.
     let told = zstd::zstd_safe::get_frame_content_size(data).ok().flatten();
     let size = told.unwrap_or(room);
-    match decompress_zstd(data, size.min(room)) {
+    match decompress_zstd(data, size.min(room), Vec::new()) {
         _ if told.is_some_and(|size| size > room) => Err(ChunkFault::TooMuch { size }),
         Ok(message) if message.len() as u64 > room => Err(ChunkFault::TooMuch { size: message.len() as u64 }),
         Ok(message) => Ok(Some(message)),

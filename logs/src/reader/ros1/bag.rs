@@ -196,7 +196,7 @@ impl BagChunk {
         let data = file.read(self.data.clone()).ok_or(ChunkFault::Records)?;
         let contents = match self.compression.as_str() {
             "none" => data,
-            "lz4" => decompress_lz4(&data, self.size)?,
+            "lz4" => decompress_lz4(&data, self.size, Vec::new())?,
             "bz2" => decompress_bz2(&data, self.size)?,
             other => return Err(ChunkFault::UnknownCompression(other.to_owned())),
         };

@@ -136,6 +136,26 @@ fn more_chunks_than_are_loaded_ahead_all_come() {
 }
 
 #[test]
+fn what_a_message_says_does_not_hang_on_those_that_were_read_before_it() {
+    let folder = Folder::new();
+    let message = |time: u64| -> Vec<u8> {
+        // Blocks grow, shrink and overlap.
+        let size = [400_000, 90_000, 150_000, 100, 70_000, 1_000_000][time as usize % 6];
+        (0..size).map(|byte: u64| ((byte * (time + 1)) >> 5) as u8).collect()
+    };
+    for options in layouts() {
+        let mut log = TestLog::new(options.chunk_size(Some(80_000)));
+        for time in (0..60).map(|time| time ^ 3) {
+            log.raw("/a", "p/msg/A", time, &message(time));
+        }
+        let (seen, damage) = read_all(open(&[folder.write("a.mcap", &log.finish())]).unwrap());
+        assert_eq!(times(&seen), (0..60).collect::<Vec<_>>());
+        assert!(seen.iter().zip(0..).all(|(seen, time)| seen.3 == message(time)));
+        assert_eq!(damage, []);
+    }
+}
+
+#[test]
 fn messages_that_are_compressed_by_themselves_are_unpacked() {
     let folder = Folder::new();
     for options in layouts() {
