@@ -1,13 +1,13 @@
 //! Writing a log: an MCAP file that can be read up to the last closed chunk whatever happens to the program.
 
+use super::chunk_file::ChunkFile;
 use super::{Compression, LogWriteError};
 use crate::file::OutputFile;
 use gridweave_runtime::message::Channel;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The bytes that a message takes in a chunk beside its own: opcode, length and header.
@@ -42,13 +42,13 @@ pub enum Outcome<'a> {
 
 /// Writes a log: an MCAP file with profile `ros2`, chunked and indexed, with checksums.
 ///
-/// It is written beside, as `NAME.part`, and takes its name when it is [finished](Self::finish). A chunk is written in one
-/// piece when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it is
+/// It is written beside, as `NAME.part`, and takes its name when it is [finished](Self::finish). The beginning of a chunk is
+/// written last, when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it is
 /// complete.
 pub struct LogWriter {
     path: PathBuf,
     output: OutputFile,
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<ChunkFile>,
     chunk_size: u64,
     open_bytes: u64,
 }
@@ -61,7 +61,7 @@ impl LogWriter {
     pub fn create(path: &Path, options: LogOptions) -> Result<Self, LogWriteError> {
         let mut output = OutputFile::create(path)?;
         let file = output.file().try_clone().map_err(|error| LogWriteError::from_io(path, error))?;
-        let writer = write_options(options).create(BufWriter::new(file));
+        let writer = write_options(options).create(ChunkFile::new(file));
         let writer = writer.map_err(|error| LogWriteError::from_mcap(path, error))?;
         output.keep(true);
         Ok(Self { path: path.to_owned(), output, writer, chunk_size: options.chunk_size, open_bytes: 0 })
@@ -105,13 +105,15 @@ impl LogWriter {
     pub fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result<(), LogWriteError> {
         self.close_chunk()?;
         let record = Metadata { name: name.to_owned(), metadata };
-        self.writer.write_metadata(&record).map_err(|error| LogWriteError::from_mcap(&self.path, error))
+        self.writer.write_metadata(&record).map_err(|error| LogWriteError::from_mcap(&self.path, error))?;
+        self.close_chunk()
     }
 
     /// Writes an attachment.
     pub fn attachment(&mut self, attachment: &Attachment<'_>) -> Result<(), LogWriteError> {
         self.close_chunk()?;
-        self.writer.attach(attachment).map_err(|error| LogWriteError::from_mcap(&self.path, error))
+        self.writer.attach(attachment).map_err(|error| LogWriteError::from_mcap(&self.path, error))?;
+        self.close_chunk()
     }
 
     /// Ends the log, says in it how the run ended, and gives where it lies. One that is complete takes the place of a file
@@ -152,6 +154,7 @@ impl LogWriter {
         }
     }
 
+    /// Ends the chunk, if one is open. What was written is in the file then, and a chunk may begin.
     fn close_chunk(&mut self) -> Result<(), LogWriteError> {
         self.open_bytes = 0;
         self.writer.flush().map_err(|error| LogWriteError::from_mcap(&self.path, error))
@@ -172,8 +175,87 @@ fn write_options(options: LogOptions) -> WriteOptions {
         .compression_level(level)
         // The compressor's own threads would make its output depend on their number.
         .compression_threads(0)
-        // Chunks are closed here, so that the file is flushed with every one of them.
+        // Chunks are closed here, so that the file is flushed with every one of them: a program that dies leaves none that is half
+        // written.
         .chunk_size(None)
-        // Chunks are put together in memory: a program that dies leaves none that is half written.
-        .disable_seeking(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reader::{Damage, LogFile, LogReader};
+    use std::borrow::Cow;
+
+    /// Small and large ones.
+    fn message(number: u32) -> Vec<u8> {
+        let size = [10, 70_000, 300, 2_000_000, 40_000][number as usize % 5];
+        (0..size).map(|byte: u32| ((byte * (number + 1)) >> 4) as u8).collect()
+    }
+
+    fn write(log: &mut LogWriter, count: u32) {
+        let channel = Channel { topic: "/a".into(), message_encoding: "cdr".into(), ..Default::default() };
+        let channel_id = log.channel(&channel).unwrap();
+        for sequence in 0..count {
+            let time = u64::from(sequence);
+            let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
+            log.write(&header, &message(sequence)).unwrap();
+        }
+    }
+
+    fn read(path: &Path) -> (Vec<Vec<u8>>, Vec<Damage>) {
+        let file = LogFile::open(path).unwrap();
+        let mut damage = file.damage().to_vec();
+        let mut reader = LogReader::new(vec![file]);
+        let mut messages = Vec::new();
+        while let Some(message) = reader.next_message() {
+            messages.push(message.data.to_vec());
+        }
+        damage.extend(reader.take_damage().into_iter().map(|(_, damage)| damage));
+        (messages, damage)
+    }
+
+    const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Lz4, Compression::Zstd];
+
+    #[test]
+    fn messages_records_and_attachments_of_any_size_are_read_as_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        for compression in COMPRESSIONS {
+            let mut log = LogWriter::create(&path, LogOptions { compression, ..Default::default() }).unwrap();
+            log.metadata("long", BTreeMap::from([("text".to_owned(), "x".repeat(200_000))])).unwrap();
+            write(&mut log, 12);
+            let data = Cow::Owned(vec![7; 300_000]);
+            let (name, media_type) = ("a".to_owned(), "b".to_owned());
+            log.attachment(&Attachment { log_time: 1, create_time: 2, name, media_type, data }).unwrap();
+            write(&mut log, 3);
+            log.finish(Outcome::Complete).unwrap();
+            let (messages, damage) = read(&path);
+            assert_eq!((messages.len(), damage), (15, vec![]));
+            let expected = (0..6).map(|number| message(number / 2)).chain((3..12).map(message));
+            assert!(messages.into_iter().eq(expected), "{compression:?}");
+            let bytes = std::fs::read(&path).unwrap();
+            assert!(mcap::MessageStream::new(&bytes).unwrap().all(|message| message.is_ok()));
+            let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+            let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+            assert_eq!(attachment.data.len(), 300_000);
+            assert_eq!(summary.stats.unwrap().message_count, 15);
+        }
+    }
+
+    #[test]
+    fn of_a_writer_that_dies_all_closed_chunks_are_left_and_nothing_of_the_open_one() {
+        let folder = tempfile::tempdir().unwrap();
+        for (compression, number) in COMPRESSIONS.into_iter().zip(0..) {
+            let path = folder.path().join(format!("{number}.mcap"));
+            let mut log = LogWriter::create(&path, LogOptions { compression, chunk_size: 1 << 29 }).unwrap();
+            write(&mut log, 7);
+            log.flush().unwrap();
+            write(&mut log, 9);
+            // As a process that is killed: nothing more is written.
+            std::mem::forget(log);
+            let (messages, damage) = read(&path.with_extension("mcap.part"));
+            assert!(messages.into_iter().eq((0..7).map(message)), "{compression:?}");
+            assert!(matches!(damage[..], [Damage::NoEnd { .. }]), "{damage:?}");
+        }
+    }
 }

@@ -13,6 +13,7 @@
 //! the input bear are passed on under names that begin with `earlier_`, and so are all their other metadata records and their
 //! attachments, as they are; but not the records `rosbag2`, which describe the file that they are in.
 
+mod chunk_file;
 mod close;
 mod error;
 pub(crate) mod given_frames;
