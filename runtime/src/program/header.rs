@@ -30,6 +30,7 @@ pub(super) enum Told {
     Message = 2,
     Finish = 3,
     Abort = 4,
+    Next = 5,
 }
 
 /// What a sample of a program says.
@@ -39,6 +40,7 @@ pub(super) enum Said {
     Warning,
     Done,
     Failed,
+    End,
 }
 
 impl Said {
@@ -49,6 +51,7 @@ impl Said {
             17 => Self::Warning,
             18 => Self::Done,
             19 => Self::Failed,
+            20 => Self::End,
             _ => return None,
         })
     }

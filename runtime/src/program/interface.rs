@@ -25,7 +25,7 @@ use serde::Deserialize;
 pub struct Interface {
     /// What the stage does.
     pub summary: &'static str,
-    /// Its inputs, in the order that breaks ties. At least one.
+    /// Its inputs, in the order that breaks ties; none of a source.
     pub inputs: Vec<InputPort>,
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
@@ -72,8 +72,8 @@ impl Interface {
             let protocol = written.protocol;
             return Err(format!("it speaks protocol {protocol} of a call, and this program speaks {CALL_VERSION}"));
         }
-        if written.inputs.is_empty() {
-            return Err("it has no inputs, and only stages with inputs can be programs".to_owned());
+        if written.inputs.is_empty() && written.outputs.is_empty() {
+            return Err("it has neither inputs nor outputs".to_owned());
         }
         let ports = || written.inputs.iter().chain(&written.outputs);
         if let Some(name) = ports().map(|port| &port.name).find(|name| !is_port_name(name)) {
@@ -167,6 +167,6 @@ mod tests {
             assert!(error.contains(says), "{error}");
         }
         let none = r#"{ "protocol": 1, "inputs": [], "outputs": [], "parameters": {} }"#;
-        assert!(Interface::read(none).unwrap_err().contains("no inputs"));
+        assert!(Interface::read(none).unwrap_err().contains("neither inputs nor outputs"));
     }
 }

@@ -19,7 +19,9 @@
 //!    standard input ends exits, and a stage whose program ends has failed.
 //! 3. **Ready.** The program opens the services, makes its ports, receives once so that it is connected, and writes `r`.
 //! 4. **Calls.** The stage sends `START`, `MESSAGE`, `FINISH` or `ABORT` and waits. The program answers with any number of
-//!    `OUTPUT` and `WARNING`, and with `DONE` or `FAILED` as the last. It sends nothing while it is not called.
+//!    `OUTPUT` and `WARNING`, and with `DONE` or `FAILED` as the last. It sends nothing while it is not called. A program without
+//!    inputs is a source: it gets `NEXT` instead of `MESSAGE` and `FINISH`, until it answers with `END`, and says the log time of
+//!    each `OUTPUT`, which never falls.
 //! 5. **Credits.** The program has [`CREDITS`] of them, gives one away with each sample it sends, and waits when it has none.
 //!    The stage gives one back for each sample that it has taken, as a byte `c`.
 //!
@@ -29,10 +31,12 @@
 //! | `MESSAGE` | 2 | the bytes of a message that has come on the input `port`; `message` is its header |
 //! | `FINISH` | 3 | nothing: all inputs have ended |
 //! | `ABORT` | 4 | text: why the run has failed |
-//! | `OUTPUT` | 16 | the bytes of a message for the output `port`; of `message` only `robot` is read |
+//! | `NEXT` | 5 | nothing: the next message of a source is wanted, or the next few |
+//! | `OUTPUT` | 16 | the bytes of a message for the output `port`; of `message` only `robot` is read, and of a source `log_time` |
 //! | `WARNING` | 17 | text: what is wrong with the input and left out; counted |
 //! | `DONE` | 18 | nothing |
 //! | `FAILED` | 19 | text: why the stage cannot go on |
+//! | `END` | 20 | nothing: a source has no more messages; `DONE` follows |
 //!
 //! What a program says of itself before all that is its [`Interface`].
 
@@ -40,6 +44,7 @@ mod call;
 mod header;
 mod interface;
 mod process;
+mod source;
 mod stage;
 
 pub use call::CREDITS;

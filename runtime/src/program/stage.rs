@@ -2,9 +2,10 @@
 
 use super::call::{CallError, Program};
 use super::header::{CallHeader, Said, Told};
+use super::source::ProgramSource;
 use super::{Interface, Launch};
 use crate::message::{Message, MessageHeader};
-use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Parameters, StageError, StageKind};
+use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Outputs, Parameters, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -17,15 +18,23 @@ struct Given(Map<String, Value>);
 impl Parameters for Given {}
 
 /// A running program, and what its stage calls it in errors.
-struct ProgramStage {
-    program: Program,
+pub(super) struct ProgramStage {
+    pub(super) program: Program,
     /// The names of the inputs.
     inputs: Vec<&'static str>,
     /// What runs, such as the name of a module.
     what: String,
 }
 
-type Outputs = Vec<Out<AnyMessage>>;
+/// An output for each that the interface has.
+pub(super) struct Ports(Vec<Out<AnyMessage>>);
+
+/// The ports are those of an interface; see [`kind_of`].
+impl Outputs for Ports {
+    fn declare(_: &mut OutputPorts) -> Self {
+        Self(Vec::new())
+    }
+}
 
 /// The kind `name` of a stage with the ports and parameters of `interface`, which is the program of `launch` and is called `what` in
 /// errors. It is kept for as long as this program runs.
@@ -33,22 +42,28 @@ pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Lau
     let Interface { summary, inputs, outputs, parameters, text } = interface;
     let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();
     let what = what.to_owned();
-    let declare = move |ports: &mut OutputPorts| -> Outputs {
-        outputs.iter().map(|port| ports.encoded_port(port.clone())).collect()
-    };
+    let declare =
+        move |ports: &mut OutputPorts| Ports(outputs.iter().map(|port| ports.encoded_port(port.clone())).collect());
     let make = move |Given(parameters): Given, context: &Context| {
         let program = Program::start(&launch, context.stall_timeout)?;
         let mut stage = ProgramStage { program, inputs: names.clone(), what: what.clone() };
         stage.start(parameters, context, &text)?;
         Ok(stage)
     };
-    let mut builder = StageKind::stage_with(name, summary, declare, make);
-    for (index, port) in inputs.into_iter().enumerate() {
-        builder = builder.encoded_input(port, move |stage: &mut ProgramStage, message, output| {
-            stage.receive(index, message, output)
-        });
-    }
-    let kind = builder.finish(ProgramStage::finish).abort(ProgramStage::abort).build();
+    let kind = match inputs.is_empty() {
+        true => StageKind::source_with(name, summary, declare, move |given, context: &Context| {
+            make(given, context).map(ProgramSource::new)
+        }),
+        false => {
+            let mut builder = StageKind::stage_with(name, summary, declare, make);
+            for (index, port) in inputs.into_iter().enumerate() {
+                builder = builder.encoded_input(port, move |stage: &mut ProgramStage, message, output| {
+                    stage.receive(index, message, output)
+                });
+            }
+            builder.finish(ProgramStage::finish).abort(ProgramStage::abort).build()
+        }
+    };
     Box::leak(Box::new(kind.with_schema(parameters)))
 }
 
@@ -69,7 +84,7 @@ impl ProgramStage {
         started.map_err(|error| StageError::new(format!("start {}", self.what), error))
     }
 
-    fn receive(&mut self, port: usize, message: &Message, output: &Output<Outputs>) -> Result<(), StageError> {
+    fn receive(&mut self, port: usize, message: &Message, output: &Output<Ports>) -> Result<(), StageError> {
         let name = self.inputs.get(port).copied().unwrap_or_default();
         let doing = |what: &str| {
             let of_robot = if message.robot().is_empty() { String::new() } else { format!(" of {}", message.robot()) };
@@ -82,20 +97,20 @@ impl ProgramStage {
         called.map_err(|error| self.failed(error, doing))
     }
 
-    fn finish(&mut self, output: &Output<Outputs>) -> Result<(), StageError> {
+    fn finish(&mut self, output: &Output<Ports>) -> Result<(), StageError> {
         let nothing = (&MessageHeader::default(), &[][..]);
         let called =
             self.program.call(Told::Finish, (0, 0), nothing, |said, header, bytes| take(output, said, header, bytes));
         called.map_err(|error| self.failed(error, |what| format!("finish in {what}")))
     }
 
-    fn abort(&mut self, reason: &str) {
+    pub(super) fn abort(&mut self, reason: &str) {
         let words = (&MessageHeader::default(), reason.as_bytes());
         // The run has failed already.
         let _ = self.program.call(Told::Abort, (0, 0), words, |_, _, _| Ok(()));
     }
 
-    fn failed(&self, error: CallError, doing: impl FnOnce(&str) -> String) -> StageError {
+    pub(super) fn failed(&self, error: CallError, doing: impl FnOnce(&str) -> String) -> StageError {
         match error {
             CallError::Stage(error) => error,
             error => StageError::new(doing(&self.what), error),
@@ -104,9 +119,9 @@ impl ProgramStage {
 }
 
 /// Passes on what a program says.
-fn take(output: &Output<Outputs>, said: Said, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
+pub(super) fn take(output: &Output<Ports>, said: Said, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
     match said {
-        Said::Output => match output.get(header.port as usize) {
+        Said::Output => match output.0.get(header.port as usize) {
             Some(port) => port.send_bytes(header.message.robot.as_str(), bytes),
             None => Err(StageError::new("send a message", format!("the program has no output {}", header.port))),
         },
@@ -114,6 +129,6 @@ fn take(output: &Output<Outputs>, said: Said, header: &CallHeader, bytes: &[u8])
             output.warn(String::from_utf8_lossy(bytes));
             Ok(())
         }
-        Said::Done | Said::Failed => Ok(()),
+        Said::Done | Said::Failed | Said::End => Ok(()),
     }
 }

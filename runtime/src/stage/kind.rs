@@ -64,6 +64,9 @@ pub trait Source: 'static {
     fn progress(&self) -> Option<f64> {
         None
     }
+
+    /// The run has failed: what was made is left in a state that can be used.
+    fn abort(&mut self, _reason: &str) {}
 }
 
 impl StageKind {
@@ -289,5 +292,9 @@ impl<S: Source> RunningSource for Running<S> {
 
     fn progress(&self) -> Option<f64> {
         self.source.progress()
+    }
+
+    fn abort(&mut self, reason: &str) {
+        self.source.abort(reason);
     }
 }

@@ -33,6 +33,7 @@ pub(super) trait RunningSource {
     fn next(&mut self) -> Result<bool, StageError>;
     fn wait(&mut self, longest: Duration);
     fn progress(&self) -> Option<f64>;
+    fn abort(&mut self, reason: &str);
 }
 
 impl Node {
@@ -95,8 +96,10 @@ impl Node {
 
     /// Tells a stage that the run has failed.
     pub fn abort(&mut self, reason: &str) {
-        if let Role::Stage(stage) = &mut self.role {
-            stage.abort(reason);
+        match &mut self.role {
+            Role::Stage(stage) => stage.abort(reason),
+            Role::Source(source) => source.abort(reason),
+            Role::External => {}
         }
     }
 

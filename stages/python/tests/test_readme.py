@@ -15,8 +15,9 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 
 class ReadmeTest(unittest.TestCase):
     def test_the_class_sends_what_it_says(self):
-        function, corners = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
+        function, corners, source = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
         self.assertIn(function.strip(), (EXAMPLES / "invert.py").read_text())
+        self.assertIn(source.strip(), (EXAMPLES / "circle.py").read_text())
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "corners.py"
             path.write_text(corners)

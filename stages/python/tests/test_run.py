@@ -107,6 +107,8 @@ class Host:
             sample = self.subscriber.receive()
             header = sample.user_header().contents
             said, robot = What(header.what), header.robot
+            if said is What.OUTPUT:
+                self.log_time = header.log_time
             payload = ctypes.string_at(sample.payload_ptr, sample.payload().len())
             sample.delete()
             self.ring(b"c")
@@ -216,6 +218,58 @@ class RunTest(unittest.TestCase):
         _, (said, text) = self.host.call(What.START, json.dumps(told).encode())
         self.assertEqual(said, What.FAILED)
         self.assertIn("other ports or parameters", text)
+
+
+SOURCE = '''
+from gridweave import Output, Parameter, Stage
+from gridweave.msg.nav_msgs import OccupancyGrid
+
+class Counter(Stage):
+    """Counts."""
+    out = Output(OccupancyGrid)
+    times = Parameter([10, 20, 20])
+
+    def messages(self):
+        for time in self.times:
+            self.out.send(OccupancyGrid(data=[time]), "robot1", log_time=time)
+            yield
+        self.out.send(OccupancyGrid(), log_time=99)
+
+    def abort(self, reason):
+        self.warn(f"told: {reason}")
+'''
+
+
+class SourceTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        module = Path(folder.name) / "counter.py"
+        module.write_text(SOURCE)
+        self.host = Host(folder.name, str(module))
+        self.addCleanup(lambda: self.host.process.returncode is None and self.host.end())
+
+    def test_a_source_gives_what_is_next_until_its_end(self):
+        self.host.start()
+        for time in (10, 20, 20):
+            (said, robot, _), = self.host.call(What.NEXT)[0]
+            self.assertEqual((said, robot, self.host.log_time), (What.OUTPUT, b"robot1", time))
+        answers, end = self.host.call(What.NEXT)
+        self.assertEqual(([said for said, *_ in answers], end), ([What.OUTPUT, What.END], (What.DONE, "")))
+        self.assertEqual(self.host.call(What.NEXT), ([(What.END, b"", b"")], (What.DONE, "")))
+
+    def test_log_times_that_fall_are_told_with_the_line(self):
+        self.host.start(times=[10, 9])
+        self.host.call(What.NEXT)
+        answers, (said, text) = self.host.call(What.NEXT)
+        self.assertEqual((answers, said), ([], What.FAILED))
+        self.assertIn("ValueError: the log time 9 ns comes after 10 ns", text)
+        self.assertIn("self.out.send(OccupancyGrid(data=[time])", text)
+
+    def test_an_abort_is_told_to_a_source(self):
+        self.host.start()
+        answers, end = self.host.call(What.ABORT, b"the disk is full")
+        self.assertEqual((answers[0][2], end[0]), (b"told: the disk is full", What.DONE))
 
 
 if __name__ == "__main__":

@@ -115,6 +115,60 @@ class StageTest(unittest.TestCase):
             stage(lambda map: map)
 
 
+class Ticks(Stage):
+    """Counts."""
+
+    out = Output(PoseStamped)
+    other = Output(OccupancyGrid)
+    times = Parameter([0, 5, 5, 7])
+
+    def messages(self):
+        for time in self.times:
+            self.out.send(PoseStamped(), "robot1", log_time=time)
+            self.other.send(OccupancyGrid(), log_time=np.uint64(time))
+            yield
+
+
+class SourceTest(unittest.TestCase):
+    def begin(self, kind, parameters=None):
+        self.sent = []
+        return kind.begin(parameters, send=lambda *what: self.sent.append(what))
+
+    def test_a_source_has_no_inputs_and_says_when_its_messages_were_logged(self):
+        told = Ticks.interface()
+        self.assertEqual((told["inputs"], [port["name"] for port in told["outputs"]]), ([], ["out", "other"]))
+        steps = self.begin(Ticks).messages()
+        next(steps)
+        self.assertEqual([(name, robot, time) for name, _, robot, time in self.sent], [("out", "robot1", 0), ("other", "", 0)])
+        self.assertEqual(len(list(steps)), 3)
+        self.assertEqual([time for *_, time in self.sent], [0, 0, 5, 5, 5, 5, 7, 7])
+
+    def test_log_times_that_fall_or_are_none_are_refused(self):
+        for times, says in (([3, 2], "2 ns comes after 3 ns"), ([-1], "never fall"), ([1 << 64], "fit in 64 bits")):
+            with self.assertRaisesRegex(ValueError, says):
+                list(self.begin(Ticks, {"times": times}).messages())
+        for time in (None, 1.5):
+            with self.assertRaises(TypeError):
+                self.begin(Ticks).out.send(PoseStamped(), "robot1", time)
+
+    def test_only_a_source_says_log_times(self):
+        made = Corners.begin()
+        with self.assertRaisesRegex(TypeError, "only a source"):
+            made.corner.send(PoseStamped(), "robot1", log_time=1)
+
+    def test_a_source_without_a_generator_is_refused(self):
+        class Silent(Stage):
+            out = Output(PoseStamped)
+
+        class Hasty(Silent):
+            def messages(self):
+                self.out.send(PoseStamped(), log_time=0)
+
+        for kind in (Silent, Hasty):
+            with self.assertRaisesRegex(TypeError, "has a generator messages"):
+                kind.interface()
+
+
 class LoadTest(unittest.TestCase):
     def load(self, text, name=""):
         with tempfile.TemporaryDirectory() as folder:

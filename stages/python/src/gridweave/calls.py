@@ -27,10 +27,12 @@ class What(IntEnum):
     MESSAGE = 2
     FINISH = 3
     ABORT = 4
+    NEXT = 5
     OUTPUT = 16
     WARNING = 17
     DONE = 18
     FAILED = 19
+    END = 20
 
 
 class Header(ctypes.Structure):
@@ -126,12 +128,12 @@ class Calls:
         self._credits += bells.count(b"c")
         return bool(bells)
 
-    def send(self, port: int, message: Any, robot: str) -> None:
-        """Sends a message on an output, written straight into the memory that the stage reads."""
+    def send(self, port: int, message: Any, robot: str, log_time: int = 0) -> None:
+        """Sends a message on an output, written straight into the memory that the stage reads. Of a source it has a log time."""
         name = robot.encode()
         if len(name) > 64:
             raise ValueError(f"the name of the robot `{robot}` has {len(name)} bytes, and at most 64 fit")
-        self._send(What.OUTPUT, port, name, size(message), lambda data: encode_into(message, data))
+        self._send(What.OUTPUT, port, name, size(message), lambda data: encode_into(message, data), log_time)
 
     def say(self, what: What, text: str = "") -> None:
         """Says something beside messages."""
@@ -142,7 +144,7 @@ class Calls:
 
         self._send(what, 0, b"", len(data), write)
 
-    def _send(self, what: What, port: int, robot: bytes, length: int, write: Any) -> None:
+    def _send(self, what: What, port: int, robot: bytes, length: int, write: Any, log_time: int = 0) -> None:
         if not self._is_called:
             raise RuntimeError("a stage sends while it handles a message, not from threads of its own at other times")
         while self._credits == 0:
@@ -150,7 +152,7 @@ class Calls:
                 raise SystemExit
         sample = self._publisher.loan_slice_uninit(length)
         header = sample.user_header().contents
-        header.version, header.what, header.port, header.robot = PROTOCOL, what, port, robot
+        header.version, header.what, header.port, header.robot, header.log_time = PROTOCOL, what, port, robot, log_time
         write(memoryview(_MOST.from_address(sample.payload_ptr)).cast("B")[:length])
         sample.assume_init().send()
         self._credits -= 1

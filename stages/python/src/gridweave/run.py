@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import traceback
-from typing import Any, Callable
+from typing import Any, Callable, Iterator
 
 from .calls import Calls, What
 from .load import load
@@ -26,6 +26,8 @@ class Program:
         self.module, self.calls = module, calls
         self.stage: Stage
         self.inputs: list[tuple[str, type, Callable[[Any, About], None]]] = []
+        #: What a source still has to send.
+        self.messages: Iterator[Any] = iter(())
 
     def start(self, told: dict[str, Any]) -> None:
         """Makes the stage."""
@@ -36,9 +38,11 @@ class Program:
         outputs = {output["name"]: number for number, output in enumerate(interface["outputs"])}
         context = Context(told["stage"], told["seed"], told["reference"], told["robots"], tuple(told["inputs"]))
         own = {name: value for name, value in told["parameters"].items() if name in interface["parameters"]["properties"]}
-        self.stage = made.begin(own, context, lambda name, message, robot: self.calls.send(outputs[name], message, robot),
+        self.stage = made.begin(own, context, lambda name, *sent: self.calls.send(outputs[name], *sent),
                                 lambda what: self.calls.say(What.WARNING, what))
         self.inputs = [(name, port.type, getattr(self.stage, f"on_{name}")) for name, port in made._members(_input()).items()]
+        if made._is_source():
+            self.messages = self.stage.messages()  # type: ignore[attr-defined]
 
     def receive(self, port: int, about: About, data: memoryview) -> None:
         """Hands a message to the stage. One that cannot be read is left out with a warning."""
@@ -50,12 +54,21 @@ class Program:
             return
         take(message, about)
 
+    def advance(self) -> None:
+        """Lets a source send what comes next."""
+        try:
+            next(self.messages)
+        except StopIteration:
+            self.calls.say(What.END)
+
     def serve(self) -> None:
         """Answers calls until there are no more."""
         while (call := self.calls.wait()) is not None:
             try:
                 if call.what == What.MESSAGE:
                     self.receive(call.port, call.about, call.data)
+                elif call.what == What.NEXT:
+                    self.advance()
                 elif call.what == What.START:
                     self.start(json.loads(bytes(call.data)))
                 elif call.what == What.FINISH:

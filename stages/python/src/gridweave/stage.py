@@ -1,6 +1,8 @@
 """What a stage is: its ports and parameters, and what it does with a message."""
 
+import functools
 import inspect
+import operator
 import typing
 from dataclasses import dataclass
 from typing import Any, Callable
@@ -34,17 +36,19 @@ class Output:
         `/{robot}/{stage}/NAME`. A `side` output is beside what the stage is for: the name of a stage alone does not mean it.
         """
         self.type, self.summary, self.topic, self.side = type, summary, topic, side
-        self._send: Callable[[Any, str], None] | None = None
+        self._send: Callable[..., None] | None = None
 
-    def send(self, message: Any, robot: str = "") -> None:
-        """Sends a message about `robot` (empty: about none in particular), with the log time of the message that is handled."""
+    def send(self, message: Any, robot: str = "", log_time: int | None = None) -> None:
+        """Sends a message about `robot` (empty: about none in particular). It has the log time of the message that is handled; a
+        source, which handles none, says it: nanoseconds, which never fall.
+        """
         if type(message) is not self.type:
             raise TypeError(f"this output takes {ros_type(self.type)}, not {type(message).__name__}")
         if self._send is None:
             raise RuntimeError("a stage sends through its own outputs, as `self.NAME.send(...)`")
-        self._send(message, robot)
+        self._send(message, robot, log_time)
 
-    def _tied(self, send: Callable[[Any, str], None]) -> "Output":
+    def _tied(self, send: Callable[..., None]) -> "Output":
         tied = Output(self.type, self.summary, topic=self.topic, side=self.side)
         tied._send = send
         return tied
@@ -133,6 +137,9 @@ class Stage:
             def on_map(self, map, about):
                 self.corner.send(PoseStamped(map.header, map.info.origin), about.robot)
 
+    One without inputs is a source, and has a generator `messages(self)` instead: it sends with `log_time`, and yields after each
+    message or after a few that belong together.
+
     The first line of its documentation is what `gridweave kinds` shows. `__init__` takes nothing and may use the parameters and
     `self.context`. A stage keeps its state itself, and reads no clock: what it sends follows from what it was given, so that a replay
     gives the same output each time.
@@ -141,7 +148,7 @@ class Stage:
     context: Context
 
     def finish(self) -> None:
-        """All inputs have ended. What is sent here carries the log time that they had come to."""
+        """All inputs have ended. What is sent here carries the log time that they had come to. A source is not told: it knows."""
 
     def abort(self, reason: str) -> None:
         """The run has failed elsewhere: leave what was made in a state that can be used."""
@@ -161,6 +168,10 @@ class Stage:
         return members
 
     @classmethod
+    def _is_source(cls) -> bool:
+        return not cls._members(Input)
+
+    @classmethod
     def interface(cls) -> dict[str, Any]:
         """The ports and parameters, as the program that runs a pipeline is told them."""
         for name in cls._members(Input):
@@ -170,6 +181,9 @@ class Stage:
         for name in handlers:
             if name not in cls._members(Input):
                 raise TypeError(f"{cls.__name__} has a method on_{name}, and no input `{name}`")
+        makes = getattr(cls, "messages", None)
+        if cls._is_source() and not inspect.isgeneratorfunction(makes):
+            raise TypeError(f"{cls.__name__} has no inputs, so it is a source, which has a generator messages(self): one that yields")
         inputs = [{"name": name, "type": ros_type(port.type), "many": port.many, "optional": port.optional,
                    "summary": port.summary} for name, port in cls._members(Input).items()]
         outputs = [{"name": name, "type": ros_type(port.type), "topic": port.topic, "side": port.side,
@@ -181,10 +195,10 @@ class Stage:
 
     @classmethod
     def begin(cls, parameters: dict[str, Any] | None = None, context: Context | None = None,
-              send: Callable[[str, Any, str], None] = lambda output, message, robot: None,
+              send: Callable[..., None] = lambda output, message, robot, log_time=None: None,
               warn: Callable[[str], None] = lambda what: None) -> "Stage":
         """Makes the stage as a pipeline does: with some parameters, and with what takes its messages (the name of the output,
-        the message, the robot) and its warnings. For tests of a stage by itself."""
+        the message, the robot and, of a source, the log time) and its warnings. For tests of a stage by itself."""
         made = cls.__new__(cls)
         known = cls._members(Parameter)
         given = parameters or {}
@@ -192,12 +206,41 @@ class Stage:
             raise TypeError(f"{cls.__name__} has no parameter `{unknown[0]}`")
         for name, parameter in known.items():
             setattr(made, name, parameter.value(given.get(name, parameter.default)))
+        timed = _rising if cls._is_source() else _untimed
+        send = timed(send)
         for name, output in cls._members(Output).items():
-            setattr(made, name, output._tied(lambda message, robot, name=name: send(name, message, robot)))
+            setattr(made, name, output._tied(functools.partial(send, name)))
         made._warn = warn
         made.context = context or Context()
         made.__init__()
         return made
+
+
+def _untimed(send: Callable[..., None]) -> Callable[..., None]:
+    """How a stage with inputs sends."""
+    def checked(output: str, message: Any, robot: str, log_time: int | None) -> None:
+        if log_time is not None:
+            raise TypeError("only a source says log times: what a stage sends has that of the message that it handles")
+        send(output, message, robot)
+
+    return checked
+
+
+def _rising(send: Callable[..., None]) -> Callable[..., None]:
+    """How a source sends."""
+    reached = 0
+
+    def checked(output: str, message: Any, robot: str, log_time: int | None) -> None:
+        nonlocal reached
+        if log_time is None:
+            raise TypeError("a source says when a message was logged: send(message, robot, log_time=NANOSECONDS)")
+        log_time = operator.index(log_time)
+        if not reached <= log_time < 1 << 64:
+            raise ValueError(f"the log time {log_time} ns comes after {reached} ns: those of a source never fall, and fit in 64 bits")
+        reached = log_time
+        send(output, message, robot, log_time)
+
+    return checked
 
 
 def stage(function: Callable[..., Any] | None = None, *, output: str = "out") -> Any:
