@@ -29,6 +29,8 @@ pub(super) struct Totals {
     pub(super) sent: u64,
     /// Messages that were dropped because there was no room.
     pub(super) dropped: u64,
+    /// Messages that waited for a receiver that began anew, and were left out for the last of their topic.
+    pub(super) superseded: u64,
     /// Batches that were taken.
     pub(super) batches: u64,
     /// Bytes of these batches, as they were sent.
@@ -174,6 +176,11 @@ impl Outbox {
         self.is_ended = true;
     }
 
+    /// Whether nothing more will be pushed.
+    pub(super) fn is_ended(&self) -> bool {
+        self.is_ended
+    }
+
     /// Whether the receiver has taken all, and the end.
     pub(super) fn is_done(&self) -> bool {
         self.is_end_taken
@@ -228,7 +235,7 @@ impl Outbox {
                 number: self.next_number,
                 receiver: self.receiver.unwrap_or(0),
                 clock_offset: self.clock_offset,
-                dropped: self.totals.dropped,
+                dropped: self.totals.dropped + self.totals.superseded,
                 is_end,
                 links: if self.receiver.is_none() { self.links.clone() } else { Vec::new() },
                 entries: entries.iter().map(|(_, waiting)| waiting.entry.clone()).collect(),
@@ -328,8 +335,7 @@ impl Outbox {
             // Of states those that wait are differences to what the receiver has not.
             let superseded = if is_state { std::mem::take(&mut topic.waiting) } else { VecDeque::new() };
             if let Some((entry, bytes)) = topic.last.take_if(|_| is_state || topic.waiting.is_empty()) {
-                let dropped = superseded.len().saturating_sub(1);
-                self.totals.dropped += dropped as u64;
+                self.totals.superseded += superseded.len().saturating_sub(1) as u64;
                 for order in superseded {
                     self.waiting.remove(&order);
                 }

@@ -148,7 +148,7 @@ impl Shared {
 
     fn note_receiver(&self, receiver: Presence, is_there: bool) {
         let mut state = self.lock();
-        let text = match is_there {
+        match is_there {
             true => {
                 let is_new = state.receivers.insert(receiver.clone());
                 let others = state.receivers.len() - 1;
@@ -158,17 +158,20 @@ impl Shared {
                         others + 1
                     ));
                 }
-                format!("the receiver `{}` is there", receiver.name)
+                tracing::info!("the receiver `{}` is there", receiver.name);
             }
             false => {
                 state.receivers.remove(&receiver);
-                let text =
-                    format!("the receiver `{}` is gone: what follows waits until it is there again", receiver.name);
-                state.notices.push(text.clone());
-                text
+                let name = receiver.name;
+                // Who has taken the end goes by right; and if it has not, that is told.
+                match state.outbox.is_ended() {
+                    true => tracing::info!("the receiver `{name}` is gone"),
+                    false => {
+                        state.tell(format!("the receiver `{name}` is gone: what follows waits until it is there again"));
+                    }
+                }
             }
-        };
-        tracing::info!("{text}");
+        }
         drop(state);
         self.has_changed.notify_all();
     }

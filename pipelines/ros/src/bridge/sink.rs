@@ -219,6 +219,7 @@ impl BridgeSink {
             ("bytes sent", now.bytes - before.bytes),
             ("bytes of the messages in them", now.message_bytes - before.message_bytes),
             ("messages dropped because the bridge does not keep up", now.dropped - before.dropped),
+            ("messages left out for the last of their topic", now.superseded - before.superseded),
         ] {
             if more > 0 {
                 output.count(what, more);
@@ -226,6 +227,9 @@ impl BridgeSink {
         }
         if now.dropped > before.dropped {
             output.warn("messages were dropped because the bridge does not keep up");
+        }
+        if now.superseded > before.superseded {
+            output.warn("of the maps that waited for a receiver that began anew the last were sent alone");
         }
         self.sender.take_notices().into_iter().for_each(|notice| output.warn(notice));
     }

@@ -236,7 +236,12 @@ impl BridgeSource {
             warn(output, format!("what the sender `{sender}` has sent cannot be read: {wrong}"));
         }
         if taken.dropped > 0 {
-            warn(output, format!("the sender `{sender}` has dropped messages for want of room"));
+            warn(
+                output,
+                format!(
+                    "the sender `{sender}` has dropped messages, for want of room or for later ones of their topics"
+                ),
+            );
             output.count("messages that senders have dropped", taken.dropped);
         }
         match taken.clock {

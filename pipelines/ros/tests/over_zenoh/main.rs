@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod bridge;
+mod bridge_verb;
+mod command;
 mod map_updates;
 mod network_namespaces;
 mod python_robots;

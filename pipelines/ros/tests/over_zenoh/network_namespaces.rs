@@ -1,15 +1,9 @@
 //! Three robots and a base, each in a network namespace of its own, with a bad link between them. The log of the base gives the
 //! same merged map as the logs of the robots.
 
+use crate::command::{GRIDWEAVE, run};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
-
-/// What takes longer hangs.
-const LONGEST: Duration = Duration::from_secs(400);
-
-const COMMAND: &str = env!("CARGO_BIN_EXE_gridweave-ros");
 
 const BASE: &str = r#"
 [pipeline]
@@ -44,58 +38,31 @@ keep_last = 1000000
 keep_maps = 1000000
 "#;
 
-/// Runs a command to its end.
+/// Three robots send their logs to a base over a link.
 #[track_caller]
-fn run(program: &str, args: &[&str], folder: &Path) -> String {
-    let log = fs::File::create(folder.join("stderr")).unwrap();
-    let mut child = Command::new(program)
-        .args(args)
-        .current_dir(folder)
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .env_remove("ZENOH_SESSION_CONFIG_URI")
-        .stdout(Stdio::null())
-        .stderr(log)
-        .spawn()
-        .unwrap();
-    let until = Instant::now() + LONGEST;
-    let text = || fs::read_to_string(folder.join("stderr")).unwrap_or_default();
-    loop {
-        match child.try_wait().unwrap() {
-            Some(status) if status.success() => return text(),
-            Some(status) => panic!("{program} {args:?}: {status}\n{}", text()),
-            None if Instant::now() > until => {
-                let _ = child.kill();
-                panic!("{program} {args:?} hangs\n{}", text());
-            }
-            None => std::thread::sleep(Duration::from_millis(50)),
-        }
-    }
-}
-
-/// Three robots send their logs to a base over a link. Says what the link did.
-fn carry(folder: &Path, link: &[&str]) -> String {
+fn carry(folder: &Path, link: &[&str]) {
     fs::write(folder.join("base.toml"), BASE).unwrap();
     fs::write(folder.join("robot.toml"), ROBOT).unwrap();
     run(
-        COMMAND,
+        GRIDWEAVE,
         &["simulate", "-o", "robots.mcap", "--robots", "3", "--set", "duration=60.0", "--set", "snapshots=12"],
         folder,
     );
     let mut commands =
-        vec![format!("exec {COMMAND} run base.toml --output base.mcap --summary base.json > base.txt 2>&1")];
+        vec![format!("exec {GRIDWEAVE} run base.toml --output base.mcap --summary base.json > base.txt 2>&1")];
     for robot in ["robot1", "robot2", "robot3"] {
         let log = format!("{robot}.mcap");
-        run(COMMAND, &["filter", "robots.mcap", "-o", &log, "--robots", robot], folder);
+        run(GRIDWEAVE, &["filter", "robots.mcap", "-o", &log, "--robots", robot], folder);
         let summary = format!("{robot}.json");
         commands.push(format!(
-            "exec {COMMAND} run robot.toml --input {log} --set base.sender={robot} --summary {summary} > {robot}.txt 2>&1"
+            "exec {GRIDWEAVE} run robot.toml --input {log} --set base.sender={robot} --summary {summary} > {robot}.txt 2>&1"
         ));
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/network/bad_link.py");
     let mut args = vec!["--user", "--map-root-user", "--net", "python3", script.to_str().unwrap()];
     args.extend(link);
     args.extend(commands.iter().map(String::as_str));
-    run("unshare", &args, folder)
+    run("unshare", &args, folder);
 }
 
 /// The maps that come of the log that the base has written, and of those of the robots.
@@ -103,7 +70,7 @@ fn carry(folder: &Path, link: &[&str]) -> String {
 fn assert_same_merged_map(folder: &Path) {
     let merge = |log: &str| {
         let map = format!("{log}.yaml");
-        run(COMMAND, &["merge", &format!("{log}.mcap"), "--map", &map, "-o", &format!("{log}.merged.mcap")], folder);
+        run(GRIDWEAVE, &["merge", &format!("{log}.mcap"), "--map", &map, "-o", &format!("{log}.merged.mcap")], folder);
         fs::read(folder.join(format!("{log}.pgm"))).unwrap()
     };
     let (by_bridge, by_wire) = (merge("base"), merge("robots"));

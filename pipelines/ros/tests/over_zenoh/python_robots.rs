@@ -1,83 +1,21 @@
 //! The whole command between programs that others have written: robots and a viewer in Python, by `eclipse-zenoh` and `rosbags`, which
 //! have type hashes and an encoding of their own; and by `zenoh-ros2-sdk`, which has keys, tokens and attachments of its own, too.
 
+use crate::command::{GRIDWEAVE, Running, run};
 use crate::wire::Router;
 use std::ffi::OsStr;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::thread;
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
-
-const LONGEST: Duration = Duration::from_secs(300);
 
 fn script(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name)
 }
 
-/// A command that is killed where the test ends before it.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-impl Running {
-    #[track_caller]
-    fn start(program: &Path, args: &[&OsStr], folder: &Path, log: &str) -> Self {
-        let log = File::create(folder.join(log)).unwrap();
-        let command = Command::new(program)
-            .args(args)
-            .current_dir(folder)
-            .env_remove("ROS_DOMAIN_ID")
-            .env_remove("ZENOH_SESSION_CONFIG_URI")
-            .env("PYTHONDONTWRITEBYTECODE", "1")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(log)
-            .spawn();
-        Self(command.unwrap_or_else(|error| panic!("cannot start {}: {error}", program.display())))
-    }
-
-    /// Waits for its end, and gives the status and what it has printed.
-    #[track_caller]
-    fn end(&mut self) -> (i32, String) {
-        let mut stdout = self.0.stdout.take().unwrap();
-        let reader = thread::spawn(move || {
-            let mut text = String::new();
-            stdout.read_to_string(&mut text).unwrap();
-            text
-        });
-        let until = Instant::now() + LONGEST;
-        let status = loop {
-            if let Some(status) = self.0.try_wait().unwrap() {
-                break status;
-            }
-            assert!(Instant::now() < until, "it hangs");
-            thread::sleep(Duration::from_millis(20));
-        };
-        (status.code().unwrap_or(-1), reader.join().unwrap())
-    }
-}
-
-#[track_caller]
-fn run(program: &Path, args: &[&str], folder: &Path) -> String {
-    let args: Vec<&OsStr> = args.iter().map(OsStr::new).collect();
-    let (status, printed) = Running::start(program, &args, folder, "run.log").end();
-    let errors = std::fs::read_to_string(folder.join("run.log")).unwrap();
-    assert_eq!(status, 0, "{} {args:?}: {printed}{errors}", program.display());
-    printed
-}
-
 /// The interpreter of a virtual environment with the libraries.
 fn python(folder: &Path) -> PathBuf {
     let environment = folder.join("python");
-    run(Path::new("python3"), &["-m", "venv", environment.to_str().unwrap()], folder);
+    run("python3", &["-m", "venv", environment.to_str().unwrap()], folder);
     let python = environment.join("bin/python");
     let requirements = script("requirements.txt");
     let install = ["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "--requirement"];
@@ -113,13 +51,12 @@ fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     let python = python(folder);
-    let gridweave = Path::new(env!("CARGO_BIN_EXE_gridweave-ros"));
     let building =
         ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60", "scans=true"];
     let building = building.into_iter().flat_map(|setting| ["--set", setting]);
     let simulate: Vec<&str> = ["simulate", "-o", "in.mcap", "--robots", "2"].into_iter().chain(building).collect();
-    run(gridweave, &simulate, folder);
-    run(gridweave, &["filter", "in.mcap", "-o", "robots.mcap", "--topics", topics], folder);
+    run(GRIDWEAVE, &simulate, folder);
+    run(GRIDWEAVE, &["filter", "in.mcap", "-o", "robots.mcap", "--topics", topics], folder);
 
     let router = Router::start();
     let connect =
@@ -131,7 +68,7 @@ fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
         .chain(connect.iter().flat_map(|set| ["--set".as_ref(), OsStr::new(set.as_str())]))
         .chain(more.iter().map(OsStr::new))
         .collect();
-    let mut merging = Running::start(gridweave, &arguments, folder, "merging.log");
+    let mut merging = Running::start(GRIDWEAVE, &arguments, folder, "merging.log");
     let words =
         |what: &str| format!("{what}: {}", std::fs::read_to_string(folder.join("merging.log")).unwrap_or_default());
 
@@ -144,7 +81,7 @@ fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     };
     let mut playing = play("robots.log");
     let mut line = String::new();
-    BufReader::new(playing.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    BufReader::new(playing.stdout()).read_line(&mut line).unwrap();
     assert_eq!(line, "all is sent\n", "{}", std::fs::read_to_string(folder.join("robots.log")).unwrap());
 
     // One who comes when all was sent sees the map and the frames all the same, and so does one who comes later still.
@@ -169,13 +106,11 @@ fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     drop(playing);
     let mut again = play("again.log");
     let mut line = String::new();
-    BufReader::new(again.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+    BufReader::new(again.stdout()).read_line(&mut line).unwrap();
     assert_eq!(line, "all is sent\n");
 
-    let id = merging.0.id().to_string();
-    run(Path::new("kill"), &["-INT", &id], folder);
-    let (status, printed) = merging.end();
-    assert_eq!(status, 0, "{}", words(&printed));
+    merging.signal("INT");
+    merging.end_with(0);
     let summary = folder.join("summary.json");
-    run(gridweave, &["evaluate", summary.to_str().unwrap(), "--truth", "in.truth.json"], folder);
+    run(GRIDWEAVE, &["evaluate", summary.to_str().unwrap(), "--truth", "in.truth.json"], folder);
 }

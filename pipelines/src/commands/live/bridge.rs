@@ -67,6 +67,7 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     let open =
         |link: &super::link_choice::Link| WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port);
     let mut watched = links.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+    say(format_args!("carries {} links of {}; ctrl-c ends that, and not the run", links.len(), running.name()));
     let mut messages = 0u64;
     loop {
         // What has passed before the run ended is still there after it.
@@ -98,7 +99,8 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     let count = |what: &str| counts.get(what).copied().unwrap_or_default();
     // A receiver that began anew was told the last messages again: what was taken says nothing of what was not.
     let lost = count("messages that were not taken before the end")
-        + count("messages dropped because the bridge does not keep up");
+        + count("messages dropped because the bridge does not keep up")
+        + count("messages left out for the last of their topic");
     let (carried, bytes) = (messages.saturating_sub(lost), count("bytes sent"));
     print_line(format_args!("carried {carried} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
     let missed: u64 = watched.iter().map(WatchedLink::missed).sum();
