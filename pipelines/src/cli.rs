@@ -107,9 +107,9 @@ impl Command {
 }
 
 impl Cli {
-    /// Does what the command line says, with the given stage kinds.
-    pub(crate) fn execute(self, registry: &Registry) -> Result<Status> {
-        let _trace = self.telling.start()?;
+    /// Does what the command line says, with the given stage kinds. `hear` hears what is warned of.
+    pub(crate) fn execute(self, registry: &Registry, hear: fn(&str, &str)) -> Result<Status> {
+        let _trace = self.telling.start(hear)?;
         if self.command.has_something_to_put_in_order() {
             interrupt::hold_back();
         }

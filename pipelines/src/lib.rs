@@ -38,8 +38,13 @@ use std::process::ExitCode;
 /// given one counts. The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be
 /// merged.
 pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
+    command_with(kinds, |_, _| {})
+}
+
+/// The same, with somebody who hears what is warned of in this process: the module that does, and its words.
+pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, hear: fn(&str, &str)) -> ExitCode {
     let registry = shipped::registry(kinds);
-    match cli::Cli::parse().execute(&registry) {
+    match cli::Cli::parse().execute(&registry, hear) {
         Ok(Status::Done) => ExitCode::SUCCESS,
         Ok(Status::BadUse) => ExitCode::from(2),
         Ok(Status::Failed) => ExitCode::from(1),

@@ -14,7 +14,7 @@ use tracing::field::{Field, Visit};
 use tracing::span;
 use tracing::{Level, Subscriber};
 use tracing_chrome::{ChromeLayerBuilder, EventOrSpan, FlushGuard};
-use tracing_subscriber::filter::{EnvFilter, filter_fn};
+use tracing_subscriber::filter::{EnvFilter, LevelFilter, filter_fn};
 use tracing_subscriber::layer::{self, Layer};
 use tracing_subscriber::prelude::*;
 use tracing_subscriber::registry::LookupSpan;
@@ -60,12 +60,12 @@ enum LogFormat {
 }
 
 impl TellingArgs {
-    /// Begins to tell. A trace is complete when what is given is dropped.
-    pub(crate) fn start(&self) -> Result<Option<FlushGuard>> {
+    /// Begins to tell. A trace is complete when what is given is dropped. `hear` hears each warning: its module, and its words.
+    pub(crate) fn start(&self, hear: fn(&str, &str)) -> Result<Option<FlushGuard>> {
         let (trace, guard) = self.trace_layer()?.unzip();
         // Set once, as the subscriber is.
         let _ = FORMAT.set(self.log_format);
-        tracing_subscriber::registry().with(self.lines()).with(StageNames).with(trace).init();
+        tracing_subscriber::registry().with(self.lines()).with(StageNames).with(trace).with(warnings(hear)).init();
         Ok(guard)
     }
 
@@ -114,6 +114,33 @@ impl TellingArgs {
 fn usual_filter(verbose: u8) -> &'static str {
     // Without a router, which nobody needs, Zenoh warns of what it has waited for in vain.
     ["warn,zenoh=error", "info", "debug"].get(usize::from(verbose)).copied().unwrap_or("trace")
+}
+
+/// Hands on what is warned of, as it is said: the user may not be told it in these words.
+fn warnings<S: Subscriber + for<'a> LookupSpan<'a>>(hear: fn(&str, &str)) -> impl Layer<S> {
+    // Of a filter that is a function, nobody could say that it asks for no more than warnings.
+    Listener(hear).with_filter(LevelFilter::WARN)
+}
+
+struct Listener(fn(&str, &str));
+
+impl<S: Subscriber> Layer<S> for Listener {
+    fn on_event(&self, event: &tracing::Event<'_>, _: layer::Context<'_, S>) {
+        let mut words = Words(String::new());
+        event.record(&mut words);
+        (self.0)(event.metadata().target(), &words.0);
+    }
+}
+
+/// The message of an event.
+struct Words(String);
+
+impl Visit for Words {
+    fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
+        if field.name() == "message" {
+            self.0 = format!("{value:?}");
+        }
+    }
 }
 
 /// The file of a trace. What cannot be written is told once and left out: the run goes on.
@@ -171,9 +198,9 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for StageNames {
         }
     }
 
-    fn max_level_hint(&self) -> Option<tracing::level_filters::LevelFilter> {
+    fn max_level_hint(&self) -> Option<LevelFilter> {
         // It asks for no span by itself.
-        Some(tracing::level_filters::LevelFilter::OFF)
+        Some(LevelFilter::OFF)
     }
 }
 
@@ -223,5 +250,16 @@ mod tests {
         };
         assert_eq!(told(0), [false, true, true]);
         assert_eq!(told(1), [true, true, true]);
+    }
+
+    #[test]
+    fn warnings_are_heard_in_the_words_of_their_module() {
+        static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        let layer = warnings(|module, words| HEARD.lock().unwrap().push(format!("{module}: {words}")));
+        tracing::subscriber::with_default(tracing_subscriber::registry().with(layer), || {
+            tracing::warn!(target: "zenoh_link_tls::unicast", "{} was not let in", "somebody");
+            tracing::info!(target: "zenoh_link_tls::unicast", "all is well");
+        });
+        assert_eq!(*HEARD.lock().unwrap(), ["zenoh_link_tls::unicast: somebody was not let in"]);
     }
 }

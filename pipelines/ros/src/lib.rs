@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
-//!     gridweave::command(gridweave_ros::kinds())
+//!     gridweave::command_with(gridweave_ros::kinds(), gridweave_ros::bridge::hear)
 //! }
 //! ```
 //!

@@ -25,12 +25,14 @@
 //!    times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is: it
 //!    is compared with other times of the same robot alone.
 
+mod certificates;
 mod clock;
 mod difference;
 mod intake;
 mod network;
 mod outbox;
 mod presence;
+mod refusals;
 mod sender;
 pub mod sink;
 pub mod source;
@@ -39,6 +41,7 @@ mod tests;
 mod wire;
 
 use gridweave_runtime::stage::StageKind;
+pub use refusals::hear;
 
 /// The stage kinds of a bridge.
 pub fn kinds() -> [StageKind; 2] {

@@ -1,5 +1,7 @@
 //! How the ends of a bridge find each other, and whom they let in.
 
+use super::certificates::Certificates;
+use super::refusals::obstacle;
 use crate::connection::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::net::IpAddr;
@@ -21,6 +23,7 @@ pub(super) struct Network {
     pub(super) discover: bool,
     pub(super) zenoh_config: Option<PathBuf>,
     pub(super) insecure: bool,
+    pub(super) certificates: Certificates,
 }
 
 impl Network {
@@ -40,15 +43,20 @@ impl Network {
                     Ok(_) if !self.insecure && is_open(endpoint) => {
                         errors.push(ParameterError::new(key, open(endpoint)))
                     }
+                    Ok(_) if !cfg!(feature = "tls") && is_encrypted(endpoint) => {
+                        errors.push(ParameterError::new(key, "the program was built without the feature `tls`"))
+                    }
                     Ok(_) => {}
                 }
             }
         }
         if self.discover && !self.insecure && self.zenoh_config.is_none() {
-            let text = "asks everybody on the network, and what is sent to who answers is not encrypted: name the other end, use \
-                        TLS by `zenoh_config`, or set `insecure = true` on a network that you trust";
+            let text = "asks everybody on the network, and what is sent to who answers is not encrypted: name the other end as \
+                        `tls/HOST:PORT`, or set `insecure = true` on a network that you trust";
             errors.push(ParameterError::new("discover", text));
         }
+        let has_file = self.zenoh_config.is_some();
+        errors.extend(self.certificates.check(&self.connect, &self.listen, has_file));
         errors
     }
 
@@ -69,12 +77,34 @@ impl Network {
                 None => Ok(config),
             };
         }
-        let settings = [
+        let certificates = self.certificates.settings()?;
+        let mut settings = vec![
             ("scouting/multicast/enabled", if self.discover { "true" } else { "false" }),
             // Senders have nothing to say to each other.
             ("scouting/gossip/autoconnect", "{ router: [], peer: [], client: [] }"),
         ];
+        settings.extend(certificates.iter().map(|(key, value)| (*key, value.as_str())));
         peer_config(&self.connect, &self.listen, &settings)
+    }
+
+    /// Why none of the endpoints to connect to is reached, as far as that can be told. Asks each of them, one after the other.
+    pub(super) fn obstacles(&self) -> Vec<String> {
+        let Ok(config) = self.config() else { return Vec::new() };
+        let why = |endpoint: String| {
+            let mut config = config.clone();
+            let list = serde_json::to_string(&[&endpoint]).ok()?;
+            config.insert_json5("connect/endpoints", &list).ok()?;
+            Some(format!("{endpoint}: {}", obstacle(config)?))
+        };
+        endpoints_of(&config, "connect/endpoints").into_iter().filter_map(why).collect()
+    }
+
+    /// Where others connect to, as words.
+    pub(super) fn doors(&self) -> String {
+        match &self.zenoh_config {
+            Some(path) => format!("where {} says", path.display()),
+            None => self.listen.join(" and "),
+        }
     }
 
     /// Where the other end is looked for, as words.
@@ -103,10 +133,15 @@ fn is_open(endpoint: &str) -> bool {
     !is_loopback && !ENCRYPTED.contains(&protocol)
 }
 
+/// Whether what goes there is encrypted.
+pub(super) fn is_encrypted(endpoint: &str) -> bool {
+    endpoint.split_once('/').is_some_and(|(protocol, _)| ENCRYPTED.contains(&protocol))
+}
+
 fn open(endpoint: &str) -> String {
     format!(
-        "`{endpoint}` is not this machine, and what goes there is not encrypted: use TLS by `zenoh_config`, or set `insecure = true` \
-         on a network that you trust"
+        "`{endpoint}` is not this machine, and what goes there is not encrypted: write it as `tls/HOST:PORT`, with certificates, or \
+         set `insecure = true` on a network that you trust"
     )
 }
 
@@ -133,13 +168,22 @@ mod tests {
     fn network(connect: &[&str], listen: &[&str]) -> Network {
         let owned = |list: &[&str]| list.iter().map(|&text| text.to_owned()).collect();
         let (connect, listen) = (owned(connect), owned(listen));
-        Network { bridge: "base".into(), connect, listen, discover: false, zenoh_config: None, insecure: false }
+        Network {
+            bridge: "base".into(),
+            connect,
+            listen,
+            discover: false,
+            zenoh_config: None,
+            insecure: false,
+            certificates: Certificates::default(),
+        }
     }
 
     #[test]
     fn what_leaves_the_machine_is_encrypted_or_told_to_be_open() {
-        for closed in ["tcp/localhost:7448", "tcp/127.0.0.1:0", "tcp/[::1]:7448", "tls/10.0.0.1:7448", "quic/base:1"] {
-            assert_eq!(network(&[closed], &[closed]).check(), [], "{closed}");
+        for closed in ["tcp/localhost:7448", "tcp/127.0.0.1:0", "tcp/[::1]:7448", "tls/10.0.0.1:7448"] {
+            let is_known = cfg!(feature = "tls") || !is_encrypted(closed);
+            assert_eq!(network(&[closed], &[]).check().is_empty(), is_known, "{closed}");
         }
         for open in ["tcp/0.0.0.0:7448", "tcp/[::]:0", "tcp/base:7448", "udp/10.0.0.1:7448", "tcp/1.2.3.4:5#iface=lo"] {
             let errors = network(&[], &[open]).check();

@@ -5,12 +5,12 @@ use super::network::Network;
 use super::outbox::{Limits, Outbox, Totals};
 use super::presence::{Presence, Role, watch};
 use super::wire::{Answer, Link, from_bytes};
-use crate::connection::in_words;
+use crate::connection::{in_words, is_connected};
 use gridweave_runtime::message::MessageHeader;
 use gridweave_runtime::stage::StageError;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::CongestionControl;
@@ -24,6 +24,8 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(100);
 const AFTER_FAILURE: Duration = Duration::from_secs(1);
 /// So long a receiver may take to be found before somebody is told.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// So long after that it is looked for the reason again, which may have become another.
+const NEXT_LOOK: Duration = Duration::from_secs(30);
 
 /// How a sender goes about it.
 #[derive(Clone, Debug)]
@@ -54,6 +56,8 @@ struct State {
     /// The receivers that are there.
     receivers: BTreeSet<Presence>,
     is_stopped: bool,
+    /// What was told last of why there is no receiver.
+    told_of_absence: Option<String>,
     /// What somebody should know.
     notices: Vec<String>,
 }
@@ -69,14 +73,15 @@ impl Sender {
         let me = Presence { name: settings.name.clone(), number };
         let token = me.declare(&session, &settings.network.bridge, Role::Sender)?;
         let outbox = Outbox::new(settings.name.clone(), number, links, settings.limits);
-        let state = State { outbox, receivers: BTreeSet::new(), is_stopped: false, notices: Vec::new() };
+        let state =
+            State { outbox, receivers: BTreeSet::new(), is_stopped: false, told_of_absence: None, notices: Vec::new() };
         let shared = Arc::new(Shared { state: Mutex::new(state), has_changed: Condvar::new() });
         let of_callback = Arc::clone(&shared);
         watch(&session, &settings.network.bridge, Role::Receiver, move |receiver, is_there| {
             of_callback.note_receiver(receiver, is_there);
         })?;
         let of_thread = Arc::clone(&shared);
-        let thread = std::thread::Builder::new().name("bridge".to_owned());
+        let thread = thread::Builder::new().name("bridge".to_owned());
         let thread = thread.spawn(move || Worker { session, settings, shared: of_thread }.run());
         let thread = thread.map_err(|error| StageError::new("start the thread of a bridge", error))?;
         Ok(Self { shared, thread: Some(thread), token: Some(token) })
@@ -167,7 +172,8 @@ impl Shared {
                 match state.outbox.is_ended() {
                     true => tracing::info!("the receiver `{name}` is gone"),
                     false => {
-                        state.tell(format!("the receiver `{name}` is gone: what follows waits until it is there again"));
+                        state
+                            .tell(format!("the receiver `{name}` is gone: what follows waits until it is there again"));
                     }
                 }
             }
@@ -184,6 +190,19 @@ impl State {
     }
 }
 
+/// When it is to be told next that there is no receiver; never, once one was found.
+struct Search(Option<Instant>);
+
+impl Search {
+    fn is_due(&mut self) -> bool {
+        let is_due = self.0.is_some_and(|next| Instant::now() >= next);
+        if is_due {
+            self.0 = Some(Instant::now() + NEXT_LOOK);
+        }
+        is_due
+    }
+}
+
 /// What the thread works with.
 struct Worker {
     session: Session,
@@ -193,8 +212,8 @@ struct Worker {
 
 impl Worker {
     fn run(self) {
-        let (start, mut is_told) = (Instant::now(), false);
-        while let Some((receiver, batch, is_greeting)) = self.next_batch(start, &mut is_told) {
+        let mut search = Search(Some(Instant::now() + PATIENCE));
+        while let Some((receiver, batch, is_greeting)) = self.next_batch(&mut search) {
             let sent = Instant::now();
             let answered = self.ask(&receiver, batch).and_then(|answer| {
                 let Some((answer, offset)) = answer else { return Ok(false) };
@@ -219,22 +238,18 @@ impl Worker {
     }
 
     /// Waits for something to send, and somebody to send it to. None when it is to stop.
-    fn next_batch(&self, start: Instant, is_told: &mut bool) -> Option<(Presence, Vec<u8>, bool)> {
+    fn next_batch(&self, search: &mut Search) -> Option<(Presence, Vec<u8>, bool)> {
         let mut state = self.shared.lock();
         loop {
             if state.is_stopped {
                 return None;
             }
-            if !*is_told && start.elapsed() > PATIENCE && state.receivers.is_empty() {
-                *is_told = true;
-                let (bridge, others) = (&self.settings.network.bridge, self.settings.network.others());
-                state.tell(format!(
-                    "there is no receiver of the bridge `{bridge}` at {others}. It is looked for until it is there"
-                ));
+            if search.is_due() && state.receivers.is_empty() {
+                self.tell_why_nobody_is_there();
             }
             // Of several the same one always.
             if let Some(receiver) = state.receivers.first().cloned() {
-                *is_told = true;
+                search.0 = None;
                 let batch = state.outbox.batch_for(receiver.number).map(|batch| batch.map(<[u8]>::to_vec));
                 let is_greeting = state.outbox.is_greeting();
                 match batch {
@@ -244,6 +259,28 @@ impl Worker {
                 }
             }
             state = self.shared.wait(state, LOOK_INTERVAL);
+        }
+    }
+
+    /// Tells that nobody is there, and what is known of the reason: in a thread of its own, as that takes long to find out.
+    fn tell_why_nobody_is_there(&self) {
+        let (network, shared) = (self.settings.network.clone(), Arc::clone(&self.shared));
+        let is_connected = is_connected(&self.session);
+        let find = move || {
+            let obstacles = if is_connected { Vec::new() } else { network.obstacles() };
+            let (bridge, others) = (&network.bridge, network.others());
+            let reasons = if obstacles.is_empty() { String::new() } else { format!(" ({})", obstacles.join("; ")) };
+            let text = format!(
+                "there is no receiver of the bridge `{bridge}` at {others}{reasons}. It is looked for until it is there"
+            );
+            let mut state = shared.lock();
+            if state.receivers.is_empty() && state.told_of_absence.as_ref() != Some(&text) {
+                state.told_of_absence = Some(text.clone());
+                state.tell(text);
+            }
+        };
+        if let Err(error) = thread::Builder::new().name("bridge search".to_owned()).spawn(find) {
+            tracing::warn!("the thread that finds out why nobody is there was not started: {error}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! The stage `bridge_sink`: sends links of a live run to another machine.
 
+use super::certificates::Certificates;
 use super::clock::Clock;
 use super::network::{BASE, Network, is_part_of_key};
 use super::outbox::{Limits, Totals};
@@ -24,13 +25,20 @@ pub struct SinkParameters {
     /// The robot that messages about none in particular are sent as: a base that sends its merged map to another is one. Its
     /// topics and map frames get its name.
     pub robot: Option<String>,
-    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Until one answers it is looked for.
     pub connect: Vec<String>,
-    /// Where others may connect, as `tcp/HOST:PORT`. Nothing is listened to if none are given.
+    /// Where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Nothing is listened to if none are given.
     pub listen: Vec<String>,
     /// Look for the other end on the local network, by multicast.
     pub discover: bool,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen` and `discover`: for TLS, for example.
+    /// The authority (PEM) by which the certificate of the other end must be signed, for `tls/HOST:PORT`; without it one that
+    /// browsers know.
+    pub authority: Option<PathBuf>,
+    /// The certificate (PEM) of this end, for receivers that ask for one.
+    pub certificate: Option<PathBuf>,
+    /// The private key (PEM) of `certificate`.
+    pub key: Option<PathBuf>,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen`, `discover` and the certificates.
     pub zenoh_config: Option<PathBuf>,
     /// Allow addresses of other machines without encryption, on a network that is trusted.
     pub insecure: bool,
@@ -57,6 +65,9 @@ impl Default for SinkParameters {
             connect: vec![BASE.to_owned()],
             listen: Vec::new(),
             discover: false,
+            authority: None,
+            certificate: None,
+            key: None,
             zenoh_config: None,
             insecure: false,
             keep_last: 6000,
@@ -69,8 +80,10 @@ impl Default for SinkParameters {
 
 impl SinkParameters {
     fn network(&self) -> Network {
-        let Self { bridge, connect, listen, discover, zenoh_config, insecure, .. } = self.clone();
-        Network { bridge, connect, listen, discover, zenoh_config, insecure }
+        let Self { bridge, connect, listen, discover, zenoh_config, insecure, authority, certificate, key, .. } =
+            self.clone();
+        let certificates = Certificates { authority, certificate, key };
+        Network { bridge, connect, listen, discover, zenoh_config, insecure, certificates }
     }
 
     fn settings(&self, clock: Clock) -> Settings {

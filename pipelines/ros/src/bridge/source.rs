@@ -1,9 +1,11 @@
 //! The stage `bridge_source`: takes what other machines send over a bridge into a live pipeline.
 
+use super::certificates::Certificates;
 use super::clock::Clock;
 use super::intake::{Intake, Item, Taken};
 use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
+use super::refusals::take_heard;
 use super::wire::{Link, to_bytes};
 use crate::connection::in_words;
 use gridweave_logs::schemas::schema_text;
@@ -34,13 +36,20 @@ pub struct SourceParameters {
     pub bridge: String,
     /// What the other ends call this one.
     pub receiver: String,
-    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Until one answers it is looked for.
     pub connect: Vec<String>,
-    /// Where others may connect, as `tcp/HOST:PORT`. Nothing else is listened to.
+    /// Where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Nothing else is listened to.
     pub listen: Vec<String>,
     /// Let the other ends find this one on the local network, by multicast.
     pub discover: bool,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen` and `discover`: for TLS, for example.
+    /// The authority (PEM) by which the certificates of all must be signed who connect to `tls/HOST:PORT`. Without it anybody may who
+    /// knows the authority of `certificate`.
+    pub authority: Option<PathBuf>,
+    /// The certificate (PEM) of this end, for `tls/HOST:PORT`, with the names by which others connect to it.
+    pub certificate: Option<PathBuf>,
+    /// The private key (PEM) of `certificate`.
+    pub key: Option<PathBuf>,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen`, `discover` and the certificates.
     pub zenoh_config: Option<PathBuf>,
     /// Allow addresses of other machines without encryption, on a network that is trusted.
     pub insecure: bool,
@@ -60,6 +69,9 @@ impl Default for SourceParameters {
             connect: Vec::new(),
             listen: vec![BASE.to_owned()],
             discover: false,
+            authority: None,
+            certificate: None,
+            key: None,
             zenoh_config: None,
             insecure: false,
             clock_tolerance: 1.0,
@@ -70,8 +82,10 @@ impl Default for SourceParameters {
 
 impl SourceParameters {
     fn network(&self) -> Network {
-        let Self { bridge, connect, listen, discover, zenoh_config, insecure, .. } = self.clone();
-        Network { bridge, connect, listen, discover, zenoh_config, insecure }
+        let Self { bridge, connect, listen, discover, zenoh_config, insecure, authority, certificate, key, .. } =
+            self.clone();
+        let certificates = Certificates { authority, certificate, key };
+        Network { bridge, connect, listen, discover, zenoh_config, insecure, certificates }
     }
 }
 
@@ -143,6 +157,10 @@ pub(super) struct BridgeSource {
     /// The sessions of those that have said their end.
     ended: BTreeSet<u64>,
     end_after: Option<usize>,
+    /// Where others connect to, as words.
+    doors: String,
+    /// Why somebody was not let in, as far as it was told on the log.
+    refusals: BTreeSet<String>,
     /// The numbers that channels have here: by port, sender, number there, and topic.
     channels: BTreeMap<(usize, u64, u32, String), u32>,
     _token: LivelinessToken,
@@ -178,6 +196,8 @@ impl BridgeSource {
             senders: BTreeSet::new(),
             ended: BTreeSet::new(),
             end_after: parameters.end_after,
+            doors: network.doors(),
+            refusals: BTreeSet::new(),
             channels: BTreeMap::new(),
             _token: token,
             _queryable: queryable,
@@ -202,6 +222,18 @@ impl BridgeSource {
         match self.ended.contains(&sender.number) {
             true => self.intake.forget(sender.number),
             false => warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows")),
+        }
+    }
+
+    /// Tells whom this end has not let in. They try again and again: the log is told once.
+    fn note_refusals(&mut self, output: &Output<Ports>) {
+        for reason in take_heard() {
+            let text = format!("somebody was not let in at {}: {reason}", self.doors);
+            output.count("connections that were not let in", 1);
+            match self.refusals.insert(reason) {
+                true => warn(output, text),
+                false => output.warn(text),
+            }
         }
     }
 
@@ -323,6 +355,7 @@ impl Source for BridgeSource {
     }
 
     fn next(&mut self, output: &Output<Ports>) -> Result<bool, StageError> {
+        self.note_refusals(output);
         for _ in 0..BATCHES {
             let Some(event) = self.waiting.pop_front().or_else(|| self.events.try_recv().ok()) else { break };
             match event {

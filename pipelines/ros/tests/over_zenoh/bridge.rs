@@ -16,12 +16,12 @@ fn free_endpoint() -> (String, u16) {
     (format!("tcp/127.0.0.1:{port}"), port)
 }
 
-fn source(endpoint: &str, more: &str) -> LoneStage {
+pub(crate) fn source(endpoint: &str, more: &str) -> LoneStage {
     let parameters = format!("listen = [\"{endpoint}\"]\n{more}");
     LoneStage::new(&gridweave_ros::bridge::source::kind(), &parameters).unwrap()
 }
 
-fn sink(endpoint: &str, more: &str) -> LoneStage {
+pub(crate) fn sink(endpoint: &str, more: &str) -> LoneStage {
     let wire = |(output, ros_type): (&'static str, &str)| InputWire {
         port: "in",
         from: "robots".into(),
@@ -36,19 +36,19 @@ fn sink(endpoint: &str, more: &str) -> LoneStage {
     LoneStage::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context).unwrap()
 }
 
-fn map(frame: &str, time: u64, size: usize) -> Vec<u8> {
+pub(crate) fn map(frame: &str, time: u64, size: usize) -> Vec<u8> {
     let info = MapMetaData { width: size as u32, height: size as u32, resolution: 0.05, ..Default::default() };
     let data: Vec<u8> = (0..size * size).map(|at| if at % 7 == time as usize % 7 { 100 } else { 0 }).collect();
     encode(&OccupancyGrid { header: Header::new(LogTime(time), frame), info, data: &data }).unwrap()
 }
 
-fn give(sink: &mut LoneStage, wire: usize, robot: &str, topic: &str, time: u64, bytes: Vec<u8>) {
+pub(crate) fn give(sink: &mut LoneStage, wire: usize, robot: &str, topic: &str, time: u64, bytes: Vec<u8>) {
     let (robot, topic) = (FixedText::new(robot).unwrap(), FixedText::new(topic).unwrap());
     let header = MessageHeader { robot, topic, log_time: LogTime(time), publish_time: time, ..Default::default() };
     sink.give_message("in", Message::from_vec(header, bytes).on_wire(wire)).unwrap();
 }
 
-fn give_pose(sink: &mut LoneStage, time: u64) {
+pub(crate) fn give_pose(sink: &mut LoneStage, time: u64) {
     let pose = PoseWithCovarianceStamped { header: Header::new(LogTime(time), "robot1/map"), ..Default::default() };
     give(sink, 1, "robot1", "/robot1/pose", time, encode(&pose).unwrap());
 }
@@ -66,7 +66,7 @@ fn wait_for(source: &mut LoneStage, what: &str, mut is_so: impl FnMut(&mut LoneS
 
 /// Lets a source go on until so many messages have come on an output, and gives them.
 #[track_caller]
-fn come(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
+pub(crate) fn come(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
     let mut messages = Vec::new();
     wait_for(source, output, |source| {
         let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
@@ -148,17 +148,20 @@ fn an_end_that_nobody_takes_is_told() {
 }
 
 /// A wire between two ports of this machine, which can be cut.
-struct Wire {
+pub(crate) struct Wire {
     is_cut: Arc<AtomicBool>,
     streams: Arc<Mutex<Vec<TcpStream>>>,
+    passed: Arc<Mutex<Vec<u8>>>,
 }
 
 impl Wire {
-    fn new(to: u16) -> (Self, String) {
+    pub(crate) fn new(to: u16) -> (Self, String) {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let endpoint = format!("tcp/{}", listener.local_addr().unwrap());
         let (is_cut, streams) = (Arc::<AtomicBool>::default(), Arc::<Mutex<Vec<TcpStream>>>::default());
         let (cut, open) = (Arc::clone(&is_cut), Arc::clone(&streams));
+        let passed = Arc::<Mutex<Vec<u8>>>::default();
+        let seen = Arc::clone(&passed);
         thread::spawn(move || {
             for near in listener.incoming().flatten() {
                 // Nobody answers where the wire is cut.
@@ -168,9 +171,11 @@ impl Wire {
                 }
                 for (mut from, mut to) in [(near.try_clone().unwrap(), far.try_clone().unwrap()), (far, near)] {
                     open.lock().unwrap().push(from.try_clone().unwrap());
+                    let seen = Arc::clone(&seen);
                     thread::spawn(move || {
                         let mut bytes = [0; 4096];
                         while let Ok(count @ 1..) = from.read(&mut bytes) {
+                            seen.lock().unwrap().extend_from_slice(&bytes[..count]);
                             if to.write_all(&bytes[..count]).is_err() {
                                 break;
                             }
@@ -180,7 +185,12 @@ impl Wire {
                 }
             }
         });
-        (Self { is_cut, streams }, endpoint)
+        (Self { is_cut, streams, passed }, endpoint)
+    }
+
+    /// All that has passed, either way.
+    pub(crate) fn passed(&self) -> Vec<u8> {
+        self.passed.lock().unwrap().clone()
     }
 
     fn cut(&self) {

@@ -259,7 +259,8 @@ fn without_a_base_a_bridge_says_so_and_ends_with_status_1() {
     let mut bridge = robot.bridge(&endpoint, &["--set", "linger=0.1"]);
     robot.play(&[]);
     let sent = robot.messages(&robot.name, "output");
-    bridge.wait_for(&format!("there is no receiver of the bridge `base` at {endpoint}"));
+    bridge.wait_for(&format!("there is no receiver of the bridge `base` at {endpoint} ({endpoint}: "));
+    bridge.wait_for("nothing listens there");
     bridge.signal("INT");
     let carried = bridge.end_with(1);
     assert!(carried.contains(&format!("carried 0 of {sent} messages")), "{carried}");

@@ -10,4 +10,6 @@ mod network_namespaces;
 mod python_robots;
 mod scans;
 mod stages;
+#[cfg(feature = "tls")]
+mod tls;
 mod wire;

@@ -1,0 +1,118 @@
+//! The certificates by which the ends of a bridge know each other.
+
+use super::network::is_encrypted;
+use gridweave_runtime::stage::ParameterError;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// What the parameters of a stage say of certificates: files in PEM.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Certificates {
+    /// The authority by which the certificate of the other end is signed.
+    pub(super) authority: Option<PathBuf>,
+    /// What this end shows of itself, and the key to it.
+    pub(super) certificate: Option<PathBuf>,
+    pub(super) key: Option<PathBuf>,
+}
+
+impl Certificates {
+    fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+        let files = [("authority", &self.authority), ("certificate", &self.certificate), ("key", &self.key)];
+        files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?)))
+    }
+
+    /// What is wrong with them where an end connects and listens there.
+    pub(super) fn check(&self, connect: &[String], listen: &[String], has_file: bool) -> Vec<ParameterError> {
+        let first = self.files().map(|(name, _)| name).next();
+        let has_tls = |endpoints: &[String]| endpoints.iter().any(|endpoint| is_encrypted(endpoint));
+        let error = |field: &str, text: &str| vec![ParameterError::new(field, text)];
+        match (first, &self.certificate, &self.key) {
+            (Some(first), ..) if has_file => {
+                error(first, "is not used beside `zenoh_config`, which names the certificates itself")
+            }
+            (_, Some(_), None) => error("key", "must be given, too: the private key of `certificate`"),
+            (_, None, Some(_)) => error("certificate", "must be given, too: the certificate that `key` is for"),
+            (Some(first), ..) if !has_tls(connect) && !has_tls(listen) => {
+                error(first, "is for addresses of the form `tls/HOST:PORT`, and there is none")
+            }
+            (_, None, None) if !has_file && has_tls(listen) => {
+                error("certificate", "must be given, and its `key`: who connects to `tls/...` asks for it")
+            }
+            (_, Some(_), _) if self.authority.is_none() && !has_tls(listen) => {
+                error("authority", "must be given, too: the authority by which the other end's certificate is signed")
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The settings of Zenoh, as JSON5. With an authority and a certificate each end asks the other for its own.
+    ///
+    /// # Errors
+    /// A file cannot be read: Zenoh tells nobody.
+    pub(super) fn settings(&self) -> Result<Vec<(&'static str, String)>, String> {
+        let mut settings = Vec::new();
+        for (name, path) in self.files() {
+            let cannot_read =
+                |cause: &dyn std::fmt::Display| format!("cannot read `{name}`, {}: {cause}", path.display());
+            File::open(path).map_err(|error| cannot_read(&error))?;
+            let text = serde_json::to_string(path).map_err(|error| cannot_read(&error))?;
+            let keys: &[&str] = match name {
+                "authority" => &["transport/link/tls/root_ca_certificate"],
+                "certificate" => &["transport/link/tls/listen_certificate", "transport/link/tls/connect_certificate"],
+                _ => &["transport/link/tls/listen_private_key", "transport/link/tls/connect_private_key"],
+            };
+            settings.extend(keys.iter().map(|&key| (key, text.clone())));
+        }
+        if self.authority.is_some() && self.certificate.is_some() {
+            settings.push(("transport/link/tls/enable_mtls", "true".to_owned()));
+        }
+        Ok(settings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn certificates_are_given_where_they_are_used_and_with_what_belongs_to_them() {
+        let given = |names: &str| {
+            let path = |name: &str| names.contains(name).then(|| PathBuf::from(name));
+            Certificates { authority: path("authority"), certificate: path("certificate"), key: path("key") }
+        };
+        let wrong = |names: &str, connect: &str, listen: &str, has_file: bool| {
+            let list =
+                |endpoint: &str| (!endpoint.is_empty()).then(|| endpoint.to_owned()).into_iter().collect::<Vec<_>>();
+            given(names).check(&list(connect), &list(listen), has_file).pop().map(|error| error.field)
+        };
+        for (names, connect, listen) in [
+            ("", "tcp/localhost:1", ""),
+            ("", "tls/base:1", ""),
+            ("authority", "tls/base:1", ""),
+            ("authority certificate key", "tls/base:1", ""),
+            ("certificate key", "", "tls/0.0.0.0:1"),
+            ("authority certificate key", "", "tls/0.0.0.0:1"),
+        ] {
+            assert_eq!(wrong(names, connect, listen, false), None, "{names} {connect} {listen}");
+        }
+        for (names, connect, listen, field) in [
+            ("authority", "tcp/base:1", "", "authority"),
+            ("certificate", "tls/base:1", "", "key"),
+            ("key", "tls/base:1", "", "certificate"),
+            ("certificate key", "tls/base:1", "", "authority"),
+            ("", "", "tls/0.0.0.0:1", "certificate"),
+            ("authority", "", "tls/0.0.0.0:1", "certificate"),
+        ] {
+            assert_eq!(wrong(names, connect, listen, false).as_deref(), Some(field), "{names} {connect} {listen}");
+        }
+        assert_eq!(wrong("authority", "tls/base:1", "", true).as_deref(), Some("authority"));
+        assert_eq!(wrong("", "", "tls/0.0.0.0:1", true), None);
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_told() {
+        let missing = Certificates { authority: Some("/there/is/none.pem".into()), ..Default::default() };
+        let error = missing.settings().unwrap_err();
+        assert!(error.starts_with("cannot read `authority`, /there/is/none.pem: No such file"), "{error}");
+    }
+}
