@@ -3,8 +3,8 @@
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{
-    MapAgreement, MapDeformation, MarkerArray, OccupancyGrid, Path, RobotFrames, RosMessage, SimulationTruth,
-    TopologicalMap, Verdicts,
+    MachineStages, MapAgreement, MapDeformation, MarkerArray, OccupancyGrid, Path, RobotFrames, RosMessage,
+    SimulationTruth, TopologicalMap, Verdicts,
 };
 use std::collections::BTreeMap;
 
@@ -35,7 +35,8 @@ pub(crate) const LATCHED: &str = "\
 ";
 
 /// What is sent when it changes, and holds until it is sent again.
-const STATES: [&str; 9] = [
+const STATES: [&str; 10] = [
+    MachineStages::NAME,
     MapAgreement::NAME,
     MapDeformation::NAME,
     MarkerArray::NAME,

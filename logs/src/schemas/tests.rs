@@ -155,6 +155,20 @@ fn result_messages_agree_with_their_definitions() {
         accepted: true,
         errors: vec![0.5, 0.25],
     });
+    let stage = |name: &str| StageProgress {
+        name: name.into(),
+        state: "running".into(),
+        messages_in: 1,
+        messages_out: 2,
+        in_per_s: 3.5,
+        out_per_s: 4.5,
+        busy: 0.25,
+        dropped: 5,
+        restarts: 6,
+        warnings: 7,
+    };
+    let stages = vec![stage("robots"), stage("map_aligner")];
+    assert_agrees(&MachineStages { header: header(), machine: "robot1".into(), interval: 2.0, stages });
     let frame = |robot: &str| RobotFrame {
         robot: robot.into(),
         frame_id: format!("{robot}/map"),

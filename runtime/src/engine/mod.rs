@@ -25,7 +25,7 @@ pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
 pub use statistics::stage_statistics;
-pub use watch::{WatchedLink, watch_stages};
+pub use watch::{WatchedLink, watch_stages, watch_statistics};
 
 use crate::link::RunNames;
 use crate::message::LogTime;

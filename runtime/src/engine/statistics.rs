@@ -20,6 +20,7 @@ pub(super) fn run_statistics(pipeline: &Pipeline, board: &Arc<Board>) -> RunStat
 fn of_stage(name: &str, board: &StageBoard) -> StageStatistics {
     StageStatistics {
         name: name.to_owned(),
+        state: board.state().word(),
         messages_in: board.get(StageNumber::MessagesIn),
         messages_out: (0..board.ports()).map(|port| board.sent(port)).sum(),
         busy_ms: board.get(StageNumber::Busy) as f64 * 1e-6,

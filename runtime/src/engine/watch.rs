@@ -2,11 +2,13 @@
 
 use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
+use super::statistics::run_statistics;
 use super::{Failure, RunError};
 use crate::link::StageBoard;
 use crate::link::{Observer, SampleHeader};
 use crate::message::Message;
 use crate::pipeline::{Mode, Pipeline};
+use crate::stage::RunStatistics;
 use iceoryx2::node::Node;
 use iceoryx2::service::ipc::Service;
 use std::collections::BTreeMap;
@@ -107,6 +109,12 @@ impl WatchedLink {
         let passed = self.board.sent(self.port).saturating_sub(self.sent_before);
         self.missed.max(passed.saturating_sub(self.taken))
     }
+}
+
+/// Tells what the stages of a run have done so far.
+pub fn watch_statistics(run: &RunningRun, pipeline: &Pipeline) -> Result<RunStatistics, RunError> {
+    let board = open_board(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
+    Ok(run_statistics(pipeline, &board))
 }
 
 /// What each stage of a run shows of itself, in the order of the pipeline.

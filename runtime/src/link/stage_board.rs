@@ -20,6 +20,18 @@ pub enum StageState {
     Ended = 3,
 }
 
+impl StageState {
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Absent => "absent",
+            Self::Starting => "starting",
+            Self::Running => "running",
+            Self::Ended => "ended",
+        }
+    }
+}
+
 /// The place of the state, which is no [`StageNumber`].
 const STATE: usize = 1;
 

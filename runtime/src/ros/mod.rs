@@ -9,6 +9,7 @@ mod deformation;
 mod geometry;
 mod gridweave;
 mod icp;
+mod machine;
 mod map_msgs;
 mod nav;
 mod sensor;
@@ -29,6 +30,7 @@ pub use gridweave::{
     UnmergedRobot, Verdict, Verdicts,
 };
 pub use icp::IcpErrors;
+pub use machine::{MachineStages, StageProgress};
 pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};

@@ -9,6 +9,8 @@ use std::sync::Arc;
 pub struct StageStatistics {
     /// Its name in the pipeline.
     pub name: String,
+    /// How it stands: `absent`, `starting`, `running` or `ended`.
+    pub state: &'static str,
     /// Messages that it was given.
     pub messages_in: u64,
     /// Messages that it has sent.

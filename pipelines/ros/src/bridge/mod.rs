@@ -33,6 +33,7 @@ mod network;
 mod outbox;
 mod presence;
 mod refusals;
+mod report;
 mod sender;
 pub mod sink;
 pub mod source;

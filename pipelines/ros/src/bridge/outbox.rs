@@ -7,7 +7,7 @@
 use super::difference::difference;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, to_bytes};
 use gridweave_logs::qos;
-use gridweave_runtime::message::MessageHeader;
+use gridweave_runtime::message::{LogTime, MessageHeader};
 use std::collections::{BTreeMap, VecDeque};
 
 /// A batch takes no further entries when it has this many bytes.
@@ -46,6 +46,9 @@ pub(super) struct Outbox {
     session: u64,
     limits: Limits,
     links: Vec<Link>,
+    /// The link of what this end has to tell of itself, which is not counted with what it was given.
+    report: Option<u32>,
+    last_log_time: Option<LogTime>,
     /// What waits, in its order.
     waiting: BTreeMap<u64, Waiting>,
     next_order: u64,
@@ -96,6 +99,8 @@ impl Outbox {
             session,
             limits,
             links,
+            report: None,
+            last_log_time: None,
             waiting: BTreeMap::new(),
             next_order: 0,
             topics: BTreeMap::new(),
@@ -120,11 +125,39 @@ impl Outbox {
         }
     }
 
+    /// Makes a link one of what this end has to tell of itself: it is not counted.
+    pub(super) fn report_on(&mut self, link: usize) {
+        self.report = u32::try_from(link).ok();
+    }
+
+    /// Tells something of this end, unless what it has told before still waits, or the end was said.
+    ///
+    /// # Errors
+    /// There is not enough memory.
+    pub(super) fn report(&mut self, header: &MessageHeader, bytes: &[u8]) -> Result<(), String> {
+        let Some(link) = self.report.filter(|_| !self.is_ended) else { return Ok(()) };
+        let key = (link, header.topic.as_str().to_owned());
+        if self.topics.get(&key).is_some_and(|topic| !topic.waiting.is_empty()) {
+            return Ok(());
+        }
+        self.put(key, entry(link as usize, header, Form::Whole, Vec::new()), bytes, true)
+    }
+
+    /// The log time of the last message that it was given.
+    pub(super) fn last_log_time(&self) -> Option<LogTime> {
+        self.last_log_time
+    }
+
+    fn is_counted(&self, entry: &Entry) -> bool {
+        entry.form != Form::Channel && Some(entry.link) != self.report
+    }
+
     /// Takes a message of a link.
     ///
     /// # Errors
     /// There is not enough memory.
     pub(super) fn push(&mut self, link: usize, header: &MessageHeader, bytes: &[u8]) -> Result<(), String> {
+        self.last_log_time = Some(header.log_time);
         let ros_type = self.links.get(link).map_or("", |link| link.ros_type.as_str());
         let is_state = qos::is_latched_result(header.topic.as_str(), ros_type);
         let entry = entry(link, header, Form::Whole, Vec::new());
@@ -189,7 +222,7 @@ impl Outbox {
     /// How many messages the receiver has not taken.
     pub(super) fn untaken(&self) -> usize {
         let on_its_way = self.on_its_way.iter().flat_map(|sent| sent.entries.iter().map(|(_, waiting)| waiting));
-        self.waiting.values().chain(on_its_way).filter(|waiting| waiting.entry.form != Form::Channel).count()
+        self.waiting.values().chain(on_its_way).filter(|waiting| self.is_counted(&waiting.entry)).count()
     }
 
     pub(super) fn totals(&self) -> Totals {
@@ -279,7 +312,7 @@ impl Outbox {
                 self.totals.batches += 1;
                 self.totals.bytes += sent.bytes.len() as u64;
                 for (_, waiting) in &sent.entries {
-                    self.totals.sent += u64::from(waiting.entry.form != Form::Channel);
+                    self.totals.sent += u64::from(self.is_counted(&waiting.entry));
                     self.totals.message_bytes += waiting.size;
                 }
                 Ok(())

@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::network::Network;
 use super::outbox::{Limits, Outbox, Totals};
 use super::presence::{Presence, Role, watch};
+use super::report::Report;
 use super::wire::{Answer, Link, from_bytes};
 use crate::connection::{in_words, is_connected};
 use gridweave_runtime::message::MessageHeader;
@@ -67,12 +68,17 @@ impl Sender {
     ///
     /// # Errors
     /// It cannot be joined.
-    pub(super) fn start(settings: Settings, links: Vec<Link>) -> Result<Self, StageError> {
+    pub(super) fn start(settings: Settings, mut links: Vec<Link>, report: Option<Report>) -> Result<Self, StageError> {
         let session = settings.network.open()?;
         let number = Presence::number_of(&session);
         let me = Presence { name: settings.name.clone(), number };
         let token = me.declare(&session, &settings.network.bridge, Role::Sender)?;
-        let outbox = Outbox::new(settings.name.clone(), number, links, settings.limits);
+        let carried = links.len();
+        links.extend(report.as_ref().map(|_| Report::link()));
+        let mut outbox = Outbox::new(settings.name.clone(), number, links, settings.limits);
+        if report.is_some() {
+            outbox.report_on(carried);
+        }
         let state =
             State { outbox, receivers: BTreeSet::new(), is_stopped: false, told_of_absence: None, notices: Vec::new() };
         let shared = Arc::new(Shared { state: Mutex::new(state), has_changed: Condvar::new() });
@@ -82,7 +88,7 @@ impl Sender {
         })?;
         let of_thread = Arc::clone(&shared);
         let thread = thread::Builder::new().name("bridge".to_owned());
-        let thread = thread.spawn(move || Worker { session, settings, shared: of_thread }.run());
+        let thread = thread.spawn(move || Worker { session, settings, report, shared: of_thread }.run());
         let thread = thread.map_err(|error| StageError::new("start the thread of a bridge", error))?;
         Ok(Self { shared, thread: Some(thread), token: Some(token) })
     }
@@ -207,11 +213,12 @@ impl Search {
 struct Worker {
     session: Session,
     settings: Settings,
+    report: Option<Report>,
     shared: Arc<Shared>,
 }
 
 impl Worker {
-    fn run(self) {
+    fn run(mut self) {
         let mut search = Search(Some(Instant::now() + PATIENCE));
         while let Some((receiver, batch, is_greeting)) = self.next_batch(&mut search) {
             let sent = Instant::now();
@@ -238,11 +245,22 @@ impl Worker {
     }
 
     /// Waits for something to send, and somebody to send it to. None when it is to stop.
-    fn next_batch(&self, search: &mut Search) -> Option<(Presence, Vec<u8>, bool)> {
-        let mut state = self.shared.lock();
+    fn next_batch(&mut self, search: &mut Search) -> Option<(Presence, Vec<u8>, bool)> {
+        let shared = Arc::clone(&self.shared);
+        let mut state = shared.lock();
         loop {
             if state.is_stopped {
                 return None;
+            }
+            // Its log time is that of the message before it, as that of a log which is played is not that of the clock.
+            if let (Some(report), Some(log_time)) = (&mut self.report, state.outbox.last_log_time()) {
+                let told = report.take(Instant::now(), log_time, self.settings.clock.nanoseconds().unsigned_abs());
+                let told =
+                    told.and_then(|told| told.map_or(Ok(()), |(header, bytes)| state.outbox.report(&header, &bytes)));
+                if let Err(wrong) = told {
+                    state.tell(format!("what the stages here do cannot be told: {wrong}"));
+                    self.report = None;
+                }
             }
             if search.is_due() && state.receivers.is_empty() {
                 self.tell_why_nobody_is_there();
@@ -258,7 +276,7 @@ impl Worker {
                     Err(wrong) => state.tell(format!("a batch could not be made: {wrong}")),
                 }
             }
-            state = self.shared.wait(state, LOOK_INTERVAL);
+            state = shared.wait(state, LOOK_INTERVAL);
         }
     }
 

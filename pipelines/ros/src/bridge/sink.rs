@@ -4,6 +4,7 @@ use super::certificates::Certificates;
 use super::clock::Clock;
 use super::network::{BASE, Network, is_part_of_key};
 use super::outbox::{Limits, Totals};
+use super::report::Report;
 use super::sender::{Sender, Settings};
 use super::wire::Link;
 use gridweave_runtime::message::{Channel, FixedText, Message};
@@ -51,6 +52,9 @@ pub struct SinkParameters {
     /// At least so many seconds from one batch of messages to the next.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub interval: f64,
+    /// So many seconds apart the other end is told what the stages of this run do, for its `top`; 0 for never.
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub tell_stages: f64,
     /// For so many seconds the end of the run waits until the other end has taken what was sent last.
     #[schemars(range(min = 0.0, max = 86400.0))]
     pub linger: f64,
@@ -73,6 +77,7 @@ impl Default for SinkParameters {
             keep_last: 6000,
             keep_maps: 100,
             interval: 0.05,
+            tell_stages: 2.0,
             linger: 30.0,
         }
     }
@@ -159,8 +164,11 @@ impl BridgeSink {
         };
         let links: Vec<Link> = context.inputs.iter().map(link).collect();
         let settings = parameters.settings(clock);
+        let interval = Duration::try_from_secs_f64(parameters.tell_stages).ok().filter(|interval| !interval.is_zero());
+        let told = context.statistics.clone().zip(interval);
+        let report = told.map(|(statistics, interval)| Report::new(&settings.name, statistics, interval));
         Ok(Self {
-            sender: Sender::start(settings, links.clone())?,
+            sender: Sender::start(settings, links.clone(), report)?,
             links,
             robot: parameters.robot,
             linger: Duration::try_from_secs_f64(parameters.linger).unwrap_or_default(),

@@ -6,14 +6,16 @@ use super::intake::{Intake, Item, Taken};
 use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
 use super::refusals::take_heard;
+use super::report;
 use super::wire::{Link, to_bytes};
 use crate::connection::in_words;
 use gridweave_logs::schemas::schema_text;
 use gridweave_logs::source::live_kind;
 use gridweave_runtime::message::{Channel, MessageHeader};
+use gridweave_runtime::ros::{MachineStages, RosMessage};
 use gridweave_runtime::stage::{
-    AnyMessage, Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, PortType, Source, StageError,
-    StageKind,
+    AnyMessage, Context, Out, Output, OutputPort, OutputPorts, Outputs, ParameterError, Parameters, PortType, Source,
+    StageError, StageKind,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -110,7 +112,7 @@ pub fn kind() -> StageKind {
     .live_only()
 }
 
-/// The outputs: those that every source of what robots send has.
+/// The outputs: those that every source of what robots send has, and what the senders tell of themselves.
 pub(super) struct Ports(Vec<Port>);
 
 struct Port {
@@ -121,12 +123,16 @@ struct Port {
 
 impl Outputs for Ports {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let port = |port: gridweave_runtime::stage::OutputPort| Port {
-            name: port.name,
-            port_type: port.port_type,
-            out: ports.encoded_port(port),
+        let port =
+            |port: OutputPort| Port { name: port.name, port_type: port.port_type, out: ports.encoded_port(port) };
+        let stages = OutputPort {
+            name: report::PORT,
+            port_type: PortType::Ros(MachineStages::NAME),
+            topic: None,
+            side: true,
+            summary: "what the stages of the senders' runs do; `top` shows it where something reads it, such as a log",
         };
-        Self(live_kind().outputs.into_iter().map(port).collect())
+        Self(live_kind().outputs.into_iter().chain([stages]).map(port).collect())
     }
 }
 
@@ -311,7 +317,9 @@ impl BridgeSource {
                 if !is_announced {
                     port.out.announce(channel, &channel_of(topic, &link.ros_type))?;
                 }
-                output.count("messages taken", 1);
+                if port.name != report::PORT {
+                    output.count("messages taken", 1);
+                }
                 port.out.send_encoded(MessageHeader { channel, ..header }, &bytes)
             }
         }

@@ -111,6 +111,25 @@ fn a_receiver_that_begins_anew_gets_what_waits_and_the_last_of_each_topic() {
 }
 
 #[test]
+fn what_an_end_tells_of_itself_does_not_pile_up_and_is_not_counted() {
+    let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+    outbox.report_on(MAPS);
+    carry(&mut outbox, &mut intake, 0);
+    for time in 0..5 {
+        outbox.report(&header("/robot1/stages", time), &[time as u8; 40]).unwrap();
+    }
+    assert_eq!(outbox.untaken(), 0);
+    // While one waits, no other is taken.
+    assert_eq!(messages(&carry(&mut outbox, &mut intake, 0).items), [(0, vec![0; 40])]);
+    outbox.report(&header("/robot1/stages", 5), &[5; 40]).unwrap();
+    assert_eq!(messages(&carry(&mut outbox, &mut intake, 0).items), [(5, vec![5; 40])]);
+    outbox.end();
+    outbox.report(&header("/robot1/stages", 6), &[6; 40]).unwrap();
+    assert!(carry(&mut outbox, &mut intake, 0).is_end);
+    assert_eq!((outbox.totals().sent, outbox.totals().dropped, outbox.is_done()), (0, 0, true));
+}
+
+#[test]
 fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
     const HOUR: i64 = 3600 * SECOND;
     let at = 2 * HOUR as u64;

@@ -53,29 +53,48 @@ fn free_endpoint() -> String {
     format!("tcp/127.0.0.1:{port}")
 }
 
-/// A log of two robots in a small building, with so few poses and readings that nobody who looks on misses one.
-fn simulate(folder: &Path) {
-    let building = ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60"];
+/// So many seconds of a drive are one log.
+const PART: u64 = 20_000_000_000;
+/// How much later than the rest of its log a message is which is never sent: who plays it stays, as a robot does.
+const NEVER: u64 = 100_000_000_000_000;
+
+/// The drive of two robots in a small building, in three logs, with so few poses and readings that nobody who looks on misses one.
+/// Gives how many messages each holds.
+fn simulate(folder: &Path) -> [u64; 3] {
+    let building =
+        ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60", "snapshots=9"];
     let building = building.into_iter().flat_map(|setting| ["--set", setting]);
     let simulate: Vec<&str> = ["simulate", "-o", "all.mcap", "--robots", "2"].into_iter().chain(building).collect();
     run(GRIDWEAVE, &simulate, folder);
     let bytes = fs::read(folder.join("all.mcap")).unwrap();
-    let messages = || mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let is_carried = |message: &mcap::Message<'_>| TOPICS.contains(&last_part(&message.channel.topic));
+    let messages = || mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).filter(is_carried);
     // Poses of all robots pass on one link, and so do readings.
-    let last_part = |topic: &str| topic.rsplit('/').next().unwrap().to_owned();
     let mut counts = BTreeMap::<String, usize>::new();
-    messages().for_each(|message| *counts.entry(last_part(&message.channel.topic)).or_default() += 1);
+    messages().for_each(|message| *counts.entry(last_part(&message.channel.topic).to_owned()).or_default() += 1);
     let mut seen = BTreeMap::<String, usize>::new();
-    let mut log = mcap::Writer::new(fs::File::create(folder.join("in.mcap")).unwrap()).unwrap();
+    let log = |part: usize| fs::File::create(folder.join(format!("part{part}.mcap"))).unwrap();
+    let mut logs = [0, 1, 2].map(|part| mcap::Writer::new(log(part)).unwrap());
+    let (mut written, start) = ([0; 3], messages().next().unwrap().log_time);
     for message in messages() {
-        let (number, name) =
-            (seen.entry(message.channel.topic.clone()).or_default(), last_part(&message.channel.topic));
-        if *number % counts[&name].div_ceil(NEVER_MISSED) == 0 {
-            log.write(&message).unwrap();
+        let number = seen.entry(message.channel.topic.clone()).or_default();
+        if number.is_multiple_of(counts[last_part(&message.channel.topic)].div_ceil(NEVER_MISSED)) {
+            let part = ((message.log_time - start) / PART).min(2) as usize;
+            logs[part].write(&message).unwrap();
+            written[part] += 1;
         }
         *number += 1;
     }
-    log.finish().unwrap();
+    let last = messages().find(|message| message.channel.topic == "/robot1/pose").unwrap();
+    for log in &mut logs {
+        log.write(&mcap::Message { log_time: last.log_time + NEVER, ..last.clone() }).unwrap();
+        log.finish().unwrap();
+    }
+    written
+}
+
+fn last_part(topic: &str) -> &str {
+    topic.rsplit('/').next().unwrap_or_default()
 }
 
 /// The run of a robot.
@@ -83,18 +102,22 @@ struct Robot {
     name: String,
     run: Running,
     folder: TempDir,
+    /// How many messages each of its logs holds, and how many were sent.
+    holds: [u64; 3],
+    sent: u64,
+    players: Vec<Running>,
 }
 
 impl Robot {
     #[track_caller]
     fn start() -> Self {
         let folder = TempDir::new().unwrap();
-        simulate(folder.path());
+        let holds = simulate(folder.path());
         let name = own_name("robot");
         fs::write(folder.path().join("robot.toml"), ROBOT.replace("NAME", &name)).unwrap();
         let args = ["run", "robot.toml", "--output", "robot.mcap"];
         let run = Running::start(GRIDWEAVE, &args, folder.path(), "robot.log");
-        Self { name, run, folder }
+        Self { name, run, folder, holds, sent: 0, players: Vec::new() }
     }
 
     fn path(&self) -> &Path {
@@ -111,16 +134,24 @@ impl Robot {
         bridge
     }
 
-    /// Lets the robots send what they have.
+    /// Lets the robots send a part of what they have, and waits until their own log has it.
     #[track_caller]
-    fn play(&self, more: &[&str]) {
-        let play = ["play", "in.mcap", "--rate", "0", "--run", &self.name, "--wait", "60"];
-        run(GRIDWEAVE, &[&play, more].concat(), self.path());
+    fn play(&mut self, part: usize) {
+        let log = format!("part{part}.mcap");
+        let play = ["play", &log, "--rate", "50", "--run", &self.name, "--wait", "60"];
+        let player = Running::start(GRIDWEAVE, &play, self.path(), &format!("{log}.log"));
+        self.sent += self.holds[part];
+        wait_until(&log, || self.messages(&self.name, "output") == self.sent, || player.errors() + &self.run.errors());
+        self.players.push(player);
     }
 
     /// Ends the run as a user does.
     #[track_caller]
     fn end(&mut self) {
+        for player in &mut self.players {
+            player.signal("INT");
+            player.end_with(0);
+        }
         self.run.signal("INT");
         self.run.end_with(0);
     }
@@ -170,9 +201,9 @@ impl Robot {
 
 /// A base that takes what robots send as a log, until one has said that nothing follows.
 #[track_caller]
-fn log_base(robot: &Robot, endpoint: &str, log: &str) -> (String, Running) {
+fn log_base(robot: &Robot, base: &str, endpoint: &str, log: &str) -> (String, Running) {
     let (name, pipeline) = (own_name("base"), format!("{log}.toml"));
-    fs::write(robot.path().join(&pipeline), BASE.replace("NAME", &name)).unwrap();
+    fs::write(robot.path().join(&pipeline), base.replace("NAME", &name)).unwrap();
     let listen = format!("robots.listen=[\"{endpoint}\"]");
     let args = ["run", &pipeline, "--output", log, "--set", &listen, "--set", "robots.end_after=1"];
     (name, Running::start(GRIDWEAVE, &args, robot.path(), &format!("{log}.log")))
@@ -188,15 +219,17 @@ fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
     let args = [&args[..], &["--set", &listen, "--set", "robots.end_after=1"]].concat();
     let mut base = Running::start(GRIDWEAVE, &args, robot.path(), "base.log");
     let mut bridge = robot.bridge(&endpoint, &[]);
-    robot.play(&[]);
-    let sent: usize = robot.messages(&robot.name, "output") as usize;
-    // What has passed before the run ended is carried.
+    (0..3).for_each(|part| robot.play(part));
+    let sent = robot.sent;
+    let base_name = base.run_name();
+    let came = || ["maps", "tags"].map(|stage| robot.messages(&base_name, stage)).iter().sum::<u64>() == sent;
+    wait_until("all of it", came, || bridge.errors() + &base.errors());
     robot.end();
     let carried = bridge.end_with(0);
     assert!(carried.contains(&format!("carried {sent} of {sent} messages of 3 links")), "{carried}");
     base.end_with(0);
     let said = robot.messages_of("robot.mcap");
-    assert_eq!(said.iter().map(Vec::len).sum::<usize>(), sent);
+    assert_eq!(said.iter().map(Vec::len).sum::<usize>() as u64, sent);
     assert!(robot.messages_of("base.mcap") == said);
     // While it went on the base merged them rightly, and what it has logged merges as what the robots have logged.
     run(GRIDWEAVE, &["evaluate", "summary.json", "--truth", "all.truth.json"], robot.path());
@@ -208,25 +241,27 @@ fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
 fn a_base_that_is_killed_and_started_again_is_told_and_gets_what_follows() {
     let mut robot = Robot::start();
     let endpoint = free_endpoint();
-    let (first_name, first) = log_base(&robot, &endpoint, "first.mcap");
+    let (first_name, first) = log_base(&robot, BASE, &endpoint, "first.mcap");
     let mut bridge = robot.bridge(&endpoint, &["-v"]);
-    robot.play(&["--end", "20"]);
-    let before = robot.messages(&robot.name, "output");
+    robot.play(0);
+    let before = robot.sent;
     let taken = || robot.messages(&first_name, "output") == before;
     wait_until("the first part", taken, || bridge.errors() + &first.errors());
     first.signal("KILL");
     bridge.wait_for("the receiver `base` is gone");
     drop(first);
     // This waits.
-    robot.play(&["--start", "20", "--end", "40"]);
-    let (_, mut second) = log_base(&robot, &endpoint, "second.mcap");
+    robot.play(1);
+    let (_, mut second) = log_base(&robot, BASE, &endpoint, "second.mcap");
     let times_there = || bridge.errors().matches("the receiver `base` is there").count();
     wait_until("another base", || times_there() == 2, || bridge.errors());
-    robot.play(&["--start", "40"]);
-    let sent = robot.messages(&robot.name, "output");
-    robot.end();
+    robot.play(2);
+    let sent = robot.sent;
+    // It takes what has passed until then.
+    bridge.signal("INT");
     let (status, carried) = bridge.end();
     second.end_with(0);
+    robot.end();
     // All that followed has come; of the maps that waited the last one.
     let (mut came, mut superseded) = (0, 0);
     let topics = robot.messages_of("robot.mcap").into_iter().zip(robot.messages_of("second.mcap"));
@@ -253,17 +288,57 @@ fn a_base_that_is_killed_and_started_again_is_told_and_gets_what_follows() {
 }
 
 #[test]
+fn top_at_the_base_shows_the_stages_of_the_robot_with_its_name() {
+    let mut robot = Robot::start();
+    let endpoint = free_endpoint();
+    let (name, mut base) =
+        log_base(&robot, &BASE.replace("robots.tags\"", "robots.tags\", \"robots.stages\""), &endpoint, "base.mcap");
+    let mut bridge = robot.bridge(&endpoint, &["--set", "tell_stages=0.1"]);
+    (0..3).for_each(|part| robot.play(part));
+    let sent = robot.sent;
+    let top = |more: &[&str]| {
+        let args = ["top", "--once", "--interval", "0.3", "--run", &name, "--wait", "60"];
+        run(GRIDWEAVE, &[&args, more].concat(), robot.path())
+    };
+    let mut told = serde_json::Value::Null;
+    let is_told = || {
+        let shown: serde_json::Value = serde_json::from_str(&top(&["--json"])).unwrap();
+        told = shown["machines"][0].clone();
+        told["stages"][1]["messages_in"] == sent
+    };
+    wait_until("the robot's stages", is_told, || bridge.errors() + &base.errors());
+    let names = told["stages"].as_array().unwrap().iter().map(|stage| stage["name"].as_str().unwrap());
+    assert_eq!(
+        (told["machine"].as_str(), names.collect::<Vec<_>>()),
+        (Some("robot"), vec!["robots", "output"]),
+        "{told}"
+    );
+    assert_eq!(told["stages"][0]["state"], "running", "{told}");
+    let shown = top(&[]);
+    let words = |line: &str| line.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>().join(" ");
+    let rows: Vec<String> = shown.lines().skip(1).map(words).collect();
+    assert_eq!(rows, ["MACHINE STAGE", "(here) robots", "(here) output", "robot robots", "robot output"], "{shown}");
+    // A run that is told of no others looks as ever.
+    let alone = run(GRIDWEAVE, &["top", "--once", "--interval", "0.1", "--run", &robot.name], robot.path());
+    assert!(!alone.contains("MACHINE"), "{alone}");
+    robot.end();
+    // What a bridge has to tell of itself is not counted with what it carries.
+    let carried = bridge.end_with(0);
+    assert!(carried.contains(&format!("carried {sent} of {sent} messages of 3 links")), "{carried}");
+    base.end_with(0);
+}
+
+#[test]
 fn without_a_base_a_bridge_says_so_and_ends_with_status_1() {
     let mut robot = Robot::start();
     let endpoint = free_endpoint();
     let mut bridge = robot.bridge(&endpoint, &["--set", "linger=0.1"]);
-    robot.play(&[]);
-    let sent = robot.messages(&robot.name, "output");
+    robot.play(0);
     bridge.wait_for(&format!("there is no receiver of the bridge `base` at {endpoint} ({endpoint}: "));
     bridge.wait_for("nothing listens there");
     bridge.signal("INT");
     let carried = bridge.end_with(1);
-    assert!(carried.contains(&format!("carried 0 of {sent} messages")), "{carried}");
+    assert!(carried.contains("carried 0 of "), "{carried}");
     let told = bridge.errors();
     assert!(told.contains("the other end of the bridge has not taken the end within 0.1 s"), "{told}");
     robot.end();

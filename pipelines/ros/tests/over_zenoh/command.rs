@@ -47,6 +47,11 @@ impl Running {
         Self { child, log }
     }
 
+    /// What to call the run that it is.
+    pub(crate) fn run_name(&self) -> String {
+        format!("gw{}_", self.child.id())
+    }
+
     /// What it prints to standard output.
     pub(crate) fn stdout(&mut self) -> &mut impl Read {
         self.child.stdout.as_mut().unwrap()

@@ -8,7 +8,7 @@ use crate::status::{BadUse, Status};
 use crate::terminal::{print_line, say};
 use anyhow::{Result, bail};
 use clap::Args;
-use gridweave_runtime::engine::WatchedLink;
+use gridweave_runtime::engine::{WatchedLink, watch_statistics};
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{Context, InputWire, Registry};
 use std::sync::atomic::Ordering;
@@ -61,7 +61,8 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         let ros_type = output.port_type.name().to_owned();
         InputWire { port, from: stage.name.clone(), output: output.name, ros_type, ..Default::default() }
     });
-    let context = Context { stage: "bridge".to_owned(), inputs: wires.collect(), ..Default::default() };
+    let statistics = Some(watch_statistics(&running.run, &running.pipeline)?);
+    let context = Context { stage: "bridge".to_owned(), inputs: wires.collect(), statistics, ..Default::default() };
     let stop = stop_on_interrupt("what is on its way is sent");
     let mut near = kind.make(parameters, &context, Vec::new())?;
     let open =

@@ -2,6 +2,7 @@
 
 mod bridge;
 mod link_choice;
+mod other_machines;
 mod play;
 mod record;
 mod running;

@@ -1,5 +1,6 @@
 //! `gridweave top`: what the stages of a run do, redrawn in place.
 
+use super::other_machines::{Machine, OtherMachines};
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
@@ -11,6 +12,7 @@ use gridweave_runtime::engine::{memory_of_process, watch_stages};
 use gridweave_runtime::link::Histogram;
 use gridweave_runtime::link::{StageBoard, StageNumber, StageState, WireNumber};
 use gridweave_runtime::pipeline::{Mode, Pipeline, Wire};
+use gridweave_runtime::ros::StageProgress;
 use gridweave_runtime::stage::Registry;
 use serde_json::{Value, json};
 use std::io::IsTerminal;
@@ -46,6 +48,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let running = find_run(&args.run, registry)?;
     let stop = stop_on_interrupt("the display ends");
     let boards = watch_stages(&running.run, &running.pipeline)?;
+    let mut others = OtherMachines::watch(&running)?;
     let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
     let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
     let (mut before, mut since) = (look(), Instant::now());
@@ -58,13 +61,14 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
         }
         let is_over = !running.run.is_running();
         let now = look();
+        others.update()?;
         let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
         let is_read = match args.json {
-            true => print_line(to_json(&running, &stages))?,
+            true => print_line(to_json(&running, &stages, &others))?,
             false => print(format_args!(
                 "{}{}",
                 if is_redrawn { CLEAR } else { "" },
-                to_text(&running, &stages, is_redrawn)
+                to_text(&running, &stages, &others, is_redrawn)
             ))?,
         };
         if is_over {
@@ -148,7 +152,7 @@ fn rates(pipeline: &Pipeline, before: &[Snapshot], now: &[Snapshot], seconds: f6
         let latency = now.latency.since(&before.latency);
         StageRates {
             name: spec.name.clone(),
-            state: state(now.state),
+            state: now.state.word(),
             messages_in: now.messages_in,
             messages_out: out(now),
             rate_in: rate(before.messages_in, now.messages_in),
@@ -168,16 +172,7 @@ fn rates(pipeline: &Pipeline, before: &[Snapshot], now: &[Snapshot], seconds: f6
     rates.collect()
 }
 
-fn state(state: StageState) -> &'static str {
-    match state {
-        StageState::Absent => "absent",
-        StageState::Starting => "starting",
-        StageState::Running => "running",
-        StageState::Ended => "ended",
-    }
-}
-
-fn to_json(running: &Running, stages: &[StageRates]) -> Value {
+fn to_json(running: &Running, stages: &[StageRates], others: &OtherMachines) -> Value {
     let stage = |stage: &StageRates| {
         json!({
             "name": stage.name,
@@ -199,24 +194,41 @@ fn to_json(running: &Running, stages: &[StageRates]) -> Value {
         "run": running.run.prefix,
         "pipeline": running.pipeline.name,
         "stages": stages.iter().map(stage).collect::<Vec<_>>(),
+        "machines": others.machines().map(|machine| machine_to_json(&machine)).collect::<Vec<_>>(),
+    })
+}
+
+fn machine_to_json(machine: &Machine<'_>) -> Value {
+    json!({
+        "machine": machine.told.machine,
+        "silent_s": machine.silent.map(|silent| silent.as_secs_f64()),
+        "stages": machine.told.stages,
     })
 }
 
 /// The columns of the display, and what of them a narrow terminal is not shown: what matters least comes first.
-const HEADS: [&str; 13] = [
-    "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB", "STARTS",
-    "WARNINGS",
+const HEADS: [&str; 14] = [
+    "MACHINE", "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB",
+    "STARTS", "WARNINGS",
 ];
 const LEFT_OUT_FIRST: [&str; 8] = ["P50 MS", "P99 MS", "MB", "OUT/S", "STATE", "STARTS", "WARNINGS", "P95 MS"];
 
+/// What the machine is called that this program is on, where there are others.
+const HERE: &str = "(here)";
+/// What is not known.
+const UNKNOWN: &str = "-";
+
 /// The page: on a terminal that it is redrawn on each stage has one line, and columns that do not fit are left out.
-fn to_text(running: &Running, stages: &[StageRates], is_redrawn: bool) -> String {
-    let mut table = Table::new(HEADS);
+fn to_text(running: &Running, stages: &[StageRates], others: &OtherMachines, is_redrawn: bool) -> String {
+    // Without others, the column of machines says nothing.
+    let hidden = usize::from(others.machines().next().is_none());
+    let mut table = Table::new(HEADS.into_iter().skip(hidden));
     for stage in stages {
         let milliseconds =
-            |seconds: Option<f64>| seconds.map_or_else(|| "-".to_owned(), |time| format!("{:.2}", time * 1e3));
+            |seconds: Option<f64>| seconds.map_or_else(|| UNKNOWN.to_owned(), |time| format!("{:.2}", time * 1e3));
         let [p50, p95, p99] = stage.latency.map(milliseconds);
-        table.row([
+        let cells = [
+            HERE.to_owned(),
             stage.name.clone(),
             stage.state.to_owned(),
             format!("{:.1}", stage.rate_in),
@@ -227,14 +239,43 @@ fn to_text(running: &Running, stages: &[StageRates], is_redrawn: bool) -> String
             p95,
             p99,
             format!("{:.1} %", stage.busy * 100.0),
-            stage.memory.map_or_else(|| "-".to_owned(), |bytes| format!("{:.1}", bytes as f64 * 1e-6)),
+            stage.memory.map_or_else(|| UNKNOWN.to_owned(), |bytes| format!("{:.1}", bytes as f64 * 1e-6)),
             (stage.restarts + u64::from(stage.state != "absent")).to_string(),
             stage.warnings.to_string(),
-        ]);
+        ];
+        table.row(cells.into_iter().skip(hidden));
+    }
+    for machine in others.machines() {
+        machine.told.stages.iter().for_each(|stage| table.row(of_other_machine(&machine, stage)));
     }
     let width = width();
     if let Some(width) = width.filter(|_| is_redrawn) {
         table.narrow_to(width, &LEFT_OUT_FIRST);
     }
     format!("{}\n{}", running.name(), table.fit(width))
+}
+
+/// The row of a stage on another machine, in the columns of [`HEADS`].
+fn of_other_machine(machine: &Machine<'_>, stage: &StageProgress) -> [String; 14] {
+    let state = match machine.silent {
+        Some(silent) => format!("silent {} s", silent.as_secs()),
+        None => stage.state.clone(),
+    };
+    let unknown = || UNKNOWN.to_owned();
+    [
+        machine.told.machine.clone(),
+        stage.name.clone(),
+        state,
+        format!("{:.1}", stage.in_per_s),
+        format!("{:.1}", stage.out_per_s),
+        unknown(),
+        stage.dropped.to_string(),
+        unknown(),
+        unknown(),
+        unknown(),
+        format!("{:.1} %", stage.busy * 100.0),
+        unknown(),
+        (stage.restarts + u64::from(stage.state != StageState::Absent.word())).to_string(),
+        stage.warnings.to_string(),
+    ]
 }
