@@ -1,6 +1,7 @@
 //! Live runs whose stages fail: those that may come back and go on, and the others end the run with their name.
 use crate::support::{
-    LOG, OUTPUT, Run, TROUBLED, counts, left_over, outcome, processes, read, signal, start, wait_until,
+    LOG, LogBuilder, OUTPUT, RECEIVE, Run, TROUBLED, counts, left_over, outcome, processes, read, signal, start,
+    wait_until,
 };
 use std::path::PathBuf;
 
@@ -193,6 +194,21 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
     let waits: Vec<&str> = done.ended.stderr.lines().filter_map(|line| line.split(" again in ").nth(1)).collect();
     assert!(waits.starts_with(&["0.5 s", "1.0 s", "2.0 s"]), "{:#?}", done.ended);
     done.ended.assert(1, &["stage `middle` failed: cannot start: it was told so"]);
+}
+
+#[test]
+fn a_link_with_more_topics_than_are_kept_for_who_comes_late_says_so() {
+    let run = Run::start(RECEIVE, &[]);
+    let mut log = LogBuilder::new(&run.path(LOG));
+    for robot in 0..50 {
+        log.pose(f64::from(robot), &format!("robot{robot}"), 1.0, 2.0);
+    }
+    log.finish();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["played 50 messages"]);
+    wait_until("poses", || run.number("output", "messages_in") == 50);
+    let done = run.interrupt();
+    done.assert_done();
+    done.ended.assert(0, &["robots.pose has more than 40 topics and channels"]);
 }
 
 #[test]

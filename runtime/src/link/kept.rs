@@ -11,7 +11,8 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// The most topics of which the last message is kept. What is beyond is not repeated.
+/// The most topics of which the last message is kept. What is beyond is not repeated, and that is told. Every reader has room for
+/// all that is repeated, which is memory that is set aside for the largest message of the link.
 pub(super) const MAX_TOPICS: usize = 40;
 /// Messages up to this size are copied, larger ones held where they are.
 const LARGEST_COPIED: usize = 16 * 1024;
@@ -44,6 +45,8 @@ pub(super) struct Kept<S: Service> {
     next: BTreeMap<u64, u64>,
     /// Whether the owner was not started again: all that was sent is still to come.
     is_first: bool,
+    /// Whether there were more topics than are kept.
+    has_more: bool,
     origin: u64,
     link: String,
 }
@@ -59,6 +62,7 @@ impl<S: Service + 'static> Kept<S> {
             recent: 0,
             next: BTreeMap::new(),
             is_first,
+            has_more: false,
             origin,
             link: link.to_owned(),
         }
@@ -149,7 +153,15 @@ impl<S: Service + 'static> Kept<S> {
     fn place(&mut self, topic: &Topic) -> Option<usize> {
         if self.messages.get(self.recent).is_none_or(|last| last.topic != *topic) {
             let found = self.messages.iter().position(|last| last.topic == *topic);
-            self.recent = found.or((self.messages.len() < MAX_TOPICS).then_some(self.messages.len()))?;
+            let place = found.or((self.messages.len() < MAX_TOPICS).then_some(self.messages.len()));
+            if place.is_none() && !std::mem::replace(&mut self.has_more, true) {
+                tracing::warn!(
+                    "{} has more than {MAX_TOPICS} topics and channels: who reads it late, such as a stage that is started again, \
+                     gets the last message of the first {MAX_TOPICS} alone",
+                    self.link
+                );
+            }
+            self.recent = place?;
         }
         Some(self.recent)
     }

@@ -25,6 +25,7 @@
 //!    times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is: it
 //!    is compared with other times of the same robot alone.
 
+mod absent;
 mod certificates;
 mod clock;
 mod difference;

@@ -1,5 +1,6 @@
 //! The stage `bridge_source`: takes what other machines send over a bridge into a live pipeline.
 
+use super::absent::Absent;
 use super::certificates::Certificates;
 use super::clock::Clock;
 use super::intake::{Intake, Item, Taken};
@@ -160,6 +161,8 @@ pub(super) struct BridgeSource {
     clock: Clock,
     /// The senders that are there.
     senders: BTreeSet<Presence>,
+    /// Those that have gone without an end.
+    absent: Absent,
     /// The sessions of those that have said their end.
     ended: BTreeSet<u64>,
     end_after: Option<usize>,
@@ -200,6 +203,7 @@ impl BridgeSource {
             key,
             clock,
             senders: BTreeSet::new(),
+            absent: Absent::default(),
             ended: BTreeSet::new(),
             end_after: parameters.end_after,
             doors: network.doors(),
@@ -214,6 +218,7 @@ impl BridgeSource {
     fn note_sender(&mut self, sender: Presence, is_there: bool, output: &Output<Ports>) {
         let name = sender.name.clone();
         if is_there {
+            self.absent.came(&sender).into_iter().for_each(|session| self.intake.forget(session));
             let is_other =
                 |other: &Presence| other.name == name && *other != sender && !self.ended.contains(&other.number);
             if self.senders.iter().any(is_other) {
@@ -227,7 +232,10 @@ impl BridgeSource {
         self.senders.remove(&sender);
         match self.ended.contains(&sender.number) {
             true => self.intake.forget(sender.number),
-            false => warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows")),
+            false => {
+                self.absent.left(sender).into_iter().for_each(|session| self.intake.forget(session));
+                warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows"));
+            }
         }
     }
 
