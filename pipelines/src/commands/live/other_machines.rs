@@ -2,6 +2,7 @@
 
 use super::link_choice::all_links;
 use super::running::Running;
+use crate::terminal::say;
 use anyhow::Result;
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::MessageFlags;
@@ -28,18 +29,19 @@ pub(super) struct Machine<'a> {
 }
 
 impl OtherMachines {
-    /// Looks on at the links of a run by which it is told of other machines.
-    ///
-    /// # Errors
-    /// The run has gone, or too many look on.
-    pub(super) fn watch(running: &Running) -> Result<Self> {
+    /// Looks on at the links of a run by which it is told of other machines. Where that cannot be, as the stage does not start, it
+    /// says so: what the stages of the run itself do is to be seen all the same.
+    pub(super) fn watch(running: &Running) -> Self {
         let pipeline = &running.pipeline;
         let is_told_by = |link: &super::link_choice::Link| {
             pipeline.stages[link.stage].kind.outputs[link.port].port_type == PortType::Ros(MachineStages::NAME)
         };
         let links = all_links(pipeline).into_iter().filter(is_told_by);
-        let links = links.map(|link| WatchedLink::open(&running.run, pipeline, link.stage, link.port));
-        Ok(Self { links: links.collect::<Result<_, _>>()?, told: BTreeMap::new() })
+        let open = |link: super::link_choice::Link| {
+            let opened = WatchedLink::open(&running.run, pipeline, link.stage, link.port);
+            opened.map_err(|error| say(format_args!("what other machines do is not shown: {error}"))).ok()
+        };
+        Self { links: links.filter_map(open).collect(), told: BTreeMap::new() }
     }
 
     /// Takes what was told since the last call.

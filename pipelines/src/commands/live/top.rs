@@ -48,7 +48,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let running = find_run(&args.run, registry)?;
     let stop = stop_on_interrupt("the display ends");
     let boards = watch_stages(&running.run, &running.pipeline)?;
-    let mut others = OtherMachines::watch(&running)?;
+    let mut others = OtherMachines::watch(&running);
     let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
     let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
     let (mut before, mut since) = (look(), Instant::now());
