@@ -39,6 +39,8 @@ pub(crate) struct SentMap {
     covered: Option<Rectangle>,
     /// How many cells all updates after the whole map have brought.
     brought: usize,
+    /// What updates before the whole map had covered. The two are on topics of their own, and a listener may take them in another order.
+    outdated: Option<Rectangle>,
 }
 
 /// What is to be sent of a map.
@@ -58,12 +60,12 @@ impl SentMap {
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
         let is_whole = prefix.cell_count() == map.data.len();
         let cells = map.data.to_vec();
-        is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, brought: 0 })
+        is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, brought: 0, outdated: None })
     }
 
     /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for that,
-    /// and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
-    pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>) -> Part {
+    /// or not everybody hears updates, and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
+    pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, hears_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id
             && (before.resolution, before.width, before.height, before.origin)
@@ -80,7 +82,8 @@ impl SentMap {
             (Some(changed), Some(covered)) => Some(changed.with(covered)),
             (changed, covered) => changed.or(covered),
         };
-        match part.filter(|part| lies_alike && self.brought.saturating_add(part.cell_count()) < self.cells.len()) {
+        let may_update = lies_alike && hears_updates;
+        match part.filter(|part| may_update && self.brought.saturating_add(part.cell_count()) < self.cells.len()) {
             Some(part) => {
                 self.covered = Some(part);
                 self.brought += part.cell_count();
@@ -111,7 +114,14 @@ impl SentMap {
 
     fn set_whole(&mut self) {
         self.whole.clone_from(&self.cells);
-        (self.covered, self.brought) = (None, 0);
+        (self.outdated, self.covered, self.brought) = (self.covered.take().or(self.outdated), None, 0);
+    }
+
+    /// The part of a whole map that is to be sent as an update behind it, as an update of before may be put into it otherwise.
+    pub(crate) fn take_outdated(&mut self) -> Option<Rectangle> {
+        let Rectangle { low, high } = self.outdated.take()?;
+        let high = [high[0].min(self.prefix.info.width as usize), high[1].min(self.prefix.info.height as usize)];
+        (low[0] < high[0] && low[1] < high[1]).then_some(Rectangle { low, high })
     }
 
     /// The header of an update with a part of the map, and the cells of that, which `cells` is filled with.
@@ -167,14 +177,14 @@ mod tests {
     fn an_update_holds_what_differs_from_the_whole_map_and_what_updates_have_changed_before() {
         let mut cells = vec![0; 40];
         let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
-        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Nothing);
+        assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Nothing);
         assert!(!sent.is_updated());
         (cells[9], cells[18]) = (1, 2);
-        assert_eq!(sent.take(&map(8, 5, &cells)), part([1, 1], [3, 3]));
+        assert_eq!(sent.take(&map(8, 5, &cells), true), part([1, 1], [3, 3]));
         // What was told is taken back: whoever has the update must be told.
         (cells[9], cells[18], cells[12]) = (0, 0, 7);
-        assert_eq!(sent.take(&map(8, 5, &cells)), part([1, 1], [5, 3]));
-        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Nothing);
+        assert_eq!(sent.take(&map(8, 5, &cells), true), part([1, 1], [5, 3]));
+        assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Nothing);
         assert!(sent.is_updated());
         let Part::Update(rectangle) = part([1, 1], [5, 3]) else { panic!() };
         let mut buffer = Vec::new();
@@ -183,6 +193,11 @@ mod tests {
         assert_eq!((update.data, update.header.frame_id.as_str()), (&[0, 0, 0, 7, 0, 0, 0, 0][..], "world"));
         assert_eq!(sent.whole().data, cells);
         assert!(!sent.is_updated());
+        assert_eq!(sent.take_outdated().map(Part::Update), Some(part([1, 1], [5, 3])), "the update may come behind it");
+        assert_eq!(sent.take_outdated(), None);
+        cells[0] = 1;
+        assert_eq!(sent.take(&map(8, 5, &cells), false), Part::Whole, "not everybody hears updates");
+        assert_eq!(sent.take_outdated(), None);
     }
 
     #[test]
@@ -192,33 +207,36 @@ mod tests {
         let mut parts = Vec::new();
         for value in 1..8 {
             cells[..12].fill(value);
-            parts.push(sent.take(&map(8, 5, &cells)));
+            parts.push(sent.take(&map(8, 5, &cells), true));
         }
         let update = part([0, 0], [8, 2]);
         assert_eq!(parts, [update, update, Part::Whole, update, update, Part::Whole, update]);
         cells.fill(9);
-        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Whole);
+        assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Whole);
         cells[0] = 1;
         sent.owe_whole();
-        assert_eq!(sent.take(&map(8, 5, &cells)), Part::Whole);
+        assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Whole);
         cells[0] = 2;
-        assert_eq!(sent.take(&map(8, 5, &cells)), part([0, 0], [1, 1]));
+        assert_eq!(sent.take(&map(8, 5, &cells), true), part([0, 0], [1, 1]));
     }
 
     #[test]
     fn a_map_of_another_place_size_or_frame_is_sent_as_a_whole() {
         let mut cells = vec![0; 40];
         let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
-        assert_eq!(sent.take(&map(5, 8, &cells)), Part::Whole);
+        cells[39] = 1;
+        assert_eq!(sent.take(&map(8, 5, &cells), true), part([7, 4], [8, 5]));
+        assert_eq!(sent.take(&map(5, 8, &cells), true), Part::Whole);
+        assert_eq!(sent.take_outdated(), None, "it lies outside of the other map, and is refused there");
         let mut moved = map(5, 8, &cells);
         moved.info.origin.position.x = 0.05;
-        assert_eq!(sent.take(&moved), Part::Whole);
+        assert_eq!(sent.take(&moved, true), Part::Whole);
         moved.header.frame_id = "world/robot2".into();
-        assert_eq!(sent.take(&moved), Part::Whole);
+        assert_eq!(sent.take(&moved, true), Part::Whole);
         moved.header.stamp.sec = 7;
-        assert_eq!(sent.take(&moved), Part::Nothing, "a later stamp is no change");
+        assert_eq!(sent.take(&moved, true), Part::Nothing, "a later stamp is no change");
         cells.truncate(35);
-        assert_eq!(sent.take(&map(5, 7, &cells)), Part::Whole);
+        assert_eq!(sent.take(&map(5, 7, &cells), true), Part::Whole);
         assert!(SentMap::new(&map(8, 5, &cells)).is_none() && SentMap::new(&map(0, 0, &[])).is_some());
     }
 
@@ -246,7 +264,7 @@ mod tests {
                     cells[*cell] = *value;
                 }
                 let mut buffer = Vec::new();
-                match sent.take(&map(width, height, &cells)) {
+                match sent.take(&map(width, height, &cells), true) {
                     Part::Nothing => {}
                     Part::Whole => (all, some) = (cells.clone(), cells.clone()),
                     Part::Update(part) => {

@@ -5,7 +5,7 @@
 //! updates has an older map, until the next update or, at once, the whole map that is sent because of that.
 
 use super::audience::{Audience, updates_of};
-use super::changed_part::{Part, SentMap};
+use super::changed_part::{Part, Rectangle, SentMap};
 use super::key_expression::Topic;
 use super::node::{Node, Publisher};
 use super::qos::Qos;
@@ -37,8 +37,8 @@ struct MapTopic {
 pub(crate) enum Sent {
     /// All of it.
     Whole,
-    /// An update, which has so many bytes less than the whole map.
-    Update { saved: usize },
+    /// What has changed.
+    Update,
     /// Nothing, as nothing has changed.
     Nothing,
 }
@@ -97,17 +97,13 @@ impl MapTopics {
         if map.info.width as usize * map.info.height as usize != map.data.len() {
             return Ok(None);
         }
-        match topic.sent.take(map) {
+        match topic.sent.take(map, self.audience.hears_updates(name)) {
             Part::Nothing => Ok(Some(Sent::Nothing)),
-            Part::Update(part) if self.audience.hears_updates(name) => {
-                let mut cells = Vec::new();
-                let update = encode(&topic.sent.update(part, &mut cells))
-                    .map_err(|error| StageError::new(format!("publish the updates of `{name}`"), error))?;
-                topic.updates.send(&update)?;
-                Ok(Some(Sent::Update { saved: bytes.len().saturating_sub(update.len()) }))
+            Part::Update(part) => topic.send_update(part).map(|()| Some(Sent::Update)),
+            Part::Whole => {
+                topic.whole.send(bytes)?;
+                topic.send_outdated().map(|()| Some(Sent::Whole))
             }
-            Part::Update(_) => topic.send_whole().map(|()| Some(Sent::Whole)),
-            Part::Whole => topic.whole.send(bytes).map(|()| Some(Sent::Whole)),
         }
     }
 
@@ -124,7 +120,20 @@ impl MapTopics {
 impl MapTopic {
     fn send_whole(&mut self) -> Result<(), StageError> {
         let bytes = encode(&self.sent.whole()).map_err(|error| StageError::new("publish a whole map", error))?;
-        self.whole.send(&bytes)
+        self.whole.send(&bytes)?;
+        self.send_outdated()
+    }
+
+    fn send_update(&mut self, part: Rectangle) -> Result<(), StageError> {
+        let mut cells = Vec::new();
+        let update = encode(&self.sent.update(part, &mut cells))
+            .map_err(|error| StageError::new("publish what has changed in a map", error))?;
+        self.updates.send(&update)
+    }
+
+    /// Behind a whole map: what updates of before would put back that are taken after it.
+    fn send_outdated(&mut self) -> Result<(), StageError> {
+        self.sent.take_outdated().map_or(Ok(()), |part| self.send_update(part))
     }
 }
 

@@ -180,10 +180,9 @@ impl RosSink {
         };
         match sent {
             Some(Sent::Whole) => output.count("messages published", 1),
-            Some(Sent::Update { saved }) => {
+            Some(Sent::Update) => {
                 output.count("messages published", 1);
                 output.count("map updates published", 1);
-                output.count("bytes saved by map updates", saved as u64);
             }
             Some(Sent::Nothing) => output.count("maps without a change, not published", 1),
             None => output.warn(format!("maps on `{name}` were left out: they do not hold as many cells as they say")),

@@ -111,6 +111,24 @@ impl Robot {
 
     pub(crate) fn subscribe(&self, topic: &Topic, qos: Qos) -> Hearer {
         let (sender, messages) = channel();
+        let (subscriber, token) = self.subscribe_to(topic, qos, sender);
+        Hearer { messages, _subscribers: vec![subscriber], _tokens: vec![token] }
+    }
+
+    /// Hears two topics, whose messages come in the order in which they have arrived.
+    pub(crate) fn subscribe_both(&self, topics: [(&Topic, Qos); 2]) -> Hearer {
+        let (sender, messages) = channel();
+        let both = topics.map(|(topic, qos)| self.subscribe_to(topic, qos, sender.clone()));
+        let (subscribers, tokens) = both.into_iter().unzip();
+        Hearer { messages, _subscribers: subscribers, _tokens: tokens }
+    }
+
+    fn subscribe_to(
+        &self,
+        topic: &Topic,
+        qos: Qos,
+        sender: std::sync::mpsc::Sender<(Option<Attachment>, Vec<u8>)>,
+    ) -> (AdvancedSubscriber<()>, LivelinessToken) {
         let call = move |sample: zenoh::sample::Sample| {
             let attachment = sample.attachment().and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()));
             sender.send((attachment, sample.payload().to_bytes().into_owned())).ok();
@@ -125,7 +143,7 @@ impl Robot {
         let subscriber = subscriber.wait().unwrap();
         let entity = self.entity(Kind::Subscriber(topic.clone(), qos));
         let token = self.session.liveliness().declare_token(entity.to_string()).wait().unwrap();
-        Hearer { messages, _subscriber: subscriber, _token: token }
+        (subscriber, token)
     }
 
     /// Waits until there is something whose token ends so.
@@ -166,8 +184,8 @@ impl Sender {
 
 pub(crate) struct Hearer {
     messages: Receiver<(Option<Attachment>, Vec<u8>)>,
-    _subscriber: AdvancedSubscriber<()>,
-    _token: LivelinessToken,
+    _subscribers: Vec<AdvancedSubscriber<()>>,
+    _tokens: Vec<LivelinessToken>,
 }
 
 impl Hearer {
