@@ -6,6 +6,9 @@
 
 use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
 
+/// An update has at most this share of the cells of the map: it is sent a second time behind the next whole map.
+const SHARE: usize = 4;
+
 /// A rectangle of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Rectangle {
@@ -64,7 +67,7 @@ impl SentMap {
     }
 
     /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for that,
-    /// or not everybody hears updates, and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
+    /// or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
     pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, hears_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id
@@ -82,7 +85,8 @@ impl SentMap {
             (Some(changed), Some(covered)) => Some(changed.with(covered)),
             (changed, covered) => changed.or(covered),
         };
-        let may_update = lies_alike && hears_updates;
+        let is_small = |part: &Rectangle| part.cell_count() <= self.cells.len() / SHARE;
+        let may_update = lies_alike && hears_updates && part.as_ref().is_some_and(is_small);
         match part.filter(|part| may_update && self.brought.saturating_add(part.cell_count()) < self.cells.len()) {
             Some(part) => {
                 self.covered = Some(part);
@@ -206,11 +210,11 @@ mod tests {
         let mut sent = SentMap::new(&map(8, 5, &cells)).unwrap();
         let mut parts = Vec::new();
         for value in 1..8 {
-            cells[..12].fill(value);
+            cells[..8].fill(value);
             parts.push(sent.take(&map(8, 5, &cells), true));
         }
-        let update = part([0, 0], [8, 2]);
-        assert_eq!(parts, [update, update, Part::Whole, update, update, Part::Whole, update]);
+        let update = part([0, 0], [8, 1]);
+        assert_eq!(parts, [update, update, update, update, Part::Whole, update, update]);
         cells.fill(9);
         assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Whole);
         cells[0] = 1;
