@@ -19,6 +19,8 @@ use std::time::Duration;
 pub const CREDITS: usize = 16;
 /// How many messages a program may hold without copying them.
 const HELD: usize = 32;
+/// So long a program may take to come to the end of a call when nothing that it sends is of use any more.
+const END_TIME: Duration = Duration::from_secs(5);
 /// For how large a payload, in bytes, room is set aside before the first is sent.
 const FIRST_PLACE: usize = 4 * 1024;
 
@@ -99,7 +101,8 @@ impl Program {
         }
     }
 
-    /// Calls the program, and hands to `take` what it sends and warns of. When this has failed, so have all later calls.
+    /// Calls the program, and hands to `take` what it sends and warns of, until that fails. When this has failed otherwise, so have all
+    /// later calls.
     pub(super) fn call(
         &mut self,
         what: Told,
@@ -113,7 +116,7 @@ impl Program {
         let (port, wire) = (port as u32, wire as u32);
         let header = CallHeader { version: CALL_VERSION, what: what as u32, port, wire, message: *message };
         let result = self.tell(header, bytes).map_err(CallError::from).and_then(|()| self.hear(take));
-        self.is_alive = result.is_ok();
+        self.is_alive &= matches!(result, Ok(()) | Err(CallError::Stage(_)));
         result
     }
 
@@ -137,8 +140,17 @@ impl Program {
         mut take: impl FnMut(Said, &CallHeader, &[u8]) -> Result<(), StageError>,
     ) -> Result<(), CallError> {
         let Some(ports) = &self.ports else { return Ok(()) };
+        // What cannot be passed on ends the run, and the program comes to the end of its call, so that it can be told.
+        let mut refused: Option<StageError> = None;
         loop {
-            self.process.wait(self.longest).map_err(CallError::Lost)?;
+            let longest = match refused {
+                Some(_) => Some(self.longest.map_or(END_TIME, |longest| longest.min(END_TIME))),
+                None => self.longest,
+            };
+            if let Err(lost) = self.process.wait(longest) {
+                self.is_alive = false;
+                return Err(refused.map_or(CallError::Lost(lost), CallError::Stage));
+            }
             let sample =
                 ports.subscriber.receive().map_err(|error| CallError::Link(failed("hear from a program")(&error)))?;
             let header = sample.as_ref().map(|sample| *sample.user_header()).unwrap_or_default();
@@ -146,9 +158,13 @@ impl Program {
             let (Some(sample), Some(said)) = (sample, said) else { return Err(CallError::Words) };
             self.process.ring(b'c');
             match said {
-                Said::Done => return Ok(()),
-                Said::Failed => return Err(CallError::Failed(String::from_utf8_lossy(sample.payload()).into_owned())),
-                said => take(said, &header, sample.payload()).map_err(CallError::Stage)?,
+                Said::Done => return refused.map_or(Ok(()), |error| Err(CallError::Stage(error))),
+                Said::Failed => {
+                    let says = || CallError::Failed(String::from_utf8_lossy(sample.payload()).into_owned());
+                    return Err(refused.map_or_else(says, CallError::Stage));
+                }
+                said if refused.is_none() => refused = take(said, &header, sample.payload()).err(),
+                _ => {}
             }
         }
     }
