@@ -64,6 +64,29 @@ kind = "mcap_sink"
 inputs = ["log.*", "circle", "source", "troubled"]
 "#;
 
+/// Two stages in Python that exchange messages of a type that one of their modules defines.
+const OWN_TYPES: &str = r#"
+[pipeline]
+name = "own_types"
+
+[stages.log]
+kind = "mcap_source"
+
+[stages.finder]
+kind = "python"
+module = "rooms.py:Finder"
+inputs = ["log.map"]
+
+[stages.gatherer]
+kind = "python"
+module = "rooms.py:Gatherer"
+inputs = ["finder"]
+
+[stages.out]
+kind = "mcap_sink"
+inputs = ["finder", "gatherer"]
+"#;
+
 /// What `simulate` is told where nothing hangs on the building.
 const TWO_ROBOTS: [&str; 4] = ["--robots", "2", "--set", "beams=90"];
 
@@ -105,9 +128,11 @@ impl Python {
         call(&environment.join("bin/python"), &install.into_iter().chain(packages).collect::<Vec<_>>());
         fs::write(folder.path().join("python.toml"), PIPELINE).unwrap();
         fs::write(folder.path().join("sources.toml"), SOURCES).unwrap();
+        fs::write(folder.path().join("types.toml"), OWN_TYPES).unwrap();
         let modules = [
             "stages/python/examples/circle.py",
             "stages/python/examples/invert.py",
+            "tests/end_to_end/python_stages/rooms.py",
             "tests/end_to_end/python_stages/troubled.py",
             "tests/end_to_end/python_stages/troubled_source.py",
         ];
@@ -279,6 +304,38 @@ impl Python {
         self.gridweave(&["check", "wrong.toml"]).assert(2, &["wrong.toml", "a source has no inputs"]);
     }
 
+    fn types_of_ones_own_go_from_stage_to_stage_and_into_the_log_with_their_definition(&self) {
+        let mut log = LogBuilder::new(&self.file("few.mcap"));
+        for at in 0..3 {
+            log.map(f64::from(at), "robot1", &TestMap::room());
+        }
+        log.finish();
+        let mut first = None;
+        for engine in ENGINES {
+            self.run_pipeline("types.toml", "few.mcap", engine, &[]).assert(0, &[]);
+            let bytes = fs::read(self.file("out.mcap")).unwrap();
+            assert!(*first.get_or_insert_with(|| bytes.clone()) == bytes, "{engine}");
+        }
+        let summary = fs::read_to_string(self.file("summary.json")).unwrap();
+        assert!(!summary.contains("without a definition"), "{summary}");
+        let ended = self.gridweave(&["cat", "out.mcap", "--topics", "/rooms"]);
+        ended.assert(0, &["\"rooms_msgs/msg/Rooms\"", "\"hall 1\"", "\"hall 3\"", "\"corners\""]);
+        self.gridweave(&["cat", "out.mcap", "--topics", "/{robot}/finder/room"]).assert(0, &["\"hall\"", "\"size\""]);
+        assert_eq!(self.left_over(), Vec::<String>::new());
+    }
+
+    fn a_type_that_two_stages_define_differently_is_underlined(&self) {
+        let other = fs::read_to_string(self.file("rooms.py")).unwrap().replace("string name\\n", "string title\\n");
+        fs::write(self.file("other_rooms.py"), other).unwrap();
+        fs::write(self.file("wrong.toml"), OWN_TYPES.replacen("rooms.py:Gatherer", "other_rooms.py:Gatherer", 1))
+            .unwrap();
+        let words = ["wrong.toml", "mean two types by one name", "which `gatherer` defines otherwise"];
+        self.gridweave(&["check", "wrong.toml"]).assert(2, &words);
+        fs::write(self.file("bad.py"), "from gridweave.msg import define\n\ndefine(\"a/msg/B\", \"c/D e\")\n").unwrap();
+        fs::write(self.file("wrong.toml"), OWN_TYPES.replacen("rooms.py:Gatherer", "bad.py", 1)).unwrap();
+        self.gridweave(&["check", "wrong.toml"]).assert(2, &["a/msg/B uses c/msg/D, which is not known", "bad.py"]);
+    }
+
     fn a_message_that_cannot_be_decoded_is_left_out_and_counted(&self) {
         let map = TestMap::room();
         let mut log = LogBuilder::new(&self.file("bad.mcap"));
@@ -392,6 +449,14 @@ fn python_stages_may_be_sources() {
     python.sources_give_the_same_bytes_on_every_engine_and_their_messages_by_log_time();
     python.a_pipeline_may_have_no_log();
     python.whatever_happens_to_a_source_is_told_and_nothing_is_left();
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
+fn python_stages_may_have_message_types_of_their_own() {
+    let python = Python::new(&[]);
+    python.types_of_ones_own_go_from_stage_to_stage_and_into_the_log_with_their_definition();
+    python.a_type_that_two_stages_define_differently_is_underlined();
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::sink::routing::{ResultTopics, Route, is_tf};
 use crate::supplement::SupplementKind;
 use foxglove::{ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
 use gridweave_runtime::message::{Channel, FixedText, Message};
-use gridweave_runtime::stage::{Context, Output, StageError};
+use gridweave_runtime::stage::{Context, InputWire, Output, StageError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -32,7 +32,7 @@ pub(super) struct FoxgloveSink {
     statistics: Statistics,
     result_topics: ResultTopics,
     given_frames: GivenFrames,
-    input_types: Vec<String>,
+    inputs: Vec<InputWire>,
     shown: Vec<Shown>,
     /// By wire and number: numbers are given by each source for itself. None is not shown.
     announced: BTreeMap<(usize, u32), Option<usize>>,
@@ -60,7 +60,7 @@ impl FoxgloveSink {
             kept,
             result_topics: ResultTopics::new(context),
             given_frames: GivenFrames::new(context),
-            input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
+            inputs: context.inputs.clone(),
             shown: Vec::new(),
             announced: BTreeMap::new(),
             results: BTreeMap::new(),
@@ -123,8 +123,10 @@ impl FoxgloveSink {
         if let Some(&place) = self.results.get(&key) {
             return place;
         }
-        let ros_type = self.input_types.get(message.wire()).filter(|name| !name.is_empty()).cloned();
-        let place = ros_type.and_then(|ros_type| self.show(result_channel(message.header().topic.as_str(), &ros_type)));
+        let input = self.inputs.get(message.wire()).filter(|input| !input.ros_type.is_empty());
+        let topic = message.header().topic;
+        let channel = input.map(|input| result_channel(topic.as_str(), &input.ros_type, &input.definition));
+        let place = channel.and_then(|channel| self.show(channel));
         self.results.insert(key, place);
         place
     }

@@ -40,7 +40,7 @@ impl ResultTopics {
         let topic = &channel.topic;
         match self.type_on(topic) {
             None => Route::Write(qos::completed(channel.clone())),
-            Some(TFMessage::NAME) if is_tf(channel) => Route::Write(result_channel(topic, TFMessage::NAME)),
+            Some(TFMessage::NAME) if is_tf(channel) => Route::Write(result_channel(topic, TFMessage::NAME, "")),
             Some(_) => Route::LeaveOut(format!(
                 "the input's messages on {topic} were left out: a result of this run has that topic"
             )),
@@ -58,14 +58,19 @@ pub(crate) fn is_tf(channel: &Channel) -> bool {
     channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME
 }
 
-/// The channel of a result. Its schema is empty if the type is none that Gridweave has a definition of.
-pub fn result_channel(topic: &str, ros_type: &str) -> Channel {
+/// The channel of a result. `definition` is that of its type where a stage brings one. Without it the schema is empty if the type is
+/// none that Gridweave has a definition of.
+pub fn result_channel(topic: &str, ros_type: &str, definition: &str) -> Channel {
+    let schema = match definition.is_empty() {
+        true => schema_text(ros_type).unwrap_or_default(),
+        false => definition.to_owned(),
+    };
     Channel {
         topic: topic.to_owned(),
         message_encoding: "cdr".to_owned(),
         schema_name: ros_type.to_owned(),
         schema_encoding: "ros2msg".to_owned(),
-        schema: schema_text(ros_type).unwrap_or_default().into_bytes(),
+        schema: schema.into_bytes(),
         metadata: qos::metadata(topic, ros_type),
     }
 }
@@ -116,7 +121,7 @@ mod tests {
 
     #[test]
     fn transforms_of_the_input_join_those_of_the_result() {
-        let expected = result_channel("/tf_static", TFMessage::NAME);
+        let expected = result_channel("/tf_static", TFMessage::NAME, "");
         for name in [TFMessage::NAME, "tf2_msgs/TFMessage"] {
             assert_eq!(results().route(&channel("/tf_static", name)), Route::Write(expected.clone()));
         }

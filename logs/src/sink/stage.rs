@@ -7,7 +7,7 @@ use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
 use crate::supplement::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{RosMessage, TFMessage};
-use gridweave_runtime::stage::{Context, Output, StageError, match_robot};
+use gridweave_runtime::stage::{Context, InputWire, Output, StageError, match_robot};
 use std::collections::BTreeMap;
 
 /// A channel of the log.
@@ -47,7 +47,7 @@ pub(super) struct McapSink {
     /// Empty for all.
     only_topics: Vec<String>,
     result_topics: ResultTopics,
-    input_types: Vec<String>,
+    inputs: Vec<InputWire>,
     given_frames: GivenFrames,
     /// None once it has ended, or cannot be written any more.
     log: Option<LogWriter>,
@@ -83,7 +83,7 @@ impl McapSink {
             pass_input,
             only_topics,
             result_topics: ResultTopics::new(context),
-            input_types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
+            inputs: context.inputs.clone(),
             given_frames: GivenFrames::new(context),
             log: Some(log),
             begun: false,
@@ -118,13 +118,16 @@ impl McapSink {
             return Ok(lane);
         }
         let topic = message.header().topic;
-        let ros_type = self.input_types.get(message.wire()).filter(|name| !name.is_empty()).ok_or_else(|| {
+        let input = self.inputs.get(message.wire()).filter(|input| !input.ros_type.is_empty()).ok_or_else(|| {
             StageError::new(format!("write a message on {topic}"), "nothing says what type it has")
                 .with_help("wire an output that has a type, or announce a channel before the message")
         })?;
-        let channel = result_channel(topic.as_str(), ros_type);
+        let channel = result_channel(topic.as_str(), &input.ros_type, &input.definition);
         if channel.schema.is_empty() {
-            output.warn(format!("{ros_type} is written without a definition: other programs cannot read {topic}"));
+            output.warn(format!(
+                "{} is written without a definition: other programs cannot read {topic}",
+                input.ros_type
+            ));
         }
         let lane = self.lane(channel);
         self.results.insert(key, lane);
@@ -225,7 +228,7 @@ impl McapSink {
         let lane = match number {
             0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
             0 => {
-                if self.input_types.get(message.wire()).is_some_and(|ros_type| ros_type == TFMessage::NAME) {
+                if self.inputs.get(message.wire()).is_some_and(|input| input.ros_type == TFMessage::NAME) {
                     self.given_frames.learn(message.bytes());
                 }
                 self.result_lane(message, output)?

@@ -151,11 +151,25 @@ impl<'a> Binder<'a> {
         if !accepts(declaration, port_type) {
             return Err(self.wrong_port(from, port, at));
         }
+        let ros_type = port_type.name();
+        if declaration.port_type == port_type && self.is_defined_otherwise(from, ros_type) {
+            let reader = self.reader().0;
+            let label = format!("it gives {ros_type}, which `{reader}` defines otherwise");
+            let problem = Diagnostic::new(format!("`{name}` and `{reader}` mean two types by one name")).at(at, label);
+            return Err(problem.help("let both take the definition from one module".to_owned()));
+        }
         if !self.has_room(port, all) {
             return Err(self.no_room(from, all, port, at));
         }
         self.inputs.push(Input { port, from, at: at.clone() });
         Ok(())
+    }
+
+    /// Whether the stage that an output belongs to defines a type, and the reader defines it in another way.
+    fn is_defined_otherwise(&self, from: Output, ros_type: &str) -> bool {
+        let definition = |stage: usize| self.drafts.get(stage)?.kind?.definition(ros_type);
+        let (given, taken) = (definition(from.stage), definition(self.stage));
+        given.is_some() && taken.is_some() && given != taken
     }
 
     /// The first port that has room and is of exactly this type or, failing that, of any type.

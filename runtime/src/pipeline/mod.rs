@@ -200,7 +200,8 @@ impl Pipeline {
         let output = &from.kind.outputs[wire.from_port];
         let ros_type = output.port_type.name().to_owned();
         let port = spec.kind.inputs[wire.port].name;
-        InputWire { port, from: from.name.clone(), output: output.name, ros_type, topic }
+        let definition = from.kind.definition(&ros_type).unwrap_or_default().to_owned();
+        InputWire { port, from: from.name.clone(), output: output.name, ros_type, definition, topic }
     }
 }
 

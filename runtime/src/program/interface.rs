@@ -4,6 +4,7 @@ use super::header::CALL_VERSION;
 use crate::stage::{InputPort, OutputPort, PortType, RESERVED_KEYS};
 use schemars::Schema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// The ports and parameters of a stage that is a program, as that says in JSON:
 ///
@@ -20,7 +21,7 @@ use serde::Deserialize;
 /// ```
 ///
 /// An input may say `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a JSON
-/// schema.
+/// schema. `definitions` may hold, by the name of a port's type that nobody else knows, its definition as a text of the form `ros2msg`.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// What the stage does.
@@ -31,6 +32,8 @@ pub struct Interface {
     pub outputs: Vec<OutputPort>,
     /// The JSON schema of its parameters.
     pub parameters: Schema,
+    /// The definitions of types of its own, by their names.
+    pub definitions: BTreeMap<String, String>,
     /// The text that this was read from.
     pub text: String,
 }
@@ -43,6 +46,8 @@ struct Written {
     inputs: Vec<WrittenPort>,
     outputs: Vec<WrittenPort>,
     parameters: Schema,
+    #[serde(default)]
+    definitions: BTreeMap<String, String>,
 }
 
 #[derive(Deserialize)]
@@ -82,6 +87,9 @@ impl Interface {
         if let Some(port) = ports().find(|port| !is_ros_type(&port.ros_type)) {
             return Err(format!("the port `{}` has the type `{}`, which is no ROS 2 type", port.name, port.ros_type));
         }
+        if let Some(name) = written.definitions.keys().find(|name| !ports().any(|port| port.ros_type == **name)) {
+            return Err(format!("it defines `{name}`, which is the type of none of its ports"));
+        }
         for ports in [&written.inputs, &written.outputs] {
             let is_double = |at: &usize| ports[..*at].iter().any(|port| port.name == ports[*at].name);
             if let Some(at) = (0..ports.len()).find(is_double) {
@@ -114,6 +122,7 @@ impl Interface {
             inputs: written.inputs.into_iter().map(input).collect(),
             outputs: written.outputs.into_iter().map(output).collect(),
             parameters: written.parameters,
+            definitions: written.definitions,
             text: text.to_owned(),
         })
     }
@@ -159,6 +168,11 @@ mod tests {
                 "\"properties\": {}",
                 "\"properties\": { \"depth\": {} }",
                 "a parameter `depth`, which no pipeline can set",
+            ),
+            (
+                "\"protocol\": 1",
+                "\"protocol\": 1, \"definitions\": { \"a/msg/None\": \"\" }",
+                "the type of none of its ports",
             ),
             (TEXT, "{}", "not understood"),
             (TEXT, "", "not understood"),

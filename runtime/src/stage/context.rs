@@ -44,6 +44,9 @@ pub struct InputWire {
     pub output: &'static str,
     /// The ROS 2 type of its messages; empty for any.
     pub ros_type: String,
+    /// The definition of that type, a text of the form `ros2msg`; empty if the stage that it comes from brings none, as those of all
+    /// types that Gridweave knows do not.
+    pub definition: String,
     /// The topic that its messages get in a log, with `{robot}` for the robot's name; empty if they bring topics of their
     /// own, as those of a source do.
     pub topic: String,

@@ -7,6 +7,7 @@ use super::{
     Context, InputPort, Output, OutputEnd, OutputPort, OutputPorts, Outputs, ParameterError, Parameters, StageError,
 };
 use schemars::Schema;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -30,6 +31,8 @@ pub struct StageKind {
     pub inputs: Vec<InputPort>,
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
+    /// The definitions of message types that nobody else knows, by their names.
+    definitions: BTreeMap<String, String>,
     external: bool,
     live_only: bool,
     schema: Schema,
@@ -159,6 +162,7 @@ impl StageKind {
             summary,
             inputs,
             outputs,
+            definitions: BTreeMap::new(),
             external: false,
             ask: None,
             live_only: false,
@@ -195,6 +199,7 @@ impl StageKind {
             summary,
             inputs: Vec::new(),
             outputs: Vec::new(),
+            definitions: BTreeMap::new(),
             external: false,
             live_only: false,
             schema: P::schema(),
@@ -223,6 +228,18 @@ impl StageKind {
     pub fn with_schema(self, schema: Schema) -> Self {
         let described = schema.clone();
         Self { schema, check: Arc::new(move |table| json_schema::check(&described, table)), ..self }
+    }
+
+    /// The same kind with the definitions of message types of its ports that nobody else knows: by name, texts of the form
+    /// `ros2msg`, which log formats have for them.
+    #[must_use]
+    pub fn with_definitions(self, definitions: BTreeMap<String, String>) -> Self {
+        Self { definitions, ..self }
+    }
+
+    /// The definition of a message type, if the kind brings one.
+    pub fn definition(&self, ros_type: &str) -> Option<&str> {
+        self.definitions.get(ros_type).map(String::as_str)
     }
 
     /// The kind for live pipelines alone: of a source that waits for what comes from outside, and has no end.

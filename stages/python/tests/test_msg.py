@@ -65,5 +65,47 @@ class MessageTest(unittest.TestCase):
             msg.ros_type(int)
 
 
+class OwnTypeTest(unittest.TestCase):
+    ROOM = "# A room.\nstd_msgs/Header header\nstring name\nfloat32[] heights\ngeometry_msgs/Point[] corners\nuint8 LARGE=2\nuint8 size"
+
+    def test_a_type_of_ones_own_is_as_any_other(self):
+        room_type = msg.define("own_msgs/msg/Room", self.ROOM)
+        from gridweave.msg.own_msgs import Room
+        self.assertIs(Room, room_type)
+        self.assertEqual(msg.ros_type(Room), "own_msgs/msg/Room")
+        room = Room(name="kitchen", heights=[2.5, 2.0], size=Room.LARGE)
+        back = msg.decode(Room, memoryview(msg.encode(room)))
+        self.assertEqual((back.name, back.heights.tolist(), back.size, back.corners), ("kitchen", [2.5, 2.0], 2, []))
+        floor_type = msg.define("own_msgs/msg/Floor", "Room[] rooms\nown_msgs/Room[2] two")
+        floor = floor_type(rooms=[room] * 3)
+        back = msg.decode(floor_type, memoryview(msg.encode(floor)))
+        self.assertEqual(([room.name for room in back.rooms], len(back.two)), (["kitchen"] * 3, 2))
+
+    def test_its_definition_has_all_types_that_it_uses_each_once(self):
+        msg.define("own_msgs/msg/Room", self.ROOM)
+        msg.define("own_msgs/msg/Floor", "Room[] rooms\nown_msgs/Room[2] two")
+        parts = msg.definition("own_msgs/msg/Floor").split("=" * 80 + "\n")
+        names = [part.splitlines()[0] for part in parts[1:]]
+        self.assertEqual(parts[0], "Room[] rooms\nown_msgs/Room[2] two\n")
+        self.assertEqual(names, ["MSG: own_msgs/Room", "MSG: geometry_msgs/Point", "MSG: std_msgs/Header", "MSG: builtin_interfaces/Time"])
+        self.assertIsNone(msg.definition("nav_msgs/msg/OccupancyGrid"))
+
+    def test_to_define_it_again_changes_nothing_and_otherwise_it_is_refused(self):
+        first = msg.define("own_msgs/msg/Twice", "string name\n")
+        self.assertIs(msg.define("own_msgs/msg/Twice", "string  name"), first)
+        for name, text, says in (
+            ("own_msgs/msg/Twice", "string name\nint8 more", "is known already"),
+            ("nav_msgs/msg/OccupancyGrid", "string name", "is known already"),
+            ("own_msgs/Room", "string name", "no name of a message type"),
+            ("own_msgs/msg/room type", "string name", "no name of a message type"),
+            ("own_msgs/msg/Lost", "other_msgs/Unknown x", "uses other_msgs/msg/Unknown, which is not known"),
+            ("own_msgs/msg/Bad", "string", "cannot be read"),
+            ("own_msgs/msg/Two", "int8 a\n" + "=" * 80 + "\nMSG: a/B\nint8 b", "several types"),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(ValueError, says):
+                msg.define(name, text)
+        self.assertNotIn("own_msgs/msg/Lost", msg._STORE.types)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -8,6 +8,7 @@ import numpy as np
 
 from gridweave import About, Context, Input, Output, Parameter, Stage, stage
 from gridweave.load import load
+from gridweave.msg import define
 from gridweave.msg.geometry_msgs import PoseStamped
 from gridweave.msg.nav_msgs import OccupancyGrid
 
@@ -64,6 +65,17 @@ class StageTest(unittest.TestCase):
         made.on_map(OccupancyGrid(), About("", 5, "/map", 0))
         self.assertEqual(self.warned, ["maps of nobody"])
         self.assertEqual(made.context.seed, 3)
+
+    def test_a_type_of_ones_own_comes_with_its_definition(self):
+        class Names(Stage):
+            map = Input(OccupancyGrid)
+            name = Output(define("stage_msgs/msg/Name", "string name"))
+
+            def on_map(self, map, about):
+                pass
+
+        self.assertEqual(Names.interface()["definitions"], {"stage_msgs/msg/Name": "string name\n"})
+        self.assertNotIn("definitions", Corners.interface())
 
     def test_another_type_than_that_of_the_output_is_refused(self):
         made = self.begin(Corners)

@@ -3,7 +3,7 @@
 use super::recording::Recorded;
 use gridweave_logs::sink::result_channel;
 use gridweave_runtime::message::{Channel, Message};
-use gridweave_runtime::stage::{Context, Output, StageError, StageKind};
+use gridweave_runtime::stage::{Context, InputWire, Output, StageError, StageKind};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
@@ -13,8 +13,8 @@ pub(super) type Received = Arc<Mutex<Vec<Recorded>>>;
 /// The kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
 pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
     let make = move |(): (), context: &Context| {
-        let types = context.inputs.iter().map(|wire| wire.ros_type.clone()).collect();
-        Ok(CaseSink { received: Arc::clone(&received), types, channels: BTreeMap::new() })
+        let inputs = context.inputs.clone();
+        Ok(CaseSink { received: Arc::clone(&received), inputs, channels: BTreeMap::new() })
     };
     StageKind::stage(name, "Keeps what a stage sends.", make)
         .any_inputs("messages", "what the stage sends", CaseSink::receive)
@@ -24,8 +24,7 @@ pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
 
 struct CaseSink {
     received: Received,
-    /// The ROS 2 type of every wire; empty for any.
-    types: Vec<String>,
+    inputs: Vec<InputWire>,
     /// By wire, number and topic; results of the stage have the number 0.
     channels: BTreeMap<(usize, u32, String), Arc<Channel>>,
 }
@@ -43,12 +42,12 @@ impl CaseSink {
         let channel = match self.channels.get(&key) {
             Some(channel) => Arc::clone(channel),
             None => {
-                let ros_type = self.types.get(wire).filter(|name| !name.is_empty() && header.channel == 0);
-                let ros_type = ros_type.ok_or_else(|| {
+                let input = self.inputs.get(wire).filter(|input| !input.ros_type.is_empty() && header.channel == 0);
+                let input = input.ok_or_else(|| {
                     StageError::new(format!("keep a message on {topic}"), "nothing says what type it has")
                         .with_help("announce a channel before the message, or give the output port a type")
                 })?;
-                let channel = Arc::new(result_channel(topic, ros_type));
+                let channel = Arc::new(result_channel(topic, &input.ros_type, &input.definition));
                 self.channels.insert(key, Arc::clone(&channel));
                 channel
             }

@@ -59,7 +59,8 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         let stage = &running.pipeline.stages[link.stage];
         let output = &stage.kind.outputs[link.port];
         let ros_type = output.port_type.name().to_owned();
-        InputWire { port, from: stage.name.clone(), output: output.name, ros_type, ..Default::default() }
+        let definition = stage.kind.definition(&ros_type).unwrap_or_default().to_owned();
+        InputWire { port, from: stage.name.clone(), output: output.name, ros_type, definition, ..Default::default() }
     });
     let statistics = Some(watch_statistics(&running.run, &running.pipeline)?);
     let context = Context { stage: "bridge".to_owned(), inputs: wires.collect(), statistics, ..Default::default() };

@@ -94,12 +94,14 @@ struct Recorder {
 
 impl Recorder {
     fn new(running: &Running, link: Link) -> Result<Self> {
-        let port_type = match running.pipeline.stages[link.stage].kind.outputs[link.port].port_type {
+        let kind = &running.pipeline.stages[link.stage].kind;
+        let port_type = match kind.outputs[link.port].port_type {
             PortType::Ros(name) => Some(name),
             PortType::Any => None,
         };
+        let definition = port_type.and_then(|name| kind.definition(name)).unwrap_or_default().to_owned();
         let link = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
-        Ok(Self { link, lanes: Lanes { port_type, ..Lanes::default() } })
+        Ok(Self { link, lanes: Lanes { port_type, definition, ..Lanes::default() } })
     }
 
     /// Writes what has passed. Gives how many messages these were.
@@ -119,6 +121,8 @@ impl Recorder {
 struct Lanes {
     /// The type of its messages, but for those that come on channels of their own.
     port_type: Option<&'static str>,
+    /// The definition of that type, if the stage brings it.
+    definition: String,
     announced: BTreeMap<u32, Channel>,
     /// The channels of the log: by the number that was announced, and the topic.
     channels: BTreeMap<(u32, String), u16>,
@@ -164,12 +168,16 @@ impl Lanes {
             return Some(channel.clone());
         }
         let name = self.port_type?;
+        let schema = match self.definition.is_empty() {
+            true => schema_text(name)?,
+            false => self.definition.clone(),
+        };
         Some(Channel {
             topic: topic.to_owned(),
             message_encoding: "cdr".to_owned(),
             schema_name: name.to_owned(),
             schema_encoding: "ros2msg".to_owned(),
-            schema: schema_text(name)?.into_bytes(),
+            schema: schema.into_bytes(),
             ..Default::default()
         })
     }
@@ -212,5 +220,15 @@ mod tests {
         assert_eq!(file.metadata("drive").unwrap()["weather"], "rain");
         assert_eq!(file.statistics().unwrap().messages, 1);
         assert_eq!(lanes.untyped, 0);
+    }
+
+    #[test]
+    fn a_type_that_its_stage_defines_is_recorded_with_its_definition() {
+        let channel = |definition: &str| {
+            let definition = definition.to_owned();
+            Lanes { port_type: Some("rooms/msg/Room"), definition, ..Lanes::default() }.channel(0, "/rooms")
+        };
+        assert!(channel("").is_none(), "nobody knows it");
+        assert_eq!(channel("string name\n").unwrap().schema, b"string name\n");
     }
 }

@@ -11,7 +11,7 @@ use gridweave_logs::dynamic::{JsonOptions, Schema};
 use gridweave_logs::schemas::schema_text;
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
-use gridweave_runtime::stage::{PortType, Registry};
+use gridweave_runtime::stage::{PortType, Registry, StageKind};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -49,7 +49,8 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
     };
     let stop = stop_on_interrupt("the tap ends");
     let mut watched = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
-    let mut types = Types::new(running.pipeline.stages[link.stage].kind.outputs[link.port].port_type);
+    let kind = &running.pipeline.stages[link.stage].kind;
+    let mut types = Types::new(kind, kind.outputs[link.port].port_type);
     let mut left = args.count.unwrap_or(u64::MAX);
     loop {
         // What has passed before the run ended is still there after it.
@@ -81,8 +82,9 @@ struct Types {
 }
 
 impl Types {
-    fn new(port: PortType) -> Self {
-        let schema = |name: &str| Schema::parse(name, &schema_text(name)?).ok();
+    fn new(kind: &StageKind, port: PortType) -> Self {
+        let text = |name: &str| kind.definition(name).map(str::to_owned).or_else(|| schema_text(name));
+        let schema = |name: &str| Schema::parse(name, &text(name)?).ok();
         let port = match port {
             PortType::Ros(name) => Some((name.to_owned(), schema(name))),
             PortType::Any => None,

@@ -7,7 +7,7 @@ import typing
 from dataclasses import dataclass
 from typing import Any, Callable
 
-from .msg import ros_type
+from .msg import definition, ros_type
 
 #: The version of the protocol of a call, in which the stage is spoken to.
 PROTOCOL = 1
@@ -190,8 +190,10 @@ class Stage:
                     "summary": port.summary} for name, port in cls._members(Output).items()]
         properties = {name: parameter.schema() for name, parameter in cls._members(Parameter).items()}
         summary = " ".join((inspect.getdoc(cls) or cls.__name__).split("\n\n")[0].split())
-        return {"protocol": PROTOCOL, "name": cls.__name__, "summary": summary, "inputs": inputs, "outputs": outputs,
-                "parameters": {"type": "object", "properties": properties, "additionalProperties": False}}
+        interface = {"protocol": PROTOCOL, "name": cls.__name__, "summary": summary, "inputs": inputs, "outputs": outputs,
+                     "parameters": {"type": "object", "properties": properties, "additionalProperties": False}}
+        own = {port["type"]: text for port in inputs + outputs if (text := definition(port["type"])) is not None}
+        return interface | ({"definitions": own} if own else {})
 
     @classmethod
     def begin(cls, parameters: dict[str, Any] | None = None, context: Context | None = None,

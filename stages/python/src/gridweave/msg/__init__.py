@@ -6,10 +6,17 @@
 Every field has a default: numbers are 0, texts empty, arrays of numbers are numpy arrays of the type that the text says, other
 arrays are lists, and messages in messages are such dataclasses. Constants of a text are attributes of its class.
 
+A type of one's own is made from its text, once, in a module that all stages import it from:
+
+    from gridweave.msg import define
+
+    Room = define("my_msgs/msg/Room", "string name\\nfloat64 area")
+
 The parser and the encoding are those of the package `rosbags`.
 """
 
 import dataclasses
+import re
 import sys
 import types
 from pathlib import Path
@@ -20,7 +27,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-__all__ = ["decode", "encode", "ros_type"]
+__all__ = ["decode", "define", "encode", "ros_type"]
 
 
 def _texts() -> Path:
@@ -32,6 +39,9 @@ def _texts() -> Path:
 _NUMPY = {"float32": "f4", "float64": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
           "uint32": "u4", "int64": "i8", "uint64": "u8", "bool": "?", "byte": "u1", "char": "u1", "octet": "u1"}
 _STORE = get_typestore(Stores.EMPTY)
+#: The texts of all types by their names, and the names of those that are not shipped.
+_KNOWN: dict[str, str] = {}
+_OWN: set[str] = set()
 
 
 def _zero(kind: str) -> Any:
@@ -100,23 +110,75 @@ def _make(name: str, constants: Any, fields: Any) -> type:
     return made
 
 
+def _add(texts: dict[str, str]) -> None:
+    """Makes types of texts, which may use each other and those that are there."""
+    parsed = {}
+    for name, text in texts.items():
+        parsed |= get_types_from_msg(text, name)
+    _STORE.register(parsed)
+    _KNOWN.update(texts)
+    for name in texts:
+        package, _, short = name.split("/")
+        module = sys.modules.setdefault(f"{__name__}.{package}", types.ModuleType(f"{__name__}.{package}"))
+        setattr(sys.modules[__name__], package, module)
+        _STORE.types[name] = _make(name, *_STORE.fielddefs[name])
+        setattr(module, short, _STORE.types[name])
+
+
 def _load() -> None:
     texts = {}
     for path in sorted(_texts().rglob("*.msg")):
         package = path.relative_to(_texts()).parts[0]
-        texts |= get_types_from_msg(path.read_text(), f"{package}/msg/{path.stem}")
+        texts[f"{package}/msg/{path.stem}"] = path.read_text()
     if not texts:
         raise ImportError(f"there are no message texts in {_texts()}: install the package by `pip install stages/python`")
-    _STORE.register(texts)
-    for name, (constants, fields) in _STORE.fielddefs.items():
-        package, _, short = name.split("/")
-        module = sys.modules.setdefault(f"{__name__}.{package}", types.ModuleType(f"{__name__}.{package}"))
-        setattr(sys.modules[__name__], package, module)
-        _STORE.types[name] = _make(name, constants, fields)
-        setattr(module, short, _STORE.types[name])
+    _add(texts)
 
 
 _load()
+
+
+def define(name: str, text: str) -> type:
+    """Makes a message type of one's own of a `.msg` text, and gives its class, which can be imported from `gridweave.msg` from then on.
+
+    `name` is `package/msg/Type`. The text may use all types that are known. To define a type again changes nothing; in another
+    way it is an error, as two stages would read the same bytes differently.
+    """
+    if not re.fullmatch(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*", name):
+        raise ValueError(f"`{name}` is no name of a message type, such as my_msgs/msg/Room")
+    if name in _KNOWN:
+        if _KNOWN[name].split() != text.split():
+            raise ValueError(f"{name} is known already, and is defined otherwise")
+        return _STORE.types[name]
+    if re.search(r"^={80}$", text, re.MULTILINE):
+        raise ValueError(f"the text of {name} holds several types: define each by itself, those that are used first")
+    try:
+        (_, fields), = get_types_from_msg(text, name).values()
+    except Exception as error:  # noqa: BLE001: the parser has its own, and gets others from what it reads
+        raise ValueError(f"the text of {name} cannot be read: {error}") from None
+    if unknown := sorted(_used(fields) - set(_KNOWN)):
+        raise ValueError(f"{name} uses {unknown[0]}, which is not known: define it before")
+    _add({name: text})
+    _OWN.add(name)
+    return _STORE.types[name]
+
+
+def _used(fields: Any) -> set[str]:
+    """The types of messages in a message."""
+    plain = (desc[1][0] if desc[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE) else desc for _, desc in fields)
+    return {content for node, content in plain if node == Nodetype.NAME}
+
+
+def definition(name: str) -> str | None:
+    """The text of a type that is not shipped with those of all that it uses, as logs hold it (`ros2msg`); None of one that is."""
+    if name not in _OWN:
+        return None
+    parts, used = [_KNOWN[name]], [name]
+    for at in used:
+        for inner in sorted(_used(_STORE.fielddefs[at][1]) - set(used)):
+            used.append(inner)
+            parts.append(f"{'=' * 80}\nMSG: {inner.replace('/msg/', '/')}\n{_KNOWN[inner]}")
+    return "".join(part if part.endswith("\n") else part + "\n" for part in parts)
 
 
 def ros_type(message_class: type) -> str:
