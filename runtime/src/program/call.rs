@@ -21,6 +21,8 @@ pub const CREDITS: usize = 16;
 const HELD: usize = 32;
 /// So long a program may take to come to the end of a call when nothing that it sends is of use any more.
 const END_TIME: Duration = Duration::from_secs(5);
+/// So much sooner than the engine gives up on the stage a call is given up, at the most: the program then says where it hangs.
+const FOR_LAST_WORDS: Duration = Duration::from_secs(2);
 /// For how large a payload, in bytes, room is set aside before the first is sent.
 const FIRST_PLACE: usize = 4 * 1024;
 
@@ -92,7 +94,7 @@ impl Program {
         let process = Process::start(launch, folder.path()).map_err(|error| StageError::new(program(), error))?;
         let (ports, folder) = (Some(ports), Some(folder));
         // A little before the engine would end the stage, which could not say where its program hangs.
-        let longest = longest.map(|longest| longest.mul_f64(0.9));
+        let longest = longest.map(|longest| longest - (longest / 4).min(FOR_LAST_WORDS));
         let mut started = Self { process, ports, folder, room: Room::default(), longest, is_alive: true };
         match started.process.wait(longest) {
             Ok(b'r') => Ok(started),
