@@ -10,10 +10,15 @@ import threading
 import time
 
 from sdk import LATCHED, RELIABLE, know, start
-from zenoh_ros2_sdk import ROS2Subscriber, get_topic_names_and_types
+from zenoh_ros2_sdk import ROS2Subscriber, get_topic_info, get_topic_names_and_types
 
 router, robots, longest, folder = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
 session, seen, changed = start(router, folder), {}, threading.Event()
+
+
+def is_published(topic):
+    info = get_topic_info(topic, domain_id=0)
+    return info is not None and info.publisher_count > 0
 
 
 def take_map(grid):
@@ -39,8 +44,9 @@ def take_frames(message):
 
 
 end = time.monotonic() + longest
-# What was sent before is asked for once only, of the publishers that are known in that moment.
-while not {"/map", "/tf_static"} <= dict(get_topic_names_and_types(domain_id=0)).keys():
+# What was sent before is asked for once only, of the publishers that are known in that moment. Who merges hears `/tf_static` as well, so
+# that the topic is there before they are.
+while not all(is_published(topic) for topic in ["/map", "/tf_static"]):
     if time.monotonic() > end:
         sys.exit("there is neither a map nor a frame")
 for topic, ros_type, call, qos in [
