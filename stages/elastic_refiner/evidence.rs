@@ -5,13 +5,13 @@ use super::body::Body;
 use super::equations::{Equations, Solution};
 use super::refine::Round;
 
-/// How much less than is allowed maps may bend, as shares of its deviations: where they bend little, what is allowed is too much to
-/// be likely. Below the last, maps of a building's size bend by less than a cell.
-const SHARES: [f64; 3] = [0.5, 0.25, 0.125];
+/// Where maps bend little, what they are allowed is too much to be likely. So bends are tried that are less, by this share of the
+/// deviations.
+const LITTLE: f64 = 0.25;
 
 /// How much likelier what walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm: the ratio
-/// of the evidence of two linear models (MacKay 1992, "Bayesian interpolation"), the maps being allowed to bend as far as is
-/// likeliest of what `parameters` say and less. Above 0 the bend gains more than it costs. `None` if there is no number.
+/// of the evidence of two linear models (MacKay 1992, "Bayesian interpolation"), the maps being allowed to bend as far as
+/// `parameters` say, or a little, whichever is likelier. Above 0 the bend gains more than it costs. `None` if there is no number.
 ///
 /// What walls say is what they said in the last round. They are taken to be as wrong as one cell in every half metre: as the cells
 /// of a map round all of a wall alike, maps that are not bent must not seem so for it.
@@ -20,14 +20,11 @@ pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefine
         Some(0.5 * (of_bends.log_determinant()? - solution.log_determinant() + solution.explained))
     };
     let mut best = log_ratio(&last.of_bends, &last.solution)?;
-    for share in SHARES {
-        // It is the sign that counts, and most maps that bend do so clearly.
-        if best > 0.0 {
-            break;
-        }
-        let less =
-            ElasticRefinerParameters { bend: share * parameters.bend, turn: share * parameters.turn, ..*parameters };
-        let of_bends = Equations::of_bends(bodies, &last.of_bends.places, &less);
+    // It is the sign that counts, and most maps that bend do so clearly.
+    if best <= 0.0 {
+        let little =
+            ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
+        let of_bends = Equations::of_bends(bodies, &last.of_bends.places, &little);
         let mut equations = of_bends.clone();
         last.walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         best = best.max(log_ratio(&of_bends, &equations.solve()?)?);

@@ -10,15 +10,16 @@ import threading
 import time
 
 from sdk import LATCHED, RELIABLE, know, start
-from zenoh_ros2_sdk import ROS2Subscriber, get_topic_info, get_topic_names_and_types
+from zenoh_ros2_sdk import ROS2Subscriber, get_topic_names_and_types
 
 router, robots, longest, folder = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4]
 session, seen, changed = start(router, folder), {}, threading.Event()
 
 
-def is_published(topic):
-    info = get_topic_info(topic, domain_id=0)
-    return info is not None and info.publisher_count > 0
+def fail(words):
+    # Without that its threads go on.
+    session.close()
+    sys.exit(words)
 
 
 def take_map(grid):
@@ -43,26 +44,39 @@ def take_frames(message):
     changed.set()
 
 
-end = time.monotonic() + longest
-# What was sent before is asked for once only, of the publishers that are known in that moment. Who merges hears `/tf_static` as well, so
-# that the topic is there before they are.
-while not all(is_published(topic) for topic in ["/map", "/tf_static"]):
-    if time.monotonic() > end:
-        sys.exit("there is neither a map nor a frame")
-for topic, ros_type, call, qos in [
+def is_done():
+    return "map" in seen and len(seen.get("frames", {})) >= robots
+
+
+TOPICS = [
     ("/map", "nav_msgs/msg/OccupancyGrid", take_map, LATCHED),
     ("/map_updates", "map_msgs/msg/OccupancyGridUpdate", take_update, RELIABLE),
     ("/tf_static", "tf2_msgs/msg/TFMessage", take_frames, LATCHED),
-]:
+]
+for _, ros_type, _, _ in TOPICS:
     know(ros_type)
-    ROS2Subscriber(topic, ros_type, call, node_name="viewer", domain_id=0, qos=qos)
-while not ("map" in seen and len(seen.get("frames", {})) >= robots):
-    if not changed.wait(max(0.0, end - time.monotonic())) or time.monotonic() > end:
-        sys.exit(f"there is only {seen}")
-    changed.clear()
+end = time.monotonic() + longest
+while not is_done():
+    # What was sent before is asked for once only, of the publishers that are known when a subscriber begins, and one that comes later is not
+    # asked: so they begin anew.
+    subscribers = [
+        ROS2Subscriber(topic, ros_type, call, node_name="viewer", domain_id=0, qos=qos)
+        for topic, ros_type, call, qos in TOPICS
+    ]
+    until = time.monotonic() + 5.0
+    while not is_done() and changed.wait(max(0.0, until - time.monotonic())):
+        changed.clear()
+    for subscriber in subscribers:
+        subscriber.close()
+    if time.monotonic() > end and not is_done():
+        fail(f"there is only {seen}")
 seen["publishers"] = {}
-for topic, ros_types in get_topic_names_and_types(domain_id=0, timeout=10.0):
-    package, _, name = ros_types[0].split("/")
-    seen["publishers"][topic] = f"{package}::msg::dds_::{name}_"
+# What is there when it asks may not all be told at once.
+while not {"/map", "/tf_static"} <= seen["publishers"].keys():
+    if time.monotonic() > end:
+        fail(f"these topics alone are listed: {seen['publishers']}")
+    for topic, ros_types in get_topic_names_and_types(domain_id=0, timeout=10.0):
+        package, _, name = ros_types[0].split("/")
+        seen["publishers"][topic] = f"{package}::msg::dds_::{name}_"
 json.dump(seen, sys.stdout)
 session.close()
