@@ -66,8 +66,9 @@ impl SentMap {
         is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, brought: 0, outdated: None })
     }
 
-    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for that,
-    /// or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as the map has: so no more is sent than twice what had to be.
+    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for
+    /// that, or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as the map
+    /// has: so no more is sent than twice what had to be.
     pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, hears_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id

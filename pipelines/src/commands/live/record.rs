@@ -10,8 +10,7 @@ use anyhow::{Result, bail};
 use clap::Args;
 use gridweave_logs::file::check_writable;
 use gridweave_logs::reader::SupplementKind;
-use gridweave_logs::schemas::schema_text;
-use gridweave_logs::sink::{LogOptions, LogWriter, Outcome, write_supplement};
+use gridweave_logs::sink::{LogOptions, LogWriter, Outcome, result_channel, write_supplement};
 use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{PortType, Registry};
@@ -167,19 +166,9 @@ impl Lanes {
         if let Some(channel) = self.announced.get(&number) {
             return Some(channel.clone());
         }
-        let name = self.port_type?;
-        let schema = match self.definition.is_empty() {
-            true => schema_text(name)?,
-            false => self.definition.clone(),
-        };
-        Some(Channel {
-            topic: topic.to_owned(),
-            message_encoding: "cdr".to_owned(),
-            schema_name: name.to_owned(),
-            schema_encoding: "ros2msg".to_owned(),
-            schema: schema.into_bytes(),
-            ..Default::default()
-        })
+        let channel = result_channel(topic, self.port_type?, &self.definition);
+        // A type that nobody knows could not be read from the log.
+        (!channel.schema.is_empty()).then_some(channel)
     }
 }
 
