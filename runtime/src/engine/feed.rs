@@ -72,24 +72,28 @@ impl Feed {
         Some(Outputs::sink(&self.outputs, self.ports.binary_search(&port).ok()?))
     }
 
-    /// Waits until every reader is connected, so that none misses the first messages. `false` if it takes too long.
+    /// Waits until every reader and the stage itself, which repeats the last messages to who comes late, are connected, so
+    /// that none misses the first messages. `false` if it takes too long.
     pub fn wait_for_readers(&self, longest: Duration) -> bool {
         self.wait(&self.sleeper, longest, |sender| sender.is_connected())
     }
 
-    /// Waits until every reader has taken all that was sent. What is sent is lost with its sender where it has not been
+    /// Waits until every reader and the stage itself have taken all that was sent. What is sent is lost with its sender where it has not been
     /// taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers go on.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
         let sleeper = Sleeper::new(self.sleeper.board().clone(), Arc::default());
         self.wait(&sleeper, longest, LinkSender::is_taken)
     }
 
+    /// Waits until all links are ready, and the stage has taken in what was sent so far.
     fn wait(&self, sleeper: &Sleeper, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
+        // The stage sees a program that sends only while that is there: without its answer a short visit would pass unseen.
+        let (board, asked) = (sleeper.board(), sleeper.board().ask());
         let are_ready = || {
             if !self.run.is_running() {
                 return Err(LinkError::Stopped);
             }
-            Ok(self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
+            Ok(board.has_answered(asked) && self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
         };
         sleeper.wait_until(Some(Instant::now() + longest), are_ready).unwrap_or(false)
     }

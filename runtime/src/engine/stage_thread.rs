@@ -192,7 +192,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     /// A source whose messages come from outside keeps the last of them for readers that come late.
     fn drive_external(&mut self) -> Result<(), Failure> {
         loop {
-            self.outputs.borrow_mut().links().iter_mut().try_for_each(|link| link.look())?;
+            self.outputs.borrow_mut().take_in()?;
             self.look()?;
             if self.sleeper.control().is_draining() {
                 let reached = self.outputs.borrow().reached();
@@ -265,7 +265,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let watermark = lower_bound(&self.queues);
         self.sleeper.wait(|| {
             let mut outputs = self.outputs.borrow_mut();
-            if outputs.is_greeted() || watermark.is_some_and(|watermark| outputs.can_flush(watermark)) {
+            if outputs.is_greeted() || outputs.is_asked() || watermark.is_some_and(|watermark| outputs.can_flush(watermark)) {
                 return Ok(true);
             }
             for link in outputs.links() {

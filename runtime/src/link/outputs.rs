@@ -63,6 +63,23 @@ impl<S: Service + 'static> Outputs<S> {
         Ok(())
     }
 
+    /// Whether a program that sends as this stage waits until what it has sent is taken in.
+    pub(crate) fn is_asked(&self) -> bool {
+        let board = self.sleeper.board();
+        board.get(StageNumber::Asked) != board.get(StageNumber::Answered)
+    }
+
+    /// Takes in what programs outside of the run have sent on the links, and tells those that wait for it.
+    pub(crate) fn take_in(&mut self) -> Result<(), LinkError> {
+        // Read before: what is asked while this goes on is answered by the next.
+        let (is_asked, asked) = (self.is_asked(), self.sleeper.board().get(StageNumber::Asked));
+        self.links.iter_mut().try_for_each(LinkSender::look)?;
+        if is_asked {
+            self.sleeper.board().answer(asked);
+        }
+        Ok(())
+    }
+
     /// Sends all that was gathered and the end of the stream on every link, and waits until every reader has
     /// acknowledged it. The stage had come to the log time `time`. A reader that comes meanwhile, as one does that was
     /// started again, is sent what it has missed, and the end.
@@ -231,6 +248,37 @@ mod tests {
             }
             count
         }
+    }
+
+    #[test]
+    fn a_program_that_sends_from_outside_can_wait_until_the_stage_has_taken_in_what_it_sent() {
+        let world = World::new();
+        (1..=2).for_each(|stage| world.board.stage(stage).clear());
+        let node = world.names.node::<Local>().unwrap();
+        let outputs = |role| {
+            let sender = LinkSender::new(&node, &world.names, &world.shape(), Vec::new(), world.port(), role, false);
+            let sleeper = Rc::new(Sleeper::new(world.board.stage(0), Arc::clone(&world.control)));
+            Outputs::new(vec![sender.unwrap()], sleeper)
+        };
+        let stage = outputs(SenderRole::FedOwner);
+        let board = world.board.stage(0);
+        assert!(board.has_answered(board.ask()), "nobody is waited for who is not there");
+        board.set_state(StageState::Running);
+
+        // Unless the stage looks while the program is there, it never hears of it.
+        let program = outputs(SenderRole::Guest);
+        let (asked, asked_by_another) = (board.ask(), board.ask());
+        assert!(!board.has_answered(asked) && stage.borrow().is_asked());
+        stage.borrow_mut().take_in().unwrap();
+        assert!(board.has_answered(asked) && board.has_answered(asked_by_another) && !stage.borrow().is_asked());
+        let header = MessageHeader { log_time: TIME, length: 3, flags: MessageFlags::DATA, ..Default::default() };
+        Outputs::sink(&program, 0).send(header, b"map").unwrap();
+        let asked = board.ask();
+        assert!(!board.has_answered(asked));
+        stage.borrow_mut().take_in().unwrap();
+        assert!(board.has_answered(asked));
+        drop(program);
+        assert_eq!(board.all_sent(), 1);
     }
 
     #[test]

@@ -46,6 +46,8 @@ pub enum StageNumber {
     Started = 4,
     /// How many readers of its links have come, and programs that look on.
     Greetings = 5,
+    /// How often programs that send as this stage have asked it to take in what they sent.
+    Asked = 6,
     /// Messages that it was given.
     MessagesIn = 8,
     /// Nanoseconds that it has worked.
@@ -54,6 +56,8 @@ pub enum StageNumber {
     Warnings = 10,
     /// Since when it has worked on one message, on the monotonic clock; 0 while it waits.
     WorkingSince = 11,
+    /// How many of the askings it has answered.
+    Answered = 12,
 }
 
 /// A number of one wire of a stage.
@@ -171,6 +175,24 @@ impl StageBoard {
         let before = self.stage_word(StageNumber::Greetings as usize).fetch_add(1, Ordering::AcqRel);
         self.ring();
         before + 1
+    }
+
+    /// A program that sends as this stage asks it to take in what was sent. Gives the number of the asking, from 1 on.
+    pub(crate) fn ask(&self) -> u64 {
+        let before = self.stage_word(StageNumber::Asked as usize).fetch_add(1, Ordering::AcqRel);
+        self.ring();
+        before + 1
+    }
+
+    /// The stage has taken in what was sent before so many askings.
+    pub(crate) fn answer(&self, asked: u64) {
+        self.set(StageNumber::Answered, asked);
+        self.ring();
+    }
+
+    /// Whether the stage has answered the asking, or is not there to answer.
+    pub(crate) fn has_answered(&self, asked: u64) -> bool {
+        !self.is_there() || self.get(StageNumber::Answered) >= asked
     }
 
     /// Where the stage sleeps, and the programs that send as this stage.
