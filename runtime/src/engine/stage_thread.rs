@@ -265,7 +265,10 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let watermark = lower_bound(&self.queues);
         self.sleeper.wait(|| {
             let mut outputs = self.outputs.borrow_mut();
-            if outputs.is_greeted() || outputs.is_asked() || watermark.is_some_and(|watermark| outputs.can_flush(watermark)) {
+            if outputs.is_greeted()
+                || outputs.is_asked()
+                || watermark.is_some_and(|watermark| outputs.can_flush(watermark))
+            {
                 return Ok(true);
             }
             for link in outputs.links() {

@@ -4,9 +4,8 @@ use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::statistics::run_statistics;
 use super::{Failure, RunError};
-use crate::link::StageBoard;
-use crate::link::{Observer, SampleHeader};
-use crate::message::Message;
+use crate::link::{Observer, SampleHeader, StageBoard};
+use crate::message::{Message, MessageFlags};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::RunStatistics;
 use iceoryx2::node::Node;
@@ -82,19 +81,14 @@ impl WatchedLink {
         let (next, missed, taken) = (&mut self.next, &mut self.missed, &mut self.taken);
         let taken = self.observer.take(|sample, message| {
             let sequence = message.header().sequence;
-            let is_repeated = message.header().flags.contains(crate::message::MessageFlags::REPEATED);
-            match next.get_mut(&sample.origin) {
-                // Sent again for another reader.
-                Some(next) if sequence < *next => return,
-                Some(next) => {
-                    *missed += if is_repeated { 0 } else { sequence - *next };
-                    *next = sequence.saturating_add(1);
-                }
-                // What is repeated comes in the order of the numbers, and does not tell where the stream stands.
-                None if is_repeated => {}
-                None => drop(next.insert(sample.origin, sequence.saturating_add(1))),
+            let is_repeated = message.header().flags.contains(MessageFlags::REPEATED);
+            // What is repeated does not tell where the stream stands.
+            if !is_repeated {
+                let next = next.entry(sample.origin).or_insert(sequence);
+                *missed += sequence.saturating_sub(*next);
+                *next = sequence.saturating_add(1);
             }
-            *taken += u64::from(message.header().flags.contains(crate::message::MessageFlags::DATA));
+            *taken += u64::from(message.header().flags.contains(MessageFlags::DATA));
             take(sample, message);
         });
         taken.map_err(RunError::of_run)

@@ -63,6 +63,7 @@ mod protocol;
 #[cfg(test)]
 mod protocol_model;
 mod receiver;
+mod repeats;
 mod room;
 mod sample;
 mod sender;

@@ -1,18 +1,22 @@
 //! The end of a link of one that looks on.
 
+use super::heard::Heard;
+use super::repeats::{Repeat, Repeats};
 use super::service::{MAX_OBSERVERS, OBSERVER_BUFFER};
 use super::{LinkError, RunNames, SampleHeader, unpack};
-use crate::message::{Message, MessageFlags};
+use crate::message::{Message, MessageFlags, Storage};
 use iceoryx2::node::Node;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::service::Service;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError as E;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// Looks on at a link, of a replay or a live one, and changes nothing: where it is too slow, it misses messages.
 pub struct Observer<S: Service> {
     subscriber: Subscriber<S, [u8], SampleHeader>,
+    heard: BTreeMap<u64, Heard>,
     name: String,
 }
 
@@ -43,28 +47,50 @@ impl<S: Service + 'static> Observer<S> {
             }
             other => failed(&other),
         })?;
-        Ok(Some(Self { subscriber, name }))
+        Ok(Some(Self { subscriber, heard: BTreeMap::new(), name }))
     }
 
-    /// Takes the messages that have passed since the last call, with the header of the sample that each came in. Marks of
-    /// the protocol are left out.
-    pub fn take(&self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), LinkError> {
+    /// Takes the messages that have passed since the last call, each once, with the header of the sample that it came in. Marks
+    /// of the protocol are left out.
+    pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("receive from {}", self.name))(cause);
+        let mut repeats = Repeats::default();
         while let Some(sample) = self.subscriber.receive().map_err(|e| failed(&e))? {
             let header = *sample.user_header();
             // A copy, as one that looks on must not hold what the run's senders need.
-            let bytes = Rc::new(sample.payload().to_vec());
+            let bytes: Rc<dyn Storage> = Rc::new(sample.payload().to_vec());
             drop(sample);
-            unpack(&header, bytes, &self.name, |message| {
-                let flags = message.header().flags;
-                let is_mark = flags.contains(MessageFlags::WATERMARK) || flags.contains(MessageFlags::END);
-                if !is_mark {
-                    take(&header, message);
-                }
-            })?;
+            if header.message.flags.contains(MessageFlags::REPEATED) {
+                repeats.push((header, bytes));
+                continue;
+            }
+            for repeat in repeats.before(&header) {
+                unpack_new(&mut self.heard, repeat, &self.name, &mut take)?;
+            }
+            unpack_new(&mut self.heard, (header, bytes), &self.name, &mut take)?;
         }
-        Ok(())
+        repeats.all().into_iter().try_for_each(|repeat| unpack_new(&mut self.heard, repeat, &self.name, &mut take))
     }
+}
+
+/// Takes the messages of a sample, unless it has come before.
+fn unpack_new(
+    heard: &mut BTreeMap<u64, Heard>,
+    (header, bytes): Repeat,
+    link: &str,
+    take: &mut impl FnMut(&SampleHeader, Message),
+) -> Result<(), LinkError> {
+    let is_repeated = header.message.flags.contains(MessageFlags::REPEATED);
+    if !heard.entry(header.origin).or_insert_with(|| Heard::new(false)).note(header.number, is_repeated).0 {
+        return Ok(());
+    }
+    unpack(&header, bytes, link, |message| {
+        let flags = message.header().flags;
+        let is_mark = flags.contains(MessageFlags::WATERMARK) || flags.contains(MessageFlags::END);
+        if !is_mark {
+            take(&header, message);
+        }
+    })
 }
 
 fn service_buffer<S: Service>(service: &PortFactory<S, [u8], SampleHeader>) -> usize {

@@ -5,10 +5,11 @@ use super::heap::HeapLink;
 use super::heard::Heard;
 use super::held::HeldSamples;
 use super::protocol::NOTHING_HEARD;
+use super::repeats::Repeats;
 use super::service::{LinkShape, PortBoard, origin};
 use super::stage_board::{StageBoard, StageNumber, StageState, WireNumber};
 use super::{InputQueue, LinkError, Order, RunNames, SampleHeader, unpack};
-use crate::message::{LogTime, MessageFlags};
+use crate::message::{LogTime, MessageFlags, Storage};
 use iceoryx2::node::Node;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -18,6 +19,7 @@ use iceoryx2::service::Service;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::collections::{BTreeMap, VecDeque};
+use std::rc::Rc;
 
 /// One wire of a stage, as the reader and its senders know it.
 #[derive(Clone)]
@@ -70,6 +72,8 @@ pub struct LinkReceiver<S: Service> {
     freed: usize,
     /// The log time that the owner had come to at the end.
     ended: Option<LogTime>,
+    /// What was sent again by senders of whom nothing has come yet.
+    repeats: Repeats,
     held: HeldSamples,
     most_held: usize,
     /// Where large payloads travel; none if that is in the samples.
@@ -109,6 +113,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
             waiting: VecDeque::new(),
             freed: 0,
             ended: None,
+            repeats: Repeats::default(),
             held: HeldSamples::default(),
         })
     }
@@ -119,7 +124,12 @@ impl<S: Service + 'static> LinkReceiver<S> {
         self.connect()?;
         while self.order == Order::LogTime || queue.is_empty() {
             match self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
-                Some(sample) => self.take_in(sample, queue)?,
+                Some(sample) => self.take_sample(sample, queue)?,
+                None if !self.repeats.is_empty() => {
+                    for (header, storage) in self.repeats.all() {
+                        self.take_in(&header, storage, queue)?;
+                    }
+                }
                 None => {
                     self.note_end(queue);
                     break;
@@ -163,7 +173,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
 
     /// Whether there is something to receive, or a sender has come, or nothing will follow any more.
     pub(crate) fn has_news(&self, queue: &InputQueue) -> Result<bool, LinkError> {
-        if self.senders != self.owner.board.senders(self.owner.port) {
+        if self.senders != self.owner.board.senders(self.owner.port) || !self.repeats.is_empty() {
             return Ok(true);
         }
         let has_samples = self.subscriber.has_samples().map_err(|e| self.failed("receive from", &e))?;
@@ -216,8 +226,30 @@ impl<S: Service + 'static> LinkReceiver<S> {
         self.known.entry(sender).or_insert_with(new)
     }
 
-    fn take_in(&mut self, sample: Sample<S, [u8], SampleHeader>, queue: &mut InputQueue) -> Result<(), LinkError> {
+    fn take_sample(&mut self, sample: Sample<S, [u8], SampleHeader>, queue: &mut InputQueue) -> Result<(), LinkError> {
         let header = *sample.user_header();
+        let storage = match &self.heap {
+            Some(heap) if header.has_payload() && sample.payload().is_empty() => heap.take(header.message.sequence)?,
+            _ => self.held.hold(sample, self.most_held),
+        };
+        let flags = header.message.flags;
+        if !flags.contains(MessageFlags::REPEATED) {
+            for (header, storage) in self.repeats.before(&header) {
+                self.take_in(&header, storage, queue)?;
+            }
+        } else if !flags.contains(MessageFlags::END) && self.known(header.origin).heard.next().is_none() {
+            self.repeats.push((header, storage));
+            return Ok(());
+        }
+        self.take_in(&header, storage, queue)
+    }
+
+    fn take_in(
+        &mut self,
+        header: &SampleHeader,
+        storage: Rc<dyn Storage>,
+        queue: &mut InputQueue,
+    ) -> Result<(), LinkError> {
         let flags = header.message.flags;
         let is_repeated = flags.contains(MessageFlags::REPEATED);
         let depth = self.end.depth as u64;
@@ -233,9 +265,9 @@ impl<S: Service + 'static> LinkReceiver<S> {
         let mut messages = 0;
         if flags.contains(MessageFlags::END) {
             // What others have sent may come after the owner's last word.
-            self.note_end_mark(&header);
+            self.note_end_mark(header);
         } else if is_new {
-            messages = self.unpack(&header, sample, queue)?;
+            messages = self.unpack(header, storage, queue)?;
         }
         self.waiting.push_back(Waiting { origin: header.origin, number: header.number, is_repeated, messages });
         self.give_back();
@@ -246,13 +278,9 @@ impl<S: Service + 'static> LinkReceiver<S> {
     fn unpack(
         &mut self,
         header: &SampleHeader,
-        sample: Sample<S, [u8], SampleHeader>,
+        storage: Rc<dyn Storage>,
         queue: &mut InputQueue,
     ) -> Result<usize, LinkError> {
-        let storage = match &self.heap {
-            Some(heap) if header.has_payload() && sample.payload().is_empty() => heap.take(header.message.sequence)?,
-            _ => self.held.hold(sample, self.most_held),
-        };
         let before = queue.len();
         let mut taken = 0;
         unpack(header, storage, &self.name, |message| {
