@@ -3,7 +3,9 @@
 //! The factor is made column by column, each from those before it that reach it (left-looking; Davis, "Direct Methods for
 //! Sparse Linear Systems", 2006). Blocks of a fixed size take an index for nine numbers, and the processor keeps them in registers.
 
+use super::dissection::Part;
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// The lower triangle of a symmetric matrix by its columns: the entries of each in any order, and several for one place, which are
 /// added up.
@@ -11,6 +13,8 @@ pub(super) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
 
 /// No column.
 const NONE: usize = usize::MAX;
+/// Parts of fewer columns are made in one go.
+const LEAST_DIVIDED: usize = 200;
 
 /// The lower factor `L` of a matrix `L L^T`.
 #[derive(Clone, Debug)]
@@ -25,46 +29,15 @@ pub(super) struct BlockCholesky {
 }
 
 impl BlockCholesky {
-    /// Factors a matrix. `None` if it is not positive definite.
-    pub(super) fn factor(columns: &Columns) -> Option<Self> {
-        let count = columns.len();
+    /// Factors a matrix, whose columns are in an order of which `whole` tells what has nothing to do with each other. `None` if it
+    /// is not positive definite.
+    pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<Self> {
         let (starts, rows) = pattern(columns);
         let mut blocks = vec![Matrix3::zeros(); rows.len()];
-        let mut inverses = Vec::with_capacity(count);
-        let mut work = vec![Matrix3::zeros(); count];
-        // The columns whose next block lies in a row, as chains; and where that block is.
-        let (mut chains, mut following) = (vec![NONE; count], vec![NONE; count]);
-        let mut next = starts.clone();
-        for column in 0..count {
-            for (row, block) in &columns[column] {
-                work[*row] += block;
-            }
-            let mut before = chains[column];
-            while before != NONE {
-                let after = following[before];
-                let places = next[before]..starts[before + 1];
-                let by = blocks[places.start].transpose();
-                for (row, block) in rows[places.clone()].iter().zip(&blocks[places]) {
-                    work[*row] -= block * by;
-                }
-                next[before] += 1;
-                link(before, &next, &starts, &rows, &mut chains, &mut following);
-                before = after;
-            }
-            let own = starts[column];
-            let diagonal = work[column].cholesky()?;
-            let inverse = diagonal.l().try_inverse()?;
-            blocks[own] = diagonal.l();
-            work[column] = Matrix3::zeros();
-            let by = inverse.transpose();
-            for place in own + 1..starts[column + 1] {
-                blocks[place] = work[rows[place]] * by;
-                work[rows[place]] = Matrix3::zeros();
-            }
-            inverses.push(inverse);
-            next[column] = own + 1;
-            link(column, &next, &starts, &rows, &mut chains, &mut following);
-        }
+        let mut inverses = vec![Matrix3::zeros(); columns.len()];
+        let mut next = starts[..columns.len()].to_vec();
+        let made = MadeColumns { blocks: &mut blocks, inverses: &mut inverses, next: &mut next };
+        Factoring { columns, starts: &starts, rows: &rows }.factor(whole, made)?;
         Some(Self { starts, rows, blocks, inverses })
     }
 
@@ -136,19 +109,99 @@ impl BlockCholesky {
     }
 }
 
-/// Puts a column into the chain of the row of its next block.
-fn link(
-    column: usize,
-    next: &[usize],
-    starts: &[usize],
-    rows: &[usize],
-    chains: &mut [usize],
-    following: &mut [usize],
-) {
-    if next[column] < starts[column + 1] {
-        let row = rows[next[column]];
-        following[column] = chains[row];
-        chains[row] = column;
+/// A matrix that is being factored, and where its factor has blocks.
+struct Factoring<'a> {
+    columns: &'a Columns,
+    starts: &'a [usize],
+    rows: &'a [usize],
+}
+
+/// The columns of the factor that belong to a part.
+struct MadeColumns<'a> {
+    blocks: &'a mut [Matrix3<f64>],
+    inverses: &'a mut [Matrix3<f64>],
+    /// For each column that is made, its first block that lies in no row of a column that is made.
+    next: &'a mut [usize],
+}
+
+impl<'a> MadeColumns<'a> {
+    /// The first so many columns, which have so many blocks, and the others.
+    fn split(self, columns: usize, blocks: usize) -> [MadeColumns<'a>; 2] {
+        let (first_blocks, blocks) = self.blocks.split_at_mut(blocks);
+        let (first_inverses, inverses) = self.inverses.split_at_mut(columns);
+        let (first_next, next) = self.next.split_at_mut(columns);
+        [
+            MadeColumns { blocks: first_blocks, inverses: first_inverses, next: first_next },
+            MadeColumns { blocks, inverses, next },
+        ]
+    }
+
+    fn borrowed(&mut self) -> MadeColumns<'_> {
+        MadeColumns { blocks: self.blocks, inverses: self.inverses, next: self.next }
+    }
+}
+
+impl Factoring<'_> {
+    /// Makes the columns of a part: those of its sides at once, as none reaches a column of the other side, and then those that
+    /// separate them. In which order parts are added up does not depend on which side is done first.
+    fn factor(&self, part: &Part, mut made: MadeColumns<'_>) -> Option<()> {
+        let mut own = part.places.clone();
+        if let Some(sides) = part.sides.as_deref().filter(|_| own.len() > LEAST_DIVIDED) {
+            let [low, high] = sides;
+            let blocks_of = |side: &Part| self.starts[side.places.end] - self.starts[side.places.start];
+            let [of_low, others] = made.borrowed().split(low.places.len(), blocks_of(low));
+            let [of_high, _] = others.split(high.places.len(), blocks_of(high));
+            let (low_made, high_made) = rayon::join(|| self.factor(low, of_low), || self.factor(high, of_high));
+            low_made.and(high_made)?;
+            own.start = high.places.end;
+        }
+        self.factor_own(part.places.start, own, made)
+    }
+
+    /// Makes the columns `own` of a part that begins with the column `first`. Those before them are made.
+    fn factor_own(&self, first: usize, own: Range<usize>, made: MadeColumns<'_>) -> Option<()> {
+        let MadeColumns { blocks, inverses, next } = made;
+        let begin = self.starts[first];
+        // For each own column those before it whose next block lies in its row.
+        let mut reaching: Vec<Vec<usize>> = vec![Vec::new(); own.len()];
+        let reach = |reaching: &mut Vec<Vec<usize>>, column: usize, next: usize| {
+            if next < self.starts[column + 1] && own.contains(&self.rows[next]) {
+                reaching[self.rows[next] - own.start].push(column);
+            }
+        };
+        (first..own.start).for_each(|column| reach(&mut reaching, column, next[column - first]));
+        // By row, from the first own one.
+        let mut work = vec![Matrix3::zeros(); self.columns.len() - own.start];
+        for column in own.clone() {
+            for (row, block) in &self.columns[column] {
+                work[*row - own.start] += block;
+            }
+            for before in std::mem::take(&mut reaching[column - own.start]) {
+                let places = next[before - first]..self.starts[before + 1];
+                let of_before = &blocks[places.start - begin..places.end - begin];
+                let by = of_before[0].transpose();
+                for (row, block) in self.rows[places].iter().zip(of_before) {
+                    work[*row - own.start] -= block * by;
+                }
+                next[before - first] += 1;
+                reach(&mut reaching, before, next[before - first]);
+            }
+            let places = self.starts[column]..self.starts[column + 1];
+            let diagonal = work[column - own.start].cholesky()?.l();
+            let inverse = diagonal.try_inverse()?;
+            blocks[places.start - begin] = diagonal;
+            work[column - own.start] = Matrix3::zeros();
+            let by = inverse.transpose();
+            for place in places.start + 1..places.end {
+                let work = &mut work[self.rows[place] - own.start];
+                blocks[place - begin] = *work * by;
+                *work = Matrix3::zeros();
+            }
+            inverses[column - first] = inverse;
+            next[column - first] = places.start + 1;
+            reach(&mut reaching, column, places.start + 1);
+        }
+        Some(())
     }
 }
 
@@ -203,7 +256,9 @@ impl SelectedInverse<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dissection::Dissection;
     use super::*;
+    use crate::geometry::Point2;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
@@ -232,7 +287,7 @@ mod tests {
             holes in 0..100_usize,
         ) {
             let (columns, dense) = matrix(&seed, holes);
-            let factor = BlockCholesky::factor(&columns).unwrap();
+            let factor = BlockCholesky::factor(&columns, &Part::undivided(0..BLOCKS)).unwrap();
             let inverse = dense.clone().try_inverse().unwrap();
             prop_assert!((factor.log_determinant() - dense.determinant().ln()).abs() < 1e-9);
             let right = DVector::from_fn(3 * BLOCKS, |row, _| seed[row]);
@@ -254,11 +309,41 @@ mod tests {
     }
 
     #[test]
+    fn sides_that_are_made_at_once_give_the_same_factor() {
+        const WIDTH: usize = 36;
+        let at: Vec<Point2> =
+            (0..18 * WIDTH).map(|node| Point2::new((node % WIDTH) as f64, (node / WIDTH) as f64)).collect();
+        let near = |node: usize| {
+            let at = &at;
+            (0..at.len()).filter(move |&other| other != node && (at[node] - at[other]).norm() < 1.5)
+        };
+        let neighbours: Vec<Vec<usize>> = (0..at.len()).map(|node| near(node).collect()).collect();
+        let Dissection { places, whole } = Dissection::new(&at, &neighbours);
+        assert!(whole.sides.is_some() && at.len() > 2 * LEAST_DIVIDED);
+        let mut columns: Columns = vec![Vec::new(); at.len()];
+        for (node, neighbours) in neighbours.iter().enumerate() {
+            columns[places[node]].push((places[node], 9.0 * Matrix3::identity()));
+            let later = neighbours.iter().filter(|&&other| places[other] > places[node]);
+            let block = |other: usize| {
+                Matrix3::from_fn(|row, column| 0.2 * ((node + 2 * other + row + 3 * column) as f64).sin())
+            };
+            columns[places[node]].extend(later.map(|&other| (places[other], block(other))));
+        }
+        let parted = BlockCholesky::factor(&columns, &whole).unwrap();
+        let at_once = BlockCholesky::factor(&columns, &Part::undivided(0..at.len())).unwrap();
+        let pairs = parted.blocks.iter().zip(&at_once.blocks);
+        assert!(pairs.map(|(one, other)| (one - other).norm()).all(|difference| difference < 1e-12));
+        let again = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let again = again.install(|| BlockCholesky::factor(&columns, &whole)).unwrap();
+        assert_eq!(again.blocks, parted.blocks, "to the bit, on any number of cores");
+    }
+
+    #[test]
     fn a_matrix_that_is_not_positive_definite_has_no_factor() {
         for bad in [-1.0, 0.0, f64::NAN] {
             let columns =
                 vec![vec![(0, Matrix3::identity()), (1, Matrix3::zeros())], vec![(1, bad * Matrix3::identity())]];
-            assert!(BlockCholesky::factor(&columns).is_none(), "{bad}");
+            assert!(BlockCholesky::factor(&columns, &Part::undivided(0..2)).is_none(), "{bad}");
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::ElasticRefinerParameters;
 use super::block_cholesky::{BlockCholesky, Columns, SelectedInverse};
 use super::body::Body;
+use super::dissection::Dissection;
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -17,20 +18,22 @@ const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 /// Normal equations, node by node. The nodes of all bodies are numbered one after the other.
 #[derive(Clone, Debug)]
 pub(super) struct Equations {
-    /// Where each node stands in the order in which nodes are eliminated.
-    pub(super) places: Arc<[usize]>,
+    /// The order in which nodes are eliminated.
+    pub(super) order: Arc<Dissection>,
     columns: Columns,
     vector: Vec<Vector3<f64>>,
 }
 
 impl Equations {
     /// What is known of the nodes of the bodies without looking at walls.
-    pub(super) fn of_bends(bodies: &[Body<'_>], places: &Arc<[usize]>, parameters: &ElasticRefinerParameters) -> Self {
-        let mut equations = Self {
-            places: Arc::clone(places),
-            columns: vec![Vec::new(); places.len()],
-            vector: vec![Vector3::zeros(); places.len()],
-        };
+    pub(super) fn of_bends(
+        bodies: &[Body<'_>],
+        order: &Arc<Dissection>,
+        parameters: &ElasticRefinerParameters,
+    ) -> Self {
+        let count = order.places.len();
+        let mut equations =
+            Self { order: Arc::clone(order), columns: vec![Vec::new(); count], vector: vec![Vector3::zeros(); count] };
         let mut first = 0;
         for body in bodies {
             let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
@@ -65,28 +68,28 @@ impl Equations {
 
     /// Adds a block for two nodes. They are symmetric: what is told of two nodes is to be added both ways round.
     pub(super) fn add(&mut self, row: usize, column: usize, block: impl FnOnce() -> Matrix3<f64>) {
-        let (row, column) = (self.places[row], self.places[column]);
+        let (row, column) = (self.order.places[row], self.order.places[column]);
         if row >= column {
             self.columns[column].push((row, block()));
         }
     }
 
     pub(super) fn add_vector(&mut self, node: usize, part: &Vector3<f64>) {
-        self.vector[self.places[node]] += part;
+        self.vector[self.order.places[node]] += part;
     }
 
     /// Solves them. `None` if they have no solution.
     pub(super) fn solve(&self) -> Option<Solution> {
-        let factor = BlockCholesky::factor(&self.columns)?;
+        let factor = BlockCholesky::factor(&self.columns, &self.order.whole)?;
         let solved = factor.solve(&self.vector);
-        let moves = self.places.iter().map(|&place| solved[place]).collect();
+        let moves = self.order.places.iter().map(|&place| solved[place]).collect();
         let explained = self.vector.iter().zip(&solved).map(|(part, by)| part.dot(by)).sum();
-        Some(Solution { moves, explained, places: Arc::clone(&self.places), factor })
+        Some(Solution { moves, explained, order: Arc::clone(&self.order), factor })
     }
 
     /// The logarithm of the determinant of their matrix. `None` if they have no solution.
     pub(super) fn log_determinant(&self) -> Option<f64> {
-        Some(BlockCholesky::factor(&self.columns)?.log_determinant())
+        Some(BlockCholesky::factor(&self.columns, &self.order.whole)?.log_determinant())
     }
 }
 
@@ -129,7 +132,7 @@ pub(super) struct Solution {
     pub(super) moves: Vec<Vector3<f64>>,
     /// By how much the moves lessen the sum of all squares, in variances.
     pub(super) explained: f64,
-    places: Arc<[usize]>,
+    order: Arc<Dissection>,
     factor: BlockCholesky,
 }
 
@@ -141,7 +144,7 @@ impl Solution {
 
     /// How uncertain the nodes are.
     pub(super) fn covariances(&self) -> Covariances<'_> {
-        Covariances { places: &self.places, inverse: self.factor.selected_inverse() }
+        Covariances { places: &self.order.places, inverse: self.factor.selected_inverse() }
     }
 }
 

@@ -24,7 +24,7 @@ pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefine
     if best <= 0.0 {
         let little =
             ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
-        let of_bends = Equations::of_bends(bodies, &last.of_bends.places, &little);
+        let of_bends = Equations::of_bends(bodies, &last.of_bends.order, &little);
         let mut equations = of_bends.clone();
         last.walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         best = best.max(log_ratio(&of_bends, &equations.solve()?)?);

@@ -3,7 +3,7 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::contacts::{Bent, Contacts, contacts};
-use super::dissection::dissected;
+use super::dissection::Dissection;
 use super::drift::{Drift, drift};
 use super::equations::{Equations, Solution, bend_cost};
 use super::evidence::gain;
@@ -89,8 +89,8 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
     for share in ROUNDS {
         let walls = find(&bends, share);
         // What is tied to what changes from round to round, and with it the order that leaves the factor sparse.
-        let places = places(bodies, &firsts, &walls);
-        let of_bends = Equations::of_bends(bodies, &places, parameters);
+        let order = Arc::new(order(bodies, &firsts, &walls));
+        let of_bends = Equations::of_bends(bodies, &order, parameters);
         let mut equations = of_bends.clone();
         walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         let solution = equations.solve()?;
@@ -125,8 +125,8 @@ fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     Some([low - margin, high + margin])
 }
 
-/// Where each node of all bodies stands in the order in which they are eliminated.
-fn places(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Arc<[usize]> {
+/// The order in which the nodes of all bodies are eliminated.
+fn order(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Dissection {
     let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
     let at: Vec<Point2> =
         bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
@@ -146,7 +146,5 @@ fn places(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Arc<[usi
         of_node.sort_unstable();
         of_node.dedup();
     }
-    let mut places = vec![0; at.len()];
-    dissected(&at, &neighbours).into_iter().enumerate().for_each(|(place, node)| places[node] = place);
-    places.into()
+    Dissection::new(&at, &neighbours)
 }

@@ -164,11 +164,16 @@ fn judge_one<'a>(
     let rival_of = |other: &Candidate<'_>| {
         Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)
     };
-    let found_too_by = all
-        .iter()
-        .filter(|other| other.alignment.accepted && other.alignment.source != alignment.source)
-        .find(|other| rival_of(other).is_none())
-        .map(|other| other.alignment.source.as_str());
+    let others = all.iter().filter(|other| other.alignment.accepted && other.alignment.source != alignment.source);
+    let found_too = others.filter(|other| rival_of(other).is_none());
+    let found_too_by = found_too.clone().next().map(|other| other.alignment.source.as_str());
+    // The best of a search that has not looked at tags, and tags that suffice without walls.
+    let is_best_of_search = |one: &Alignment| matches!(origin(one), Origin::Search { .. }) && one.rank == 0;
+    let found_by_tags_and_walls = |other: &Candidate<'_>| {
+        let pair = [*alignment, other.alignment];
+        pair.iter().any(|one| is_best_of_search(one)) && pair.iter().any(|one| one.source == "tags" && !one.provisional)
+    };
+    let found_by_tags_and_walls = found_too.clone().any(found_by_tags_and_walls);
     let by_evidence = |one: &Rival, other: &Rival| one.agreement.evidence.total_cmp(&other.agreement.evidence);
     // Where a bend is no excuse, the maps cannot lie at a place at which they contradict each other, however much of them meets
     // there, if there is one at which they do not.
@@ -195,6 +200,7 @@ fn judge_one<'a>(
     let odds = Odds::new(&Grounds {
         origin,
         found_too: found_too_by.is_some(),
+        found_by_tags_and_walls,
         is_expected,
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),

@@ -14,7 +14,9 @@
 //!   and contradict each other on as much; and where the maps share no more than a room, nearly all: rooms of other buildings
 //!   have the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent
 //!   onto the other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags
-//!   have not looked at walls, and ask for more of them.
+//!   have not looked at walls, and ask for more of them. Where enough tags and a search that has not looked at tags have come to
+//!   the same place, each by itself, it is one building and one floor, and two fifths are enough: what contradicts is a bend
+//!   that is too fine to be undone, or was moved.
 //!
 //! How unlikely a bend is counts against chance like evidence: bends and walls are measured in the same units.
 //!
@@ -58,8 +60,9 @@ const MUCH_WALL: (f64, f64) = (60.0, 80.0);
 /// The same where one map is bent onto the other: what was only bent agrees in nearly all then, and unrelated maps agree in
 /// little more than before.
 pub(super) const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
-/// The same where the user knows the place: it is one building, and what contradicts is a bend, or was moved.
-const AGREEMENT_OF_HALVES_WHERE_EXPECTED: f64 = 0.4;
+/// The same where the user knows the place, or tags and a search over all places tell the same: it is one building, and what
+/// contradicts is a bend, or was moved.
+const AGREEMENT_OF_HALVES_WHERE_KNOWN: f64 = 0.4;
 /// The same where the maps share the area of one room.
 const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
 /// The same for a place that tags tell.
@@ -103,6 +106,8 @@ pub struct Grounds {
     pub origin: Origin,
     /// Whether another source has found the same.
     pub found_too: bool,
+    /// Whether enough tags tell it, and a search over all places has come to the same first.
+    pub found_by_tags_and_walls: bool,
     /// Whether the user knows about where the maps lie, and it is there.
     pub is_expected: bool,
     /// The evidence of walls, see [`Agreement`](super::Agreement).
@@ -138,6 +143,7 @@ impl Odds {
         let Grounds {
             origin,
             found_too,
+            found_by_tags_and_walls,
             is_expected,
             evidence,
             wall_agreement,
@@ -153,7 +159,8 @@ impl Odds {
         let (from, most) = WORSE_AGREEMENT;
         let worse = (wall_agreement - agreement_elsewhere - from) / (most - from);
         let halves = match origin {
-            Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_EXPECTED,
+            _ if found_by_tags_and_walls => AGREEMENT_OF_HALVES_WHERE_KNOWN,
+            Origin::Search { .. } if is_expected => AGREEMENT_OF_HALVES_WHERE_KNOWN,
             Origin::Search { lead } => {
                 let share_of_room = 1.0 - share_of_way(overlap, ROOM);
                 let of_little =
@@ -199,6 +206,7 @@ mod tests {
     const GROUNDS: Grounds = Grounds {
         origin: Origin::Tags,
         found_too: false,
+        found_by_tags_and_walls: false,
         is_expected: false,
         evidence: 300.0,
         wall_agreement: 0.9,
@@ -255,6 +263,13 @@ mod tests {
         assert!(with(0.4, far_ahead) < 0.6 && with(0.46, far_ahead) > 0.999);
         assert!(with(0.46, Origin::Search { lead: 7.0 }) < 0.9);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
+        let by_both = |wall_agreement: f64, origin: Origin| {
+            let grounds = Grounds { origin, wall_agreement, found_too: true, found_by_tags_and_walls: true, ..GROUNDS };
+            Odds::new(&grounds).probability()
+        };
+        for origin in [Origin::Tags, Origin::Search { lead: 1.0 }] {
+            assert!(by_both(0.4, origin) < 0.6 && by_both(0.46, origin) > 0.999);
+        }
     }
 
     #[test]

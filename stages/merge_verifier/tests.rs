@@ -164,6 +164,27 @@ fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
     assert!(verdict.refusal.is_none() && verdict.candidate.alignment.source == "maps");
 }
 
+/// Furniture was moved all over the building, so that the maps contradict each other in much at their right place.
+#[test]
+fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_tell_the_same() {
+    let places = (0..10).flat_map(|x| [1.1, 2.6, 3.9, 8.2, 9.6, 11.0].map(|y| (0.9 + 1.9 * f64::from(x), y)));
+    let turned = |(x, y): (f64, f64)| ([x - 0.6, y, x + 0.6, y], [x, y - 0.6, x, y + 0.6]);
+    let (before, after): (Vec<_>, Vec<_>) = places.map(turned).unzip();
+    let a = FloorPlan::office().with(&before).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(3.0, 2.0, 0.4));
+    let b = FloorPlan::office().with(&after).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
+    let truth = a.transform_to(&b);
+    let tags = by_tags(&truth);
+    let verdict = judged(&a, &b, std::slice::from_ref(&tags));
+    assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
+    let maps = by_maps(&[truth, pose(4.0, 0.0, 0.0) * truth]);
+    let together = [&[tags.clone()], maps.as_slice()].concat();
+    assert_eq!(judged(&a, &b, &together).refusal, None);
+    let second = [&[tags.clone()], by_maps(&[pose(4.0, 0.0, 0.0) * truth, truth]).as_slice()].concat();
+    assert!(judged(&a, &b, &second).refusal.is_some(), "the search has come to another place first");
+    let few = Alignment { provisional: true, ..tags };
+    assert!(judged(&a, &b, &[&[few], maps.as_slice()].concat()).refusal.is_some(), "too few tags");
+}
+
 #[test]
 fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
     let plan = nearly_symmetric();

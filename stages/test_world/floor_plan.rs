@@ -48,6 +48,12 @@ impl FloorPlan {
         Self { walls: walls.iter().map(|[x1, y1, x2, y2]| (Point2::new(*x1, *y1), Point2::new(*x2, *y2))).collect() }
     }
 
+    /// The same with more walls.
+    pub(crate) fn with(mut self, walls: &[[f64; 4]]) -> Self {
+        self.walls.extend(Self::new(walls).walls);
+        self
+    }
+
     /// An office of 20 x 12 m: a corridor, rooms of all sizes with doors, and one slanted wall.
     pub(crate) fn office() -> Self {
         Self::new(&[
