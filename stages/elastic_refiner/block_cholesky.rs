@@ -1,46 +1,20 @@
-//! The Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and what is needed of its inverse.
-//!
-//! The factor is made column by column, each from those before it that reach it (left-looking; Davis, "Direct Methods for
-//! Sparse Linear Systems", 2006). Blocks of a fixed size take an index for nine numbers, and the processor keeps them in registers.
+//! The Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and what is needed of its inverse. Blocks of a fixed size take an index for nine numbers, and the processor keeps them in registers.
 
-use super::dissection::Part;
 use nalgebra::{Matrix3, Vector3};
-use std::ops::Range;
-
-/// The lower triangle of a symmetric matrix by its columns: the entries of each in any order, and several for one place, which are
-/// added up.
-pub(super) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
-
-/// No column.
-const NONE: usize = usize::MAX;
-/// Parts of fewer columns are made in one go.
-const LEAST_DIVIDED: usize = 200;
 
 /// The lower factor `L` of a matrix `L L^T`.
 #[derive(Clone, Debug)]
 pub(super) struct BlockCholesky {
     /// Where the blocks of each column begin.
-    starts: Vec<usize>,
+    pub(super) starts: Vec<usize>,
     /// The row of each block: in each column the diagonal comes first, and then those below.
-    rows: Vec<usize>,
-    blocks: Vec<Matrix3<f64>>,
+    pub(super) rows: Vec<usize>,
+    pub(super) blocks: Vec<Matrix3<f64>>,
     /// The inverse of each diagonal block.
-    inverses: Vec<Matrix3<f64>>,
+    pub(super) inverses: Vec<Matrix3<f64>>,
 }
 
 impl BlockCholesky {
-    /// Factors a matrix, whose columns are in an order of which `whole` tells what has nothing to do with each other. `None` if it
-    /// is not positive definite.
-    pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<Self> {
-        let (starts, rows) = pattern(columns);
-        let mut blocks = vec![Matrix3::zeros(); rows.len()];
-        let mut inverses = vec![Matrix3::zeros(); columns.len()];
-        let mut next = starts[..columns.len()].to_vec();
-        let made = MadeColumns { blocks: &mut blocks, inverses: &mut inverses, next: &mut next };
-        Factoring { columns, starts: &starts, rows: &rows }.factor(whole, made)?;
-        Some(Self { starts, rows, blocks, inverses })
-    }
-
     /// The blocks of a column below its diagonal, each with its row.
     fn below(&self, column: usize) -> impl Iterator<Item = (usize, &Matrix3<f64>)> {
         let places = self.starts[column] + 1..self.starts[column + 1];
@@ -109,132 +83,6 @@ impl BlockCholesky {
     }
 }
 
-/// A matrix that is being factored, and where its factor has blocks.
-struct Factoring<'a> {
-    columns: &'a Columns,
-    starts: &'a [usize],
-    rows: &'a [usize],
-}
-
-/// The columns of the factor that belong to a part.
-struct MadeColumns<'a> {
-    blocks: &'a mut [Matrix3<f64>],
-    inverses: &'a mut [Matrix3<f64>],
-    /// For each column that is made, its first block that lies in no row of a column that is made.
-    next: &'a mut [usize],
-}
-
-impl<'a> MadeColumns<'a> {
-    /// The first so many columns, which have so many blocks, and the others.
-    fn split(self, columns: usize, blocks: usize) -> [MadeColumns<'a>; 2] {
-        let (first_blocks, blocks) = self.blocks.split_at_mut(blocks);
-        let (first_inverses, inverses) = self.inverses.split_at_mut(columns);
-        let (first_next, next) = self.next.split_at_mut(columns);
-        [
-            MadeColumns { blocks: first_blocks, inverses: first_inverses, next: first_next },
-            MadeColumns { blocks, inverses, next },
-        ]
-    }
-
-    fn borrowed(&mut self) -> MadeColumns<'_> {
-        MadeColumns { blocks: self.blocks, inverses: self.inverses, next: self.next }
-    }
-}
-
-impl Factoring<'_> {
-    /// Makes the columns of a part: those of its sides at once, as none reaches a column of the other side, and then those that
-    /// separate them. In which order parts are added up does not depend on which side is done first.
-    fn factor(&self, part: &Part, mut made: MadeColumns<'_>) -> Option<()> {
-        let mut own = part.places.clone();
-        if let Some(sides) = part.sides.as_deref().filter(|_| own.len() > LEAST_DIVIDED) {
-            let [low, high] = sides;
-            let blocks_of = |side: &Part| self.starts[side.places.end] - self.starts[side.places.start];
-            let [of_low, others] = made.borrowed().split(low.places.len(), blocks_of(low));
-            let [of_high, _] = others.split(high.places.len(), blocks_of(high));
-            let (low_made, high_made) = rayon::join(|| self.factor(low, of_low), || self.factor(high, of_high));
-            low_made.and(high_made)?;
-            own.start = high.places.end;
-        }
-        self.factor_own(part.places.start, own, made)
-    }
-
-    /// Makes the columns `own` of a part that begins with the column `first`. Those before them are made.
-    fn factor_own(&self, first: usize, own: Range<usize>, made: MadeColumns<'_>) -> Option<()> {
-        let MadeColumns { blocks, inverses, next } = made;
-        let begin = self.starts[first];
-        // For each own column those before it whose next block lies in its row.
-        let mut reaching: Vec<Vec<usize>> = vec![Vec::new(); own.len()];
-        let reach = |reaching: &mut Vec<Vec<usize>>, column: usize, next: usize| {
-            if next < self.starts[column + 1] && own.contains(&self.rows[next]) {
-                reaching[self.rows[next] - own.start].push(column);
-            }
-        };
-        (first..own.start).for_each(|column| reach(&mut reaching, column, next[column - first]));
-        // By row, from the first own one.
-        let mut work = vec![Matrix3::zeros(); self.columns.len() - own.start];
-        for column in own.clone() {
-            for (row, block) in &self.columns[column] {
-                work[*row - own.start] += block;
-            }
-            for before in std::mem::take(&mut reaching[column - own.start]) {
-                let places = next[before - first]..self.starts[before + 1];
-                let of_before = &blocks[places.start - begin..places.end - begin];
-                let by = of_before[0].transpose();
-                for (row, block) in self.rows[places].iter().zip(of_before) {
-                    work[*row - own.start] -= block * by;
-                }
-                next[before - first] += 1;
-                reach(&mut reaching, before, next[before - first]);
-            }
-            let places = self.starts[column]..self.starts[column + 1];
-            let diagonal = work[column - own.start].cholesky()?.l();
-            let inverse = diagonal.try_inverse()?;
-            blocks[places.start - begin] = diagonal;
-            work[column - own.start] = Matrix3::zeros();
-            let by = inverse.transpose();
-            for place in places.start + 1..places.end {
-                let work = &mut work[self.rows[place] - own.start];
-                blocks[place - begin] = *work * by;
-                *work = Matrix3::zeros();
-            }
-            inverses[column - first] = inverse;
-            next[column - first] = places.start + 1;
-            reach(&mut reaching, column, places.start + 1);
-        }
-        Some(())
-    }
-}
-
-/// Where the columns of the factor begin, and the rows of their blocks: a column has those of the matrix, and those of the columns
-/// whose first block below the diagonal lies in its row (Liu 1990, "The role of elimination trees in sparse factorization").
-fn pattern(columns: &Columns) -> (Vec<usize>, Vec<usize>) {
-    let mut starts = vec![0];
-    let mut rows: Vec<usize> = Vec::new();
-    let mut children: Vec<Vec<usize>> = vec![Vec::new(); columns.len()];
-    let mut seen_in = vec![NONE; columns.len()];
-    let mut of_column = Vec::new();
-    for (column, entries) in columns.iter().enumerate() {
-        of_column.clear();
-        seen_in[column] = column;
-        let own = entries.iter().map(|(row, _)| row);
-        let of_children = children[column].iter().flat_map(|&child| &rows[starts[child]..starts[child + 1]]);
-        for &row in own.chain(of_children).filter(|row| **row > column) {
-            if seen_in[row] != column {
-                seen_in[row] = column;
-                of_column.push(row);
-            }
-        }
-        of_column.sort_unstable();
-        if let Some(&parent) = of_column.first() {
-            children[parent].push(column);
-        }
-        rows.push(column);
-        rows.extend(&of_column);
-        starts.push(rows.len());
-    }
-    (starts, rows)
-}
-
 /// Some blocks of the inverse of a matrix: those where its factor has any.
 #[derive(Clone, Debug)]
 pub(super) struct SelectedInverse<'a> {
@@ -256,9 +104,9 @@ impl SelectedInverse<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dissection::Dissection;
+    use super::super::dissection::Part;
+    use super::super::factoring::{Columns, factor};
     use super::*;
-    use crate::geometry::Point2;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
@@ -287,7 +135,7 @@ mod tests {
             holes in 0..100_usize,
         ) {
             let (columns, dense) = matrix(&seed, holes);
-            let factor = BlockCholesky::factor(&columns, &Part::undivided(0..BLOCKS)).unwrap();
+            let factor = factor(&columns, &Part::undivided(0..BLOCKS)).unwrap();
             let inverse = dense.clone().try_inverse().unwrap();
             prop_assert!((factor.log_determinant() - dense.determinant().ln()).abs() < 1e-9);
             let right = DVector::from_fn(3 * BLOCKS, |row, _| seed[row]);
@@ -305,45 +153,6 @@ mod tests {
                     prop_assert!((selected.at(column, row) - expected.transpose()).norm() < 1e-9);
                 }
             }
-        }
-    }
-
-    #[test]
-    fn sides_that_are_made_at_once_give_the_same_factor() {
-        const WIDTH: usize = 36;
-        let at: Vec<Point2> =
-            (0..18 * WIDTH).map(|node| Point2::new((node % WIDTH) as f64, (node / WIDTH) as f64)).collect();
-        let near = |node: usize| {
-            let at = &at;
-            (0..at.len()).filter(move |&other| other != node && (at[node] - at[other]).norm() < 1.5)
-        };
-        let neighbours: Vec<Vec<usize>> = (0..at.len()).map(|node| near(node).collect()).collect();
-        let Dissection { places, whole } = Dissection::new(&at, &neighbours);
-        assert!(whole.sides.is_some() && at.len() > 2 * LEAST_DIVIDED);
-        let mut columns: Columns = vec![Vec::new(); at.len()];
-        for (node, neighbours) in neighbours.iter().enumerate() {
-            columns[places[node]].push((places[node], 9.0 * Matrix3::identity()));
-            let later = neighbours.iter().filter(|&&other| places[other] > places[node]);
-            let block = |other: usize| {
-                Matrix3::from_fn(|row, column| 0.2 * ((node + 2 * other + row + 3 * column) as f64).sin())
-            };
-            columns[places[node]].extend(later.map(|&other| (places[other], block(other))));
-        }
-        let parted = BlockCholesky::factor(&columns, &whole).unwrap();
-        let at_once = BlockCholesky::factor(&columns, &Part::undivided(0..at.len())).unwrap();
-        let pairs = parted.blocks.iter().zip(&at_once.blocks);
-        assert!(pairs.map(|(one, other)| (one - other).norm()).all(|difference| difference < 1e-12));
-        let again = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let again = again.install(|| BlockCholesky::factor(&columns, &whole)).unwrap();
-        assert_eq!(again.blocks, parted.blocks, "to the bit, on any number of cores");
-    }
-
-    #[test]
-    fn a_matrix_that_is_not_positive_definite_has_no_factor() {
-        for bad in [-1.0, 0.0, f64::NAN] {
-            let columns =
-                vec![vec![(0, Matrix3::identity()), (1, Matrix3::zeros())], vec![(1, bad * Matrix3::identity())]];
-            assert!(BlockCholesky::factor(&columns, &Part::undivided(0..2)).is_none(), "{bad}");
         }
     }
 }

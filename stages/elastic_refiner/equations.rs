@@ -1,9 +1,10 @@
 //! The normal equations of all nodes of all maps, and their solution.
 
 use super::ElasticRefinerParameters;
-use super::block_cholesky::{BlockCholesky, Columns, SelectedInverse};
+use super::block_cholesky::{BlockCholesky, SelectedInverse};
 use super::body::Body;
 use super::dissection::Dissection;
+use super::factoring::{Columns, factor};
 use crate::deformation::Deformation;
 use crate::geometry::Point2;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -80,7 +81,7 @@ impl Equations {
 
     /// Solves them. `None` if they have no solution.
     pub(super) fn solve(&self) -> Option<Solution> {
-        let factor = BlockCholesky::factor(&self.columns, &self.order.whole)?;
+        let factor = factor(&self.columns, &self.order.whole)?;
         let solved = factor.solve(&self.vector);
         let moves = self.order.places.iter().map(|&place| solved[place]).collect();
         let explained = self.vector.iter().zip(&solved).map(|(part, by)| part.dot(by)).sum();
@@ -89,7 +90,7 @@ impl Equations {
 
     /// The logarithm of the determinant of their matrix. `None` if they have no solution.
     pub(super) fn log_determinant(&self) -> Option<f64> {
-        Some(BlockCholesky::factor(&self.columns, &self.order.whole)?.log_determinant())
+        Some(factor(&self.columns, &self.order.whole)?.log_determinant())
     }
 }
 

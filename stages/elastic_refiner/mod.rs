@@ -25,6 +25,7 @@ mod dissection;
 mod drift;
 mod equations;
 mod evidence;
+mod factoring;
 mod parameters;
 mod refine;
 mod sharpness;

@@ -177,9 +177,9 @@ fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_te
     let verdict = judged(&a, &b, std::slice::from_ref(&tags));
     assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
     let maps = by_maps(&[truth, pose(4.0, 0.0, 0.0) * truth]);
-    let together = [&[tags.clone()], maps.as_slice()].concat();
+    let together = [std::slice::from_ref(&tags), &maps].concat();
     assert_eq!(judged(&a, &b, &together).refusal, None);
-    let second = [&[tags.clone()], by_maps(&[pose(4.0, 0.0, 0.0) * truth, truth]).as_slice()].concat();
+    let second = [std::slice::from_ref(&tags), &by_maps(&[pose(4.0, 0.0, 0.0) * truth, truth])].concat();
     assert!(judged(&a, &b, &second).refusal.is_some(), "the search has come to another place first");
     let few = Alignment { provisional: true, ..tags };
     assert!(judged(&a, &b, &[&[few], maps.as_slice()].concat()).refusal.is_some(), "too few tags");

@@ -174,6 +174,7 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         "deg from it, median",
         "95 %",
         "within the covariance's 95 % of it",
+        "wrong by the common places",
     ];
     let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
     let mut data = Table::new([
@@ -185,6 +186,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         "normalised error squared",
         "m from the best rigid frame",
         "deg from it",
+        "m apart at common places, median",
+        "90 %",
         "reason",
     ]);
     let mut shares: [Vec<(f64, f64)>; 3] = Default::default();
@@ -219,6 +222,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         let degrees_from_best: Vec<f64> = from_best.iter().map(|best| best.degrees).collect();
         let of_best: Vec<f64> = from_best.iter().filter_map(|best| best.normalised_error_squared).collect();
         let within_best = of_best.iter().filter(|error| **error < NORMALISED_95).count();
+        let wrong_by_places =
+            trials.iter().filter(|trial| trial.common.as_ref().is_some_and(is_wrong_by_places)).count();
         let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
         table.row(
             [format!("{value}")]
@@ -232,12 +237,13 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
                 .chain(common.map(number))
                 .chain([wrong_by_best.count().to_string()])
                 .chain([median(&degrees_from_best), quantile(&degrees_from_best, 0.95)].map(number))
-                .chain([format!("{within_best} of {}", of_best.len())]),
+                .chain([format!("{within_best} of {}", of_best.len()), wrong_by_places.to_string()]),
         );
         for trial in trials {
             let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
             let Trial { seed, outcome, error_m, error_deg, normalised, reason, common } = trial;
             let from_best = common.and_then(|common| common.from_best);
+            let rigid = common.map(|common| common.rigid);
             let words = outcome.words().to_owned();
             data.row([
                 value.to_string(),
@@ -248,6 +254,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
                 number(normalised),
                 number(from_best.map(|best| best.metres)),
                 number(from_best.map(|best| best.degrees)),
+                number(rigid.map(|rigid| rigid.median_m)),
+                number(rigid.map(|rigid| rigid.p90_m)),
                 reason,
             ]);
         }
@@ -263,6 +271,15 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         shape: Shape::Lines(series.map(|((name, share), band)| Series::new(name, share).with_band(band)).collect()),
     };
     results.plot(&name, &plot)
+}
+
+/// Whether places that both robots have driven through lie farther apart by the rigid frames than they must: by half a metre in the
+/// median, or by a metre at 90 %.
+fn is_wrong_by_places(common: &CommonPlaces) -> bool {
+    let best = common.from_best.map(|best| best.best);
+    let beyond = |found: f64, best: Option<f64>, most: f64| found >= most + best.unwrap_or_default();
+    beyond(common.rigid.median_m, best.map(|best| best.median_m), RIGHT_METRES)
+        || beyond(common.rigid.p90_m, best.map(|best| best.p90_m), 2.0 * RIGHT_METRES)
 }
 
 fn trials(sweep: &Sweep, value: f64, args: &NoiseArgs, registry: &Registry) -> Result<Vec<Trial>> {
