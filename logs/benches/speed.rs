@@ -4,7 +4,8 @@
 //!
 //! - Reading: the messages by log time as stages are given them, against a bare walk over the records with the same checksums
 //!   (`mcap::sans_io::LinearReader`), and against `mcap::MessageStream`. All three read the file.
-//! - Writing: `LogWriter`, against the bare `mcap::Writer` with the same chunks, compression and checksums, both where no file lies;
+//! - Writing: `LogWriter`, against the bare `mcap::Writer` with the same chunks, compression and checksums, both where no file
+//!   lies;
 //!   and `LogWriter` where one does, which it replaces only once the new one is on the disk.
 //! - `info`: what `gridweave info` does with a file of 2 GB that has an index.
 //!

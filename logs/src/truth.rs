@@ -46,8 +46,8 @@ impl TruthSink {
     }
 }
 
-/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note`, `centres` (robot to x, y) and `common` (x and y in the
-/// second robot's map, and in the first's).
+/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note`, `centres` (robot to x, y) and `common` (x and y in
+/// the second robot's map, and in the first's).
 fn to_json(truth: &SimulationTruth) -> Value {
     fn object<T>(entries: &[T], entry: impl Fn(&T) -> (&String, Value)) -> Value {
         entries.iter().map(entry).map(|(name, value)| (name.clone(), value)).collect::<Map<_, _>>().into()

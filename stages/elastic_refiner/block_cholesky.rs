@@ -1,4 +1,5 @@
-//! The Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and what is needed of its inverse. Blocks of a fixed size take an index for nine numbers, and the processor keeps them in registers.
+//! The Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and what is needed of its inverse. Blocks of a fixed size
+//! take an index for nine numbers, and the processor keeps them in registers.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 
 /// Points of the walls of a map that are looked up in another, at most.
 const MOST_POINTS: usize = 12_000;
-/// Metres of wall between two points that are looked up, at the least; and as a share of the reach, as what is looked for far away
-/// need not be known to a hand's breadth. Both are below the length of wall that counts as one measurement.
+/// Metres of wall between two points that are looked up, at the least; and as a share of the reach, as what is looked for far
+/// away need not be known to a hand's breadth. Both are below the length of wall that counts as one measurement.
 const LEAST_SPACING: f64 = 0.25;
 const SPACING_BY_REACH: f64 = 0.25;
 
@@ -86,8 +86,8 @@ pub(super) struct Apart {
     pub(super) bent: f64,
 }
 
-/// The walls of map b that lie within `reach` of walls of map a, as they are bent: the length that each stands for, metres, and how
-/// far apart they lie.
+/// The walls of map b that lie within `reach` of walls of map a, as they are bent: the length that each stands for, metres, and
+/// how far apart they lie.
 pub(super) fn apart<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
     let (length, found) = find_all(a, b, reach);
     (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), bent: contact.residual.abs() }))

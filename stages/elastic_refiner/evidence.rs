@@ -13,8 +13,8 @@ const LITTLE: f64 = 0.25;
 /// of the evidence of two linear models (MacKay 1992, "Bayesian interpolation"), the maps being allowed to bend as far as
 /// `parameters` say, or a little, whichever is likelier. Above 0 the bend gains more than it costs. `None` if there is no number.
 ///
-/// What walls say is what they said in the last round. They are taken to be as wrong as one cell in every half metre: as the cells
-/// of a map round all of a wall alike, maps that are not bent must not seem so for it.
+/// What walls say is what they said in the last round. They are taken to be as wrong as one cell in every half metre: as the
+/// cells of a map round all of a wall alike, maps that are not bent must not seem so for it.
 pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefinerParameters) -> Option<f64> {
     let log_ratio = |of_bends: &Equations, solution: &Solution| {
         Some(0.5 * (of_bends.log_determinant()? - solution.log_determinant() + solution.explained))

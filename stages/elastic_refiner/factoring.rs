@@ -1,8 +1,8 @@
 //! How a sparse symmetric matrix of blocks of 3 x 3 is factored.
 //!
 //! The factor is made column by column, each from those before it that reach it (left-looking; Davis, "Direct Methods for
-//! Sparse Linear Systems", 2006). What a dissection has told apart is made at once, on as many cores as there are; what is added up is
-//! added in one order all the same.
+//! Sparse Linear Systems", 2006). What a dissection has told apart is made at once, on as many cores as there are; what is added
+//! up is added in one order all the same.
 
 use super::block_cholesky::BlockCholesky;
 use super::dissection::Part;
@@ -10,8 +10,8 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The lower triangle of a symmetric matrix by its columns: the entries of each in any order, and several for one place, which are
-/// added up.
+/// The lower triangle of a symmetric matrix by its columns: the entries of each in any order, and several for one place, which
+/// are added up.
 pub(super) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
 
 /// No column.
@@ -21,8 +21,8 @@ const LEAST_DIVIDED: usize = 200;
 /// So many columns at least are made by one thread.
 const LEAST_TOGETHER: usize = 8;
 
-/// Factors a matrix, whose columns are in an order of which `whole` tells what has nothing to do with each other. `None` if it is not
-/// positive definite.
+/// Factors a matrix, whose columns are in an order of which `whole` tells what has nothing to do with each other. `None` if it is
+/// not positive definite.
 pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<BlockCholesky> {
     let (starts, rows) = pattern(columns);
     let mut blocks = vec![Matrix3::zeros(); rows.len()];
@@ -121,8 +121,8 @@ impl Factoring<'_> {
         Some(())
     }
 
-    /// Writes to the own columns those of the matrix, less what the columns take off that are made. As these are done, each own column
-    /// is by itself.
+    /// Writes to the own columns those of the matrix, less what the columns take off that are made. As these are done, each own
+    /// column is by itself.
     fn take_off_made(
         &self,
         first: usize,
@@ -177,8 +177,9 @@ impl Factoring<'_> {
     }
 }
 
-/// Where the columns of the factor begin, and the rows of their blocks: a column has those of the matrix, and those of the columns
-/// whose first block below the diagonal lies in its row (Liu 1990, "The role of elimination trees in sparse factorization").
+/// Where the columns of the factor begin, and the rows of their blocks: a column has those of the matrix, and those of the
+/// columns whose first block below the diagonal lies in its row (Liu 1990, "The role of elimination trees in sparse
+/// factorization").
 fn pattern(columns: &Columns) -> (Vec<usize>, Vec<usize>) {
     let mut starts = vec![0];
     let mut rows: Vec<usize> = Vec::new();

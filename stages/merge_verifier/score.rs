@@ -9,7 +9,8 @@
 //!   do not depend on each other counts against it.
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
-//!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one leads all
+//!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
+//!   leads all
 //!   others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree on much
 //!   and contradict each other on as much; and where the maps share no more than a room, nearly all: rooms of other buildings
 //!   have the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent

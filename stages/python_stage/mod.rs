@@ -1,8 +1,8 @@
 //! `python`: a stage that is written in Python.
 //!
-//! The package `gridweave` in [`stages/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe MODULE`, it
-//! says what the stage takes and gives, and `python -m gridweave.run MODULE FOLDER` is its program. What goes on between the two
-//! is that of every [`program`].
+//! The package `gridweave` in [`stages/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe
+//! MODULE`, it says what the stage takes and gives, and `python -m gridweave.run MODULE FOLDER` is its program. What goes on
+//! between the two is that of every [`program`].
 
 mod describe;
 
@@ -30,8 +30,8 @@ impl Parameters for PythonParameters {}
 /// Those of a parameter's name that every stage in Python has.
 const OWN: [&str; 2] = ["module", "interface"];
 
-/// The variable of the environment that names the interpreter, where it is not the `python3` of PATH. A pipeline file cannot: it may
-/// come from anywhere.
+/// The variable of the environment that names the interpreter, where it is not the `python3` of PATH. A pipeline file cannot: it
+/// may come from anywhere.
 const INTERPRETER: &str = "GRIDWEAVE_PYTHON";
 
 /// `python`: what the module that it names says.

@@ -2,8 +2,8 @@
 //!
 //! After Tsardoulias et al., sections 4.1.2 to 4.2. Walls stand at right angles, so the directions of two maps give
 //! their rotation up to quarter turns, and more precisely than tags do; the tags tell the quarter turn and the
-//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags. Tags that do not suffice by
-//! themselves, such as two, are refused there.
+//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags. Tags that do not
+//! suffice by themselves, such as two, are refused there.
 //!
 //! Not for buildings without right angles: there every rotation comes from the tags.
 

@@ -1,10 +1,11 @@
 //! Draws the maps of robots from the scans of their lidars: for robots that are localised, or have odometry, and whose
 //! maps nobody logs or sends.
 //!
-//! A cell's occupancy is kept in log-odds (Moravec and Elfes 1985; Thrun, Burgard and Fox, "Probabilistic Robotics", table 9.1): a
-//! beam makes free what it passes, and occupied where it ends. What a scan sees is laid where the robot was:
+//! A cell's occupancy is kept in log-odds (Moravec and Elfes 1985; Thrun, Burgard and Fox, "Probabilistic Robotics", table 9.1):
+//! a beam makes free what it passes, and occupied where it ends. What a scan sees is laid where the robot was:
 //!
-//! - **with poses in the map** (of a localizer or a SLAM), every beam from where the lidar was when it was sent, between the poses
+//! - **with poses in the map** (of a localizer or a SLAM), every beam from where the lidar was when it was sent, between the
+//!   poses
 //!   before and after it: a robot that turns at 1 radian a second turns by 6 degrees during a scan of 0.1 seconds;
 //! - **with odometry alone**, scans are matched with the map so far first, one for each step of the drive: odometry says about
 //!   where, and [ICP](crate::icp_refiner) from several rotations says exactly where. Nothing closes loops: the map drifts, and is

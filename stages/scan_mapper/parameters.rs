@@ -25,7 +25,8 @@ pub struct ScanMapperParameters {
     /// No cell is held to be occupied with a smaller probability than this.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
-    /// What a beam has met farther away is not drawn, metres; the beam shows free space so far. The lidar's own limit counts as well.
+    /// What a beam has met farther away is not drawn, metres; the beam shows free space so far. The lidar's own limit counts as
+    /// well.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1000))]
     pub max_range: f64,
     /// A beam that has met nothing within the lidar's limit shows free space so far, metres. 0 leaves such beams out: many lidars

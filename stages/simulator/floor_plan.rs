@@ -83,7 +83,8 @@ struct Row {
 }
 
 impl FloorPlan {
-    /// A random building. The limits of [`SimulatorParameters`](super::SimulatorParameters) leave every room about 1.5 m wide and deep, or more.
+    /// A random building. The limits of [`SimulatorParameters`](super::SimulatorParameters) leave every room about 1.5 m wide and
+    /// deep, or more.
     pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
         let BuildingSize { width, height, room_depth, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);

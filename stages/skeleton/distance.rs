@@ -70,8 +70,8 @@ fn distances_along_columns(cells: &[u8], stride: usize) -> Vec<u16> {
 }
 
 /// Squared distances along columns of one row, as they are read while distances along the row are found: with as many cells that
-/// are not free before the row and behind it as the row has, and [`CHUNK`] more behind it. Beyond the cells that bound a stretch of
-/// free ones, nothing is nearer than they.
+/// are not free before the row and behind it as the row has, and [`CHUNK`] more behind it. Beyond the cells that bound a stretch
+/// of free ones, nothing is nearer than they.
 #[derive(Default)]
 struct Squares {
     /// Cut at [`i16::MAX`]: twice as many are looked at together as of `wide`.

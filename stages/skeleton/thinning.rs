@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 /// Cells are taken away in the order of their distances in steps of this part of a cell.
 const STEPS_PER_CELL: f32 = 4.0;
-/// A cell from which the distance grows by less than this from centre to centre, to each of its neighbours, lies on a ridge. Towards
-/// a square corner a ridge falls by 0.71, in a corridor of even width by 0, and on a slope there is a neighbour beyond whose
-/// distance is greater by 0.92 or more.
+/// A cell from which the distance grows by less than this from centre to centre, to each of its neighbours, lies on a ridge.
+/// Towards a square corner a ridge falls by 0.71, in a corridor of even width by 0, and on a slope there is a neighbour beyond
+/// whose distance is greater by 0.92 or more.
 const RIDGE_SLOPE: f32 = 0.55;
 
 /// Rows that are sorted together.
@@ -81,8 +81,8 @@ const NARROW: u32 = 0;
 const RIDGE: u32 = 1;
 
 impl Band {
-    /// Sorts the cells of the rows from `number * BAND` on that have a clearance of `least`, and marks them in `cells`. The memory of
-    /// `kinds` is used again.
+    /// Sorts the cells of the rows from `number * BAND` on that have a clearance of `least`, and marks them in `cells`. The
+    /// memory of `kinds` is used again.
     fn of(distances: &DistanceMap, least: f32, number: usize, cells: &mut [u8], kinds: &mut Vec<u32>) -> Self {
         let (stride, all) = (distances.window.stride, &distances.distances);
         kinds.clear();

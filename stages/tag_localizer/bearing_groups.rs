@@ -22,9 +22,9 @@ pub struct Bearing {
 
 /// The bearings of one tag, those of one place joined to their mean.
 ///
-/// As with [`ReadingGroups`](super::ReadingGroups), what the readings of one place have in common does not average out: the errors
-/// of the pose and of the heading. A bearing that contradicts the others of its place makes a group of its own, which keeps an outlier
-/// from spoiling a mean.
+/// As with [`ReadingGroups`](super::ReadingGroups), what the readings of one place have in common does not average out: the
+/// errors of the pose and of the heading. A bearing that contradicts the others of its place makes a group of its own, which
+/// keeps an outlier from spoiling a mean.
 #[derive(Clone, Debug, Default)]
 pub struct BearingGroups {
     groups: Vec<Group>,
@@ -33,8 +33,8 @@ pub struct BearingGroups {
     bearings: u32,
 }
 
-/// Weighted sums over bearings. Positions and directions are taken from the first one, so that sums lose nothing far from the origin,
-/// and none goes the long way round.
+/// Weighted sums over bearings. Positions and directions are taken from the first one, so that sums lose nothing far from the
+/// origin, and none goes the long way round.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     anchor: Point2,
@@ -86,8 +86,8 @@ impl BearingGroups {
 
     /// One ray a group: variance of the mean direction with that of the heading, and the variance of the place.
     ///
-    /// `pose_stddev`, metres, and `heading_stddev`, radians, are the least that the pose and its heading count with. The pose counts
-    /// with its largest variance, whatever the direction, as in [`ReadingGroups::rings`](super::ReadingGroups::rings).
+    /// `pose_stddev`, metres, and `heading_stddev`, radians, are the least that the pose and its heading count with. The pose
+    /// counts with its largest variance, whatever the direction, as in [`ReadingGroups::rings`](super::ReadingGroups::rings).
     pub fn rays(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ray> + '_ {
         self.groups.iter().map(move |group| Ray {
             origin: group.anchor + group.offset / group.weight,

@@ -20,8 +20,8 @@ const LEAST_ABSENCE: f64 = 1.0;
 const LEAST_SIGHTING_STDDEV: f64 = 0.01;
 /// No camera sees a tag farther off, metres.
 const FARTHEST: f64 = 1000.0;
-/// A tag of which nothing but bearings is known is looked for first on a grid that is so many times as wide: they do not say how far
-/// off it is.
+/// A tag of which nothing but bearings is known is looked for first on a grid that is so many times as wide: they do not say how
+/// far off it is.
 const WIDER: f64 = 4.0;
 
 /// Localizes all tags of one robot as its poses and readings come in.
@@ -53,8 +53,8 @@ enum Says {
     Range(f64),
     /// Where it is from the robot: metres ahead, and to the left.
     Place(Vector2<f64>),
-    /// In which direction it is, radians from straight ahead of the robot, with its standard deviation, seen from the sensor: metres
-    /// ahead of the robot, and to its left.
+    /// In which direction it is, radians from straight ahead of the robot, with its standard deviation, seen from the sensor:
+    /// metres ahead of the robot, and to its left.
     Bearing { sensor: Vector2<f64>, bearing: f64, stddev: f64 },
 }
 
@@ -169,8 +169,8 @@ impl TagLocalizer {
         self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Place(place), stddev })
     }
 
-    /// Adds in which direction a tag is: radians, counterclockwise from straight ahead of the robot, with its standard deviation (0
-    /// or no number if it is not known). `sensor` is where the sensor is, metres ahead of the robot, and to its left.
+    /// Adds in which direction a tag is: radians, counterclockwise from straight ahead of the robot, with its standard deviation
+    /// (0 or no number if it is not known). `sensor` is where the sensor is, metres ahead of the robot, and to its left.
     pub fn add_bearing(
         &mut self,
         time: LogTime,

@@ -22,9 +22,9 @@ pub struct Ray {
 
 /// The product of rays, each mixed with a share of outliers.
 ///
-/// An error of the sensor's place turns the direction to a tag the more, the nearer the tag is: at distance d the direction has the
-/// variance `v(d) = variance + origin_variance / d^2`. A ray is the density of its direction, relative to the highest that it can have:
-/// `sqrt(variance / v(d)) exp(-error^2 / (2 v(d)))`.
+/// An error of the sensor's place turns the direction to a tag the more, the nearer the tag is: at distance d the direction has
+/// the variance `v(d) = variance + origin_variance / d^2`. A ray is the density of its direction, relative to the highest that it
+/// can have: `sqrt(variance / v(d)) exp(-error^2 / (2 v(d)))`.
 #[derive(Clone, Debug)]
 pub struct RayProduct {
     rays: Vec<(Ray, Vector2<f64>)>,
@@ -32,7 +32,8 @@ pub struct RayProduct {
 }
 
 impl RayProduct {
-    /// The product of `rays`. `outlier_share` of the bearings have any direction with the same probability; 0 is the pure product.
+    /// The product of `rays`. `outlier_share` of the bearings have any direction with the same probability; 0 is the pure
+    /// product.
     pub fn new(rays: impl Iterator<Item = Ray>, outlier_share: f64) -> Self {
         let with_direction = |ray: Ray| (ray, Vector2::new(ray.bearing.cos(), ray.bearing.sin()));
         Self { rays: rays.map(with_direction).collect(), outlier_share }

@@ -19,9 +19,9 @@ pub struct Exhaustive {
     pub places: Vec<Place>,
 }
 
-/// Turns map b by steps from 0 to 360 degrees, both of them tried, and at each turn lays every node of it on every node of map a; the
-/// places at which the most pairs of paths coincide (equation 2). Steps of 2 degrees are 181 turns; 4 and 7 nodes are then 5068
-/// trials.
+/// Turns map b by steps from 0 to 360 degrees, both of them tried, and at each turn lays every node of it on every node of map a;
+/// the places at which the most pairs of paths coincide (equation 2). Steps of 2 degrees are 181 turns; 4 and 7 nodes are then
+/// 5068 trials.
 ///
 /// Paths that could coincide at a turn, wherever the maps lie, are few. They are found first, and counted at each trial.
 pub fn exhaustive(a: &Topology, b: &Topology, parameters: &TopologyMatcherParameters) -> Exhaustive {

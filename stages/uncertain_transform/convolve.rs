@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 /// Cells along the side of a tile, which has one covariance.
 pub const TILE: usize = 8;
-/// Where the least standard deviation is as many cells, the kernel is laid on cells twice as wide: it is as smooth there as a kernel of
-/// half as many is on the cells themselves.
+/// Where the least standard deviation is as many cells, the kernel is laid on cells twice as wide: it is as smooth there as a
+/// kernel of half as many is on the cells themselves.
 const WIDE: f64 = 4.0;
 
 /// Convolves a map in log-odds, on cells of `geometry` in the world, with the kernel of each tile (algorithm 1, step 6).

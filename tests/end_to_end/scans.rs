@@ -70,8 +70,8 @@ fn scans_of_robots_of_which_nothing_says_where_they_were_give_no_map() {
     merge(folder).assert(1, &["nothing says where it was"]);
 }
 
-/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted askew. The
-/// odometry is in tf alone if `in_tf`.
+/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted
+/// askew. The odometry is in tf alone if `in_tf`.
 fn with_odometry(log: &Path, to: &Path, in_tf: bool) {
     const ASKEW: f64 = 0.3;
     let bytes = std::fs::read(log).unwrap();

@@ -1,5 +1,5 @@
-//! Tags as robots log them: ranges in messages of other types, signal strengths, tags that a camera sees, and logs of tags without
-//! maps.
+//! Tags as robots log them: ranges in messages of other types, signal strengths, tags that a camera sees, and logs of tags
+//! without maps.
 
 use crate::support::{Ended, LogBuilder, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};
@@ -30,8 +30,8 @@ impl World {
         Self { folder, log, truth }
     }
 
-    /// Writes the log again as `in.mcap`, without maps unless `maps`, and with `write` in place of the readings of tags: it is given
-    /// the time in seconds, the robot, its last pose, and the reading.
+    /// Writes the log again as `in.mcap`, without maps unless `maps`, and with `write` in place of the readings of tags: it is
+    /// given the time in seconds, the robot, its last pose, and the reading.
     fn write(&self, maps: bool, mut write: impl FnMut(&mut LogBuilder, f64, &str, Isometry2<f64>, TagRange)) {
         let mut out = LogBuilder::new(&self.folder.path().join("in.mcap"));
         let mut reader = LogReader::new(vec![LogFile::open(&self.log).unwrap()]);
@@ -195,8 +195,8 @@ fn tags_that_a_camera_sees_merge_maps() {
     world.run(&["info", "out.mcap"]).assert(0, &["/robot1/log/positions", "gridweave_msgs/msg/TagPosition"]);
 }
 
-/// Two robots that drive round a place of this size, in metres, from two sides, with odometry that drifts. Gives where the frame of
-/// robot2 lies in that of robot1 by the merge, and by the truth.
+/// Two robots that drive round a place of this size, in metres, from two sides, with odometry that drifts. Gives where the frame
+/// of robot2 lies in that of robot1 by the merge, and by the truth.
 fn merged_drives(
     [width, height]: [f64; 2],
     drift: f64,

@@ -40,9 +40,9 @@ impl Recoder {
         self.schema.types.iter().any(|of| of.name == HEADER)
     }
 
-    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames, and the stamps of headers later by so many
-    /// nanoseconds (earlier where these are negative). `false`, and nothing is appended, if it keeps them all. A stamp of zero
-    /// stands for no time, and stays.
+    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames, and the stamps of headers later by so
+    /// many nanoseconds (earlier where these are negative). `false`, and nothing is appended, if it keeps them all. A stamp of
+    /// zero stands for no time, and stays.
     ///
     /// # Errors
     /// The message does not fit its schema. What was appended by then is taken back.

@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What was sent last on the latched channels.
 ///
-/// It is locked while a message is sent, too: otherwise somebody who subscribes meanwhile could get an older message after a newer
-/// one.
+/// It is locked while a message is sent, too: otherwise somebody who subscribes meanwhile could get an older message after a
+/// newer one.
 #[derive(Clone, Default)]
 pub(super) struct KeptMessages(Arc<Mutex<Vec<Kept>>>);
 

@@ -7,8 +7,8 @@
 //! to whoever subscribes to it; of `/tf_static` all transforms are, the last to each frame. A viewer that is too slow
 //! gets fewer messages, the oldest of those that wait for it being dropped; nothing of the run waits for it.
 //!
-//! What the stages of the run have done so far is told on a topic of its own, `/gridweave/stages`, once a second, as JSON with a schema;
-//! not with the engine `single`, which does not count while it runs.
+//! What the stages of the run have done so far is told on a topic of its own, `/gridweave/stages`, once a second, as JSON with a
+//! schema; not with the engine `single`, which does not count while it runs.
 
 mod kept;
 mod stage;

@@ -17,8 +17,8 @@ const SCHEMA: &str = include_str!("stages.schema.json");
 /// So often it is told.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// Tells once a second what the stages have done so far, from the first message that was shown on and at its log time: viewers show what
-/// belongs to one time, and these are no times of the run.
+/// Tells once a second what the stages have done so far, from the first message that was shown on and at its log time: viewers
+/// show what belongs to one time, and these are no times of the run.
 pub(super) struct Statistics {
     /// The log time of the last message that was shown; 0 before the first.
     pub(super) log_time: Arc<AtomicU64>,

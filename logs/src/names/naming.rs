@@ -76,7 +76,8 @@ pub(super) fn name(
     Ok(Names { channels, robots: robot_of_file, remark })
 }
 
-/// What is wrong where a log was said to be one robot's, and names other robots itself: under one more name its maps are nobody's.
+/// What is wrong where a log was said to be one robot's, and names other robots itself: under one more name its maps are
+/// nobody's.
 fn named_already(
     inputs: &[Input],
     of_inputs: &[Vec<&Channel>],

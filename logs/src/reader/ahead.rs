@@ -1,5 +1,6 @@
-//! Loads blocks ahead of their use, in threads of their own, within a bound of memory. Those that are only read are loaded when they
-//! are asked for: the system reads ahead by itself, and memory that was used before is faster than a thread with memory of its own.
+//! Loads blocks ahead of their use, in threads of their own, within a bound of memory. Those that are only read are loaded when
+//! they are asked for: the system reads ahead by itself, and memory that was used before is faster than a thread with memory of
+//! its own.
 
 use super::block::{Block, LoadedBlock, Memory};
 use super::damage::ChunkFault;

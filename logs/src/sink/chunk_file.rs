@@ -7,8 +7,8 @@ use std::os::unix::fs::FileExt;
 /// What is at least as large is not copied together with what comes before and behind it.
 const LARGE: usize = 64 << 10;
 
-/// A file that is written from its beginning on. What was written since it was flushed last cannot be read in it before it is flushed
-/// again: in the place of its first bytes there are zeros, if anything.
+/// A file that is written from its beginning on. What was written since it was flushed last cannot be read in it before it is
+/// flushed again: in the place of its first bytes there are zeros, if anything.
 ///
 /// In these first bytes, up to the first large piece, one may go back and write anew.
 pub(super) struct ChunkFile {

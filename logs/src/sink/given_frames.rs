@@ -9,8 +9,8 @@ const MAP_FRAME: &str = "{robot}/map";
 
 /// The map frames of robots, which the transforms of a run place.
 ///
-/// A frame has one parent: where a recorded `world -> robot1/map` stood beside that of the run, either would be used at random. What was
-/// recorded is left out even for a robot that is not merged, since the `world` in it would pass for that of the run.
+/// A frame has one parent: where a recorded `world -> robot1/map` stood beside that of the run, either would be used at random.
+/// What was recorded is left out even for a robot that is not merged, since the `world` in it would pass for that of the run.
 pub(crate) struct GivenFrames {
     /// What map frames are called, `{robot}` standing for any name; none if the run makes no transforms.
     pattern: Option<String>,
@@ -33,8 +33,8 @@ impl GivenFrames {
         }
     }
 
-    /// A message of transforms of the input without those that place such a frame, and how many these are; `None` if there are none
-    /// among them. The message is empty if no other is left.
+    /// A message of transforms of the input without those that place such a frame, and how many these are; `None` if there are
+    /// none among them. The message is empty if no other is left.
     pub(crate) fn without(&self, transforms: &[u8]) -> Option<(Vec<u8>, usize)> {
         let pattern = self.pattern.as_ref()?;
         let mut message = decode::<TFMessage>(transforms).ok()?;

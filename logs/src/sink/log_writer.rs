@@ -43,8 +43,8 @@ pub enum Outcome<'a> {
 /// Writes a log: an MCAP file with profile `ros2`, chunked and indexed, with checksums.
 ///
 /// It is written beside, as `NAME.part`, and takes its name when it is [finished](Self::finish). The beginning of a chunk is
-/// written last, when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it is
-/// complete.
+/// written last, when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it
+/// is complete.
 pub struct LogWriter {
     path: PathBuf,
     output: OutputFile,
@@ -175,8 +175,8 @@ fn write_options(options: LogOptions) -> WriteOptions {
         .compression_level(level)
         // The compressor's own threads would make its output depend on their number.
         .compression_threads(0)
-        // Chunks are closed here, so that the file is flushed with every one of them: a program that dies leaves none that is half
-        // written.
+        // Chunks are closed here, so that the file is flushed with every one of them: a program that dies leaves none that is
+        // half written.
         .chunk_size(None)
 }
 

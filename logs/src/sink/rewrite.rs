@@ -33,8 +33,8 @@ pub enum RecoverError {
     Write(#[from] LogWriteError),
 }
 
-/// Writes all that can be read of the log at `input`, a file of any kind that is read or the folder of a bag, to `output`: messages,
-/// attachments and metadata records, under the names and numbers that they were logged with.
+/// Writes all that can be read of the log at `input`, a file of any kind that is read or the folder of a bag, to `output`:
+/// messages, attachments and metadata records, under the names and numbers that they were logged with.
 ///
 /// # Errors
 /// Nothing can be read, or the output cannot be written.

@@ -58,8 +58,8 @@ pub(crate) fn is_tf(channel: &Channel) -> bool {
     channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME
 }
 
-/// The channel of a result. `definition` is that of its type where a stage brings one. Without it the schema is empty if the type is
-/// none that Gridweave has a definition of.
+/// The channel of a result. `definition` is that of its type where a stage brings one. Without it the schema is empty if the type
+/// is none that Gridweave has a definition of.
 pub fn result_channel(topic: &str, ros_type: &str, definition: &str) -> Channel {
     let schema = match definition.is_empty() {
         true => schema_text(ros_type).unwrap_or_default(),

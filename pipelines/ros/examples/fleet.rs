@@ -6,8 +6,8 @@
 //!     cargo run --release --example fleet -- plot fleet.csv fleet.svg
 //!
 //! Each robot sends a pose ten times a second and a map every five seconds for a minute. Everything runs on one machine: give
-//! the robots, which are threads here, less of it with `nice`. Any other arguments are those of the command `gridweave-ros`, which
-//! this program is, too, for the bases that it starts.
+//! the robots, which are threads here, less of it with `nice`. Any other arguments are those of the command `gridweave-ros`,
+//! which this program is, too, for the bases that it starts.
 
 use anyhow::{Context as _, Result, bail};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
@@ -135,7 +135,8 @@ impl Base {
         Ok(Self { child, name: name.to_owned(), log: path })
     }
 
-    /// What its stages take: memory in bytes, how many of them work at a time (or wait for a processor to), and what they have dropped.
+    /// What its stages take: memory in bytes, how many of them work at a time (or wait for a processor to), and what they have
+    /// dropped.
     fn look(&self) -> Result<(f64, f64, f64)> {
         let args = ["top", "--once", "--json", "--interval", "2", "--run", &self.name];
         let top = Command::new(std::env::current_exe()?).args(args).stderr(Stdio::null()).output()?;

@@ -1,8 +1,8 @@
 //! Which part of a map has changed since the whole of it was sent.
 //!
-//! Whoever has the last whole map has the map after any of the updates that follow, whether or not the ones between have come: an update
-//! covers all cells that differ from the whole map, and those that an earlier update has covered. So what is kept of the whole map for
-//! those who come late is what the next update applies to.
+//! Whoever has the last whole map has the map after any of the updates that follow, whether or not the ones between have come: an
+//! update covers all cells that differ from the whole map, and those that an earlier update has covered. So what is kept of the
+//! whole map for those who come late is what the next update applies to.
 
 use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
 
@@ -42,7 +42,8 @@ pub(crate) struct SentMap {
     covered: Option<Rectangle>,
     /// How many cells all updates after the whole map have brought.
     brought: usize,
-    /// What updates before the whole map had covered. The two are on topics of their own, and a listener may take them in another order.
+    /// What updates before the whole map had covered. The two are on topics of their own, and a listener may take them in another
+    /// order.
     outdated: Option<Rectangle>,
 }
 
@@ -67,8 +68,8 @@ impl SentMap {
     }
 
     /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for
-    /// that, or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as the map
-    /// has: so no more is sent than twice what had to be.
+    /// that, or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as
+    /// the map has: so no more is sent than twice what had to be.
     pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, hears_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id

@@ -1,8 +1,8 @@
-//! ROS 2 without ROS: stages that take what robots publish and publish what was found, over [Zenoh](https://zenoh.io), as the ROS 2
-//! middleware `rmw_zenoh_cpp` speaks it.
+//! ROS 2 without ROS: stages that take what robots publish and publish what was found, over [Zenoh](https://zenoh.io), as the ROS
+//! 2 middleware `rmw_zenoh_cpp` speaks it.
 //!
-//! The binary `gridweave-ros` is the command `gridweave` with these kinds: `ros_source` and `ros_sink`. A program with stages of its
-//! own adds [`kinds`] to them:
+//! The binary `gridweave-ros` is the command `gridweave` with these kinds: `ros_source` and `ros_sink`. A program with stages of
+//! its own adds [`kinds`] to them:
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {

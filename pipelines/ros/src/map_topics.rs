@@ -1,8 +1,9 @@
 //! Maps that are published: whole ones, and between them the parts that have changed.
 //!
-//! A whole map is kept for those who come late (transient local), and updates apply to it; see [`changed_part`](super::changed_part).
-//! Updates are kept for nobody: one of them on a later whole map would put back what has changed. So whoever comes when there were
-//! updates has an older map, until the next update or, at once, the whole map that is sent because of that.
+//! A whole map is kept for those who come late (transient local), and updates apply to it; see
+//! [`changed_part`](super::changed_part). Updates are kept for nobody: one of them on a later whole map would put back what has
+//! changed. So whoever comes when there were updates has an older map, until the next update or, at once, the whole map that is
+//! sent because of that.
 
 use super::audience::{Audience, updates_of};
 use super::changed_part::{Part, Rectangle, SentMap};

@@ -13,9 +13,10 @@ const ROUNDING: f64 = 1e-9;
 /// Static transforms as they were told to others. Whoever listens has planned with them, and so they change only where that is
 /// better by more than its uncertainty.
 ///
-/// They are static although they change: tf2 (`StaticCache`) holds the last one for all times, and what changes is not where a frame
-/// lies but what is known of it. On `/tf` one would hold between stamps only, of whose clock nothing is known here; and no frame may be
-/// on both, as tf2 (`BufferCore::setTransform`) takes the kind of cache of the last message and drops the other with all it holds.
+/// They are static although they change: tf2 (`StaticCache`) holds the last one for all times, and what changes is not where a
+/// frame lies but what is known of it. On `/tf` one would hold between stamps only, of whose clock nothing is known here; and no
+/// frame may be on both, as tf2 (`BufferCore::setTransform`) takes the kind of cache of the last message and drops the other with
+/// all it holds.
 #[derive(Debug, Default)]
 pub(crate) struct SettledFrames {
     /// By child frame.
@@ -74,8 +75,8 @@ impl SettledFrames {
         self.told.values()
     }
 
-    /// Whether a transform differs from what was told by more than its uncertainty. What is certain, or of which nothing is known,
-    /// does.
+    /// Whether a transform differs from what was told by more than its uncertainty. What is certain, or of which nothing is
+    /// known, does.
     fn is_beyond(&self, told: &TransformStamped, transform: &TransformStamped) -> bool {
         let (before, after) = (planar(told), planar(transform));
         let moved = after.translation.vector - before.translation.vector;

@@ -31,17 +31,17 @@ pub struct SinkParameters {
     pub connect: Vec<String>,
     /// Where other programs may connect, as `tcp/HOST:PORT`; port 0 is any that is free. Nothing else is listened to.
     pub listen: Vec<String>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not given,
-    /// the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not
+    /// given, the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
     pub zenoh_config: Option<PathBuf>,
     /// The name of the ROS 2 node; `gridweave_` and the name of the stage if it is not given.
     pub node: Option<String>,
-    /// Topics that get other names than they would have in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` stands for one part
-    /// of both.
+    /// Topics that get other names than they would have in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` stands for one
+    /// part of both.
     pub rename: Vec<String>,
-    /// Whether parts of a map that have changed are published on its topic with `_updates` behind (`map_msgs/msg/OccupancyGridUpdate`)
-    /// while every node that hears the map hears these as well. The whole map follows where anybody does not, when another one comes,
-    /// and once updates would have brought as many cells as the map has.
+    /// Whether parts of a map that have changed are published on its topic with `_updates` behind
+    /// (`map_msgs/msg/OccupancyGridUpdate`) while every node that hears the map hears these as well. The whole map follows where
+    /// anybody does not, when another one comes, and once updates would have brought as many cells as the map has.
     pub map_updates: bool,
 }
 

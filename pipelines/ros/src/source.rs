@@ -35,8 +35,8 @@ pub struct SourceParameters {
     pub connect: Vec<String>,
     /// Where other programs may connect, as `tcp/HOST:PORT`; port 0 is any that is free. Nothing else is listened to.
     pub listen: Vec<String>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not given,
-    /// the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not
+    /// given, the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
     pub zenoh_config: Option<PathBuf>,
     /// The name of the ROS 2 node; `gridweave_` and the name of the stage if it is not given.
     pub node: Option<String>,
@@ -49,8 +49,8 @@ pub struct SourceParameters {
     /// So many messages of a topic wait to be taken before the oldest is dropped. Of a map it is the last.
     #[schemars(range(min = 1))]
     pub keep_last: usize,
-    /// So long after its scans were seen first a robot may take to publish a map, seconds. Then its scans are taken, if a stage reads
-    /// `scans`. If it publishes a map later than that, its scans are taken no longer.
+    /// So long after its scans were seen first a robot may take to publish a map, seconds. Then its scans are taken, if a stage
+    /// reads `scans`. If it publishes a map later than that, its scans are taken no longer.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub wait_for_map: f64,
 }

@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 /// What `gridweave merge` is told.
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
-    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags); ROBOT=LOG puts the topics and frames of a log under the name of its robot. Or map
-    /// files (map_server YAML), each the map of a robot that is called as the file.
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags); ROBOT=LOG puts the topics and frames of a log under the name
+    /// of its robot. Or map files (map_server YAML), each the map of a robot that is called as the file.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// What to write: a log (FOLDER/, with a slash behind it, is a rosbag2 folder) or, when it is called FILE.yaml, the merged map alone (map_server YAML, with the image beside
-    /// it).
+    /// What to write: a log (FOLDER/, with a slash behind it, is a rosbag2 folder) or, when it is called FILE.yaml, the merged
+    /// map alone (map_server YAML, with the image beside it).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]

@@ -13,7 +13,8 @@ pub(crate) struct RunArgs {
     /// A pipeline file, or the name of a shipped pipeline such as `tag_merge`.
     pub(crate) pipeline: PathBuf,
     /// A log to read (MCAP file or rosbag2 folder); several are merged by log time. ROBOT=LOG puts its topics and frames under
-    /// the name of its robot. Or, for a pipeline that reads map files, the map of a robot (map_server YAML); for one that reads topological maps, that of a robot (JSON).
+    /// the name of its robot. Or, for a pipeline that reads map files, the map of a robot (map_server YAML); for one that reads
+    /// topological maps, that of a robot (JSON).
     #[arg(short, long, value_name = "LOG")]
     pub(crate) input: Vec<PathBuf>,
     /// The log to write; FOLDER/, with a slash behind it, is a rosbag2 folder.

@@ -41,8 +41,8 @@ pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str
     Ok(format!("ws://{host}:{port}"))
 }
 
-/// A port of the host that is free: the stage, which may be in a process of its own, takes the one that is told here. 0 if there is
-/// none, or no such host, which the stage tells of.
+/// A port of the host that is free: the stage, which may be in a process of its own, takes the one that is told here. 0 if there
+/// is none, or no such host, which the stage tells of.
 fn free_port(host: &str) -> u16 {
     let host = host.trim_start_matches('[').trim_end_matches(']');
     TcpListener::bind((host, 0)).and_then(|listener| listener.local_addr()).map_or(0, |address| address.port())

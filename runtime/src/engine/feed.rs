@@ -78,8 +78,9 @@ impl Feed {
         self.wait(&self.sleeper, longest, |sender| sender.is_connected())
     }
 
-    /// Waits until every reader and the stage itself have taken all that was sent. What is sent is lost with its sender where it has not been
-    /// taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers go on.
+    /// Waits until every reader and the stage itself have taken all that was sent. What is sent is lost with its sender where it
+    /// has not been taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers
+    /// go on.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
         let sleeper = Sleeper::new(self.sleeper.board().clone(), Arc::default());
         self.wait(&sleeper, longest, LinkSender::is_taken)

@@ -24,8 +24,8 @@ pub(super) struct Runner {
 }
 
 impl Runner {
-    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it. `statistics`
-    /// tell what all stages have done, if that is known.
+    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it.
+    /// `statistics` tell what all stages have done, if that is known.
     pub(super) fn new(
         pipeline: &Pipeline,
         stage: usize,

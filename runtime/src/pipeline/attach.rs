@@ -7,8 +7,8 @@ use crate::stage::{InputPort, OutputPort, StageKind};
 
 impl Pipeline {
     /// Adds a stage that nothing reads but what is attached later: each of its inputs is wired to all outputs of its type, or
-    /// of any if it takes any, of which `takes` says that it takes them. It runs in the process `process`. Does nothing, and gives `false`, if that leaves
-    /// an input without a wire that needs one.
+    /// of any if it takes any, of which `takes` says that it takes them. It runs in the process `process`. Does nothing, and
+    /// gives `false`, if that leaves an input without a wire that needs one.
     pub fn attach(
         &mut self,
         kind: &StageKind,

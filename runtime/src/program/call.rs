@@ -103,8 +103,8 @@ impl Program {
         }
     }
 
-    /// Calls the program, and hands to `take` what it sends and warns of, until that fails. When this has failed otherwise, so have all
-    /// later calls.
+    /// Calls the program, and hands to `take` what it sends and warns of, until that fails. When this has failed otherwise, so
+    /// have all later calls.
     pub(super) fn call(
         &mut self,
         what: Told,

@@ -20,8 +20,9 @@ use std::collections::BTreeMap;
 /// assert_eq!(Interface::read(text).unwrap().inputs[0].name, "map");
 /// ```
 ///
-/// An input may say `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a JSON
-/// schema. `definitions` may hold, by the name of a port's type that nobody else knows, its definition as a text of the form `ros2msg`.
+/// An input may say `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a
+/// JSON schema. `definitions` may hold, by the name of a port's type that nobody else knows, its definition as a text of the form
+/// `ros2msg`.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// What the stage does.

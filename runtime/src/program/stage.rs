@@ -36,8 +36,8 @@ impl Outputs for Ports {
     }
 }
 
-/// The kind `name` of a stage with the ports and parameters of `interface`, which is the program of `launch` and is called `what` in
-/// errors. It is kept for as long as this program runs.
+/// The kind `name` of a stage with the ports and parameters of `interface`, which is the program of `launch` and is called `what`
+/// in errors. It is kept for as long as this program runs.
 pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Launch) -> &'static StageKind {
     let Interface { summary, inputs, outputs, parameters, definitions, text } = interface;
     let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();

@@ -25,7 +25,8 @@ pub struct StageStatistics {
     pub warnings: u64,
 }
 
-/// Tells what the stages of a run have done so far. It changes with the clock: nothing that a stage makes of its input may rest on it.
+/// Tells what the stages of a run have done so far. It changes with the clock: nothing that a stage makes of its input may rest
+/// on it.
 #[derive(Clone)]
 pub struct RunStatistics(Arc<dyn Fn() -> Vec<StageStatistics> + Send + Sync>);
 

@@ -148,7 +148,8 @@ fn a_sighting_that_is_none_is_told() {
     assert_eq!(localizer.add_sighting(at(0.0), "tag", Vector2::zeros(), &odd), Ok(()));
 }
 
-/// Drives past the tag, and perceives the direction to it, on a way from 0.2 m ahead of its middle; a share of the directions are any.
+/// Drives past the tag, and perceives the direction to it, on a way from 0.2 m ahead of its middle; a share of the directions are
+/// any.
 fn take_bearings(tag: Point2, outliers: f64, ranges: bool, way: f64) -> Option<TagMode> {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let noise = Normal::new(0.0, 0.05).unwrap();

@@ -184,8 +184,8 @@ fn seen_by_a_camera(log: &mut LogBuilder) {
     log.message(6.0, "/robot1/tag_positions", &nowhere);
 }
 
-/// A straight drive past a tag whose direction is perceived from half a metre ahead, with an error that goes round; one direction is
-/// wrong, and one is no number. Another tag is heard once.
+/// A straight drive past a tag whose direction is perceived from half a metre ahead, with an error that goes round; one direction
+/// is wrong, and one is no number. Another tag is heard once.
 fn bearings_alone(log: &mut LogBuilder) {
     for (step, place) in line(60).enumerate() {
         let seconds = 0.1 * step as f64;

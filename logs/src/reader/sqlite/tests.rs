@@ -130,7 +130,8 @@ fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
         }
     }
     assert!(most > 300, "{most}");
-    // A page in the middle that is lost takes its own messages with it, those that go on in it, and at worst those of all pages under it.
+    // A page in the middle that is lost takes its own messages with it, those that go on in it, and at worst those of all pages
+    // under it.
     let (mut told, mut all) = (0, 0);
     for page in 10..60 {
         let mut bytes = whole.clone();

@@ -6,22 +6,22 @@ use std::collections::VecDeque;
 /// So many of them are remembered.
 const MOST: usize = 64;
 
-/// The senders that have gone without an end. What a receiver knows of them is kept for when they come back, which takes the memory
-/// of their last maps; but not for ever.
+/// The senders that have gone without an end. What a receiver knows of them is kept for when they come back, which takes the
+/// memory of their last maps; but not for ever.
 #[derive(Debug, Default)]
 pub(super) struct Absent(VecDeque<Presence>);
 
 impl Absent {
-    /// A sender has gone. Gives the session that is to be forgotten for it, where there are too many: that of the one that has been
-    /// away longest.
+    /// A sender has gone. Gives the session that is to be forgotten for it, where there are too many: that of the one that has
+    /// been away longest.
     pub(super) fn left(&mut self, sender: Presence) -> Option<u64> {
         self.0.push_back(sender);
         let oldest = if self.0.len() > MOST { self.0.pop_front() } else { None };
         oldest.map(|oldest| oldest.number)
     }
 
-    /// A sender has come. Gives the sessions that are to be forgotten: those of its name that it has taken the place of, as a robot
-    /// does that was started again. One that comes back as it was is remembered.
+    /// A sender has come. Gives the sessions that are to be forgotten: those of its name that it has taken the place of, as a
+    /// robot does that was started again. One that comes back as it was is remembered.
     pub(super) fn came(&mut self, sender: &Presence) -> Vec<u64> {
         self.0.retain(|absent| absent != sender);
         let replaced = self.0.iter().filter(|absent| absent.name == sender.name).map(|absent| absent.number).collect();

@@ -16,9 +16,9 @@ impl Clock {
     }
 }
 
-/// By how much the clock of the receiver is ahead, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from when the
-/// sender asked and heard the answer, by its own clock, and when the receiver heard and answered, by that one's. It is wrong by no more
-/// than half of what both ways took.
+/// By how much the clock of the receiver is ahead, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from when
+/// the sender asked and heard the answer, by its own clock, and when the receiver heard and answered, by that one's. It is wrong
+/// by no more than half of what both ways took.
 pub(super) fn offset(sent: i64, came: i64, answered: i64, received: i64) -> i64 {
     let there = i128::from(came) - i128::from(sent);
     let back = i128::from(answered) - i128::from(received);

@@ -1,7 +1,7 @@
 //! What a receiver has taken of its senders.
 //!
-//! It knows no network. Of each sender it takes the batches in their order, each once, and makes of them the messages as they were
-//! given to the sender.
+//! It knows no network. Of each sender it takes the batches in their order, each once, and makes of them the messages as they
+//! were given to the sender.
 
 use super::difference::message;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};

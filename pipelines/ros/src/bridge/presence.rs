@@ -1,7 +1,7 @@
 //! Who is there: the liveliness tokens of the two ends of a bridge.
 //!
-//! A token stands under `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when nothing was
-//! heard of it for ten seconds.
+//! A token stands under `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when nothing
+//! was heard of it for ten seconds.
 
 use crate::connection::in_words;
 use gridweave_runtime::stage::StageError;

@@ -1,7 +1,7 @@
 //! Why two programs are not connected, in words that say what would mend it.
 //!
-//! Zenoh tries again for as long as it takes, and hands nobody the reason. The end that connects finds it out by [`obstacle`]; the
-//! one that listens by what Zenoh writes to the log, which a program hands to [`hear`].
+//! Zenoh tries again for as long as it takes, and hands nobody the reason. The end that connects finds it out by [`obstacle`];
+//! the one that listens by what Zenoh writes to the log, which a program hands to [`hear`].
 
 use crate::connection::in_words;
 use std::sync::{Mutex, PoisonError};

@@ -45,8 +45,8 @@ pub struct SourceParameters {
     pub listen: Vec<String>,
     /// Let the other ends find this one on the local network, by multicast.
     pub discover: bool,
-    /// The authority (PEM) by which the certificates of all must be signed who connect to `tls/HOST:PORT`. Without it anybody may who
-    /// knows the authority of `certificate`.
+    /// The authority (PEM) by which the certificates of all must be signed who connect to `tls/HOST:PORT`. Without it anybody may
+    /// who knows the authority of `certificate`.
     pub authority: Option<PathBuf>,
     /// The certificate (PEM) of this end, for `tls/HOST:PORT`, with the names by which others connect to it.
     pub certificate: Option<PathBuf>,

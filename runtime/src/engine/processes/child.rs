@@ -47,7 +47,8 @@ pub fn run_process(
     Ok(())
 }
 
-/// The way to the supervisor: standard output, locked for a line at a time, as stages may print. That it is gone is seen at standard input, so a failure to write is no news.
+/// The way to the supervisor: standard output, locked for a line at a time, as stages may print. That it is gone is seen at
+/// standard input, so a failure to write is no news.
 struct Supervisor<'a> {
     output: &'a mut dyn Write,
     told: Instant,
