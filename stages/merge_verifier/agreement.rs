@@ -54,6 +54,8 @@ pub struct Agreement {
     /// Length of wall of one map that lies where the other knows free space, farther from any wall than the tolerance,
     /// metres.
     pub wall_on_free: f64,
+    /// Of that, what lies within half a metre of a wall that runs alike, metres.
+    pub wall_beside: f64,
     /// The evidence for the alignment: the logarithm of how much likelier the walls are to meet as they do if this is the
     /// place than if map b lay anywhere. Every region counts by itself, and no region more than walls as long as its side.
     pub evidence: f64,
@@ -69,6 +71,12 @@ impl Agreement {
     pub fn wall_agreement(&self) -> f64 {
         let seen = self.wall_seen();
         if seen > 0.0 { self.wall_on_wall / seen } else { 0.0 }
+    }
+
+    /// The share of the walls that contradict which lie beside a wall that runs alike, 0 to 1; 1 if none contradict. Rough drawing
+    /// and bends leave them there. Another building has its walls anywhere.
+    pub fn drawn_beside(&self) -> f64 {
+        if self.wall_on_free > 0.0 { self.wall_beside / self.wall_on_free } else { 1.0 }
     }
 
     /// Length of wall of one map of which the other knows what is there, metres.
@@ -111,6 +119,7 @@ pub fn compare_sampled(
     for region in &regions {
         agreement.wall_on_wall += region.wall_on_wall;
         agreement.wall_on_free += region.wall_on_free;
+        agreement.wall_beside += region.wall_beside;
         let share = (parameters.region / (region.wall_on_wall + region.wall_on_free).max(1e-9)).min(1.0);
         agreement.evidence += share * (for_it * region.wall_on_wall + against_it * region.wall_on_free);
     }

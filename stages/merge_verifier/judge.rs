@@ -204,6 +204,7 @@ fn judge_one<'a>(
         is_expected,
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
+        drawn_beside: agreement.drawn_beside(),
         wall_seen: agreement.wall_seen(),
         overlap: agreement.overlap,
         bend_cost: bent.map(|bent| bent.cost),

@@ -12,7 +12,9 @@
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
 //!   leads all
 //!   others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree on much
-//!   and contradict each other on as much; and where the maps share no more than a room, nearly all: rooms of other buildings
+//!   and contradict each other on as much; so do rows of rooms of one depth, of buildings that
+//!   have nothing else in common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing
+//!   leaves it, it is three quarters of any wall; and where the maps share no more than a room, nearly all: rooms of other buildings
 //!   have the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent
 //!   onto the other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags
 //!   have not looked at walls, and ask for more of them. Where enough tags and a search that has not looked at tags have come to
@@ -58,6 +60,10 @@ const FAR_AHEAD: (f64, f64) = (5.0, 10.0);
 const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.7;
 /// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
 const MUCH_WALL: (f64, f64) = (60.0, 80.0);
+/// The same where next to none of what contradicts lies beside a wall that runs alike: nothing is drawn roughly or bent there, and
+/// the walls are others. And of which share of it on that begins to count for less, and from which on not at all.
+const AGREEMENT_OF_HALVES_OF_OTHER_WALLS: f64 = 0.75;
+const DRAWN_BESIDE: (f64, f64) = (0.1, 0.2);
 /// The same where one map is bent onto the other: what was only bent agrees in nearly all then, and unrelated maps agree in
 /// little more than before.
 pub(super) const AGREEMENT_OF_HALVES_IF_BENT: f64 = 0.7;
@@ -115,6 +121,8 @@ pub struct Grounds {
     pub evidence: f64,
     /// The share of the walls that agree, 0 to 1.
     pub wall_agreement: f64,
+    /// The share of the walls that contradict which lie beside a wall that runs alike, 0 to 1.
+    pub drawn_beside: f64,
     /// Length of wall of one map of which the other knows what is there, metres.
     pub wall_seen: f64,
     /// The area that both maps know, square metres.
@@ -148,6 +156,7 @@ impl Odds {
             is_expected,
             evidence,
             wall_agreement,
+            drawn_beside,
             wall_seen,
             overlap,
             bend_cost,
@@ -168,7 +177,11 @@ impl Odds {
                     between(AGREEMENT_OF_HALVES, AGREEMENT_OF_HALVES_IF_FAR_AHEAD, share_of_way(lead, FAR_AHEAD));
                 let in_rooms = match bend_cost {
                     Some(_) => AGREEMENT_OF_HALVES_IF_BENT,
-                    None => between(of_little, AGREEMENT_OF_HALVES_OF_MUCH_WALL, share_of_way(wall_seen, MUCH_WALL)),
+                    None => {
+                        let share_of_much = share_of_way(wall_seen, MUCH_WALL);
+                        let drawn = between(of_little, AGREEMENT_OF_HALVES_OF_MUCH_WALL, share_of_much);
+                        between(AGREEMENT_OF_HALVES_OF_OTHER_WALLS, drawn, share_of_way(drawn_beside, DRAWN_BESIDE))
+                    }
                 };
                 between(in_rooms, AGREEMENT_OF_HALVES_IN_A_ROOM, share_of_room)
             }
@@ -211,6 +224,7 @@ mod tests {
         is_expected: false,
         evidence: 300.0,
         wall_agreement: 0.9,
+        drawn_beside: 0.5,
         wall_seen: 50.0,
         overlap: 200.0,
         bend_cost: None,
@@ -264,6 +278,10 @@ mod tests {
         assert!(with(0.4, far_ahead) < 0.6 && with(0.46, far_ahead) > 0.999);
         assert!(with(0.46, Origin::Search { lead: 7.0 }) < 0.9);
         assert!(with(0.7, Origin::Tags) < 0.01 && with(0.85, Origin::Tags) > 0.999);
+        let others = |wall_agreement: f64, drawn_beside: f64| {
+            Odds::new(&Grounds { origin: far_ahead, wall_agreement, drawn_beside, ..GROUNDS }).probability()
+        };
+        assert!(others(0.67, 0.07) < 0.01 && others(0.85, 0.07) > 0.999 && others(0.48, 0.2) > 0.999);
         let by_both = |wall_agreement: f64, origin: Origin| {
             let grounds = Grounds { origin, wall_agreement, found_too: true, found_by_tags_and_walls: true, ..GROUNDS };
             Odds::new(&grounds).probability()

@@ -12,7 +12,7 @@ use gridweave_stages::merge_verifier::{
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
 
 /// What is told of a hypothesis.
-pub(super) const HEADS: [&str; 16] = [
+pub(super) const HEADS: [&str; 17] = [
     "x",
     "y",
     "yaw",
@@ -22,6 +22,7 @@ pub(super) const HEADS: [&str; 16] = [
     "evidence",
     "wall on wall m",
     "wall on free m",
+    "wall beside m",
     "overlap m2",
     "bend m",
     "bend cost",
@@ -71,7 +72,7 @@ pub(super) struct Hypothesis {
 
 impl Hypothesis {
     pub(super) fn cells(&self) -> Vec<String> {
-        let Agreement { evidence, wall_on_wall, wall_on_free, overlap, .. } = self.agreement;
+        let Agreement { evidence, wall_on_wall, wall_on_free, wall_beside, overlap, .. } = self.agreement;
         let place = &self.transform_a_b;
         let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
         let number = |value: f64| format!("{value:.3}");
@@ -87,6 +88,7 @@ impl Hypothesis {
             number(evidence),
             number(wall_on_wall),
             number(wall_on_free),
+            number(wall_beside),
             number(overlap),
             bent(|bent| bent.bend),
             bent(|bent| bent.cost),
