@@ -54,7 +54,7 @@ pub struct Agreement {
     /// Length of wall of one map that lies where the other knows free space, farther from any wall than the tolerance,
     /// metres.
     pub wall_on_free: f64,
-    /// Of that, what lies within half a metre of a wall that runs alike, metres.
+    /// Of that, what lies beside a wall that runs alike, within 0.4 m beyond the tolerance, metres.
     pub wall_beside: f64,
     /// The evidence for the alignment: the logarithm of how much likelier the walls are to meet as they do if this is the
     /// place than if map b lay anywhere. Every region counts by itself, and no region more than walls as long as its side.

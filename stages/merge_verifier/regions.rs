@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 const POINTS: usize = 120;
 /// Rounds of the registration of a region, and how far partners lie apart at the most in each, metres.
 const ROUNDS: [f64; 4] = [0.4, 0.3, 0.2, 0.2];
-/// So far beside its place a wall is found that is drawn roughly, or twice, or where a map is bent, metres.
-const BESIDE: f64 = 0.5;
+/// So far beyond what counts as its place a wall is found that is drawn roughly, or twice, or where a map is bent, metres.
+const BESIDE: f64 = 0.4;
 
 /// What two maps say of each other in one region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,11 +132,12 @@ impl RegionComparison {
         for &index in points {
             let own = other.walls.walls.points()[index];
             let point = transform * own;
+            let normal = other.walls.normals[index];
+            let turned = transform.rotation * normal;
+            // Ends and corners of walls have no direction, and may be those of any.
+            let runs_alike = |wall: usize| turned.dot(&map.walls.normals[wall]).abs() >= LEAST_NORMAL_AGREEMENT;
             if let Some(partner) = map.walls.walls.nearest(&point, self.tolerance) {
-                let (normal, of_partner) = (other.walls.normals[index], map.walls.normals[partner.index]);
-                let turned = transform.rotation * normal;
-                // Ends and corners of walls have no direction, and may be those of any.
-                if turned.dot(&of_partner).abs() < LEAST_NORMAL_AGREEMENT {
+                if !runs_alike(partner.index) {
                     continue;
                 }
                 let is_seen_from = |side: f64| {
@@ -149,10 +150,8 @@ impl RegionComparison {
                 }
             } else if is_free(map.value_at(&point)) {
                 region.wall_on_free += length;
-                let beside = map.walls.walls.nearest(&point, BESIDE);
-                let turned = transform.rotation * other.walls.normals[index];
-                let is_alike = |of_partner: Vector2<f64>| turned.dot(&of_partner).abs() >= LEAST_NORMAL_AGREEMENT;
-                if beside.is_some_and(|partner| is_alike(map.walls.normals[partner.index])) {
+                let beside = map.walls.walls.nearest(&point, self.tolerance + BESIDE);
+                if beside.is_some_and(|partner| runs_alike(partner.index)) {
                     region.wall_beside += length;
                 }
             }

@@ -10,16 +10,15 @@
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
-//!   leads all
-//!   others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree on much
-//!   and contradict each other on as much; so do rows of rooms of one depth, of buildings that
-//!   have nothing else in common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing
-//!   leaves it, it is three quarters of any wall; and where the maps share no more than a room, nearly all: rooms of other buildings
-//!   have the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent
-//!   onto the other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags
-//!   have not looked at walls, and ask for more of them. Where enough tags and a search that has not looked at tags have come to
-//!   the same place, each by itself, it is one building and one floor, and two fifths are enough: what contradicts is a bend
-//!   that is too fine to be undone, or was moved.
+//!   leads all others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree
+//!   on much and contradict each other on as much. So do rows of rooms of one depth, of buildings that have nothing else in
+//!   common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing leaves it, it is
+//!   three quarters of any wall. Where the maps share no more than a room, it is nearly all: rooms of other buildings have the
+//!   same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent onto the
+//!   other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags have not
+//!   looked at walls, and ask for more of them. Where enough tags and a search that has not looked at tags have come to the same
+//!   place, each by itself, it is one building and one floor, and two fifths are enough: what contradicts is a bend that is too
+//!   fine to be undone, or was moved.
 //!
 //! How unlikely a bend is counts against chance like evidence: bends and walls are measured in the same units.
 //!
