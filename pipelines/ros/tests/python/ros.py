@@ -90,11 +90,13 @@ class Node:
         self.declare_topic("MS", topic, name, LATCHED)
         self.kept.append(subscriber)
 
-    def publishers(self):
-        """The topics that are published, and their types, by the tokens that are there."""
-        topics = {}
-        for reply in self.session.liveliness().get("@ros2_lv/0/**", timeout=10.0):
-            parts = str(reply.ok.key_expr).split("/")
-            if parts[5] == "MP":
-                topics[parts[9].replace("%", "/")] = parts[10]
-        return topics
+    def watch_publishers(self, call):
+        """Calls with the topic and the type of each publisher that is there or comes, by its token."""
+
+        def take(sample):
+            parts = str(sample.key_expr).split("/")
+            if sample.kind == zenoh.SampleKind.PUT and parts[5] == "MP":
+                call(parts[9].replace("%", "/"), parts[10])
+
+        tokens = self.session.liveliness()
+        self.kept.append(tokens.declare_subscriber("@ros2_lv/0/**", take, history=True))

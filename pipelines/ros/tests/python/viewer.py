@@ -12,7 +12,7 @@ import time
 from ros import Node
 
 router, robots, longest = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
-node, seen, changed = Node(router, "rviz"), {}, threading.Event()
+node, seen, changed = Node(router, "rviz"), {"publishers": {}}, threading.Event()
 
 
 def take_map(grid):
@@ -33,13 +33,22 @@ def take_frames(message):
     changed.set()
 
 
+def take_publisher(topic, ros_type):
+    seen["publishers"][topic] = ros_type
+    changed.set()
+
+
+def is_done():
+    return "map" in seen and len(seen.get("frames", {})) >= robots and {"/map", "/tf_static"} <= seen["publishers"].keys()
+
+
+node.watch_publishers(take_publisher)
 node.subscribe("/map", "nav_msgs/msg/OccupancyGrid", take_map)
 node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", take_frames)
 end = time.monotonic() + longest
-while not ("map" in seen and len(seen.get("frames", {})) >= robots):
+while not is_done():
     if not changed.wait(max(0.0, end - time.monotonic())) or time.monotonic() > end:
         sys.exit(f"there is only {seen}")
     changed.clear()
-seen["publishers"] = node.publishers()
 json.dump(seen, sys.stdout)
 node.session.close()
