@@ -5,8 +5,7 @@
 //! a beam makes free what it passes, and occupied where it ends. What a scan sees is laid where the robot was:
 //!
 //! - **with poses in the map** (of a localizer or a SLAM), every beam from where the lidar was when it was sent, between the
-//!   poses
-//!   before and after it: a robot that turns at 1 radian a second turns by 6 degrees during a scan of 0.1 seconds;
+//!   poses before and after it: a robot that turns at 1 radian a second turns by 6 degrees during a scan of 0.1 seconds;
 //! - **with odometry alone**, scans are matched with the map so far first, one for each step of the drive: odometry says about
 //!   where, and [ICP](crate::icp_refiner) from several rotations says exactly where. Nothing closes loops: the map drifts, and is
 //!   bent as a whole, slowly. A SLAM does better, and where there is one its map is the one to log.

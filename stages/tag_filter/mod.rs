@@ -1,9 +1,8 @@
 //! Which tags two robots have in common, and whether they agree (Tsardoulias et al., sections 4 and 4.1.3).
 //!
 //! - [`common_tags`] takes the tags that are certain in both maps and sorts them by their common precision.
-//! - [`find_consensus`] finds the largest set of them that **one** rigid transform lays on each other. A tag that is mirrored in
-//!   one
-//!   map, or that was moved, is not in it; nor are the tags of another building that happen to bear the same ids.
+//! - [`find_consensus`] finds the largest set of them that **one** rigid transform lays on each other. A tag that is mirrored
+//!   in one map, or that was moved, is not in it; nor are the tags of another building that happen to bear the same ids.
 //! - [`chance_of_agreement`] says how likely tags at random places would agree as well.
 //! - [`judge`] puts this together: accepted or refused, with the reason in words.
 //!

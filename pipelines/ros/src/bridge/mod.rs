@@ -5,8 +5,7 @@
 //!
 //! - **Order.** The messages of a sender arrive as they were given to it, each once.
 //! - **Nothing lost.** What was not taken is sent again; so a link that breaks delays, and no more. What waits beyond the room
-//!   that
-//!   there is, is dropped, counted, and told at both ends.
+//!   that there is, is dropped, counted, and told at both ends.
 //! - **Progress.** An end is said. A sender that dies does not look like one that is done: it is told to be gone.
 //!
 //! # The protocol, version 1
@@ -19,15 +18,12 @@
 //!    slower the link, the larger it is.
 //! 3. **Greeting.** Batch 0 says which links are carried, and carries nothing. Its answer says what the receiver's clock shows.
 //! 4. **Beginning anew.** A receiver that does not know what a batch builds upon says so. The sender greets it, and sends all
-//!    channels, what
-//!    still waits, and the last message of each topic, as late readers of a link get it.
+//!    channels, what still waits, and the last message of each topic, as late readers of a link get it.
 //! 5. **Differences.** Of topics whose last message is all that holds, such as maps, each message is told by its difference to
-//!    the one
-//!    before it, compressed; the receiver makes of it the same bytes.
-//! 6. **Time.** Where the clocks differ by more than `clock_tolerance`, the receiver adds the difference that was measured to the
-//!    log
-//!    times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is: it
-//!    is compared with other times of the same robot alone.
+//!    the one before it, compressed; the receiver makes of it the same bytes.
+//! 6. **Time.** Where the clocks differ by more than `clock_tolerance`, the receiver adds the difference that was measured to
+//!    the log times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is:
+//!    it is compared with other times of the same robot alone.
 
 mod absent;
 mod certificates;
