@@ -10,7 +10,7 @@
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
-//!   leads all others by far more than chance does; of much wall, three quarters, as parts of one building that are alike agree
+//!   leads all others by far more than chance does; of much wall, five sixths, as parts of one building that are alike agree
 //!   on much and contradict each other on as much. So do rows of rooms of one depth, of buildings that have nothing else in
 //!   common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing leaves it, it is
 //!   three quarters of any wall. Where the maps share no more than a room, it is nearly all: rooms of other buildings have the
@@ -56,7 +56,7 @@ const AGREEMENT_OF_HALVES: f64 = 0.5;
 const AGREEMENT_OF_HALVES_IF_FAR_AHEAD: f64 = 0.4;
 const FAR_AHEAD: (f64, f64) = (5.0, 10.0);
 /// The same where much wall was seen: what was moved and drawn roughly has evened out, and what is left speaks against it.
-const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.7;
+const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.78;
 /// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
 const MUCH_WALL: (f64, f64) = (60.0, 80.0);
 /// The same where next to none of what contradicts lies beside a wall that runs alike: nothing is drawn roughly or bent there, and
@@ -179,7 +179,11 @@ impl Odds {
                     None => {
                         let share_of_much = share_of_way(wall_seen, MUCH_WALL);
                         let drawn = between(of_little, AGREEMENT_OF_HALVES_OF_MUCH_WALL, share_of_much);
-                        between(AGREEMENT_OF_HALVES_OF_OTHER_WALLS, drawn, share_of_way(drawn_beside, DRAWN_BESIDE))
+                        between(
+                            AGREEMENT_OF_HALVES_OF_OTHER_WALLS.max(drawn),
+                            drawn,
+                            share_of_way(drawn_beside, DRAWN_BESIDE),
+                        )
                     }
                 };
                 between(in_rooms, AGREEMENT_OF_HALVES_IN_A_ROOM, share_of_room)
@@ -291,12 +295,12 @@ mod tests {
     }
 
     #[test]
-    fn of_much_wall_three_quarters_must_agree() {
+    fn of_much_wall_five_sixths_must_agree() {
         let with = |wall_agreement: f64, wall_seen: f64| {
             let origin = Origin::Search { lead: 20.0 };
             Odds::new(&Grounds { origin, wall_agreement, wall_seen, ..GROUNDS }).probability()
         };
-        assert!(with(0.7, 100.0) < 0.6 && with(0.76, 100.0) > 0.999);
+        assert!(with(0.78, 100.0) < 0.6 && with(0.84, 100.0) > 0.999);
         assert!(with(0.6, 60.0) > 0.999 && with(0.6, 80.0) < 0.01);
     }
 

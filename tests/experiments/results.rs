@@ -3,6 +3,7 @@
 use super::plot::Plot;
 use anyhow::{Context, Result};
 use gridweave::table::Table;
+use gridweave_logs::map_file::{GridMap, save};
 use std::path::{Path, PathBuf};
 
 /// The folder that an experiment writes to.
@@ -33,6 +34,14 @@ impl Results {
     pub(super) fn plot(&mut self, name: &str, plot: &Plot) -> Result<()> {
         let svg = plot.to_svg().with_context(|| format!("cannot draw the plot {name}"))?;
         self.file(&format!("{name}.svg"), svg.as_bytes())
+    }
+
+    /// Writes a map as NAME.yaml and NAME.pgm.
+    pub(super) fn map(&mut self, name: &str, map: &GridMap) -> Result<()> {
+        let path = self.folder.join(format!("{name}.yaml"));
+        save(&path, map).with_context(|| format!("cannot write {}", path.display()))?;
+        self.written.push(path);
+        Ok(())
     }
 
     /// Tells which files there are.

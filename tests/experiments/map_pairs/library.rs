@@ -5,6 +5,7 @@ use crate::align::worlds::{self, PairWorld, Seeds};
 use crate::log::last_maps;
 use anyhow::{Context, Result};
 use gridweave_logs::map_file::{GridMap, load};
+use gridweave_runtime::ros::Time;
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, pose};
 use nalgebra::Point2;
@@ -42,6 +43,11 @@ impl MapOfBuilding {
     /// Its cells.
     pub(super) fn grid(&self) -> Result<Grid<'_>> {
         Grid::new(self.geometry, &self.cells).with_context(|| format!("the map {} cannot be used", self.name))
+    }
+
+    /// It as it is written to a file.
+    pub(super) fn to_file(&self) -> GridMap {
+        GridMap { info: self.geometry.meta_data(Time::default()), cells: self.cells.clone() }
     }
 
     /// A part of it, turned, in other cells.

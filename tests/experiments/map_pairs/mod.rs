@@ -17,7 +17,7 @@ use clap::Args;
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use judging::Judged;
-use library::{Library, SimulatedPair};
+use library::{Library, MapOfBuilding, SimulatedPair};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -50,6 +50,9 @@ pub(super) struct MapPairsArgs {
     /// Leave out the pairs with a truth.
     #[arg(long)]
     only_unrelated: bool,
+    /// Write the maps of different buildings that are merged as map files (`wrong_NUMBER_a.yaml`, `_b.yaml`), to look at.
+    #[arg(long)]
+    keep_wrong: bool,
     /// Compare the maps at every hypothesis as they are bent, too, which takes longer, and write all of them to
     /// `map_pairs_hypotheses.csv`.
     #[arg(long)]
@@ -67,6 +70,8 @@ struct Trial {
     judged: Judged,
     /// Whether each hypothesis is right.
     right: Vec<bool>,
+    /// The number of the pair and its maps, of different buildings that were merged, if they are to be kept.
+    wrong_maps: Option<(u64, [MapOfBuilding; 2])>,
 }
 
 impl Trial {
@@ -117,6 +122,7 @@ fn with_truth(folder: &std::path::Path, with_bends: bool) -> Result<Vec<Trial>> 
             pair: pair.name().to_owned(),
             is_right: judged.place().is_some_and(|place| pair.is_right(place)),
             is_unrelated: pair.is_unrelated(),
+            wrong_maps: None,
             right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
             judged,
         })
@@ -133,6 +139,7 @@ fn of_one_world(pair: &SimulatedPair, with_bends: bool) -> Trial {
         pair: pair.world.name.clone(),
         is_right: judged.place().is_some_and(|place| pair.is_right(place)),
         is_unrelated: false,
+        wrong_maps: None,
         right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
         judged,
     }
@@ -155,8 +162,10 @@ fn of_different_buildings(
         let names = maps.map(|map| map.name.as_str());
         let [a, b] = maps.map(|map| if in_parts { map.part(&mut random) } else { map.clone() });
         let judged = judging::judge_maps(&a, &b, args.hypotheses);
+        let is_kept = args.keep_wrong && judged.is_merged();
         Trial {
             set: set.to_owned(),
+            wrong_maps: is_kept.then(|| (number, [a, b])),
             pair: format!("{number}: {} and {}", names[0], names[1]),
             is_right: false,
             is_unrelated: true,
@@ -185,6 +194,11 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
     let mut hypotheses =
         Table::new(["set", "pair", "outcome", "hypothesis", "is right"].into_iter().chain(judging::HEADS));
     for trial in trials {
+        if let Some((number, maps)) = &trial.wrong_maps {
+            for (map, which) in maps.iter().zip(["a", "b"]) {
+                results.map(&format!("wrong_{number}_{which}"), &map.to_file())?;
+            }
+        }
         let Trial { set, pair, judged, right, .. } = trial;
         let outcome = trial.outcome().to_owned();
         runs.row([
