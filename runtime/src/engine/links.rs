@@ -4,6 +4,7 @@ use super::runner::readers;
 use crate::link::Board;
 use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortBoard, ReaderEnd, RunNames, SenderRole};
 use crate::pipeline::Pipeline;
+use crate::stage::RunLinks;
 use iceoryx2::node::Node;
 use iceoryx2::service::Service;
 use std::collections::BTreeMap;
@@ -16,11 +17,23 @@ pub(super) struct Links<'a> {
     pub(super) board: &'a Arc<Board>,
     /// For each output port of each stage, those that read it: stages and their wires.
     readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
+    /// For stages that show elsewhere what passes, if others than the ends of links can see that.
+    to_look_on: Option<RunLinks>,
 }
 
 impl<'a> Links<'a> {
     pub(super) fn new(pipeline: &'a Pipeline, names: &'a RunNames, board: &'a Arc<Board>) -> Self {
-        Self { pipeline, names, board, readers: readers(pipeline) }
+        Self { pipeline, names, board, readers: readers(pipeline), to_look_on: None }
+    }
+
+    /// The same of a run whose links others can look on at.
+    pub(super) fn looked_on(self, links: RunLinks) -> Self {
+        Self { to_look_on: Some(links), ..self }
+    }
+
+    /// For stages that show elsewhere what passes, if others than the ends of links can see that.
+    pub(super) fn to_look_on(&self) -> Option<RunLinks> {
+        self.to_look_on.clone()
     }
 
     /// The iceoryx2 node of one thread of the run.

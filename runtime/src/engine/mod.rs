@@ -8,6 +8,7 @@ mod links;
 pub mod processes;
 mod report;
 mod run_folder;
+mod run_links;
 mod run_lock;
 mod run_prefix;
 mod runner;
@@ -24,6 +25,7 @@ pub use feed::{Feed, FeedStopper};
 pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};
+pub use run_links::watch_links;
 pub use statistics::stage_statistics;
 pub use watch::{WatchedLink, watch_stages, watch_statistics};
 

@@ -97,6 +97,11 @@ impl RunFolder {
         RunNames::shared(self.prefix.clone(), self.path.to_string_lossy())
     }
 
+    /// The run, as those see it that look on.
+    pub(super) fn as_running(&self) -> RunningRun {
+        RunningRun { prefix: self.prefix.clone(), folder: self.path.clone() }
+    }
+
     /// Writes the pipeline of the run.
     pub fn write_pipeline(&self, text: &str) -> Result<(), RunFolderError> {
         let path = self.pipeline();

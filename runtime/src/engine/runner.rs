@@ -7,7 +7,7 @@ use super::{Failure, StageReport};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
 use crate::pipeline::{Pipeline, Wire};
-use crate::stage::{Context, Node, OutputEnd, OutputSink, RunStatistics, StageError};
+use crate::stage::{Context, Node, OutputEnd, OutputSink, StageError};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -25,19 +25,18 @@ pub(super) struct Runner {
 
 impl Runner {
     /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it.
-    /// `statistics` tell what all stages have done, if that is known.
+    /// `context` is what it is told.
     pub(super) fn new(
         pipeline: &Pipeline,
         stage: usize,
-        statistics: Option<RunStatistics>,
+        context: &Context,
         mut sink: impl FnMut(usize) -> Option<Box<dyn OutputSink>>,
     ) -> Result<Self, Failure> {
         let spec = &pipeline.stages[stage];
-        let context = Context { statistics, ..pipeline.context(stage) };
         let ends =
             spec.topics.iter().enumerate().map(|(port, topic)| OutputEnd { topic: topic.clone(), sink: sink(port) });
         let ends = ends.collect();
-        let node = guarded(|| spec.kind.make(spec.parameters.clone(), &context, ends))?;
+        let node = guarded(|| spec.kind.make(spec.parameters.clone(), context, ends))?;
         let report = StageReport { name: spec.name.clone(), kind: spec.kind.name.to_owned(), ..Default::default() };
         let origin = |wire: &Wire| {
             let from = &pipeline.stages[wire.from_stage];

@@ -59,8 +59,8 @@ fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
             let link = links.get(port).filter(|link| link.has_readers())?;
             Some(Box::new(link.clone()) as Box<dyn OutputSink>)
         };
-        let runner =
-            Runner::new(pipeline, index, None, sink).map_err(|failure| RunError::of_stage(&spec.name, failure))?;
+        let runner = Runner::new(pipeline, index, &pipeline.context(index), sink);
+        let runner = runner.map_err(|failure| RunError::of_stage(&spec.name, failure))?;
         let own = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         stages.push(SingleStage { runner, inbox: inboxes[index].clone(), queues: own, links, done: false });
     }

@@ -10,6 +10,7 @@ use crate::link::{
 };
 use crate::link::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
 use crate::message::{LogTime, MessageFlags};
+use crate::stage::Context;
 use iceoryx2::service::Service;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -95,7 +96,9 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let sink = |port: usize| Some(Outputs::sink(&outputs, ports.binary_search(&port).ok()?));
         let mut work = Work::new(board.clone(), Rc::clone(&sleeper));
         work.begin();
-        let runner = Runner::new(pipeline, stage, Some(run_statistics(pipeline, links.board)), sink)?;
+        let statistics = Some(run_statistics(pipeline, links.board));
+        let context = Context { statistics, links: links.to_look_on(), ..pipeline.context(stage) };
+        let runner = Runner::new(pipeline, stage, &context, sink)?;
         work.note();
         work.end();
         board.set_state(StageState::Running);

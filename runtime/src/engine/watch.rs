@@ -4,13 +4,14 @@ use super::links::Links;
 use super::run_folder::{RunningRun, open_board};
 use super::statistics::run_statistics;
 use super::{Failure, RunError};
-use crate::link::{Observer, SampleHeader, StageBoard};
+use crate::link::{Board, Observer, RunNames, SampleHeader, StageBoard};
 use crate::message::{Message, MessageFlags};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::RunStatistics;
 use iceoryx2::node::Node;
 use iceoryx2::service::ipc::Service;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -45,35 +46,33 @@ impl WatchedLink {
     /// # Errors
     /// Nothing in the run reads the port, the run has gone or does not make the link, or too many look on.
     pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
-        let spec = &pipeline.stages[stage];
-        let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
-        let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
-        let names = run.names();
-        let links = Links::new(pipeline, &names, &board);
-        let name = spec.kind.outputs[port].name;
-        if !links.is_read(stage, port) {
-            let text = format!("has an output `{name}` that nothing reads, and so it is no link");
-            return Err(of_stage(Failure::Outside(text)));
-        }
-        let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
+        let opening = Opening::new(run, pipeline, stage, port)?;
         let start = Instant::now();
-        let observer = loop {
-            match Observer::new(&node, &names, &spec.name, name).map_err(|error| of_stage(error.into()))? {
-                Some(observer) => break observer,
+        loop {
+            match opening.observer()? {
+                Some(observer) => return Ok(opening.begin(observer)),
                 None if start.elapsed() < LINK_TIMEOUT && run.is_running() => thread::sleep(LOOK_INTERVAL),
                 None => {
-                    let text = format!("has not made its output `{name}` within {} s", LINK_TIMEOUT.as_secs());
-                    return Err(of_stage(Failure::Outside(text)));
+                    let (name, seconds) = (opening.output(), LINK_TIMEOUT.as_secs());
+                    return Err(opening
+                        .failed(Failure::Outside(format!("has not made its output `{name}` within {seconds} s"))));
                 }
             }
-        };
-        let board = board.stage(stage);
-        if pipeline.mode == Mode::Live {
-            board.greet();
         }
-        let (sent_before, senders_before) = (board.sent(port), board.senders(port));
-        let (next, missed, taken) = (BTreeMap::new(), 0, 0);
-        Ok(Self { observer, next, missed, taken, board, port, sent_before, senders_before, _node: node })
+    }
+
+    /// The same without waiting: none if the stage has not made the link yet.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub fn open_now(
+        run: &RunningRun,
+        pipeline: &Pipeline,
+        stage: usize,
+        port: usize,
+    ) -> Result<Option<Self>, RunError> {
+        let opening = Opening::new(run, pipeline, stage, port)?;
+        Ok(opening.observer()?.map(|observer| opening.begin(observer)))
     }
 
     /// Takes the messages that have passed since the last call: each once, with the header of its sample.
@@ -102,6 +101,65 @@ impl WatchedLink {
         // Of a program that came and went meanwhile nothing may have been seen, but the owner of the link has counted it.
         let passed = self.board.sent(self.port).saturating_sub(self.sent_before);
         self.missed.max(passed.saturating_sub(self.taken))
+    }
+}
+
+/// A link that may not be there yet.
+struct Opening<'a> {
+    pipeline: &'a Pipeline,
+    stage: usize,
+    port: usize,
+    names: RunNames,
+    board: Arc<Board>,
+    node: Node<Service>,
+}
+
+impl<'a> Opening<'a> {
+    fn new(run: &RunningRun, pipeline: &'a Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
+        let spec = &pipeline.stages[stage];
+        let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
+        let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
+        let names = run.names();
+        let links = Links::new(pipeline, &names, &board);
+        if !links.is_read(stage, port) {
+            let name = spec.kind.outputs[port].name;
+            let text = format!("has an output `{name}` that nothing reads, and so it is no link");
+            return Err(of_stage(Failure::Outside(text)));
+        }
+        let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
+        Ok(Self { pipeline, stage, port, names, board, node })
+    }
+
+    fn output(&self) -> &'static str {
+        self.pipeline.stages[self.stage].kind.outputs[self.port].name
+    }
+
+    fn failed(&self, failure: Failure) -> RunError {
+        RunError::of_stage(&self.pipeline.stages[self.stage].name, failure)
+    }
+
+    fn observer(&self) -> Result<Option<Observer<Service>>, RunError> {
+        let stage = &self.pipeline.stages[self.stage].name;
+        let observer = Observer::new(&self.node, &self.names, stage, self.output());
+        observer.map_err(|error| self.failed(error.into()))
+    }
+
+    fn begin(self, observer: Observer<Service>) -> WatchedLink {
+        let board = self.board.stage(self.stage);
+        if self.pipeline.mode == Mode::Live {
+            board.greet();
+        }
+        WatchedLink {
+            observer,
+            next: BTreeMap::new(),
+            missed: 0,
+            taken: 0,
+            sent_before: board.sent(self.port),
+            senders_before: board.senders(self.port),
+            board,
+            port: self.port,
+            _node: self.node,
+        }
     }
 }
 

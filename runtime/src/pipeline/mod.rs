@@ -58,6 +58,7 @@ mod document;
 mod drawing;
 mod initial_poses;
 mod kinds;
+mod link_names;
 mod live;
 mod load;
 mod nearest;
@@ -82,6 +83,7 @@ mod write;
 
 pub use diagnostic::PipelineErrors;
 pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
+pub use link_names::{named_link, named_links};
 pub use live::{Mode, Overflow, Restart};
 pub use nearest::{quoted_list, suggest};
 pub use overrides::{Overrides, SettingError};
@@ -187,6 +189,7 @@ impl Pipeline {
             inputs: spec.inputs.iter().map(|wire| self.input_wire(spec, wire)).collect(),
             stall_timeout: self.stall_timeout,
             statistics: None,
+            links: None,
         }
     }
 

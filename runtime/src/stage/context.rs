@@ -1,6 +1,6 @@
 //! What a stage is told when it is made.
 
-use super::{InitialPoses, RunStatistics, TagFields};
+use super::{InitialPoses, RunLinks, RunStatistics, TagFields};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Duration;
@@ -24,6 +24,9 @@ pub struct Context {
     pub stall_timeout: Option<Duration>,
     /// Tells what the stages of the run have done so far, for a stage that shows it; none where the engine does not know.
     pub statistics: Option<RunStatistics>,
+    /// The links of the run, for a stage that shows elsewhere what passes on them; none where the engine keeps them to itself: all but
+    /// `processes` do.
+    pub links: Option<RunLinks>,
 }
 
 impl Context {

@@ -9,12 +9,13 @@ pub struct StageError {
     doing: String,
     cause: String,
     help: Option<String>,
+    parameter: Option<String>,
 }
 
 impl StageError {
     /// `doing` completes "cannot ...", such as "open /logs/a.mcap"; `cause` says what went wrong.
     pub fn new(doing: impl Into<String>, cause: impl fmt::Display) -> Self {
-        Self { doing: doing.into(), cause: cause.to_string(), help: None }
+        Self { doing: doing.into(), cause: cause.to_string(), help: None, parameter: None }
     }
 
     /// Adds what would mend it.
@@ -22,6 +23,18 @@ impl StageError {
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
+    }
+
+    /// Says that it is for the value of a parameter, of which only the running stage can see that it is wrong.
+    #[must_use]
+    pub fn of_parameter(mut self, parameter: impl Into<String>) -> Self {
+        self.parameter = Some(parameter.into());
+        self
+    }
+
+    /// The parameter whose value is wrong, if it is for that.
+    pub fn parameter(&self) -> Option<&str> {
+        self.parameter.as_deref()
     }
 }
 

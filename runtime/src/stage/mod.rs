@@ -56,6 +56,7 @@ mod ports;
 pub(crate) mod range;
 mod received;
 mod registry;
+mod run_links;
 mod statistics;
 mod tag_fields;
 
@@ -72,5 +73,6 @@ pub use parameters::{ParameterError, Parameters};
 pub use ports::{InputPort, OutputPort, PortType};
 pub use received::Received;
 pub use registry::Registry;
+pub use run_links::{LinkView, RunLink, RunLinks};
 pub use statistics::{RunStatistics, StageStatistics};
 pub use tag_fields::{PathLoss, TagFields};

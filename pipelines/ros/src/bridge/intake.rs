@@ -5,7 +5,7 @@
 
 use super::difference::message;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};
-use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
+use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -145,15 +145,9 @@ impl Sender {
             return Ok(Item::Channel { link, number: entry.channel, channel });
         }
         let corrected = |time: u64| time.saturating_add_signed(self.correction);
-        let header = MessageHeader {
-            log_time: LogTime(corrected(entry.log_time)),
-            publish_time: corrected(entry.publish_time),
-            channel: entry.channel,
-            log_sequence: entry.log_sequence,
-            robot: FixedText::new(&entry.robot).map_err(|error| text(&error))?,
-            topic: FixedText::new(&entry.topic).map_err(|error| text(&error))?,
-            ..Default::default()
-        };
+        let header = entry.header().map_err(|error| text(&error))?;
+        let log_time = LogTime(corrected(entry.log_time));
+        let header = MessageHeader { log_time, publish_time: corrected(entry.publish_time), ..header };
         let nothing = Vec::new();
         let key = (entry.link, entry.topic.clone());
         let known = match entry.form {

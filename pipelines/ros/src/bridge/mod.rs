@@ -24,6 +24,8 @@
 //! 6. **Time.** Where the clocks differ by more than `clock_tolerance`, the receiver adds the difference that was measured to
 //!    the log times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is:
 //!    it is compared with other times of the same robot alone.
+//! 7. **Taps.** A sender shows links of its run to programs that ask for them, whether it carries them or not: `tap/mod.rs`. An end
+//!    that knows no taps does not answer them, and carries as ever.
 
 mod absent;
 mod certificates;
@@ -38,6 +40,7 @@ mod report;
 mod sender;
 pub mod sink;
 pub mod source;
+mod tap;
 #[cfg(test)]
 mod tests;
 mod wire;
@@ -46,6 +49,6 @@ use gridweave_runtime::stage::StageKind;
 pub use refusals::hear;
 
 /// The stage kinds of a bridge.
-pub fn kinds() -> [StageKind; 2] {
-    [source::kind(), sink::kind()]
+pub fn kinds() -> [StageKind; 3] {
+    [source::kind(), sink::kind(), tap::kind()]
 }

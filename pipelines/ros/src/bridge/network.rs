@@ -68,6 +68,28 @@ impl Network {
         join(self.config())
     }
 
+    /// Joins the network as a client of who listens there, which leads to all others that are connected to it.
+    ///
+    /// # Errors
+    /// The configuration file is wrong, or nothing listens there.
+    pub(super) fn open_as_client(&self) -> Result<Session, StageError> {
+        join(self.client_config())
+    }
+
+    fn client_config(&self) -> Result<Config, String> {
+        let mut config = self.config()?;
+        let mut settings = vec![("mode", "\"client\""), ("listen/endpoints", "[]")];
+        let is_here = |endpoint: &String| host(endpoint).is_some_and(is_loopback);
+        if self.zenoh_config.is_none() && self.connect.iter().all(is_here) {
+            // This machine is called otherwise in its certificate.
+            settings.push(("transport/link/tls/verify_name_on_connect", "false"));
+        }
+        for (key, value) in settings {
+            config.insert_json5(key, value).map_err(|error| format!("{key}: {error}"))?;
+        }
+        Ok(config)
+    }
+
     fn config(&self) -> Result<Config, String> {
         if let Some(path) = &self.zenoh_config {
             let config = file_config(path)?;
@@ -89,14 +111,12 @@ impl Network {
 
     /// Why none of the endpoints to connect to is reached, as far as that can be told. Asks each of them, one after the other.
     pub(super) fn obstacles(&self) -> Vec<String> {
-        let Ok(config) = self.config() else { return Vec::new() };
-        let why = |endpoint: String| {
-            let mut config = config.clone();
-            let list = serde_json::to_string(&[&endpoint]).ok()?;
-            config.insert_json5("connect/endpoints", &list).ok()?;
-            Some(format!("{endpoint}: {}", obstacle(config)?))
-        };
-        endpoints_of(&config, "connect/endpoints").into_iter().filter_map(why).collect()
+        obstacles_of(self.config())
+    }
+
+    /// The same for a client.
+    pub(super) fn obstacles_as_client(&self) -> Vec<String> {
+        obstacles_of(self.client_config())
     }
 
     /// Where others connect to, as words.
@@ -117,6 +137,17 @@ impl Network {
     }
 }
 
+fn obstacles_of(config: Result<Config, String>) -> Vec<String> {
+    let Ok(config) = config else { return Vec::new() };
+    let why = |endpoint: String| {
+        let mut config = config.clone();
+        let list = serde_json::to_string(&[&endpoint]).ok()?;
+        config.insert_json5("connect/endpoints", &list).ok()?;
+        Some(format!("{endpoint}: {}", obstacle(config)?))
+    };
+    endpoints_of(&config, "connect/endpoints").into_iter().filter_map(why).collect()
+}
+
 /// What the name of a bridge or a sender may be.
 pub(super) fn is_part_of_key(name: &str) -> bool {
     let is_usual = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
@@ -125,12 +156,19 @@ pub(super) fn is_part_of_key(name: &str) -> bool {
 
 /// Whether what goes there leaves this machine, and can be read on its way.
 fn is_open(endpoint: &str) -> bool {
-    let Some((protocol, rest)) = endpoint.split_once('/') else { return true };
+    host(endpoint).is_none_or(|host| !is_loopback(host)) && !is_encrypted(endpoint)
+}
+
+/// The host of an endpoint.
+fn host(endpoint: &str) -> Option<&str> {
+    let (_, rest) = endpoint.split_once('/')?;
     let address = rest.split(['?', '#']).next().unwrap_or(rest);
     let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
-    let host = host.trim_start_matches('[').trim_end_matches(']');
-    let is_loopback = host == "localhost" || host.parse().is_ok_and(|address: IpAddr| address.is_loopback());
-    !is_loopback && !ENCRYPTED.contains(&protocol)
+    Some(host.trim_start_matches('[').trim_end_matches(']'))
+}
+
+fn is_loopback(host: &str) -> bool {
+    host == "localhost" || host.parse().is_ok_and(|address: IpAddr| address.is_loopback())
 }
 
 /// Whether what goes there is encrypted.

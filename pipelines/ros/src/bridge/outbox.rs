@@ -380,15 +380,5 @@ impl Outbox {
 }
 
 fn entry(link: usize, header: &MessageHeader, form: Form, bytes: Vec<u8>) -> Entry {
-    Entry {
-        link: u32::try_from(link).unwrap_or(u32::MAX),
-        form,
-        channel: header.channel,
-        log_sequence: header.log_sequence,
-        log_time: header.log_time.0,
-        publish_time: header.publish_time,
-        robot: header.robot.as_str().to_owned(),
-        topic: header.topic.as_str().to_owned(),
-        bytes,
-    }
+    Entry::new(u32::try_from(link).unwrap_or(u32::MAX), header, form, bytes)
 }

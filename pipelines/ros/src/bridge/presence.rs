@@ -1,4 +1,4 @@
-//! Who is there: the liveliness tokens of the two ends of a bridge.
+//! Who is there: the liveliness tokens of the two ends of a bridge, and of those who tap links of a sender's run.
 //!
 //! A token stands under `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when nothing
 //! was heard of it for ten seconds.
@@ -14,6 +14,8 @@ use zenoh::{Session, Wait};
 pub(super) enum Role {
     Sender,
     Receiver,
+    /// Looks on at a link of a sender's run.
+    Tapper,
 }
 
 impl Role {
@@ -21,6 +23,7 @@ impl Role {
         match self {
             Self::Sender => "sender",
             Self::Receiver => "receiver",
+            Self::Tapper => "tapper",
         }
     }
 }

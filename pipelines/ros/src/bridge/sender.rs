@@ -5,10 +5,11 @@ use super::network::Network;
 use super::outbox::{Limits, Outbox, Totals};
 use super::presence::{Presence, Role, watch};
 use super::report::Report;
+use super::tap::Taps;
 use super::wire::{Answer, Link, from_bytes};
 use crate::connection::{in_words, is_connected};
 use gridweave_runtime::message::MessageHeader;
-use gridweave_runtime::stage::StageError;
+use gridweave_runtime::stage::{RunLinks, StageError};
 use std::collections::BTreeSet;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -38,6 +39,8 @@ pub(super) struct Settings {
     /// At least so long from one batch to the next.
     pub(super) interval: Duration,
     pub(super) clock: Clock,
+    /// The links of the run, for those who tap, or why they are not shown.
+    pub(super) links: Result<RunLinks, &'static str>,
 }
 
 /// The end of a bridge that sends.
@@ -45,6 +48,7 @@ pub(super) struct Sender {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     token: Option<LivelinessToken>,
+    taps: Option<Taps>,
 }
 
 struct Shared {
@@ -72,6 +76,7 @@ impl Sender {
         let session = settings.network.open()?;
         let number = Presence::number_of(&session);
         let me = Presence { name: settings.name.clone(), number };
+        let taps = Taps::start(&session, &settings.network.bridge, &me, settings.links.clone())?;
         let token = me.declare(&session, &settings.network.bridge, Role::Sender)?;
         let carried = links.len();
         links.extend(report.as_ref().map(|_| Report::link()));
@@ -90,7 +95,7 @@ impl Sender {
         let thread = thread::Builder::new().name("bridge".to_owned());
         let thread = thread.spawn(move || Worker { session, settings, report, shared: of_thread }.run());
         let thread = thread.map_err(|error| StageError::new("start the thread of a bridge", error))?;
-        Ok(Self { shared, thread: Some(thread), token: Some(token) })
+        Ok(Self { shared, thread: Some(thread), token: Some(token), taps: Some(taps) })
     }
 
     /// Announces a channel of a link.
@@ -138,6 +143,8 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
+        // Those who tap get the last of the run.
+        drop(self.taps.take());
         self.shared.lock().is_stopped = true;
         self.shared.has_changed.notify_all();
         // Before the thread closes the session.

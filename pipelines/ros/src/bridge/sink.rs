@@ -15,6 +15,10 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Duration;
 
+/// Why nobody can tap.
+const NOT_ALLOWED: &str = "its `bridge_sink` has `allow_tap = false`";
+const NOT_TO_BE_SEEN: &str = "its run keeps its links to itself, as all do but those on the engine `processes`";
+
 /// The parameters of `bridge_sink`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -55,6 +59,8 @@ pub struct SinkParameters {
     /// So many seconds apart the other end is told what the stages of this run do, for its `top`; 0 for never.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub tell_stages: f64,
+    /// Show the links of this run to who taps them over the bridge, also those that are not sent: by `tap` on the base.
+    pub allow_tap: bool,
     /// For so many seconds the end of the run waits until the other end has taken what was sent last.
     #[schemars(range(min = 0.0, max = 86400.0))]
     pub linger: f64,
@@ -78,6 +84,7 @@ impl Default for SinkParameters {
             keep_maps: 100,
             interval: 0.05,
             tell_stages: 2.0,
+            allow_tap: true,
             linger: 30.0,
         }
     }
@@ -91,7 +98,7 @@ impl SinkParameters {
         Network { bridge, connect, listen, discover, zenoh_config, insecure, certificates }
     }
 
-    fn settings(&self, clock: Clock) -> Settings {
+    fn settings(&self, clock: Clock, context: &Context) -> Settings {
         let seconds = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         Settings {
             network: self.network(),
@@ -99,6 +106,10 @@ impl SinkParameters {
             limits: Limits { messages: self.keep_last, states: self.keep_maps },
             interval: seconds(self.interval),
             clock,
+            links: match self.allow_tap {
+                false => Err(NOT_ALLOWED),
+                true => context.links.clone().ok_or(NOT_TO_BE_SEEN),
+            },
         }
     }
 }
@@ -163,7 +174,7 @@ impl BridgeSink {
             ros_type: wire.ros_type.clone(),
         };
         let links: Vec<Link> = context.inputs.iter().map(link).collect();
-        let settings = parameters.settings(clock);
+        let settings = parameters.settings(clock, context);
         let interval = Duration::try_from_secs_f64(parameters.tell_stages).ok().filter(|interval| !interval.is_zero());
         let told = context.statistics.clone().zip(interval);
         let report = told.map(|(statistics, interval)| Report::new(&settings.name, statistics, interval));

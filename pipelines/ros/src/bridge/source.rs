@@ -323,7 +323,7 @@ impl BridgeSource {
                     number => (self.number(index, sender, number, ""), true),
                 };
                 if !is_announced {
-                    port.out.announce(channel, &channel_of(topic, &link.ros_type))?;
+                    port.out.announce(channel, &channel_of(topic, &link.ros_type, ""))?;
                 }
                 if port.name != report::PORT {
                     output.count("messages taken", 1);
@@ -340,9 +340,10 @@ impl BridgeSource {
     }
 }
 
-/// The channel of the results of a stage.
-fn channel_of(topic: &str, ros_type: &str) -> Channel {
-    let schema = schema_text(ros_type).unwrap_or_default();
+/// The channel of the results of a stage. `definition` is that of their type, if it brings one.
+pub(super) fn channel_of(topic: &str, ros_type: &str, definition: &str) -> Channel {
+    let known = || schema_text(ros_type).unwrap_or_default();
+    let schema = if definition.is_empty() { known() } else { definition.to_owned() };
     let encoding = if schema.is_empty() { "" } else { "ros2msg" };
     Channel {
         topic: topic.to_owned(),

@@ -1,6 +1,7 @@
 //! What the two ends of a bridge say to each other, in bytes: CDR, compressed with Zstandard, behind the version of the protocol.
 
 use super::difference;
+use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
 use gridweave_runtime::ros::{decode, encode};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -56,6 +57,39 @@ pub(super) struct Entry {
     pub(super) topic: String,
     #[serde(with = "serde_bytes")]
     pub(super) bytes: Vec<u8>,
+}
+
+impl Entry {
+    /// That of a message or a channel of a link, with these bytes.
+    pub(super) fn new(link: u32, header: &MessageHeader, form: Form, bytes: Vec<u8>) -> Self {
+        Self {
+            link,
+            form,
+            channel: header.channel,
+            log_sequence: header.log_sequence,
+            log_time: header.log_time.0,
+            publish_time: header.publish_time,
+            robot: header.robot.as_str().to_owned(),
+            topic: header.topic.as_str().to_owned(),
+            bytes,
+        }
+    }
+
+    /// The header that a message has.
+    ///
+    /// # Errors
+    /// A name in it is too long.
+    pub(super) fn header(&self) -> Result<MessageHeader, String> {
+        Ok(MessageHeader {
+            log_time: LogTime(self.log_time),
+            publish_time: self.publish_time,
+            channel: self.channel,
+            log_sequence: self.log_sequence,
+            robot: FixedText::new(&self.robot).map_err(|error| error.to_string())?,
+            topic: FixedText::new(&self.topic).map_err(|error| error.to_string())?,
+            ..Default::default()
+        })
+    }
 }
 
 /// What the bytes of an entry are.

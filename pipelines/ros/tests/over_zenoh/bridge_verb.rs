@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use tempfile::TempDir;
 
 /// What robots send, as a log.
-const ROBOT: &str = r#"
+pub(crate) const ROBOT: &str = r#"
 [pipeline]
 name = "NAME"
 mode = "live"
@@ -24,7 +24,7 @@ inputs = ["robots.map", "robots.pose", "robots.tags"]
 "#;
 
 /// The same on a base.
-const BASE: &str = r#"
+pub(crate) const BASE: &str = r#"
 [pipeline]
 name = "NAME"
 mode = "live"
@@ -98,8 +98,8 @@ fn last_part(topic: &str) -> &str {
 }
 
 /// The run of a robot.
-struct Robot {
-    name: String,
+pub(crate) struct Robot {
+    pub(crate) name: String,
     run: Running,
     folder: TempDir,
     /// How many messages each of its logs holds, and how many were sent.
@@ -111,16 +111,22 @@ struct Robot {
 impl Robot {
     #[track_caller]
     fn start() -> Self {
+        Self::start_with(ROBOT)
+    }
+
+    /// Starts the run of a pipeline that is called NAME, and has [`ROBOT`]'s stages.
+    #[track_caller]
+    pub(crate) fn start_with(pipeline: &str) -> Self {
         let folder = TempDir::new().unwrap();
         let holds = simulate(folder.path());
         let name = own_name("robot");
-        fs::write(folder.path().join("robot.toml"), ROBOT.replace("NAME", &name)).unwrap();
+        fs::write(folder.path().join("robot.toml"), pipeline.replace("NAME", &name)).unwrap();
         let args = ["run", "robot.toml", "--output", "robot.mcap"];
         let run = Running::start(GRIDWEAVE, &args, folder.path(), "robot.log");
         Self { name, run, folder, holds, sent: 0, players: Vec::new() }
     }
 
-    fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.folder.path()
     }
 
@@ -136,7 +142,7 @@ impl Robot {
 
     /// Lets the robots send a part of what they have, and waits until their own log has it.
     #[track_caller]
-    fn play(&mut self, part: usize) {
+    pub(crate) fn play(&mut self, part: usize) {
         let log = format!("part{part}.mcap");
         let play = ["play", &log, "--rate", "50", "--run", &self.name, "--wait", "60"];
         let player = Running::start(GRIDWEAVE, &play, self.path(), &format!("{log}.log"));
@@ -147,7 +153,7 @@ impl Robot {
 
     /// Ends the run as a user does.
     #[track_caller]
-    fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         for player in &mut self.players {
             player.signal("INT");
             player.end_with(0);
@@ -201,7 +207,7 @@ impl Robot {
 
 /// A base that takes what robots send as a log, until one has said that nothing follows.
 #[track_caller]
-fn log_base(robot: &Robot, base: &str, endpoint: &str, log: &str) -> (String, Running) {
+pub(crate) fn log_base(robot: &Robot, base: &str, endpoint: &str, log: &str) -> (String, Running) {
     let (name, pipeline) = (own_name("base"), format!("{log}.toml"));
     fs::write(robot.path().join(&pipeline), base.replace("NAME", &name)).unwrap();
     let listen = format!("robots.listen=[\"{endpoint}\"]");

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod bridge;
+mod bridge_tap;
 mod bridge_verb;
 mod command;
 mod map_updates;

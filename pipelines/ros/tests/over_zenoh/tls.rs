@@ -1,6 +1,7 @@
 //! Bridges over TLS, with certificates of authorities that the tests make.
 
 use crate::bridge::{Wire, come, give, give_pose, map, sink, source};
+use crate::bridge_tap::{Link, go_on, robot, tap_stage, times};
 use crate::command::{GRIDWEAVE, Running, wait_until};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::stage::LoneStage;
@@ -85,6 +86,29 @@ fn what_goes_over_tls_comes_as_it_was_sent_and_cannot_be_read_on_its_way() {
         assert!(came.iter().map(Message::bytes).eq(maps.iter().map(Vec::as_slice)), "{protocol}");
         assert_eq!(is_readable(&wire, "sender/robot-1"), protocol == "tcp", "{of_robot}");
     }
+}
+
+#[test]
+fn a_link_is_tapped_over_tls_with_a_certificate_of_the_fleet_alone() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let (fleet, others) = (Authority::new(folder, "fleet"), Authority::new(folder, "others"));
+    fleet.sign("base", &["localhost"]);
+    fleet.sign("robot", &["robot"]);
+    others.sign("stranger", &["stranger"]);
+    let port = free_port();
+    let of_base = files(folder, Some("fleet"), Some("base"));
+    let _base = source(&format!("tls/127.0.0.1:{port}"), &of_base);
+    let link = Link::default();
+    link.lock().unwrap().0.push(7);
+    let endpoint = format!("tls/localhost:{port}");
+    let _robot = robot(&endpoint, &files(folder, Some("fleet"), Some("robot")), Some(&link));
+    let stranger = files(folder, Some("fleet"), Some("stranger"));
+    let refused = go_on(&mut tap_stage(&endpoint, &format!("wait = 1.0\n{stranger}")), "refused", |_| false).unwrap();
+    assert!(refused.contains("it must be its `authority`") || refused.contains("asks for"), "{refused}");
+    // The base itself, by an address that its certificate does not have.
+    let mut tap = tap_stage(&format!("tls/127.0.0.1:{port}"), &of_base);
+    assert_eq!(go_on(&mut tap, "message", |tap| times(tap) == [7]), None);
 }
 
 const BASE: &str = r#"

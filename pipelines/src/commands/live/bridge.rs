@@ -1,14 +1,15 @@
 //! `gridweave bridge`: carries links of a run to a run on another machine.
 
+use super::bridge_settings::{bridge_kind, check, connecting_to, settings};
 use super::link_choice::named_links;
 use super::running::{RunChoice, find_run};
 use super::tap::LOOK_INTERVAL;
 use crate::interrupt::stop_on_interrupt;
-use crate::status::{BadUse, Status};
+use crate::status::Status;
 use crate::terminal::{print_line, say};
 use anyhow::{Result, bail};
 use clap::Args;
-use gridweave_runtime::engine::{WatchedLink, watch_statistics};
+use gridweave_runtime::engine::{WatchedLink, watch_links, watch_statistics};
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
 use gridweave_runtime::stage::{Context, InputWire, Registry};
 use std::sync::atomic::Ordering;
@@ -35,18 +36,10 @@ const SINK: &str = "bridge_sink";
 
 /// Carries links.
 pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
-    let Some(kind) = registry.get(SINK) else {
-        bail!("this program has no bridge: `gridweave-ros` has one (cargo install --path pipelines/ros)");
-    };
-    let parameters = parameters(args)?;
-    match kind.check_parameters(&parameters) {
-        Err(wrong) => return Err(BadUse(wrong.message().to_owned()).into()),
-        Ok(wrong) => {
-            if let Some(wrong) = wrong.first() {
-                return Err(BadUse(wrong.to_string()).into());
-            }
-        }
-    }
+    let kind = bridge_kind(SINK, registry)?;
+    let mut parameters = connecting_to(&args.to);
+    parameters.extend(settings(&args.set)?);
+    check(kind, &parameters)?;
     let running = find_run(&args.run, registry)?;
     let mut links = Vec::new();
     for name in &args.links {
@@ -62,8 +55,13 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         let definition = stage.kind.definition(&ros_type).unwrap_or_default().to_owned();
         InputWire { port, from: stage.name.clone(), output: output.name, ros_type, definition, ..Default::default() }
     });
-    let statistics = Some(watch_statistics(&running.run, &running.pipeline)?);
-    let context = Context { stage: "bridge".to_owned(), inputs: wires.collect(), statistics, ..Default::default() };
+    let context = Context {
+        stage: "bridge".to_owned(),
+        inputs: wires.collect(),
+        statistics: Some(watch_statistics(&running.run, &running.pipeline)?),
+        links: Some(watch_links(&running.run, &running.pipeline)),
+        ..Default::default()
+    };
     let stop = stop_on_interrupt("what is on its way is sent");
     let mut near = kind.make(parameters, &context, Vec::new())?;
     let open =
@@ -112,43 +110,14 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     Ok(if lost > 0 { Status::Failed } else { Status::Done })
 }
 
-/// What the bridge is told.
-fn parameters(args: &BridgeArgs) -> Result<toml::Table> {
-    let mut parameters = toml::Table::new();
-    if !args.to.is_empty() {
-        parameters.insert("connect".into(), args.to.clone().into());
-    }
-    for setting in &args.set {
-        let wrong = || BadUse(format!("`{setting}` is no setting: write it as PARAMETER=VALUE"));
-        let (name, value) = setting.split_once('=').ok_or_else(wrong)?;
-        // A word needs no quotes.
-        let read = format!("{name} = {value}").parse::<toml::Table>();
-        let read = read.or_else(|_| format!("{name} = {}", toml::Value::from(value)).parse()).map_err(|_| wrong())?;
-        parameters.extend(read);
-    }
-    Ok(parameters)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn args(to: &[&str], set: &[&str]) -> BridgeArgs {
-        let owned = |texts: &[&str]| texts.iter().map(|&text| text.to_owned()).collect();
-        BridgeArgs { links: Vec::new(), to: owned(to), set: owned(set), run: RunChoice::default() }
-    }
-
-    #[test]
-    fn settings_are_values_or_words() {
-        let read = parameters(&args(&["tcp/base:7448"], &["insecure=true", "sender=robot1", "linger=2.5"])).unwrap();
-        let expected = "connect = [\"tcp/base:7448\"]\ninsecure = true\nsender = \"robot1\"\nlinger = 2.5";
-        assert_eq!(read, expected.parse().unwrap());
-        assert!(parameters(&args(&[], &["insecure"])).is_err());
-    }
-
     #[test]
     fn a_program_without_a_bridge_says_which_has_one() {
-        let error = bridge(&args(&[], &[]), &Registry::default()).unwrap_err().to_string();
+        let args = BridgeArgs { links: Vec::new(), to: Vec::new(), set: Vec::new(), run: RunChoice::default() };
+        let error = bridge(&args, &Registry::default()).unwrap_err().to_string();
         assert!(error.contains("gridweave-ros"), "{error}");
     }
 }

@@ -2,21 +2,16 @@
 
 use crate::status::BadUse;
 use anyhow::Result;
-use gridweave_runtime::pipeline::{Pipeline, suggest};
+use gridweave_runtime::pipeline::{self, Pipeline};
+
+/// What to call the run whose links are named.
+const THE_RUN: &str = "the run";
 
 /// An output port of a stage that other stages read, by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Link {
     pub(super) stage: usize,
     pub(super) port: usize,
-}
-
-impl Link {
-    /// STAGE.PORT
-    pub(super) fn name(self, pipeline: &Pipeline) -> String {
-        let stage = &pipeline.stages[self.stage];
-        format!("{}.{}", stage.name, stage.kind.outputs[self.port].name)
-    }
 }
 
 /// All links of a pipeline, in its order.
@@ -33,14 +28,21 @@ pub(super) fn all_links(pipeline: &Pipeline) -> Vec<Link> {
 /// The links that a text names: `STAGE.PORT`, or `STAGE` for all that the stage has.
 pub(super) fn named_links(name: &str, pipeline: &Pipeline) -> Result<Vec<Link>> {
     let links = all_links(pipeline);
-    let stage_of = |link: &Link| pipeline.stages[link.stage].name.as_str();
-    let named = links.iter().filter(|link| link.name(pipeline) == name || stage_of(link) == name);
-    let named: Vec<Link> = named.copied().collect();
-    if named.is_empty() {
-        let names: Vec<String> = links.iter().map(|link| link.name(pipeline)).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let help = suggest(name, &names, "there are").map_or_else(String::new, |help| format!("; {help}"));
-        return Err(BadUse(format!("the run has no link `{name}`{help}")).into());
-    }
-    Ok(named)
+    let named = pipeline::named_links(name, THE_RUN, &names(&links, pipeline)).map_err(BadUse)?;
+    Ok(named.into_iter().map(|link| links[link]).collect())
+}
+
+/// The same where one is meant.
+pub(super) fn named_link(name: &str, pipeline: &Pipeline) -> Result<Link> {
+    let links = all_links(pipeline);
+    let named = pipeline::named_link(name, THE_RUN, &names(&links, pipeline)).map_err(BadUse)?;
+    Ok(links[named])
+}
+
+fn names<'a>(links: &[Link], pipeline: &'a Pipeline) -> Vec<(&'a str, &'a str)> {
+    let name = |link: &Link| {
+        let stage = &pipeline.stages[link.stage];
+        (stage.name.as_str(), stage.kind.outputs[link.port].name)
+    };
+    links.iter().map(name).collect()
 }

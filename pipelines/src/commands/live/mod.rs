@@ -1,12 +1,14 @@
 //! Commands that meet a run that is going on: play into it, record, print and carry elsewhere what passes, show what it does.
 
 mod bridge;
+mod bridge_settings;
 mod link_choice;
 mod other_machines;
 mod play;
 mod record;
 mod running;
 mod tap;
+mod tap_elsewhere;
 mod top;
 mod view;
 

@@ -46,6 +46,15 @@ impl Drop for Running {
 
 /// The run that is meant, of those of this user that are going on.
 pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Running> {
+    find_run_with(choice, registry, |_| true)
+}
+
+/// The same; where several may be meant, it is one with this pipeline.
+pub(super) fn find_run_with(
+    choice: &RunChoice,
+    registry: &Registry,
+    is_likely: impl Fn(&Pipeline) -> bool,
+) -> Result<Running> {
     if !(choice.wait.is_finite() && choice.wait >= 0.0) {
         return Err(BadUse("--wait must be 0 s or more".to_owned()).into());
     }
@@ -56,6 +65,9 @@ pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Runnin
         let going_on = names(&runs);
         if let Some(name) = &choice.run {
             runs.retain(|running| running.pipeline.name == *name || running.run.prefix.starts_with(name));
+        }
+        if runs.iter().any(|running| is_likely(&running.pipeline)) {
+            runs.retain(|running| is_likely(&running.pipeline));
         }
         match (runs.len(), runs.pop()) {
             (1, Some(running)) => return Ok(running),

@@ -1,7 +1,8 @@
 //! `gridweave tap`: prints the messages of a link as they pass.
 
-use super::link_choice::named_links;
+use super::link_choice::named_link;
 use super::running::{RunChoice, find_run};
+use super::tap_elsewhere::tap_elsewhere;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::terminal::{print, say};
@@ -21,8 +22,9 @@ use std::time::Duration;
 /// What `gridweave tap` is told.
 #[derive(Debug, Args)]
 pub(crate) struct TapArgs {
-    /// The link: STAGE.PORT, or STAGE if it has one output only.
-    #[arg(value_name = "STAGE.PORT")]
+    /// The link: STAGE.PORT, or STAGE if it has one output only; MACHINE:STAGE.PORT for that of a run on another machine, as its
+    /// bridge is called there (with `gridweave-ros`).
+    #[arg(value_name = "[MACHINE:]STAGE.PORT")]
     pub(crate) link: String,
     /// Print each message as a line of JSON.
     #[arg(long)]
@@ -30,6 +32,12 @@ pub(crate) struct TapArgs {
     /// End after so many messages.
     #[arg(long, value_name = "N")]
     pub(crate) count: Option<u64>,
+    /// Where the other machine's bridge connects to, as tcp/HOST:PORT, if that is no `bridge_source` of a run here.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub(crate) at: Vec<String>,
+    /// Set a parameter of the way to the other machine; `kinds bridge_tap` lists them.
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
     #[command(flatten)]
     pub(crate) run: RunChoice,
 }
@@ -41,29 +49,24 @@ const LONGEST_ARRAY: usize = 16;
 
 /// Prints what passes.
 pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
+    if let Some((machine, link)) = args.link.split_once(':') {
+        return tap_elsewhere(args, machine, link, registry);
+    }
+    if !(args.at.is_empty() && args.set.is_empty()) {
+        let text = "--at and --set are for links of other machines: name the link as MACHINE:STAGE.PORT";
+        return Err(BadUse(text.to_owned()).into());
+    }
     let running = find_run(&args.run, registry)?;
-    let links = named_links(&args.link, &running.pipeline)?;
-    let [link] = links.as_slice() else {
-        let names: Vec<String> = links.iter().map(|link| link.name(&running.pipeline)).collect();
-        return Err(BadUse(format!("`{}` has several outputs: choose one of {}", args.link, names.join(", "))).into());
-    };
+    let link = named_link(&args.link, &running.pipeline)?;
     let stop = stop_on_interrupt("the tap ends");
     let mut watched = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
     let kind = &running.pipeline.stages[link.stage].kind;
-    let mut types = Types::new(kind, kind.outputs[link.port].port_type);
-    let mut left = args.count.unwrap_or(u64::MAX);
+    let mut printer = Printer::new(args, Types::new(kind, kind.outputs[link.port].port_type));
     loop {
         // What has passed before the run ended is still there after it.
         let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
-        let mut lines = String::new();
-        watched.take(|_, message| {
-            if let Some(line) = types.line(&message, args.json).filter(|_| left > 0) {
-                left -= 1;
-                lines.push_str(&line);
-                lines.push('\n');
-            }
-        })?;
-        if !print(lines)? || left == 0 || is_last_look {
+        watched.take(|_, message| printer.add(&message))?;
+        if !printer.print()? || is_last_look {
             break;
         }
         thread::sleep(LOOK_INTERVAL);
@@ -74,8 +77,37 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
     Ok(Status::Done)
 }
 
+/// Prints messages, up to so many.
+pub(super) struct Printer {
+    types: Types,
+    as_json: bool,
+    left: u64,
+    lines: String,
+}
+
+impl Printer {
+    pub(super) fn new(args: &TapArgs, types: Types) -> Self {
+        Self { types, as_json: args.json, left: args.count.unwrap_or(u64::MAX), lines: String::new() }
+    }
+
+    /// Takes a message, or the announcement of a channel.
+    pub(super) fn add(&mut self, message: &Message) {
+        if let Some(line) = self.types.line(message, self.as_json).filter(|_| self.left > 0) {
+            self.left -= 1;
+            self.lines.push_str(&line);
+            self.lines.push('\n');
+        }
+    }
+
+    /// Prints what it has taken. Gives whether more is wanted.
+    pub(super) fn print(&mut self) -> Result<bool> {
+        Ok(print(std::mem::take(&mut self.lines))? && self.left > 0)
+    }
+}
+
 /// The types of the messages of a link.
-struct Types {
+#[derive(Default)]
+pub(super) struct Types {
     /// That of the port, for messages that come on no channel of their own.
     port: Option<(String, Option<Schema>)>,
     channels: BTreeMap<u32, (String, Option<Schema>)>,

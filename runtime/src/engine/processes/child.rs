@@ -4,6 +4,7 @@ use super::awake::Awake;
 use super::words::{Said, Told, say};
 use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
+use crate::engine::run_links::watch_links;
 use crate::engine::stage_thread::{Event, StageThread, tell};
 use crate::engine::work::working_for;
 use crate::engine::{Failure, RunError};
@@ -87,7 +88,8 @@ struct Process<'a> {
 impl Process<'_> {
     fn run(&self, mut supervisor: Supervisor<'_>) {
         let names = self.folder.names();
-        let links = Links::new(self.pipeline, &names, self.board);
+        let to_look_on = watch_links(&self.folder.as_running(), self.pipeline);
+        let links = Links::new(self.pipeline, &names, self.board).looked_on(to_look_on);
         let stop_reason = OnceLock::new();
         let (sender, receiver) = channel();
         listen(sender.clone());

@@ -1,0 +1,128 @@
+//! Answers those who tap, in a thread of its own, which does nothing while nobody does.
+
+use super::super::presence::{Presence, Role, watch};
+use super::super::wire::{from_bytes, to_bytes};
+use super::desk::Desk;
+use super::requests::{Answer, Request, State};
+use super::waiting::Room;
+use crate::connection::in_words;
+use gridweave_runtime::stage::{RunLinks, StageError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
+
+/// So often it is looked for messages while somebody taps.
+const LOOK_INTERVAL: Duration = Duration::from_millis(5);
+/// For so long the end of the run waits for those who tap to ask for the last of it.
+const LINGER: Duration = Duration::from_secs(2);
+
+enum Event {
+    Asked(Query),
+    Left(u64),
+    Stop,
+}
+
+/// Shows the links of the run that a sender is part of.
+pub(in super::super) struct Taps {
+    events: Sender<Event>,
+    thread: Option<JoinHandle<()>>,
+    _queryable: Queryable<()>,
+}
+
+impl Taps {
+    /// Begins to answer under the key of a sender.
+    ///
+    /// # Errors
+    /// The session has failed, or there can be no further thread.
+    pub(in super::super) fn start(
+        session: &Session,
+        bridge: &str,
+        sender: &Presence,
+        links: Result<RunLinks, &'static str>,
+    ) -> Result<Self, StageError> {
+        let key = sender.key(bridge, Role::Sender);
+        let (events, received) = channel();
+        // What comes while the thread goes is answered by nobody.
+        let asked = events.clone();
+        let take = move |query: Query| drop(asked.send(Event::Asked(query)));
+        let queryable = session.declare_queryable(key.clone()).callback(take).wait();
+        let queryable = queryable.map_err(|error| StageError::new("answer those who tap", in_words(&error)))?;
+        let left = events.clone();
+        watch(session, bridge, Role::Tapper, move |tapper, is_there| {
+            if !is_there {
+                drop(left.send(Event::Left(tapper.number)));
+            }
+        })?;
+        let thread = thread::Builder::new().name("bridge taps".to_owned());
+        // Links can be looked on at by one thread only, which begins with none.
+        let work = move || Worker { key, desk: Desk::new(links, Room::default()), events: received }.run();
+        let thread = thread.spawn(work);
+        let thread = thread.map_err(|error| StageError::new("start the thread that answers those who tap", error))?;
+        Ok(Self { events, thread: Some(thread), _queryable: queryable })
+    }
+}
+
+impl Drop for Taps {
+    fn drop(&mut self) {
+        drop(self.events.send(Event::Stop));
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Worker {
+    key: String,
+    desk: Desk<Query>,
+    events: Receiver<Event>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        while self.next() {}
+        self.desk.end();
+        let until = Instant::now() + LINGER;
+        while !self.desk.is_idle() && Instant::now() < until {
+            self.next();
+        }
+    }
+
+    /// Handles what comes next, and looks on. `false` when it is to stop.
+    fn next(&mut self) -> bool {
+        let event = match self.desk.is_idle() {
+            true => self.events.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            false => self.events.recv_timeout(LOOK_INTERVAL),
+        };
+        match event {
+            Ok(Event::Asked(query)) => self.take(query),
+            Ok(Event::Left(tapper)) => self.desk.leave(tapper),
+            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => return false,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        for (query, answer) in self.desk.look(Instant::now()) {
+            self.reply(&query, &answer);
+        }
+        true
+    }
+
+    fn take(&mut self, query: Query) {
+        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+        let answer = match from_bytes::<Request>(&bytes) {
+            Ok(request) => self.desk.ask(&request, query, Instant::now()),
+            Err(wrong) => Some((query, Answer::nothing(State::Refused, wrong))),
+        };
+        if let Some((query, answer)) = answer {
+            self.reply(&query, &answer);
+        }
+    }
+
+    fn reply(&self, query: &Query, answer: &Answer) {
+        let replied = to_bytes(answer)
+            .and_then(|bytes| query.reply(self.key.as_str(), bytes).wait().map_err(|error| in_words(&error)));
+        if let Err(wrong) = replied {
+            tracing::debug!("somebody who taps could not be answered: {wrong}");
+        }
+    }
+}

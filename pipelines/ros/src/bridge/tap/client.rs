@@ -1,0 +1,354 @@
+//! Asks a sender for what passes on a link of its run, in a thread of its own.
+
+use super::super::network::Network;
+use super::super::presence::{Presence, Role, watch};
+use super::super::wire::{from_bytes, to_bytes};
+use super::requests::{Answer, Link, Passed, Request, State};
+use crate::connection::{in_words, is_connected};
+use gridweave_runtime::pipeline::{named_link, suggest};
+use gridweave_runtime::stage::StageError;
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::{Session, Wait};
+
+/// What was not answered for so long is asked again.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
+/// So long somebody who waits does not look around.
+const LOOK_INTERVAL: Duration = Duration::from_millis(100);
+/// So often a sender is asked that does not answer, before that is told.
+const ATTEMPTS: usize = 20;
+/// So many batches wait for the reader: a slow one is asked for no more.
+const BATCHES: usize = 2;
+/// So long a program that ends waits until the sender was told.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// What is tapped.
+#[derive(Clone, Debug)]
+pub(super) struct Settings {
+    pub(super) network: Network,
+    /// The name of the sender.
+    pub(super) sender: String,
+    /// STAGE.PORT, or STAGE if it has one output only.
+    pub(super) link: String,
+    /// So long the sender may take to be found; none for ever.
+    pub(super) wait: Option<Duration>,
+}
+
+/// What has happened.
+#[derive(Debug)]
+pub(super) enum Event {
+    /// The link was found.
+    Found(Link),
+    Passed(Vec<Passed>),
+    /// So many messages more were missed.
+    Missed(u64),
+    /// What somebody should know.
+    Told(String),
+    /// The run has ended.
+    Ended,
+    Failed(StageError),
+}
+
+/// A link that is tapped. It is no longer when this is dropped.
+pub(super) struct Client {
+    pub(super) events: Receiver<Event>,
+    is_stopped: Arc<AtomicBool>,
+    /// Is closed when the thread ends.
+    thread: Receiver<()>,
+}
+
+impl Client {
+    /// Begins to tap.
+    ///
+    /// # Errors
+    /// There can be no further thread.
+    pub(super) fn start(settings: Settings) -> Result<Self, StageError> {
+        let (to, events) = sync_channel(BATCHES);
+        let (running, thread) = sync_channel::<()>(0);
+        let is_stopped = Arc::<AtomicBool>::default();
+        let until = settings.wait.map(|wait| Instant::now() + wait);
+        let asker = Asker { settings, events: to, is_stopped: Arc::clone(&is_stopped), until, opening: 0, taken: 0 };
+        let work = move || {
+            asker.run();
+            drop(running);
+        };
+        let started = thread::Builder::new().name("bridge tap".to_owned()).spawn(work);
+        started.map_err(|error| StageError::new("start the thread of a tap", error))?;
+        Ok(Self { events, is_stopped, thread })
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        self.is_stopped.store(true, Ordering::Relaxed);
+        // Who waits for room is told that there is no reader.
+        self.events = sync_channel(0).1;
+        // One that is still connecting is not waited for.
+        let _ = self.thread.recv_timeout(PATIENCE);
+    }
+}
+
+/// Why there is nothing more to do.
+enum Over {
+    /// It was stopped, or nobody reads on.
+    Stopped,
+    /// The run has ended.
+    Ended,
+    /// It cannot go on.
+    Failed(StageError),
+}
+
+impl From<StageError> for Over {
+    fn from(error: StageError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+struct Asker {
+    settings: Settings,
+    events: SyncSender<Event>,
+    is_stopped: Arc<AtomicBool>,
+    /// Until when the sender must be found; none for ever, and once it was.
+    until: Option<Instant>,
+    opening: u64,
+    taken: u64,
+}
+
+type Senders = Arc<Mutex<BTreeSet<Presence>>>;
+
+impl Asker {
+    fn run(mut self) {
+        let over = loop {
+            let session = match self.join() {
+                Ok(session) => session,
+                Err(over) => break over,
+            };
+            let over = self.tap(&session);
+            // By that the sender is told that nobody taps.
+            drop(session.close().wait());
+            match over {
+                Ok(()) => {
+                    let others = self.settings.network.others();
+                    if let Err(over) = self.tell(format!("the connection to {others} is lost: it is tried again")) {
+                        break over;
+                    }
+                }
+                Err(over) => break over,
+            }
+        };
+        // Where nobody listens, nobody is told.
+        drop(match over {
+            Over::Stopped => Ok(()),
+            Over::Ended => self.events.send(Event::Ended),
+            Over::Failed(error) => self.events.send(Event::Failed(error)),
+        });
+    }
+
+    fn doing(&self) -> String {
+        format!("look on at `{}` of `{}`", self.settings.link, self.settings.sender)
+    }
+
+    fn is_late(&self) -> bool {
+        self.until.is_some_and(|until| Instant::now() >= until)
+    }
+
+    fn tell(&self, text: String) -> Result<(), Over> {
+        self.send(Event::Told(text))
+    }
+
+    fn send(&self, event: Event) -> Result<(), Over> {
+        self.events.send(event).map_err(|_| Over::Stopped)
+    }
+
+    /// Waits a while.
+    fn pause(&self) -> Result<(), Over> {
+        thread::sleep(LOOK_INTERVAL);
+        match self.is_stopped.load(Ordering::Relaxed) {
+            true => Err(Over::Stopped),
+            false => Ok(()),
+        }
+    }
+
+    /// Joins the network, as soon as somebody listens there.
+    fn join(&self) -> Result<Session, Over> {
+        let mut is_told = false;
+        loop {
+            let error = match self.settings.network.open_as_client() {
+                Ok(session) => return Ok(session),
+                Err(error) => error,
+            };
+            self.pause()?;
+            // To find out why takes long.
+            if !self.is_late() && (is_told || self.until.is_some()) {
+                continue;
+            }
+            let obstacles = self.settings.network.obstacles_as_client();
+            let why = if obstacles.is_empty() { error.to_string() } else { obstacles.join("; ") };
+            if self.is_late() {
+                return Err(StageError::new(self.doing(), why).into());
+            }
+            self.tell(format!("no machine is reached ({why}). It is tried until one is"))?;
+            is_told = true;
+        }
+    }
+
+    /// Taps until the connection is lost.
+    fn tap(&mut self, session: &Session) -> Result<(), Over> {
+        let (senders, bridge) = (Senders::default(), self.settings.network.bridge.clone());
+        let seen = Arc::clone(&senders);
+        watch(session, &bridge, Role::Sender, move |sender, is_there| {
+            let mut senders = seen.lock().unwrap_or_else(PoisonError::into_inner);
+            match is_there {
+                true => drop(senders.insert(sender)),
+                false => drop(senders.remove(&sender)),
+            }
+        })?;
+        let me = Presence { name: "tap".to_owned(), number: Presence::number_of(session) };
+        let _token = me.declare(session, &bridge, Role::Tapper)?;
+        loop {
+            let Some(sender) = self.find(session, &senders)? else { return Ok(()) };
+            self.tap_sender(session, &me, &sender, &senders)?;
+            if !is_connected(session) {
+                return Ok(());
+            }
+            self.tell(format!("the machine `{}` is gone: it is waited for until it is there again", sender.name))?;
+        }
+    }
+
+    /// Waits for the sender; none if the connection is lost.
+    fn find(&self, session: &Session, senders: &Senders) -> Result<Option<Presence>, Over> {
+        loop {
+            let there = senders.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let mut of_name = there.iter().filter(|sender| sender.name == self.settings.sender);
+            if let Some(found) = of_name.next() {
+                if of_name.next().is_some() {
+                    self.tell(format!("several senders are called `{}`: one of them is asked", found.name))?;
+                }
+                return Ok(Some(found.clone()));
+            }
+            if !is_connected(session) {
+                return Ok(None);
+            }
+            // Those that are there are known by the first look around.
+            self.pause()?;
+            if self.is_late() {
+                return Err(self.nobody(senders).into());
+            }
+        }
+    }
+
+    fn nobody(&self, senders: &Senders) -> StageError {
+        let Settings { network, sender, .. } = &self.settings;
+        let senders = senders.lock().unwrap_or_else(PoisonError::into_inner);
+        let names: BTreeSet<&str> = senders.iter().map(|sender| sender.name.as_str()).collect();
+        let names: Vec<&str> = names.into_iter().collect();
+        let help = suggest(sender, &names, "there are").unwrap_or_else(|| "there is none at all".to_owned());
+        let (bridge, others) = (&network.bridge, network.others());
+        let cause = format!("the bridge `{bridge}` at {others} has no machine `{sender}`; {help}");
+        StageError::new(self.doing(), cause).of_parameter("sender")
+    }
+
+    /// Taps until the sender is there no longer.
+    fn tap_sender(
+        &mut self,
+        session: &Session,
+        me: &Presence,
+        sender: &Presence,
+        senders: &Senders,
+    ) -> Result<(), Over> {
+        let is_there = || senders.lock().unwrap_or_else(PoisonError::into_inner).contains(sender);
+        let mut request = Request { tapper: me.number, ..Default::default() };
+        let Some(answer) = self.ask_until_answered(session, sender, &request, &is_there)? else { return Ok(()) };
+        let links: Vec<(&str, &str)> =
+            answer.links.iter().map(|link| (link.stage.as_str(), link.output.as_str())).collect();
+        let run = format!("the run on `{}`", sender.name);
+        let wrong = |text: String| StageError::new(self.doing(), text).of_parameter("link");
+        let link = answer.links[named_link(&self.settings.link, &run, &links).map_err(wrong)?].clone();
+        request.link = format!("{}.{}", link.stage, link.output);
+        self.send(Event::Found(link))?;
+        self.until = None;
+        let mut missed = 0;
+        loop {
+            (request.opening, request.taken) = (self.opening, self.taken);
+            let Some(answer) = self.ask_until_answered(session, sender, &request, &is_there)? else { return Ok(()) };
+            if answer.opening != self.opening {
+                if self.opening != 0 {
+                    self.tell(format!("`{}` is looked on at anew: messages may have been missed", request.link))?;
+                }
+                (self.opening, self.taken, missed) = (answer.opening, 0, 0);
+            }
+            // What comes twice was taken.
+            if answer.number > self.taken {
+                self.taken = answer.number;
+                self.send(Event::Passed(answer.passed))?;
+            }
+            if answer.missed > missed {
+                self.send(Event::Missed(answer.missed - missed))?;
+                missed = answer.missed;
+            }
+            if answer.state == State::Ended {
+                return Err(Over::Ended);
+            }
+        }
+    }
+
+    /// Asks until there is an answer; none if the sender is there no longer.
+    fn ask_until_answered(
+        &self,
+        session: &Session,
+        sender: &Presence,
+        request: &Request,
+        is_there: &dyn Fn() -> bool,
+    ) -> Result<Option<Answer>, Over> {
+        for _ in 0..ATTEMPTS {
+            match self.ask(session, sender, request)? {
+                Some(Answer { state: State::Refused, text, .. }) => {
+                    let cause = format!("the machine refuses that: {text}");
+                    return Err(StageError::new(self.doing(), cause).into());
+                }
+                Some(answer) => return Ok(Some(answer)),
+                None => self.pause()?,
+            }
+            if !is_there() || !is_connected(session) {
+                return Ok(None);
+            }
+        }
+        let error = StageError::new(self.doing(), "the machine is there, and does not answer");
+        Err(error.with_help("its `gridweave-ros` must be one that knows taps").into())
+    }
+
+    /// Asks once; none if no answer comes.
+    fn ask(&self, session: &Session, sender: &Presence, request: &Request) -> Result<Option<Answer>, Over> {
+        let failed = |cause: String| StageError::new(self.doing(), cause);
+        let asked = session
+            .get(sender.key(&self.settings.network.bridge, Role::Sender))
+            .payload(to_bytes(request).map_err(failed)?)
+            .congestion_control(CongestionControl::Block)
+            // What the bridge carries goes before it, and so does its answer.
+            .priority(Priority::DataLow)
+            .timeout(ANSWER_TIMEOUT)
+            .wait();
+        let answers = asked.map_err(|error| failed(in_words(&error)))?;
+        loop {
+            match answers.recv_timeout(LOOK_INTERVAL) {
+                Ok(None) if self.is_stopped.load(Ordering::Relaxed) => return Err(Over::Stopped),
+                Ok(None) if !is_connected(session) => return Ok(None),
+                Ok(None) => {}
+                // No answer comes any more.
+                Err(_) => return Ok(None),
+                Ok(Some(reply)) => {
+                    let Ok(sample) = reply.result() else { continue };
+                    let answer = from_bytes(&sample.payload().to_bytes());
+                    return answer
+                        .map(Some)
+                        .map_err(|wrong| failed(format!("the answer cannot be read: {wrong}")).into());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The stage `bridge_tap`: takes what passes on a link of a run on another machine.
+
+use super::super::certificates::Certificates;
+use super::super::network::{BASE, Network, is_part_of_key};
+use super::super::source::channel_of;
+use super::super::wire::Form;
+use super::client::{Client, Event, Settings};
+use super::requests::{Link, Passed};
+use gridweave_runtime::message::{Channel, MessageHeader};
+use gridweave_runtime::stage::{
+    AnyMessage, Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, Source, StageError, StageKind,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::ops::Deref;
+use std::path::PathBuf;
+use std::sync::mpsc::{RecvTimeoutError, TryRecvError};
+use std::time::Duration;
+
+/// The parameters of `bridge_tap`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct TapParameters {
+    /// The name of the bridge, as its ends have it.
+    pub(super) bridge: String,
+    /// What the machine is called: the `sender` of its `bridge_sink`, or its name.
+    pub(super) sender: String,
+    /// The link of its run: STAGE.PORT, or STAGE if it has one output only.
+    pub(super) link: String,
+    /// Where the senders connect to, which is where a `bridge_source` or a router of Zenoh listens, as `tcp/HOST:PORT` or
+    /// `tls/HOST:PORT`.
+    pub(super) connect: Vec<String>,
+    /// The authority (PEM) by which the certificate of who listens there must be signed, for `tls/HOST:PORT`; without it one that
+    /// browsers know.
+    pub(super) authority: Option<PathBuf>,
+    /// The certificate (PEM) of this end, where one is asked for.
+    pub(super) certificate: Option<PathBuf>,
+    /// The private key (PEM) of `certificate`.
+    pub(super) key: Option<PathBuf>,
+    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and the certificates.
+    pub(super) zenoh_config: Option<PathBuf>,
+    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    pub(super) insecure: bool,
+    /// For so many seconds the machine is looked for; for ever if it is not given.
+    #[schemars(range(min = 0.0, max = 86400.0))]
+    pub(super) wait: Option<f64>,
+}
+
+impl Default for TapParameters {
+    fn default() -> Self {
+        Self {
+            bridge: "base".to_owned(),
+            sender: String::new(),
+            link: String::new(),
+            connect: vec![BASE.to_owned()],
+            authority: None,
+            certificate: None,
+            key: None,
+            zenoh_config: None,
+            insecure: false,
+            wait: None,
+        }
+    }
+}
+
+impl TapParameters {
+    fn network(&self) -> Network {
+        let Self { bridge, connect, zenoh_config, insecure, authority, certificate, key, .. } = self.clone();
+        let certificates = Certificates { authority, certificate, key };
+        Network { bridge, connect, listen: Vec::new(), discover: false, zenoh_config, insecure, certificates }
+    }
+}
+
+impl Parameters for TapParameters {
+    fn check_together(&self) -> Vec<ParameterError> {
+        let mut errors = self.network().check();
+        if !is_part_of_key(&self.sender) {
+            errors.push(ParameterError::new("sender", "must be given: letters, digits, `_`, `-` and `.`"));
+        }
+        if self.link.is_empty() {
+            errors.push(ParameterError::new("link", "must be given, as STAGE.PORT"));
+        }
+        errors
+    }
+}
+
+/// The kind `bridge_tap`.
+pub(in super::super) fn kind() -> StageKind {
+    StageKind::source(
+        "bridge_tap",
+        "Takes what passes on a link of a run on another machine, whose `bridge_sink` need not send it: as `tap` shows it. It changes \
+         nothing in that run; what it is too slow for is missed, and counted",
+        BridgeTap::new,
+    )
+    .live_only()
+}
+
+/// The output.
+pub(super) struct Ports(Out<AnyMessage>);
+
+impl Outputs for Ports {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self(ports.any_output("messages", "what passes, under the topics that it has there"))
+    }
+}
+
+/// Takes what passes.
+struct BridgeTap {
+    client: Client,
+    /// What has come and was not looked at.
+    waiting: Option<Event>,
+    link: Link,
+    /// The numbers that channels have here, by number there and topic.
+    channels: BTreeMap<(u32, String), u32>,
+}
+
+impl BridgeTap {
+    fn new(parameters: TapParameters, _: &Context) -> Result<Self, StageError> {
+        let settings = Settings {
+            network: parameters.network(),
+            sender: parameters.sender,
+            link: parameters.link,
+            wait: parameters.wait.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
+        };
+        let (link, channels) = (Link::default(), BTreeMap::new());
+        Ok(Self { client: Client::start(settings)?, waiting: None, link, channels })
+    }
+
+    fn send(&mut self, passed: Passed, output: &Output<Ports>) -> Result<(), StageError> {
+        let Passed { sequence, entry } = passed;
+        let unreadable = |cause: String| StageError::new("read what passes on another machine", cause);
+        if entry.form == Form::Channel {
+            let channel = Channel::decode(&entry.bytes).map_err(|error| unreadable(error.to_string()))?;
+            return output.announce(self.number(entry.channel, "").0, &channel);
+        }
+        let header = entry.header().map_err(unreadable)?;
+        output.set_log_time(header.log_time);
+        // What a stage has made comes without a channel.
+        let topic = if entry.channel == 0 { entry.topic.as_str() } else { "" };
+        let (channel, is_new) = self.number(entry.channel, topic);
+        if is_new && entry.channel == 0 {
+            output.announce(channel, &channel_of(topic, &self.link.ros_type, &self.link.definition))?;
+        }
+        output.count("messages taken", 1);
+        output.send_encoded(MessageHeader { sequence, channel, ..header }, &entry.bytes)
+    }
+
+    /// The number that a channel has here, and whether it has just got it.
+    fn number(&mut self, number: u32, topic: &str) -> (u32, bool) {
+        let next = u32::try_from(self.channels.len()).unwrap_or(u32::MAX - 1) + 1;
+        let here = *self.channels.entry((number, topic.to_owned())).or_insert(next);
+        (here, here == next)
+    }
+}
+
+impl Deref for Ports {
+    type Target = Out<AnyMessage>;
+
+    fn deref(&self) -> &Out<AnyMessage> {
+        &self.0
+    }
+}
+
+impl Source for BridgeTap {
+    type Outputs = Ports;
+
+    fn wait(&mut self, longest: Duration) {
+        if self.waiting.is_none() {
+            self.waiting = match self.client.events.recv_timeout(longest) {
+                Ok(event) => Some(event),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => Some(Event::Ended),
+            };
+        }
+    }
+
+    fn next(&mut self, output: &Output<Ports>) -> Result<bool, StageError> {
+        let event = self.waiting.take().map_or_else(|| self.client.events.try_recv(), Ok);
+        match event {
+            Ok(Event::Found(link)) => self.link = link,
+            Ok(Event::Passed(passed)) => passed.into_iter().try_for_each(|passed| self.send(passed, output))?,
+            Ok(Event::Missed(messages)) => {
+                output.count("messages missed", messages);
+                output.warn("messages were missed, as what taps the link was too slow for them");
+            }
+            Ok(Event::Told(text)) => {
+                tracing::warn!("{text}");
+                output.warn(text);
+            }
+            Ok(Event::Failed(error)) => return Err(error),
+            Err(TryRecvError::Empty) => {}
+            Ok(Event::Ended) | Err(TryRecvError::Disconnected) => return Ok(false),
+        }
+        Ok(true)
+    }
+}
