@@ -294,7 +294,7 @@ proptest! {
             prop_assert_eq!(&came, &sent);
         }
         // Whatever was, the last of each is there.
-        let last = |all: &[(u64, Vec<u8>)], is_pose: bool| all.iter().rfind(|(_, bytes)| (bytes.len() == 8) == is_pose).cloned();
+        let last = |all: &[(u64, Vec<u8>)], is_pose: bool| all.iter().rfind(|(time, bytes)| (*bytes == time.to_le_bytes()) == is_pose).cloned();
         for is_pose in [false, true] {
             prop_assert_eq!(last(&came, is_pose), last(&sent, is_pose));
         }
