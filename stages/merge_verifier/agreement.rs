@@ -1,10 +1,12 @@
 //! How well two maps agree where both know something.
 
 use super::MergeVerifierParameters;
-use super::regions::RegionComparison;
+use super::redundancy::confirming_share;
+use super::regions::{OnWall, RegionComparison};
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, is_known};
 use crate::walls::{WallMap, stride};
+use nalgebra::Vector2;
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
 /// cells.
@@ -59,6 +61,9 @@ pub struct Agreement {
     /// The evidence for the alignment: the logarithm of how much likelier the walls are to meet as they do if this is the
     /// place than if map b lay anywhere. Every region counts by itself, and no region more than walls as long as its side.
     pub evidence: f64,
+    /// The share of the walls that agree which confirm the place and do not only fix it, 0 to 1: those that do not belong to the two
+    /// straight walls of which most agrees, as any corner fits any other.
+    pub confirming: f64,
     /// The middle of the walls of map b that lie on walls of map a, frame a; the origin if there are none.
     pub centre: Point2,
 }
@@ -111,11 +116,16 @@ pub fn compare_sampled(
         tolerance,
         most_points,
     };
-    let (regions, centre) = comparison.regions(a, b, transform_a_b);
+    let (regions, on_wall) = comparison.regions(a, b, transform_a_b);
     let chance = (chance(a, tolerance) + chance(b, tolerance)) / 2.0;
     let (for_it, against_it) =
         ((AGREEMENT_OF_ONE_PLACE / chance).ln(), ((1.0 - AGREEMENT_OF_ONE_PLACE) / (1.0 - chance)).ln());
-    let mut agreement = Agreement { overlap: overlap(a, b, transform_a_b, most_points), centre, ..Default::default() };
+    let mut agreement = Agreement {
+        overlap: overlap(a, b, transform_a_b, most_points),
+        confirming: confirming_share(&on_wall),
+        centre: middle(&on_wall),
+        ..Default::default()
+    };
     for region in &regions {
         agreement.wall_on_wall += region.wall_on_wall;
         agreement.wall_on_free += region.wall_on_free;
@@ -124,6 +134,12 @@ pub fn compare_sampled(
         agreement.evidence += share * (for_it * region.wall_on_wall + against_it * region.wall_on_free);
     }
     agreement
+}
+
+/// The middle of some walls; the origin if there are none.
+fn middle(walls: &[OnWall]) -> Point2 {
+    let sum: Vector2<f64> = walls.iter().map(|wall| wall.point.coords).sum();
+    Point2::from(sum / walls.len().max(1) as f64)
 }
 
 /// The probability that a piece of wall that is laid anywhere in the known space of a map lies on a wall that runs alike:

@@ -197,6 +197,8 @@ fn judge_one<'a>(
     let elsewhere = rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
     let evidence_elsewhere = (elsewhere / agreement.evidence.max(LEAST_EVIDENCE)).min(2.0);
     let origin = origin(alignment);
+    let is_found_by_walls_alone = matches!(origin, Origin::Search { .. }) && found_too_by.is_none() && !is_expected;
+    let confirming = if is_found_by_walls_alone { agreement.confirming } else { 1.0 };
     let odds = Odds::new(&Grounds {
         origin,
         found_too: found_too_by.is_some(),
@@ -205,6 +207,7 @@ fn judge_one<'a>(
         evidence: agreement.evidence,
         wall_agreement: agreement.wall_agreement(),
         drawn_beside: agreement.drawn_beside(),
+        confirming,
         wall_seen: agreement.wall_seen(),
         overlap: agreement.overlap,
         bend_cost: bent.map(|bent| bent.cost),
@@ -230,6 +233,7 @@ fn judge_one<'a>(
         None => Some(Refusal::Chance {
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,
+            confirming,
             probability: score,
             accept: parameters.accept,
         }),

@@ -14,6 +14,7 @@ mod bending;
 mod judge;
 mod knowledge;
 mod parameters;
+mod redundancy;
 mod refusal;
 mod regions;
 mod rivals;

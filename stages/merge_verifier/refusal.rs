@@ -1,5 +1,6 @@
 //! Why two maps are not merged.
 
+use super::score::CONFIRMING;
 use std::fmt;
 
 /// Maps that agree on less wall, metres, have nothing in common that could be contradicted.
@@ -14,14 +15,18 @@ pub enum Refusal {
     Before(String),
     /// Maps that have nothing to do with each other may agree as well.
     #[error(
-        "{agree:.1} m of wall agree and {against:.1} m lie on the other map's free space, which may be chance: the place is right \
-         with a probability of {probability:.3}, and at least {accept} is asked for (accept)"
+        "{agree:.1} m of wall agree ({:.0} % of it beside the two straight walls that fix the place) and {against:.1} m lie on the other \
+         map's free space, which may be chance: the place is right with a probability of {probability:.3}, and at least {accept} is \
+         asked for (accept)",
+        confirming * 100.0
     )]
     Chance {
         /// Metres of wall on which the maps agree.
         agree: f64,
         /// Metres of wall on free space.
         against: f64,
+        /// The share of the walls that agree which confirm the place and do not only fix it; 1 where something else tells it.
+        confirming: f64,
         /// The probability that it is right.
         probability: f64,
         /// What is asked for.
@@ -97,6 +102,10 @@ impl Refusal {
     pub fn headline(&self) -> String {
         match self {
             Self::Before(reason) => reason.clone(),
+            Self::Chance { agree, confirming, .. } if *confirming < CONFIRMING => {
+                let fixing = (1.0 - confirming) * agree;
+                format!("{agree:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have")
+            }
             Self::Chance { agree, against, .. } => {
                 format!("{agree:.0} m of wall agree and {against:.0} m contradict, which may be chance")
             }

@@ -29,6 +29,15 @@ pub(super) struct Region {
     pub(super) wall_beside: f64,
 }
 
+/// A point of a wall of map b that lies on a wall of map a which runs alike.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OnWall {
+    /// Where it lies, frame a.
+    pub(super) point: Point2,
+    /// Across the wall, frame a.
+    pub(super) normal: Vector2<f64>,
+}
+
 /// How regions are compared.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RegionComparison {
@@ -43,9 +52,13 @@ pub(super) struct RegionComparison {
 }
 
 impl RegionComparison {
-    /// Compares two maps at an alignment, in squares of frame a; and the middle of the walls of map b that lie on walls of
-    /// map a, frame a.
-    pub(super) fn regions(&self, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> (Vec<Region>, Point2) {
+    /// Compares two maps at an alignment, in squares of frame a; and the walls of map b that lie on walls of map a.
+    pub(super) fn regions(
+        &self,
+        a: &MapView<'_>,
+        b: &MapView<'_>,
+        transform_a_b: &Pose2,
+    ) -> (Vec<Region>, Vec<OnWall>) {
         let mut parts: BTreeMap<(i32, i32), Part> = BTreeMap::new();
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
         for index in self.sample(b.walls) {
@@ -61,9 +74,9 @@ impl RegionComparison {
                 parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
-        let mut centre = Centre::default();
-        let regions = parts.values().map(|part| self.compare(part, a, b, transform_a_b, &mut centre)).collect();
-        (regions, centre.middle())
+        let mut on_wall = Vec::new();
+        let regions = parts.values().map(|part| self.compare(part, a, b, transform_a_b, &mut on_wall)).collect();
+        (regions, on_wall)
     }
 
     /// The numbers of the points of some walls that are looked at.
@@ -78,12 +91,12 @@ impl RegionComparison {
         a: &MapView<'_>,
         b: &MapView<'_>,
         transform_a_b: &Pose2,
-        centre: &mut Centre,
+        on_wall: &mut Vec<OnWall>,
     ) -> Region {
         let slide = self.register(&part.of_b, a.walls, b.walls, transform_a_b);
         let slid = Pose2::from_parts((transform_a_b.translation.vector + slide).into(), transform_a_b.rotation);
         let mut region = Region::default();
-        self.add(&part.of_b, b, a, &slid, &mut region, |point| centre.add(point));
+        self.add(&part.of_b, b, a, &slid, &mut region, |piece| on_wall.push(piece));
         self.add(&part.of_a, a, b, &slid.inverse(), &mut region, |_| ());
         region
     }
@@ -123,7 +136,7 @@ impl RegionComparison {
         map: &MapView<'_>,
         transform: &Pose2,
         region: &mut Region,
-        mut on_wall: impl FnMut(&Point2),
+        mut on_wall: impl FnMut(OnWall),
     ) {
         // Both ways are added up.
         let count = other.walls.walls.points().len();
@@ -146,7 +159,7 @@ impl RegionComparison {
                 };
                 if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.wall_on_wall += length;
-                    on_wall(&point);
+                    on_wall(OnWall { point, normal: turned });
                 }
             } else if is_free(map.value_at(&point)) {
                 region.wall_on_free += length;
@@ -164,22 +177,4 @@ impl RegionComparison {
 struct Part {
     of_a: Vec<usize>,
     of_b: Vec<usize>,
-}
-
-/// The middle of some points.
-#[derive(Default)]
-struct Centre {
-    sum: Vector2<f64>,
-    count: usize,
-}
-
-impl Centre {
-    fn add(&mut self, point: &Point2) {
-        self.sum += point.coords;
-        self.count += 1;
-    }
-
-    fn middle(&self) -> Point2 {
-        Point2::from(self.sum / self.count.max(1) as f64)
-    }
 }

@@ -6,7 +6,8 @@
 //!   more places were looked at, the better they agree at the best. How well that is, the other places of the same pair tell:
 //!   by extreme value theory the best of many alike leads the next by as many units of their spread as an exponential variable
 //!   has, so that a lead of `t` has the probability `exp(-t)` by chance (Gumbel 1958); and the evidence of walls in places that
-//!   do not depend on each other counts against it.
+//!   do not depend on each other counts against it. But two straight walls fix a place, and any corner fits any other: what
+//!   walls alone have found counts as far as others confirm it.
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
@@ -32,6 +33,9 @@ const PRIOR: f64 = -5.0;
 const BY_EVIDENCE: f64 = 0.2;
 /// Per unit of the lead.
 const BY_LEAD: f64 = 1.0;
+/// So large a share of the walls that agree must confirm a place that was found by the walls alone, and not only fix it, for them to
+/// count in full; and none of them counts where none confirms it.
+pub(super) const CONFIRMING: f64 = 0.4;
 /// No lead says more: from there on the model of chance itself is in doubt.
 const MOST_LEAD: f64 = 10.0;
 /// The lead of a place that enough tags, which agree with each other, tell by themselves.
@@ -122,6 +126,9 @@ pub struct Grounds {
     pub wall_agreement: f64,
     /// The share of the walls that contradict which lie beside a wall that runs alike, 0 to 1.
     pub drawn_beside: f64,
+    /// The share of the walls that agree which confirm the place and do not only fix it, 0 to 1. What tags or the user tell is not
+    /// fixed by walls, and all of them confirm it.
+    pub confirming: f64,
     /// Length of wall of one map of which the other knows what is there, metres.
     pub wall_seen: f64,
     /// The area that both maps know, square metres.
@@ -156,6 +163,7 @@ impl Odds {
             evidence,
             wall_agreement,
             drawn_beside,
+            confirming,
             wall_seen,
             overlap,
             bend_cost,
@@ -190,10 +198,11 @@ impl Odds {
             }
             Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
         };
+        let confirmed = share_of_way(confirming, (0.0, CONFIRMING));
+        let by_walls = BY_EVIDENCE * (evidence - bend_cost.unwrap_or_default());
+        let by_lead = BY_LEAD * origin.lead(found_too || is_expected);
         Self {
-            chance: PRIOR
-                + BY_EVIDENCE * (evidence - bend_cost.unwrap_or_default())
-                + BY_LEAD * origin.lead(found_too || is_expected),
+            chance: PRIOR + confirmed * by_walls.max(0.0) + by_walls.min(0.0) + confirmed * by_lead,
             likeness: BY_SHARE * (like - evidence_elsewhere) + BY_WORSE_AGREEMENT * worse.clamp(0.0, 1.0),
             part: BY_AGREEMENT * (wall_agreement - halves),
         }
@@ -228,6 +237,7 @@ mod tests {
         evidence: 300.0,
         wall_agreement: 0.9,
         drawn_beside: 0.5,
+        confirming: 0.7,
         wall_seen: 50.0,
         overlap: 200.0,
         bend_cost: None,
@@ -292,6 +302,16 @@ mod tests {
         for origin in [Origin::Tags, Origin::Search { lead: 1.0 }] {
             assert!(by_both(0.4, origin) < 0.6 && by_both(0.46, origin) > 0.999);
         }
+    }
+
+    #[test]
+    fn a_corner_that_fits_another_says_nothing() {
+        let with = |confirming: f64| {
+            let origin = Origin::Search { lead: 9.0 };
+            Odds::new(&Grounds { origin, confirming, evidence: 40.0, ..GROUNDS }).probability()
+        };
+        assert!(with(0.0) < 0.01 && with(0.14) < 0.9 && with(0.4) > 0.999);
+        assert_eq!(with(0.4), with(0.7));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use gridweave_stages::merge_verifier::{
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
 
 /// What is told of a hypothesis.
-pub(super) const HEADS: [&str; 17] = [
+pub(super) const HEADS: [&str; 18] = [
     "x",
     "y",
     "yaw",
@@ -23,6 +23,7 @@ pub(super) const HEADS: [&str; 17] = [
     "wall on wall m",
     "wall on free m",
     "wall beside m",
+    "confirming",
     "overlap m2",
     "bend m",
     "bend cost",
@@ -72,7 +73,7 @@ pub(super) struct Hypothesis {
 
 impl Hypothesis {
     pub(super) fn cells(&self) -> Vec<String> {
-        let Agreement { evidence, wall_on_wall, wall_on_free, wall_beside, overlap, .. } = self.agreement;
+        let Agreement { evidence, wall_on_wall, wall_on_free, wall_beside, confirming, overlap, .. } = self.agreement;
         let place = &self.transform_a_b;
         let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
         let number = |value: f64| format!("{value:.3}");
@@ -89,6 +90,7 @@ impl Hypothesis {
             number(wall_on_wall),
             number(wall_on_free),
             number(wall_beside),
+            number(confirming),
             number(overlap),
             bent(|bent| bent.bend),
             bent(|bent| bent.cost),
