@@ -165,7 +165,7 @@ fn of_different_buildings(
         let is_kept = args.keep_wrong && judged.is_merged();
         Trial {
             set: set.to_owned(),
-            wrong_maps: is_kept.then(|| (number, [a, b])),
+            wrong_maps: is_kept.then_some((number, [a, b])),
             pair: format!("{number}: {} and {}", names[0], names[1]),
             is_right: false,
             is_unrelated: true,
