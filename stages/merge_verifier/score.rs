@@ -11,11 +11,11 @@
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do. Where a
 //!   search over all places has come to this one, agreement must clearly be more than half, or than two fifths where this one
-//!   leads all others by far more than chance does; of much wall, five sixths, as parts of one building that are alike agree
-//!   on much and contradict each other on as much. So do rows of rooms of one depth, of buildings that have nothing else in
-//!   common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing leaves it, it is
-//!   three quarters of any wall. Where the maps share no more than a room, it is nearly all: rooms of other buildings have the
-//!   same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent onto the
+//!   leads all others by far more than chance does; of much wall, seven tenths to five sixths, as parts of one building that are
+//!   alike agree on much and contradict each other on as much. So do rows of rooms of one depth, of buildings that have nothing
+//!   else in common: where what contradicts does not lie beside a wall that runs alike, as a bend or a rough drawing leaves it, it
+//!   is three quarters of less wall, too. Where the maps share no more than a room, it is nearly all: rooms of other buildings have
+//!   the same corners and sizes, while a map is right in every room, however it is bent as a whole. Where one map was bent onto the
 //!   other they must agree in more: a bend lays what is of one place on each other, and changes little elsewhere. Tags have not
 //!   looked at walls, and ask for more of them. Where enough tags and a search that has not looked at tags have come to the same
 //!   place, each by itself, it is one building and one floor, and two fifths are enough: what contradicts is a bend that is too
@@ -59,11 +59,13 @@ const AGREEMENT_OF_HALVES: f64 = 0.5;
 /// what contradicts is a bend, or was moved. And from which lead on that begins to count, and from which on it counts in full.
 const AGREEMENT_OF_HALVES_IF_FAR_AHEAD: f64 = 0.4;
 const FAR_AHEAD: (f64, f64) = (5.0, 10.0);
-/// The same where much wall was seen: what was moved and drawn roughly has evened out, and what is left speaks against it.
-const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.78;
+/// The same where much wall was seen, for any length of it: what was moved and drawn roughly has evened out, and what is left speaks
+/// against it. What less wall tells is known less well: so much more of it must agree, divided by the root of its metres.
+const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.62;
+const MORE_OF_LESS_WALL: f64 = 1.6;
 /// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
 const MUCH_WALL: (f64, f64) = (60.0, 80.0);
-/// The same where next to none of what contradicts lies beside a wall that runs alike: nothing is drawn roughly or bent there, and
+/// The same of less wall where next to none of what contradicts lies beside a wall that runs alike: nothing is drawn roughly or bent there, and
 /// the walls are others. And of which share of it on that begins to count for less, and from which on not at all.
 const AGREEMENT_OF_HALVES_OF_OTHER_WALLS: f64 = 0.75;
 const DRAWN_BESIDE: (f64, f64) = (0.1, 0.2);
@@ -185,13 +187,10 @@ impl Odds {
                 let in_rooms = match bend_cost {
                     Some(_) => AGREEMENT_OF_HALVES_IF_BENT,
                     None => {
-                        let share_of_much = share_of_way(wall_seen, MUCH_WALL);
-                        let drawn = between(of_little, AGREEMENT_OF_HALVES_OF_MUCH_WALL, share_of_much);
-                        between(
-                            AGREEMENT_OF_HALVES_OF_OTHER_WALLS.max(drawn),
-                            drawn,
-                            share_of_way(drawn_beside, DRAWN_BESIDE),
-                        )
+                        let share_of_drawn = share_of_way(drawn_beside, DRAWN_BESIDE);
+                        let of_little = between(AGREEMENT_OF_HALVES_OF_OTHER_WALLS, of_little, share_of_drawn);
+                        let of_much = AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / wall_seen.max(1.0).sqrt();
+                        between(of_little, of_much, share_of_way(wall_seen, MUCH_WALL))
                     }
                 };
                 between(in_rooms, AGREEMENT_OF_HALVES_IN_A_ROOM, share_of_room)
@@ -315,12 +314,13 @@ mod tests {
     }
 
     #[test]
-    fn of_much_wall_five_sixths_must_agree() {
+    fn more_of_much_wall_must_agree_and_less_the_more_of_it_there_is() {
         let with = |wall_agreement: f64, wall_seen: f64| {
             let origin = Origin::Search { lead: 20.0 };
             Odds::new(&Grounds { origin, wall_agreement, wall_seen, ..GROUNDS }).probability()
         };
         assert!(with(0.78, 100.0) < 0.6 && with(0.84, 100.0) > 0.999);
+        assert!(with(0.7, 400.0) < 0.6 && with(0.76, 400.0) > 0.999);
         assert!(with(0.6, 60.0) > 0.999 && with(0.6, 80.0) < 0.01);
     }
 
