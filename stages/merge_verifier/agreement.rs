@@ -157,3 +157,28 @@ fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, most_points:
     let known = samples.filter(|sample| is_known(a.value_at(&(transform_a_b * sample.point)))).count();
     known as f64 * stride as f64 * b.walls.sample_area
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
+
+    #[test]
+    fn walls_that_are_drawn_beside_each_other_are_told_from_others_in_cells_of_any_size() {
+        for resolution in [0.05, 0.4] {
+            let fine = drawing(0.0, 0.0, 0.0);
+            let seen = seen(-1.0, -1.0, 21.0, 13.0);
+            let draw = |plan: FloorPlan| plan.draw(seen, Drawing { resolution, ..fine });
+            let (a, another) = (draw(FloorPlan::office()), draw(FloorPlan::another_office()));
+            let compared = |b: &DrawnMap, shift: f64| {
+                compare(&a.view(), &b.view(), &pose(shift, shift, 0.0), &MergeVerifierParameters::default())
+            };
+            let tolerance = (1.5 * resolution).max(MergeVerifierParameters::default().wall_tolerance);
+            let beside = compared(&a, tolerance + 0.2);
+            let other = compared(&another, 0.0);
+            assert!(beside.wall_on_free > 5.0 && other.wall_on_free > 5.0, "{beside:?} {other:?}");
+            assert!(beside.drawn_beside() > other.drawn_beside() + 0.2, "{resolution}: {beside:?} {other:?}");
+        }
+    }
+}

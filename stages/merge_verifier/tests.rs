@@ -3,7 +3,7 @@
 use super::{MergeVerifierParameters, Refusal, UserKnowledge, Verdict, compare, compare_sampled, judge};
 use crate::geometry::{Point2, Pose2, point_jacobian, pose, row_by_row};
 use crate::place_window::PlaceWindow;
-use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, bend_at, drawing, seen};
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
 use gridweave_runtime::ros::Alignment;
 use gridweave_runtime::stage::{InitialPose, Parameters};
 use nalgebra::{Matrix3, Vector2};
@@ -279,24 +279,6 @@ fn a_region_may_slide_a_little_and_not_far() {
     };
     assert!(evidence(0.12) > 0.8 * evidence(0.0), "{} {}", evidence(0.12), evidence(0.0));
     assert!(evidence(0.6) < 0.3 * evidence(0.0), "{} {}", evidence(0.6), evidence(0.0));
-}
-
-#[test]
-fn walls_that_are_drawn_beside_each_other_are_told_from_others_in_cells_of_any_size() {
-    for resolution in [0.05, 0.4] {
-        let fine = drawing(0.0, 0.0, 0.0);
-        let seen = seen(-1.0, -1.0, 21.0, 13.0);
-        let draw = |plan: FloorPlan| plan.draw(seen, Drawing { resolution, ..fine });
-        let (a, another) = (draw(FloorPlan::office()), draw(FloorPlan::another_office()));
-        let compared = |b: &DrawnMap, shift: f64| {
-            compare(&a.view(), &b.view(), &pose(shift, shift, 0.0), &MergeVerifierParameters::default())
-        };
-        let tolerance = (1.5 * resolution).max(MergeVerifierParameters::default().wall_tolerance);
-        let beside = compared(&a, tolerance + 0.2);
-        let other = compared(&another, 0.0);
-        assert!(beside.wall_on_free > 5.0 && other.wall_on_free > 5.0, "{beside:?} {other:?}");
-        assert!(beside.drawn_beside() > other.drawn_beside() + 0.2, "{resolution}: {beside:?} {other:?}");
-    }
 }
 
 #[test]
