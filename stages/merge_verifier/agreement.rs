@@ -1,8 +1,9 @@
 //! How well two maps agree where both know something.
 
 use super::MergeVerifierParameters;
+use super::crossings::points_of_walls;
 use super::redundancy::confirming_share;
-use super::regions::{OnWall, RegionComparison};
+use super::regions::{Found, OnWall, RegionComparison};
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, is_known};
 use crate::walls::{WallMap, stride};
@@ -56,8 +57,9 @@ pub struct Agreement {
     /// Length of wall of one map that lies where the other knows free space, farther from any wall than the tolerance,
     /// metres.
     pub wall_on_free: f64,
-    /// Of that, what lies beside a wall that runs alike, within 0.4 m beyond the tolerance, metres.
-    pub wall_beside: f64,
+    /// Of that, what crosses free space: pieces as long as a door is wide, with no wall that runs alike within 0.4 m beyond the
+    /// tolerance, metres.
+    pub wall_across: f64,
     /// The evidence for the alignment: the logarithm of how much likelier the walls are to meet as they do if this is the
     /// place than if map b lay anywhere. Every region counts by itself, and no region more than walls as long as its side.
     pub evidence: f64,
@@ -76,12 +78,6 @@ impl Agreement {
     pub fn wall_agreement(&self) -> f64 {
         let seen = self.wall_seen();
         if seen > 0.0 { self.wall_on_wall / seen } else { 0.0 }
-    }
-
-    /// The share of the walls that contradict which lie beside a wall that runs alike, 0 to 1; 1 if none contradict. Rough drawing
-    /// and bends leave them there. Another building has its walls anywhere.
-    pub fn drawn_beside(&self) -> f64 {
-        if self.wall_on_free > 0.0 { self.wall_beside / self.wall_on_free } else { 1.0 }
     }
 
     /// Length of wall of one map of which the other knows what is there, metres.
@@ -116,12 +112,17 @@ pub fn compare_sampled(
         tolerance,
         most_points,
     };
-    let (regions, on_wall) = comparison.regions(a, b, transform_a_b);
+    let Found { regions, on_wall, apart_of_a, apart_of_b } = comparison.compare(a, b, transform_a_b);
+    let across = |apart: &[Point2], walls: &WallMap| {
+        let spacing = walls.spacing * stride(walls.walls.points().len(), most_points) as f64;
+        points_of_walls(apart, spacing) as f64 * spacing
+    };
     let chance = (chance(a, tolerance) + chance(b, tolerance)) / 2.0;
     let (for_it, against_it) =
         ((AGREEMENT_OF_ONE_PLACE / chance).ln(), ((1.0 - AGREEMENT_OF_ONE_PLACE) / (1.0 - chance)).ln());
     let mut agreement = Agreement {
         overlap: overlap(a, b, transform_a_b, most_points),
+        wall_across: 0.5 * (across(&apart_of_a, a.walls) + across(&apart_of_b, b.walls)),
         confirming: confirming_share(&on_wall),
         centre: middle(&on_wall),
         ..Default::default()
@@ -129,7 +130,6 @@ pub fn compare_sampled(
     for region in &regions {
         agreement.wall_on_wall += region.wall_on_wall;
         agreement.wall_on_free += region.wall_on_free;
-        agreement.wall_beside += region.wall_beside;
         let share = (parameters.region / (region.wall_on_wall + region.wall_on_free).max(1e-9)).min(1.0);
         agreement.evidence += share * (for_it * region.wall_on_wall + against_it * region.wall_on_free);
     }
@@ -165,7 +165,7 @@ mod tests {
     use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
 
     #[test]
-    fn walls_that_are_drawn_beside_each_other_are_told_from_others_in_cells_of_any_size() {
+    fn walls_that_cross_rooms_are_told_from_those_drawn_beside_in_cells_of_any_size() {
         for resolution in [0.05, 0.4] {
             let fine = drawing(0.0, 0.0, 0.0);
             let seen = seen(-1.0, -1.0, 21.0, 13.0);
@@ -178,7 +178,8 @@ mod tests {
             let beside = compared(&a, tolerance + 0.2);
             let other = compared(&another, 0.0);
             assert!(beside.wall_on_free > 5.0 && other.wall_on_free > 5.0, "{beside:?} {other:?}");
-            assert!(beside.drawn_beside() > other.drawn_beside() + 0.2, "{resolution}: {beside:?} {other:?}");
+            let crossing = |agreement: &Agreement| agreement.wall_across / agreement.wall_on_free;
+            assert!(crossing(&beside) + 0.2 < crossing(&other), "{resolution}: {beside:?} {other:?}");
         }
     }
 }

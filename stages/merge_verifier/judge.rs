@@ -2,7 +2,7 @@
 
 use super::bending::BentPlace;
 use super::refusal::{Hypotheses, Hypothesis};
-use super::score::AGREEMENT_OF_HALVES_IF_BENT;
+use super::score::is_better_bent;
 use super::verdict::{Candidate, Verdict};
 use super::{
     Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
@@ -16,6 +16,8 @@ const LEAST_EVIDENCE: f64 = 1.0;
 const LIKENESS_MARGIN: f64 = 0.15;
 /// The share of the walls that agree at which nothing speaks against a place.
 const CLEAR_AGREEMENT: f64 = 0.9;
+/// Maps that agree in a smaller share of their walls, bent as they are, contradict each other.
+const CONTRADICTION_IF_BENT: f64 = 0.7;
 
 /// What the user knows of a pair of robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -107,7 +109,7 @@ fn best_of<'a>(
     best
 }
 
-/// A hypothesis with map b bent, if that lays more wall on wall, and with what a bend leaves uncertain if it does not. As it
+/// A hypothesis with map b bent, if that makes it more probable, and with what a bend leaves uncertain if it does not. As it
 /// takes long, only where more speaks for the hypothesis than against it, and where something does speak against it.
 fn bent<'a>(
     a: &MapView<'_>,
@@ -120,7 +122,11 @@ fn bent<'a>(
     let bent = is_worth_it.then(|| BentPlace::new(a, b, &rigid.alignment.transform_a_b(), parameters)).flatten();
     let Some(place) = bent else { return *rigid };
     let left_by_bend = Some(place.covariance);
-    match place.agreement.evidence - place.cost > evidence {
+    let is_better = match origin(rigid.alignment) {
+        Origin::Search { .. } => is_better_bent(&place.agreement, place.cost, &rigid.agreement),
+        Origin::Tags | Origin::FewTags => place.agreement.evidence - place.cost > evidence,
+    };
+    match is_better {
         true => Candidate { agreement: place.agreement, bent: Some(place), left_by_bend, ..*rigid },
         false => Candidate { left_by_bend, ..*rigid },
     }
@@ -180,7 +186,7 @@ fn judge_one<'a>(
     let is_refuted = |other: &Candidate<'_>| {
         may_be_bent
             && agreement.wall_agreement() >= CLEAR_AGREEMENT
-            && other.agreement.wall_agreement() < AGREEMENT_OF_HALVES_IF_BENT
+            && other.agreement.wall_agreement() < CONTRADICTION_IF_BENT
     };
     let another = all.iter().filter(|other| !is_refuted(other)).filter_map(|other| Some((other, rival_of(other)?)));
     let another = another.max_by(|(_, one), (_, other)| by_evidence(one, other));
@@ -196,24 +202,17 @@ fn judge_one<'a>(
     }
     let elsewhere = rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
     let evidence_elsewhere = (elsewhere / agreement.evidence.max(LEAST_EVIDENCE)).min(2.0);
-    let origin = origin(alignment);
-    let is_found_by_walls_alone = matches!(origin, Origin::Search { .. }) && found_too_by.is_none() && !is_expected;
-    let confirming = if is_found_by_walls_alone { agreement.confirming } else { 1.0 };
-    let odds = Odds::new(&Grounds {
-        origin,
+    let grounds = Grounds {
+        origin: origin(alignment),
         found_too: found_too_by.is_some(),
         found_by_tags_and_walls,
         is_expected,
-        evidence: agreement.evidence,
-        wall_agreement: agreement.wall_agreement(),
-        drawn_beside: agreement.drawn_beside(),
-        confirming,
-        wall_seen: agreement.wall_seen(),
-        overlap: agreement.overlap,
+        agreement: *agreement,
         bend_cost: bent.map(|bent| bent.cost),
         evidence_elsewhere,
         agreement_elsewhere: rival.map_or(0.0, |rival| rival.agreement.wall_agreement()),
-    });
+    };
+    let odds = Odds::new(&grounds);
     let score = odds.probability();
     let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {
         _ if !alignment.accepted => Some(Refusal::Before(alignment.reason.clone())),
@@ -225,7 +224,7 @@ fn judge_one<'a>(
             evidence_elsewhere,
             all,
         )),
-        None if odds.part < odds.chance => Some(Refusal::Contradiction {
+        None if odds.lacks_agreement(parameters.accept) => Some(Refusal::Contradiction {
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,
             share: agreement.wall_agreement(),
@@ -233,7 +232,7 @@ fn judge_one<'a>(
         None => Some(Refusal::Chance {
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,
-            confirming,
+            confirming: grounds.confirming(),
             probability: score,
             accept: parameters.accept,
         }),

@@ -11,6 +11,7 @@
 
 mod agreement;
 mod bending;
+mod crossings;
 mod judge;
 mod knowledge;
 mod parameters;

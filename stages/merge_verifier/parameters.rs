@@ -26,11 +26,11 @@ pub struct MergeVerifierParameters {
     /// elsewhere: turned by quarter turns, and moved by up to this many metres. 0 only turns it.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub rival_reach: f64,
-    /// How maps bend, as for the `elastic_refiner`: standard deviation of the displacement of two places of a map against each
-    /// other, metres for the root of each metre between them. Maps that contradict each other are compared once more with
-    /// one bent onto the other. 0 compares them as they came.
+    /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of each
+    /// metre between them; more than `elastic_refiner` has, as maps of any sensor are to be told from those of other places. Maps that
+    /// contradict each other are compared once more with one bent onto the other. 0 compares them as they came.
     pub bend: f64,
-    /// How maps turn, as for the `elastic_refiner`: standard deviation of the turn of two places of a map against each other,
+    /// How maps turn: standard deviation of the turn of two places of a map against each other,
     /// radians for the root of each metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub turn: f64,
@@ -47,8 +47,8 @@ impl Default for MergeVerifierParameters {
             region: 3.0,
             slide_deviation: 0.12,
             rival_reach: 4.0,
-            bend: 0.05,
-            turn: 0.01,
+            bend: 0.1,
+            turn: 0.02,
             hypotheses: BTreeMap::new(),
         }
     }

@@ -25,8 +25,20 @@ pub(super) struct Region {
     pub(super) wall_on_wall: f64,
     /// Length of wall of one map where the other knows free space, metres; the mean of both ways.
     pub(super) wall_on_free: f64,
-    /// Of that, what lies beside a wall of the other that runs alike, metres.
-    pub(super) wall_beside: f64,
+}
+
+/// What was found at the walls of two maps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Found {
+    /// Region by region.
+    pub(super) regions: Vec<Region>,
+    /// The walls of map b that lie on walls of map a.
+    pub(super) on_wall: Vec<OnWall>,
+    /// Points of walls of map a on free space of map b that do not lie beside a wall which runs alike, as a bend or a rough drawing
+    /// leaves them; frame a.
+    pub(super) apart_of_a: Vec<Point2>,
+    /// The same of walls of map b; frame b.
+    pub(super) apart_of_b: Vec<Point2>,
 }
 
 /// A point of a wall of map b that lies on a wall of map a which runs alike.
@@ -36,6 +48,14 @@ pub(super) struct OnWall {
     pub(super) point: Point2,
     /// Across the wall, frame a.
     pub(super) normal: Vector2<f64>,
+}
+
+/// A point of a wall of one map, by what the other knows there.
+enum Wall {
+    /// A wall that runs alike.
+    On(OnWall),
+    /// Free space, and no wall that runs alike beside it; its own frame.
+    Apart(Point2),
 }
 
 /// How regions are compared.
@@ -52,13 +72,8 @@ pub(super) struct RegionComparison {
 }
 
 impl RegionComparison {
-    /// Compares two maps at an alignment, in squares of frame a; and the walls of map b that lie on walls of map a.
-    pub(super) fn regions(
-        &self,
-        a: &MapView<'_>,
-        b: &MapView<'_>,
-        transform_a_b: &Pose2,
-    ) -> (Vec<Region>, Vec<OnWall>) {
+    /// Compares two maps at an alignment, in squares of frame a.
+    pub(super) fn compare(&self, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> Found {
         let mut parts: BTreeMap<(i32, i32), Part> = BTreeMap::new();
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
         for index in self.sample(b.walls) {
@@ -74,9 +89,9 @@ impl RegionComparison {
                 parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
-        let mut on_wall = Vec::new();
-        let regions = parts.values().map(|part| self.compare(part, a, b, transform_a_b, &mut on_wall)).collect();
-        (regions, on_wall)
+        let mut found = Found::default();
+        parts.values().for_each(|part| self.add_region(part, a, b, transform_a_b, &mut found));
+        found
     }
 
     /// The numbers of the points of some walls that are looked at.
@@ -85,20 +100,20 @@ impl RegionComparison {
         (0..count).step_by(stride(count, self.most_points))
     }
 
-    fn compare(
-        &self,
-        part: &Part,
-        a: &MapView<'_>,
-        b: &MapView<'_>,
-        transform_a_b: &Pose2,
-        on_wall: &mut Vec<OnWall>,
-    ) -> Region {
+    fn add_region(&self, part: &Part, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, found: &mut Found) {
         let slide = self.register(&part.of_b, a.walls, b.walls, transform_a_b);
         let slid = Pose2::from_parts((transform_a_b.translation.vector + slide).into(), transform_a_b.rotation);
         let mut region = Region::default();
-        self.add(&part.of_b, b, a, &slid, &mut region, |piece| on_wall.push(piece));
-        self.add(&part.of_a, a, b, &slid.inverse(), &mut region, |_| ());
-        region
+        let Found { regions, on_wall, apart_of_a, apart_of_b } = found;
+        self.add(&part.of_b, b, a, &slid, &mut region, |wall| match wall {
+            Wall::On(piece) => on_wall.push(piece),
+            Wall::Apart(point) => apart_of_b.push(point),
+        });
+        self.add(&part.of_a, a, b, &slid.inverse(), &mut region, |wall| match wall {
+            Wall::On(_) => (),
+            Wall::Apart(point) => apart_of_a.push(point),
+        });
+        regions.push(region);
     }
 
     /// How far some walls of map b slide to lie on those of map a: registration from point to line, where nothing but the
@@ -136,7 +151,7 @@ impl RegionComparison {
         map: &MapView<'_>,
         transform: &Pose2,
         region: &mut Region,
-        mut on_wall: impl FnMut(OnWall),
+        mut tell: impl FnMut(Wall),
     ) {
         // Both ways are added up.
         let count = other.walls.walls.points().len();
@@ -159,13 +174,13 @@ impl RegionComparison {
                 };
                 if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.wall_on_wall += length;
-                    on_wall(OnWall { point, normal: turned });
+                    tell(Wall::On(OnWall { point, normal: turned }));
                 }
             } else if is_free(map.value_at(&point)) {
                 region.wall_on_free += length;
                 let beside = map.walls.walls.nearest(&point, self.tolerance + BESIDE);
-                if beside.is_some_and(|partner| runs_alike(partner.index)) {
-                    region.wall_beside += length;
+                if !beside.is_some_and(|partner| runs_alike(partner.index)) {
+                    tell(Wall::Apart(own));
                 }
             }
         }

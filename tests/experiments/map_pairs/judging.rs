@@ -22,7 +22,7 @@ pub(super) const HEADS: [&str; 18] = [
     "evidence",
     "wall on wall m",
     "wall on free m",
-    "wall beside m",
+    "wall across m",
     "confirming",
     "overlap m2",
     "bend m",
@@ -73,7 +73,7 @@ pub(super) struct Hypothesis {
 
 impl Hypothesis {
     pub(super) fn cells(&self) -> Vec<String> {
-        let Agreement { evidence, wall_on_wall, wall_on_free, wall_beside, confirming, overlap, .. } = self.agreement;
+        let Agreement { evidence, wall_on_wall, wall_on_free, wall_across, confirming, overlap, .. } = self.agreement;
         let place = &self.transform_a_b;
         let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
         let number = |value: f64| format!("{value:.3}");
@@ -89,7 +89,7 @@ impl Hypothesis {
             number(evidence),
             number(wall_on_wall),
             number(wall_on_free),
-            number(wall_beside),
+            number(wall_across),
             number(confirming),
             number(overlap),
             bent(|bent| bent.bend),
