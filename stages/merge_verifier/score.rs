@@ -9,11 +9,12 @@
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do.
 //!
-//! Of a place that was found by walls alone, chance and part are one: it is a logistic regression that says how probable the place is by
+//! Of a place that was found by walls alone, a logistic regression says how probable it is by
 //! its lead, by how much both maps know, and by what speaks against it. Two straight walls fix a place, and any corner fits any other:
 //! lead and area count as far as walls beside these two agree, too, and confirm it. Against it are walls that cross the other map's free
 //! space. Where furniture was moved, or a wall is drawn roughly or is bent, maps of one place contradict each other as well; that
-//! does not count. Where one map was bent onto the other, the bend counts against it.
+//! does not count. Where one map was bent onto the other, the bend counts against it. Of much wall, seven tenths to five sixths must
+//! agree besides, as parts of one building that are alike agree on much and contradict each other on as much.
 //!
 //! Tags have not looked at walls, and ask for more agreement. Where the user knows the place, or enough tags and a search that has not
 //! looked at tags have come to the same place, each by itself, it is one building and one floor, and two fifths are enough: what
@@ -33,15 +34,16 @@ const LEAD_OF_TAGS: f64 = 10.0;
 const LEAD_OF_FEW_TAGS: f64 = 5.0;
 
 /// The logistic regression for places that walls have found: the logarithm of the odds where all else is 0, and per unit of the lead,
-const OF_NOTHING: f64 = -13.7;
-const BY_LEAD_OF_SEARCH: f64 = 0.96;
-/// of the logarithm of the area that both maps know, square metres,
-const BY_AREA: f64 = 5.3;
-/// of the share of the walls that cross the other's free space, and of the root of their metres,
-const BY_CROSSING_SHARE: f64 = -33.5;
-const BY_CROSSING: f64 = -1.45;
+const OF_NOTHING: f64 = -14.0;
+const BY_LEAD_OF_SEARCH: f64 = 0.89;
+/// of the logarithm of the area that both maps know, square metres, up to an area from which on more tells no more,
+const BY_AREA: f64 = 5.63;
+const MOST_AREA: f64 = 200.0;
+/// of the share of the walls that cross the other's free space, and of the logarithm of 1 and their metres,
+const BY_CROSSING_SHARE: f64 = -34.8;
+const BY_CROSSING: f64 = -2.17;
 /// and of the root of the cost of a bend.
-const BY_BEND: f64 = -0.43;
+const BY_BEND: f64 = -0.38;
 /// So large a share of the walls that agree must confirm the place, and not only fix it, for lead and area to count in full; and neither
 /// counts where none confirms it.
 pub(super) const CONFIRMING: f64 = 0.5;
@@ -49,6 +51,13 @@ pub(super) const CONFIRMING: f64 = 0.5;
 /// unit that is missing.
 const LITTLE_EVIDENCE: f64 = 10.0;
 const BY_LITTLE_EVIDENCE: f64 = -1.0;
+/// The share of the walls that agree at which a place that walls have found is as likely to be half of it only, for any length of wall:
+/// what was moved and drawn roughly has evened out then. What less wall tells is known less well: so much more of it must agree,
+/// divided by the root of its metres.
+const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.62;
+const MORE_OF_LESS_WALL: f64 = 1.6;
+/// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
+const MUCH_WALL: (f64, f64) = (60.0, 80.0);
 
 /// The logarithm of the odds of an alignment that is told by tags or the user, and for which nothing else speaks.
 const PRIOR: f64 = -5.0;
@@ -140,7 +149,7 @@ pub struct Odds {
     pub chance: f64,
     /// Against a place that is like it.
     pub likeness: f64,
-    /// Against a place at which the maps agree in part; infinite where that is part of `chance`.
+    /// Against a place at which the maps agree in part; infinite where walls have found it and there is too little of them to tell.
     pub part: f64,
     /// By how much less `chance` is for walls that cross free space.
     pub crossings: f64,
@@ -162,7 +171,7 @@ impl Odds {
                 let confirmed = confirmed(grounds.confirming());
                 let chance =
                     OF_NOTHING + confirmed * BY_LEAD_OF_SEARCH * lead + by_walls(agreement, confirmed, bend_cost);
-                return Self { chance, likeness, part: f64::INFINITY, crossings };
+                return Self { chance, likeness, part: part_of_much_wall(agreement), crossings };
             }
         };
         let evidence = agreement.evidence - bend_cost.unwrap_or_default();
@@ -198,7 +207,7 @@ fn confirmed(confirming: f64) -> f64 {
 
 /// The part of the regression that walls and a bend have.
 fn by_walls(agreement: &Agreement, confirmed: f64, bend_cost: Option<f64>) -> f64 {
-    confirmed * BY_AREA * agreement.overlap.max(1.0).ln()
+    confirmed * BY_AREA * agreement.overlap.clamp(1.0, MOST_AREA).ln()
         + by_crossings(agreement)
         + BY_BEND * bend_cost.unwrap_or_default().max(0.0).sqrt()
         + BY_LITTLE_EVIDENCE * (LITTLE_EVIDENCE - agreement.evidence).max(0.0)
@@ -207,7 +216,16 @@ fn by_walls(agreement: &Agreement, confirmed: f64, bend_cost: Option<f64>) -> f6
 fn by_crossings(agreement: &Agreement) -> f64 {
     let across = agreement.wall_across;
     let share = across / agreement.wall_seen().max(f64::MIN_POSITIVE);
-    BY_CROSSING_SHARE * share + BY_CROSSING * across.sqrt()
+    BY_CROSSING_SHARE * share + BY_CROSSING * across.ln_1p()
+}
+
+/// The odds against a place at which much wall agrees in part.
+fn part_of_much_wall(agreement: &Agreement) -> f64 {
+    let seen = agreement.wall_seen();
+    let (from, much) = MUCH_WALL;
+    let counts = ((seen - from) / (much - from)).clamp(0.0, 1.0);
+    let halves = AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt();
+    if counts > 0.0 { BY_AGREEMENT * (agreement.wall_agreement() - counts * halves) } else { f64::INFINITY }
 }
 
 /// The odds against a place that is like it.
@@ -311,7 +329,7 @@ mod tests {
             rough(agreement);
             agreement.wall_across = 20.0;
         };
-        assert!(found(8.0, other) < 0.9);
+        assert!(found(8.0, other) < 0.99);
         let mut of_other = grounds(Origin::Search { lead: 8.0 });
         other(&mut of_other.agreement);
         assert!(Odds::new(&of_other).lacks_agreement(0.999));
@@ -323,6 +341,18 @@ mod tests {
             })
         };
         assert!(of(200.0) < of(20.0));
+    }
+
+    #[test]
+    fn more_of_much_wall_must_agree_and_less_the_more_of_it_there_is() {
+        let with = |share: f64, seen: f64| {
+            found(9.0, |agreement| {
+                (agreement.wall_on_wall, agreement.wall_on_free) = (share * seen, (1.0 - share) * seen);
+            })
+        };
+        assert!(with(0.78, 100.0) < 0.6 && with(0.84, 100.0) > 0.999);
+        assert!(with(0.7, 400.0) < 0.6 && with(0.76, 400.0) > 0.999);
+        assert!(with(0.6, 60.0) > 0.999 && with(0.6, 80.0) < 0.01);
     }
 
     #[test]
@@ -349,7 +379,7 @@ mod tests {
             grounds.agreement.overlap = 80.0;
             Odds::new(&grounds).probability()
         };
-        assert!(with(Some(0.0)) == with(None) && with(Some(10.0)) > 0.999 && with(Some(1000.0)) < 0.9);
+        assert!(with(Some(0.0)) == with(None) && with(Some(10.0)) > 0.999 && with(Some(1000.0)) < 0.95);
     }
 
     #[test]
