@@ -1,8 +1,8 @@
-//! Walls of one map that cross the free space of the other: what no two maps of one place have.
+//! Walls of one map that cross the free space of the other: what maps of one place have little of.
 //!
 //! Where a map is bent, or drawn roughly, its walls lie beside those of the other. What lies alone on free space and is small is a
 //! leg, a person or a chair, and may have moved. What is as long as a door is wide is a wall, as a rule, and two maps of one place
-//! do not disagree about walls in the middle of their rooms.
+//! seldom disagree about walls in the middle of their rooms.
 
 use crate::geometry::Point2;
 use nalgebra::Vector2;

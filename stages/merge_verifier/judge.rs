@@ -1,8 +1,8 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::bending::BentPlace;
+use super::found_by_walls::is_better_bent;
 use super::refusal::{Hypotheses, Hypothesis};
-use super::score::is_better_bent;
 use super::verdict::{Candidate, Verdict};
 use super::{
     Agreement, Grounds, MapView, MergeVerifierParameters, Odds, Origin, Refusal, Rival, best_rival_nearby, compare,
@@ -78,10 +78,10 @@ pub fn judge<'a>(
     }
     if rigid.refusal.is_none() {
         // The frame that is nearest to all of a bent map, and not to the part of it that registration has come to.
-        return Some(Verdict { candidate: bent(a, b, &rigid.candidate, parameters), ..rigid });
+        return Some(Verdict { candidate: bent(a, b, &rigid.candidate, is_expected, parameters), ..rigid });
     }
     // Maps that contradict each other may do so because they are bent, and several places may be one if they are.
-    let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, parameters)).collect();
+    let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, is_expected, parameters)).collect();
     let as_bent = best_of(a, b, &bent, is_expected, true, parameters);
     as_bent.filter(|verdict| verdict.refusal.is_none()).or(Some(rigid))
 }
@@ -115,6 +115,7 @@ fn bent<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
     rigid: &Candidate<'a>,
+    is_expected: bool,
     parameters: &MergeVerifierParameters,
 ) -> Candidate<'a> {
     let Agreement { evidence, .. } = rigid.agreement;
@@ -123,8 +124,8 @@ fn bent<'a>(
     let Some(place) = bent else { return *rigid };
     let left_by_bend = Some(place.covariance);
     let is_better = match origin(rigid.alignment) {
-        Origin::Search { .. } => is_better_bent(&place.agreement, place.cost, &rigid.agreement),
-        Origin::Tags | Origin::FewTags => place.agreement.evidence - place.cost > evidence,
+        Origin::Search { .. } if !is_expected => is_better_bent(&place.agreement, place.cost, &rigid.agreement),
+        _ => place.agreement.evidence - place.cost > evidence,
     };
     match is_better {
         true => Candidate { agreement: place.agreement, bent: Some(place), left_by_bend, ..*rigid },

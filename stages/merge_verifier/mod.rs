@@ -12,6 +12,7 @@
 mod agreement;
 mod bending;
 mod crossings;
+mod found_by_walls;
 mod judge;
 mod knowledge;
 mod parameters;

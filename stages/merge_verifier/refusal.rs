@@ -1,6 +1,6 @@
 //! Why two maps are not merged.
 
-use super::score::CONFIRMING;
+use super::found_by_walls::CONFIRMING;
 use std::fmt;
 
 /// Maps that agree on less wall, metres, have nothing in common that could be contradicted.

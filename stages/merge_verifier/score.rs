@@ -9,23 +9,17 @@
 //! - **by likeness**: the building is alike in several parts, and the maps fit in another one nearly as well.
 //! - **in part**: the maps agree in much and contradict each other in as much, as two floors of one building do.
 //!
-//! Of a place that was found by walls alone, a logistic regression says how probable it is by
-//! its lead, by how much both maps know, and by what speaks against it. Two straight walls fix a place, and any corner fits any other:
-//! lead and area count as far as walls beside these two agree, too, and confirm it. Against it are walls that cross the other map's free
-//! space. Where furniture was moved, or a wall is drawn roughly or is bent, maps of one place contradict each other as well; that
-//! does not count. Where one map was bent onto the other, the bend counts against it. Of much wall, as the maps came,
-//! seven tenths to five sixths must agree besides, as parts of one building that are alike agree on much and contradict each other on as
-//! much; and nearly all where the maps share no more than a room.
+//! Places that a search has found are judged by a regression, see [`found_by_walls`](super::found_by_walls).
 //!
 //! Tags have not looked at walls, and ask for more agreement. Where the user knows the place, or enough tags and a search that has not
 //! looked at tags have come to the same place, each by itself, it is one building and one floor, and two fifths are enough: what
 //! contradicts is a bend that is too fine to be undone, or was moved.
 //!
-//! The weights of the regression were fitted to hypotheses for pairs of published maps, of simulated buildings of eight kinds and of
-//! different buildings; `tests/experiments/README.md` names them, and what came of it on others. What comes out orders alignments by how
-//! sure they are, and is a probability only as far as those pairs stand for others.
+//! What comes out orders alignments by how sure they are, and is a probability only as far as the pairs on which it was chosen stand for
+//! others; `tests/experiments/README.md` names them, and what came of it on others.
 
 use super::Agreement;
+use super::found_by_walls::{crossings, halves, log_odds};
 
 /// No lead says more: from there on the model of chance itself is in doubt.
 const MOST_LEAD: f64 = 10.0;
@@ -33,39 +27,6 @@ const MOST_LEAD: f64 = 10.0;
 const LEAD_OF_TAGS: f64 = 10.0;
 /// The lead of a place that too few tags tell to be believed alone, and what another source adds that has found the same.
 const LEAD_OF_FEW_TAGS: f64 = 5.0;
-
-/// The logistic regression for places that walls have found: the logarithm of the odds where all else is 0, and per unit of the lead,
-const OF_NOTHING: f64 = -14.0;
-const BY_LEAD_OF_SEARCH: f64 = 0.89;
-/// of the logarithm of the area that both maps know, square metres, up to an area from which on more tells no more,
-const BY_AREA: f64 = 5.63;
-const MOST_AREA: f64 = 200.0;
-/// of the share of the walls that cross the other's free space, and of the logarithm of 1 and their metres,
-const BY_CROSSING_SHARE: f64 = -34.8;
-const BY_CROSSING: f64 = -2.17;
-/// and of the root of the cost of a bend.
-const BY_BEND: f64 = -0.38;
-/// A bend lays walls on each other in wrong places, too, where rooms are alike; but not all of them: per unit of the share of the walls
-/// that contradict where a map is bent. It was not fitted: it keeps apart two simulated buildings of equal rooms that were merged without it, and all bent logs merged.
-const BY_CONTRADICTION_IF_BENT: f64 = -7.0;
-/// So large a share of the walls that agree must confirm the place, and not only fix it, for lead and area to count in full; and neither
-/// counts where none confirms it.
-pub(super) const CONFIRMING: f64 = 0.5;
-/// Less evidence than this has not been tried: no place of those pairs had so little and was in doubt. So much is taken off for each
-/// unit that is missing.
-const LITTLE_EVIDENCE: f64 = 10.0;
-const BY_LITTLE_EVIDENCE: f64 = -1.0;
-/// The share of the walls that agree at which a place that walls have found is as likely to be half of it only, for any length of wall:
-/// what was moved and drawn roughly has evened out then. What less wall tells is known less well: so much more of it must agree,
-/// divided by the root of its metres.
-const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.62;
-const MORE_OF_LESS_WALL: f64 = 1.6;
-/// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
-const MUCH_WALL: (f64, f64) = (60.0, 80.0);
-/// The same where the maps share the area of one room: rooms of other buildings have the same corners and sizes.
-const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
-/// So large is a room at the most, and so large is the area that the maps share if it is surely more than a room, square metres.
-const ROOM: (f64, f64) = (40.0, 60.0);
 
 /// The logarithm of the odds of an alignment that is told by tags or the user, and for which nothing else speaks.
 const PRIOR: f64 = -5.0;
@@ -78,7 +39,7 @@ const AGREEMENT_OF_HALVES_BY_TAGS: f64 = 0.75;
 /// The same where the user knows the place, or tags and a search over all places tell the same: it is one building, and what
 /// contradicts is a bend, or was moved.
 const AGREEMENT_OF_HALVES_WHERE_KNOWN: f64 = 0.4;
-/// Per unit of that share.
+/// Per unit of the share of the walls that agree.
 const BY_AGREEMENT: f64 = 140.0;
 
 /// The share of the evidence that a rival has where it is as likely to be right, if nothing else tells them apart.
@@ -171,25 +132,22 @@ impl Odds {
         let lead = origin.lead(found_too || is_expected);
         let likeness = likeness(grounds);
         let is_known = found_by_tags_and_walls || is_expected && matches!(origin, Origin::Search { .. });
-        let halves = match origin {
-            _ if is_known => AGREEMENT_OF_HALVES_WHERE_KNOWN,
-            Origin::Tags | Origin::FewTags => AGREEMENT_OF_HALVES_BY_TAGS,
-            Origin::Search { .. } => {
-                let crossings = -by_crossings(agreement);
-                let confirmed = confirmed(grounds.confirming());
-                let chance =
-                    OF_NOTHING + confirmed * BY_LEAD_OF_SEARCH * lead + by_walls(agreement, confirmed, bend_cost);
-                let halves = halves_by_walls(agreement, bend_cost.is_some());
-                let part = BY_AGREEMENT * (agreement.wall_agreement() - halves);
-                return Self { chance, likeness, part, crossings };
+        let is_told = is_known || !matches!(origin, Origin::Search { .. });
+        let (chance, halves) = match is_told {
+            true => {
+                let evidence = agreement.evidence - bend_cost.unwrap_or_default();
+                let halves = if is_known { AGREEMENT_OF_HALVES_WHERE_KNOWN } else { AGREEMENT_OF_HALVES_BY_TAGS };
+                (PRIOR + BY_EVIDENCE * evidence + BY_LEAD * lead, halves)
+            }
+            false => {
+                (log_odds(lead, agreement, grounds.confirming(), bend_cost), halves(agreement, bend_cost.is_some()))
             }
         };
-        let evidence = agreement.evidence - bend_cost.unwrap_or_default();
         Self {
-            chance: PRIOR + BY_EVIDENCE * evidence + BY_LEAD * lead,
+            chance,
             likeness,
             part: BY_AGREEMENT * (agreement.wall_agreement() - halves),
-            crossings: 0.0,
+            crossings: if is_told { 0.0 } else { -crossings(agreement) },
         }
     }
 
@@ -203,47 +161,6 @@ impl Odds {
         let without = Self { chance: self.chance + self.crossings, ..*self };
         self.part < self.chance || without.probability() >= probability
     }
-}
-
-/// Whether a place that walls have found is more probable with one map bent, at a cost, than as the maps came.
-pub(super) fn is_better_bent(bent: &Agreement, cost: f64, rigid: &Agreement) -> bool {
-    by_walls(bent, confirmed(bent.confirming), Some(cost)) > by_walls(rigid, confirmed(rigid.confirming), None)
-}
-
-/// How much of what speaks for a place counts, by the share of the walls that agree which confirm it.
-fn confirmed(confirming: f64) -> f64 {
-    (confirming / CONFIRMING).min(1.0)
-}
-
-/// The part of the regression that walls and a bend have.
-fn by_walls(agreement: &Agreement, confirmed: f64, bend_cost: Option<f64>) -> f64 {
-    confirmed * BY_AREA * agreement.overlap.clamp(1.0, MOST_AREA).ln()
-        + by_crossings(agreement)
-        + bend_cost.map_or(0.0, |cost| {
-            BY_CONTRADICTION_IF_BENT * (1.0 - agreement.wall_agreement()) + BY_BEND * cost.max(0.0).sqrt()
-        })
-        + BY_LITTLE_EVIDENCE * (LITTLE_EVIDENCE - agreement.evidence).max(0.0)
-}
-
-fn by_crossings(agreement: &Agreement) -> f64 {
-    let across = agreement.wall_across;
-    let share = across / agreement.wall_seen().max(f64::MIN_POSITIVE);
-    BY_CROSSING_SHARE * share + BY_CROSSING * across.ln_1p()
-}
-
-/// The share of the walls that agree at which a place that walls have found is as likely to be half of it only: of much wall, and in a
-/// room; 0 where walls that cross rooms tell enough.
-fn halves_by_walls(agreement: &Agreement, is_bent: bool) -> f64 {
-    let seen = agreement.wall_seen();
-    let of_much = AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt();
-    let of_much = if is_bent { 0.0 } else { share_of_way(seen, MUCH_WALL) * of_much };
-    let in_room = (1.0 - share_of_way(agreement.overlap, ROOM)) * AGREEMENT_OF_HALVES_IN_A_ROOM;
-    of_much.max(in_room)
-}
-
-/// How far a value has come from the first of two to the second, 0 to 1.
-fn share_of_way(value: f64, (from, to): (f64, f64)) -> f64 {
-    ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// The odds against a place that is like it.
