@@ -58,7 +58,7 @@ fn to_json(truth: &SimulationTruth) -> Value {
         "tags": object(&truth.tags, |tag| (&tag.tag_id, json!([tag.x, tag.y]))),
         "note": "frames: pose of each robot's map frame in robot1's map frame, metres and radians; tags in robot1's \
                  map frame; centres: middle of each robot's last map, in its own map frame (errors are taken there); \
-                 common: places that the first two robots have both driven through, x and y in the map frame of the \
+                 common: places that the first two robots by name have both driven through, x and y in the map frame of the \
                  second and then of the first, as their maps show them",
         "centres": object(&truth.frames, |one| (&one.robot, json!(one.centre))),
         "common": truth.common.iter().map(|place| [place.second, place.first].concat()).collect::<Vec<_>>(),

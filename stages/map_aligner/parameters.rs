@@ -50,13 +50,13 @@ pub struct MapAlignerParameters {
     /// What another place must score, as a share of the best, for `tie_margin` to count.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub tie_least_share: f64,
-    /// A guess that stands out on several maps together need not be confirmed by more than one that rests on tags if they
-    /// have at least so many metres of wall in common.
+    /// Nor are they laid together if they have less than so many metres of wall in common, or
     #[schemars(range(min = 0.0, max = 1e6))]
-    pub supporting_wall_length: f64,
-    /// The least share of these walls on which they agree.
+    pub tie_wall_length: f64,
+    /// if less than this share of these walls agrees. Where they are laid together, one alignment is enough to tie a robot to
+    /// the others.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub supporting_wall_agreement: f64,
+    pub tie_wall_agreement: f64,
     /// A robot that is laid on several maps that lie together is aligned with at most so many more of them, besides
     /// the one with which it has the most wall in common.
     pub predictions: usize,
@@ -87,8 +87,8 @@ impl Default for MapAlignerParameters {
             tie_runner_up: 0.5,
             tie_margin: 0.05,
             tie_least_share: 0.3,
-            supporting_wall_length: 50.0,
-            supporting_wall_agreement: 0.9,
+            tie_wall_length: 50.0,
+            tie_wall_agreement: 0.9,
             predictions: 2,
             little_growth: 0.2,
             provisional: true,

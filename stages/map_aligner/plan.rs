@@ -164,7 +164,9 @@ impl MergePlan {
                 return None;
             }
         };
-        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && !self.has_alike(&found);
+        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up
+            && !self.has_alike(&found)
+            && self.agrees_in_much(&found);
         let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
             statements.push(Statement::of(pair, Ok(with_reasons(&found))));
@@ -172,9 +174,8 @@ impl MergePlan {
         }
         let pairs = self.pairs_in_common(group_a, group_b, &best);
         if is_clear {
-            let is_supported = self.supports(&found);
             let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), lead));
-            let told = told.map(|told| Statement { is_supported, ..told });
+            let told = told.map(|told| Statement { is_supported: true, ..told });
             let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
             self.predictions += told.len() as u64;
             let fits = !told.is_empty();
@@ -217,12 +218,13 @@ impl MergePlan {
         others.iter().any(is_alike)
     }
 
-    /// Whether two groups that lie together clearly have so much in common that any of their pairs needs less.
-    fn supports(&self, found: &MapAlignments) -> bool {
-        let MapAlignerParameters { supporting_wall_length, supporting_wall_agreement, .. } = self.parameters;
-        found.hypotheses.first().is_some_and(|best| {
-            best.wall_in_common >= supporting_wall_length && best.wall_agreement >= supporting_wall_agreement
-        })
+    /// Whether two groups agree on so much wall, and so well, that they can be laid together. What is laid together wrongly shows a
+    /// part of the building twice, and no map that comes later has one place on it.
+    fn agrees_in_much(&self, found: &MapAlignments) -> bool {
+        let MapAlignerParameters { tie_wall_length, tie_wall_agreement, .. } = self.parameters;
+        let agrees =
+            |best: &MapAlignment| best.wall_in_common >= tie_wall_length && best.wall_agreement >= tie_wall_agreement;
+        found.hypotheses.first().is_some_and(agrees)
     }
 
     /// The guesses for a pair of robots by a search of their own.

@@ -12,7 +12,8 @@
 //! room.
 //!
 //! The weights were fitted to hypotheses for pairs of published maps, of simulated buildings of eight kinds and of different buildings,
-//! and then doubled and shifted, so that no pair of different buildings among these reaches a probability of 0.999. `tests/experiments/README.md` names the pairs, and what came of it on others.
+//! and then doubled and shifted, so that no pair of different buildings among these reaches a probability of 0.999.
+//! `tests/experiments/README.md` names the pairs, and what came of it on others.
 
 use super::Agreement;
 

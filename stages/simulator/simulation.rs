@@ -65,11 +65,15 @@ fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
             .map(|tag| (tag.id.clone(), transform_building_first.inverse_transform_point(&tag.place)))
             .collect(),
         centres: centres.collect(),
-        common: match robots {
-            [first, second, ..] => common_places(first, second),
-            _ => Vec::new(),
-        },
+        common: first_two_by_name(robots).map_or_else(Vec::new, |[first, second]| common_places(first, second)),
     }
+}
+
+/// The two robots between which common places are told: `robot10` comes before `robot2`.
+fn first_two_by_name(robots: &[RobotLog]) -> Option<[&RobotLog; 2]> {
+    let mut by_name: Vec<&RobotLog> = robots.iter().collect();
+    by_name.sort_by(|one, other| one.name.cmp(&other.name));
+    by_name.first_chunk().copied()
 }
 
 /// Places that two robots both have driven through, as the map of the first shows them and as that of the second does: what a
@@ -166,6 +170,17 @@ mod tests {
         assert!(apart(0.0) < 1e-9);
         let drifted = apart(0.01);
         assert!(drifted > 0.02 && drifted < 1.0, "{drifted}");
+    }
+
+    #[test]
+    fn common_places_are_those_of_the_first_two_robots_by_name() {
+        let of = |robots: usize| {
+            let logs = simulate(&SimulatorParameters { robots: robots as u32, beams: 8, ..small() }, 3).unwrap().robots;
+            first_two_by_name(&logs).map(|pair| pair.map(|robot| robot.name.clone()))
+        };
+        assert_eq!(of(1), None);
+        assert_eq!(of(2), Some(["robot1".to_owned(), "robot2".to_owned()]));
+        assert_eq!(of(10), Some(["robot1".to_owned(), "robot10".to_owned()]));
     }
 
     #[test]

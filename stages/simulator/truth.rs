@@ -15,7 +15,7 @@ pub struct Truth {
     pub tags: Vec<(String, Point2)>,
     /// The middle of each robot's last map, in its own map frame, metres.
     pub centres: Vec<(String, Point2)>,
-    /// Places that the first two robots both have driven through, as the map of the first shows them and as that of the second
+    /// Places that the first two robots by name both have driven through, as the map of the first shows them and as that of the second
     /// does, each in its own map frame, metres.
     pub common: Vec<[Point2; 2]>,
 }

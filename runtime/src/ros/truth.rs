@@ -40,7 +40,7 @@ pub struct SimulationTruth {
     pub frames: Vec<TrueFrame>,
     /// The tags, by id.
     pub tags: Vec<TrueTag>,
-    /// Places that the first two robots both have driven through.
+    /// Places that the first two robots by name both have driven through.
     pub common: Vec<CommonPlace>,
 }
 
