@@ -13,10 +13,9 @@ use crate::robot_pair::RobotPair;
 use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// As many groups, the largest first, are tried for a robot when its map comes; the others at the end.
+/// As many groups, the largest first, are tried for a robot when its map comes; the others at the end, when all groups that are left are
+/// tried on each other as long as any two of them come to lie together.
 const GROUPS_TRIED: usize = 3;
-/// At the end all groups are tried on the largest again as often as this, as long as it grows.
-const LAST_ROUNDS: usize = 3;
 /// Guesses are kept for a map that has grown a little if they score at least this share of what they did.
 const KEPT_SCORE: f64 = 0.9;
 
@@ -105,8 +104,8 @@ impl MergePlan {
         self.tell(statements)
     }
 
-    /// No more maps come: the last maps that were not searched are searched, so that what is told rests on them, and what
-    /// has not found its place is tried once more.
+    /// No more maps come: the last maps that were not searched are searched, so that what is told rests on them, and all that
+    /// has not found its place is tried on all else.
     pub fn finish(&mut self) -> Vec<Statement> {
         let mut statements = Vec::new();
         let not_searched = self.robots.iter().filter(|(_, known)| known.map.is_ok() && !known.is_searched);
@@ -123,10 +122,11 @@ impl MergePlan {
         for robot in &robots {
             statements.extend(self.retractions(robot, &statements));
         }
-        for _ in 0..LAST_ROUNDS {
+        loop {
             let count = self.groups.len();
-            let Some(largest) = self.groups.by_size().first().copied() else { break };
-            self.tie_with_others(largest, usize::MAX, &mut statements);
+            for number in self.groups.by_size() {
+                self.tie_with_others(number, usize::MAX, &mut statements);
+            }
             if self.groups.len() == count {
                 break;
             }
@@ -164,9 +164,7 @@ impl MergePlan {
                 return None;
             }
         };
-        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up
-            && !self.has_alike(&found)
-            && self.agrees_in_much(&found);
+        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && self.agrees_in_much(&found);
         let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
             statements.push(Statement::of(pair, Ok(with_reasons(&found))));
@@ -207,13 +205,13 @@ impl MergePlan {
         Some(PlaceWindow::between(&a, &b).of_wholes(place_a, place_b))
     }
 
-    /// Whether about as large a share of the walls agrees at another guess: then the place is not clear, however much
-    /// more wall there is at the best. What there is depends on what the robots happen to have seen.
+    /// Whether at another guess, which scores too much for the place to be clear, about as large a share of the walls agrees: the building
+    /// is alike in both, and what two of the maps say alone is no more.
     fn has_alike(&self, found: &MapAlignments) -> bool {
         let Some((best, others)) = found.hypotheses.split_first() else { return false };
         let is_alike = |other: &MapAlignment| {
-            other.share >= self.parameters.tie_least_share
-                && other.wall_agreement + self.parameters.tie_margin >= best.wall_agreement
+            other.share > self.parameters.tie_runner_up
+                && other.wall_agreement + self.parameters.alike_margin >= best.wall_agreement
         };
         others.iter().any(is_alike)
     }

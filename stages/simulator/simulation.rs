@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn common_places_are_those_of_the_first_two_robots_by_name() {
-        let of = |robots: usize| {
-            let logs = simulate(&SimulatorParameters { robots: robots as u32, beams: 8, ..small() }, 3).unwrap().robots;
+        let of = |robots: u32| {
+            let logs = simulate(&SimulatorParameters { robots, beams: 8, ..small() }, 3).unwrap().robots;
             first_two_by_name(&logs).map(|pair| pair.map(|robot| robot.name.clone()))
         };
         assert_eq!(of(1), None);
