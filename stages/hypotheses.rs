@@ -20,6 +20,12 @@ impl Origin {
     }
 }
 
+/// Whether the covariance of an alignment tells how far two maps fit about as well, as that of `map_aligner` does; that of other methods
+/// is for how far off they are.
+pub fn has_covariance_of_fit(alignment: &Alignment) -> bool {
+    alignment.hypotheses > 0 && alignment.source == "maps" && alignment.method == "maps"
+}
+
 /// Gathers hypotheses until all that belong together have come: they are judged against each other, and one without the
 /// others would be believed too easily.
 #[derive(Debug, Default)]

@@ -1,6 +1,7 @@
 //! Why a refined alignment may not be used.
 
-use super::{IcpParameters, Registration};
+use super::first_guess::LocalFrame;
+use super::{FirstGuess, IcpParameters, Registration};
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use nalgebra::Matrix2;
 
@@ -73,6 +74,23 @@ impl IcpRefusal {
         } else {
             None
         }
+    }
+
+    /// The reason against a registration that began where a search over all places has found the same walls to fit best, if they leave
+    /// that place open. Along a corridor with little that crosses it registration settles on what crosses it nearest, right or wrong,
+    /// and is sure of that; how far the walls fit about as well tells how sure it is.
+    pub fn of_search(
+        first_guess: &FirstGuess,
+        registration: &Registration,
+        parameters: &IcpParameters,
+    ) -> Option<Self> {
+        let frame = LocalFrame { centre: registration.centre, scale: 1.0 };
+        let derivative = frame.inverse_jacobian(&first_guess.transform_a_b);
+        let covariance = derivative * first_guess.covariance * derivative.transpose();
+        let (along, direction) = widest_deviation(&covariance.fixed_view::<2, 2>(0, 0).into_owned());
+        let most = parameters.max_position_deviation;
+        let is_open = !(along <= most);
+        is_open.then(|| Self::OpenPosition { direction: direction.to_degrees(), deviation: along, most })
     }
 }
 

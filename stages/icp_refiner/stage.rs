@@ -1,9 +1,9 @@
 //! The stage: keeps each robot's map with its walls, and refines the first guesses for a pair when one of the maps or the
 //! guesses change.
 
-use super::{FirstGuess, IcpParameters, Refinement, refine};
+use super::{FirstGuess, IcpParameters, IcpRefusal, Refinement, refine};
 use crate::geometry::{row_by_row, wrap_angle};
-use crate::hypotheses::{HypothesisGatherer, Origin};
+use crate::hypotheses::{HypothesisGatherer, Origin, has_covariance_of_fit};
 use crate::robot_maps::RobotMaps;
 use crate::walls::WallsOnDemand;
 use gridweave_runtime::message::LogTime;
@@ -126,7 +126,10 @@ impl IcpRefiner {
                     let [a, b] = [a, b].map(|map| map.walls(self.parameters.normal_radius));
                     let covariance = Matrix3::from_row_slice(&guess.covariance);
                     let start = FirstGuess::new(guess.transform_a_b(), covariance, &self.parameters);
-                    let refinement = refine(a, b, &start, &self.parameters);
+                    let mut refinement = refine(a, b, &start, &self.parameters);
+                    if refinement.refusal.is_none() && has_covariance_of_fit(guess) {
+                        refinement.refusal = IcpRefusal::of_search(&start, &refinement.registration, &self.parameters);
+                    }
                     let refined = Refined { maps, first_guess: guess.clone(), refinement };
                     output.errors.send(&guesses.robot, &refined.errors(output.log_time()))?;
                     refined

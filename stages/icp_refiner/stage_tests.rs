@@ -165,3 +165,23 @@ fn ranked_guesses_are_refined_and_sent_together() {
     assert_eq!(bench.give(&ranked(1, &truth)), [], "the first is missing");
     assert_eq!(bench.stage.warnings().len(), 1);
 }
+
+#[test]
+fn where_a_search_leaves_the_place_open_registration_does_not_fix_it() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let found = |along: f64, method: &str| {
+        let mut bench = StageBench::new(&super::kind(), "");
+        bench.give_map("robot1", &a);
+        bench.give_map("robot2", &b);
+        let mut covariance = [0.0; 9];
+        (covariance[0], covariance[4], covariance[8]) = (along * along, 0.01, 1e-4);
+        let (source, method) = ("maps".into(), method.into());
+        let guess = Alignment { hypotheses: 1, source, method, covariance, ..first_guess(&truth) };
+        bench.give(&guess).remove(0)
+    };
+    let open = found(4.0, "maps");
+    assert!(!open.accepted && open.reason.contains("bare corridor"), "{}", open.reason);
+    assert!(found(0.05, "maps").accepted);
+    assert!(found(4.0, "hough_spectrum").accepted, "there it tells how rough the guess is");
+}
