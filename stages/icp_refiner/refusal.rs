@@ -89,8 +89,9 @@ impl IcpRefusal {
         let covariance = derivative * first_guess.covariance * derivative.transpose();
         let (along, direction) = widest_deviation(&covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let most = parameters.max_position_deviation;
-        let is_open = !(along <= most);
-        is_open.then(|| Self::OpenPosition { direction: direction.to_degrees(), deviation: along, most })
+        // What is no number is open, too.
+        let is_fixed = along <= most;
+        (!is_fixed).then(|| Self::OpenPosition { direction: direction.to_degrees(), deviation: along, most })
     }
 }
 
