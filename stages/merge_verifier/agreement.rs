@@ -2,8 +2,8 @@
 
 use super::MergeVerifierParameters;
 use super::crossings::points_of_walls;
-use super::redundancy::confirming_share;
-use super::regions::{Found, OnWall, RegionComparison};
+use super::regions::{Found, OnWall, Region, RegionComparison};
+use super::straight_walls::StraightWalls;
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, is_known};
 use crate::walls::{WallMap, stride};
@@ -66,6 +66,12 @@ pub struct Agreement {
     /// The share of the walls that agree which confirm the place and do not only fix it, 0 to 1: those that do not belong to the two
     /// straight walls of which most agrees, as any corner fits any other.
     pub confirming: f64,
+    /// The number of straight walls that agree in the one of two directions in which there are fewer, not more than four: walls
+    /// that run one way only leave the place along them open.
+    pub walls_either_way: usize,
+    /// How far parts of map b slide to lie on map a, the root of the mean square over the walls that agree, metres: at places that
+    /// fit by chance, the walls of every room are a little beside those of the other map in another direction.
+    pub slide: f64,
     /// The middle of the walls of map b that lie on walls of map a, frame a; the origin if there are none.
     pub centre: Point2,
 }
@@ -120,10 +126,14 @@ pub fn compare_sampled(
     let chance = (chance(a, tolerance) + chance(b, tolerance)) / 2.0;
     let (for_it, against_it) =
         ((AGREEMENT_OF_ONE_PLACE / chance).ln(), ((1.0 - AGREEMENT_OF_ONE_PLACE) / (1.0 - chance)).ln());
+    let spacing = b.walls.spacing * stride(b.walls.walls.points().len(), most_points) as f64;
+    let StraightWalls { confirming, either_way } = StraightWalls::of(&on_wall, spacing);
     let mut agreement = Agreement {
         overlap: overlap(a, b, transform_a_b, most_points),
         wall_across: 0.5 * (across(&apart_of_a, a.walls) + across(&apart_of_b, b.walls)),
-        confirming: confirming_share(&on_wall),
+        confirming,
+        walls_either_way: either_way,
+        slide: slide(&regions),
         centre: middle(&on_wall),
         ..Default::default()
     };
@@ -134,6 +144,13 @@ pub fn compare_sampled(
         agreement.evidence += share * (for_it * region.wall_on_wall + against_it * region.wall_on_free);
     }
     agreement
+}
+
+/// How far regions slid, the root of the mean square over the walls that agree; 0 if none do.
+fn slide(regions: &[Region]) -> f64 {
+    let agree: f64 = regions.iter().map(|region| region.wall_on_wall).sum();
+    let squares: f64 = regions.iter().map(|region| region.wall_on_wall * region.slide.powi(2)).sum();
+    if agree > 0.0 { (squares / agree).sqrt() } else { 0.0 }
 }
 
 /// The middle of some walls; the origin if there are none.

@@ -1,7 +1,7 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::bending::BentPlace;
-use super::found_by_walls::is_better_bent;
+use super::found_by_walls::by_walls;
 use super::refusal::{Hypotheses, Hypothesis};
 use super::verdict::{Candidate, Verdict};
 use super::{
@@ -10,8 +10,6 @@ use super::{
 use crate::place_window::PlaceWindow;
 use gridweave_runtime::ros::Alignment;
 
-/// Evidence that a rival's is a share of is at least this: below, either is as good as none.
-const LEAST_EVIDENCE: f64 = 1.0;
 /// Another place is like one if the share of the walls that agree is less by this at the most.
 const LIKENESS_MARGIN: f64 = 0.15;
 /// The share of the walls that agree at which nothing speaks against a place.
@@ -124,7 +122,9 @@ fn bent<'a>(
     let Some(place) = bent else { return *rigid };
     let left_by_bend = Some(place.covariance);
     let is_better = match origin(rigid.alignment) {
-        Origin::Search { .. } if !is_expected => is_better_bent(&place.agreement, place.cost, &rigid.agreement),
+        Origin::Search { .. } if !is_expected => {
+            by_walls(&place.agreement, Some(place.cost)) > by_walls(&rigid.agreement, None)
+        }
         _ => place.agreement.evidence - place.cost > evidence,
     };
     match is_better {
@@ -169,7 +169,8 @@ fn judge_one<'a>(
     let Candidate { alignment, agreement, bent, .. } = candidate;
     let transform_a_b = candidate.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
-        Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)
+        let rival = Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)?;
+        Some(Rival { bend_cost: other.bent.map(|bent| bent.cost), ..rival })
     };
     let others = all.iter().filter(|other| other.alignment.accepted && other.alignment.source != alignment.source);
     let found_too = others.filter(|other| rival_of(other).is_none());
@@ -181,7 +182,12 @@ fn judge_one<'a>(
         pair.iter().any(|one| is_best_of_search(one)) && pair.iter().any(|one| one.source == "tags" && !one.provisional)
     };
     let found_by_tags_and_walls = found_too.clone().any(found_by_tags_and_walls);
-    let by_evidence = |one: &Rival, other: &Rival| one.agreement.evidence.total_cmp(&other.agreement.evidence);
+    let is_found_by_walls_alone = matches!(origin(alignment), Origin::Search { .. }) && found_too_by.is_none();
+    let weight = |rival: &Rival| match is_found_by_walls_alone {
+        true => by_walls(&rival.agreement, rival.bend_cost),
+        false => rival.agreement.evidence,
+    };
+    let by_weight = |one: &Rival, other: &Rival| weight(one).total_cmp(&weight(other));
     // Where a bend is no excuse, the maps cannot lie at a place at which they contradict each other, however much of them meets
     // there, if there is one at which they do not.
     let is_refuted = |other: &Candidate<'_>| {
@@ -190,7 +196,7 @@ fn judge_one<'a>(
             && other.agreement.wall_agreement() < CONTRADICTION_IF_BENT
     };
     let another = all.iter().filter(|other| !is_refuted(other)).filter_map(|other| Some((other, rival_of(other)?)));
-    let another = another.max_by(|(_, one), (_, other)| by_evidence(one, other));
+    let another = another.max_by(|(_, one), (_, other)| by_weight(one, other));
     let is_told = !alignment.provisional || found_too_by.is_some() || is_expected;
     let mut rival = another.map(|(_, rival)| rival);
     // A stage that has looked for others has sent the best of them.
@@ -199,10 +205,8 @@ fn judge_one<'a>(
         // Wherever more of the maps meets there is more evidence; what fits worse is not like it.
         let is_alike =
             |nearby: &Rival| nearby.agreement.wall_agreement() + LIKENESS_MARGIN > agreement.wall_agreement();
-        rival = rival.into_iter().chain(nearby.filter(is_alike)).max_by(by_evidence);
+        rival = rival.into_iter().chain(nearby.filter(is_alike)).max_by(by_weight);
     }
-    let elsewhere = rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
-    let evidence_elsewhere = (elsewhere / agreement.evidence.max(LEAST_EVIDENCE)).min(2.0);
     let grounds = Grounds {
         origin: origin(alignment),
         found_too: found_too_by.is_some(),
@@ -210,9 +214,9 @@ fn judge_one<'a>(
         is_expected,
         agreement: *agreement,
         bend_cost: bent.map(|bent| bent.cost),
-        evidence_elsewhere,
-        agreement_elsewhere: rival.map_or(0.0, |rival| rival.agreement.wall_agreement()),
+        rival,
     };
+    let evidence_elsewhere = grounds.evidence_elsewhere();
     let odds = Odds::new(&grounds);
     let score = odds.probability();
     let refusal = match rival.filter(|_| odds.likeness <= odds.chance.min(odds.part)) {

@@ -16,12 +16,12 @@ mod found_by_walls;
 mod judge;
 mod knowledge;
 mod parameters;
-mod redundancy;
 mod refusal;
 mod regions;
 mod rivals;
 mod score;
 mod stage;
+mod straight_walls;
 mod verdict;
 
 #[cfg(test)]

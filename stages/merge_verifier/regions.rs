@@ -25,6 +25,8 @@ pub(super) struct Region {
     pub(super) wall_on_wall: f64,
     /// Length of wall of one map where the other knows free space, metres; the mean of both ways.
     pub(super) wall_on_free: f64,
+    /// How far the walls of map b were slid to lie on those of map a, metres.
+    pub(super) slide: f64,
 }
 
 /// What was found at the walls of two maps.
@@ -78,20 +80,26 @@ impl RegionComparison {
         let key = |point: &Point2| ((point.x / self.side).floor() as i32, (point.y / self.side).floor() as i32);
         for index in self.sample(b.walls) {
             let point = transform_a_b * b.walls.walls.points()[index];
-            if is_known(a.value_at(&point)) {
+            if self.tells_of(a, &point) {
                 parts.entry(key(&point)).or_default().of_b.push(index);
             }
         }
         let transform_b_a = transform_a_b.inverse();
         for index in self.sample(a.walls) {
             let point = a.walls.walls.points()[index];
-            if is_known(b.value_at(&(transform_b_a * point))) {
+            if self.tells_of(b, &(transform_b_a * point)) {
                 parts.entry(key(&point)).or_default().of_a.push(index);
             }
         }
         let mut found = Found::default();
         parts.values().for_each(|part| self.add_region(part, a, b, transform_a_b, &mut found));
         found
+    }
+
+    /// Whether a map says anything of a wall at a place: what lies behind a wall is unknown, and a wall that is as thin as a cell may
+    /// come to lie there by a part of one.
+    fn tells_of(&self, map: &MapView<'_>, place: &Point2) -> bool {
+        is_known(map.value_at(place)) || map.walls.walls.nearest(place, self.tolerance).is_some()
     }
 
     /// The numbers of the points of some walls that are looked at.
@@ -103,7 +111,7 @@ impl RegionComparison {
     fn add_region(&self, part: &Part, a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, found: &mut Found) {
         let slide = self.register(&part.of_b, a.walls, b.walls, transform_a_b);
         let slid = Pose2::from_parts((transform_a_b.translation.vector + slide).into(), transform_a_b.rotation);
-        let mut region = Region::default();
+        let mut region = Region { slide: slide.norm(), ..Region::default() };
         let Found { regions, on_wall, apart_of_a, apart_of_b } = found;
         self.add(&part.of_b, b, a, &slid, &mut region, |wall| match wall {
             Wall::On(piece) => on_wall.push(piece),

@@ -22,6 +22,8 @@ pub struct Rival {
     pub turn: f64,
     /// What the maps say of each other there.
     pub agreement: Agreement,
+    /// If map b is bent there: how unlikely such a bend is, see [`BentPlace`](super::BentPlace).
+    pub bend_cost: Option<f64>,
 }
 
 impl Rival {
@@ -35,7 +37,8 @@ impl Rival {
     ) -> Option<Self> {
         let change = rival_a_b * transform_a_b.inverse();
         let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
-        (shift >= SAME_PLACE || turn.abs() >= SAME_TURN).then(|| Self { shift, turn, agreement: compare() })
+        let is_another = shift >= SAME_PLACE || turn.abs() >= SAME_TURN;
+        is_another.then(|| Self { shift, turn, agreement: compare(), bend_cost: None })
     }
 }
 

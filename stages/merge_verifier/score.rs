@@ -18,8 +18,8 @@
 //! What comes out orders alignments by how sure they are, and is a probability only as far as the pairs on which it was chosen stand for
 //! others; `tests/experiments/README.md` names them, and what came of it on others.
 
-use super::Agreement;
-use super::found_by_walls::{crossings, halves, log_odds};
+use super::found_by_walls::{CONFIRMING, by_walls, crossings, halves, log_odds};
+use super::{Agreement, Rival};
 
 /// No lead says more: from there on the model of chance itself is in doubt.
 const MOST_LEAD: f64 = 10.0;
@@ -42,10 +42,12 @@ const AGREEMENT_OF_HALVES_WHERE_KNOWN: f64 = 0.4;
 /// Per unit of the share of the walls that agree.
 const BY_AGREEMENT: f64 = 140.0;
 
-/// The share of the evidence that a rival has where it is as likely to be right, if nothing else tells them apart.
-const LIKE_SHARE: f64 = 0.7;
-/// The same where tags speak for one of the two.
-const LIKE_SHARE_BESIDE_TAGS: f64 = 1.3;
+/// Evidence that a rival's is a share of is at least this: below, either is as good as none.
+const LEAST_EVIDENCE: f64 = 1.0;
+/// The share of the evidence that a rival has where it is as likely to be right as a place for which tags speak, if nothing else tells
+/// them apart; and as one for which few tags speak, which may be those of another.
+const LIKE_SHARE: f64 = 1.3;
+const LIKE_SHARE_OF_FEW_TAGS: f64 = 0.7;
 /// Per unit of that share.
 const BY_SHARE: f64 = 35.0;
 /// At the most, where the rival agrees in a smaller share of its walls than this place, and by how much smaller it begins to
@@ -95,19 +97,26 @@ pub struct Grounds {
     pub agreement: Agreement,
     /// If the maps agree as they are bent: how unlikely such a bend is, see [`BentPlace`](super::BentPlace).
     pub bend_cost: Option<f64>,
-    /// The most evidence at another place, as a share of that here.
-    pub evidence_elsewhere: f64,
-    /// The share of the walls that agree there, 0 to 1.
-    pub agreement_elsewhere: f64,
+    /// The place elsewhere that is most like it; none if there is no other.
+    pub rival: Option<Rival>,
 }
 
 impl Grounds {
     /// The share of the walls that agree which confirm the place and do not only fix it, 0 to 1. What tags or the user tell is not
-    /// fixed by walls, and all of them confirm it.
+    /// fixed by walls, and at least as much of them confirms it as is asked for.
     pub fn confirming(&self) -> f64 {
-        let is_found_by_walls_alone =
-            matches!(self.origin, Origin::Search { .. }) && !self.found_too && !self.is_expected;
-        if is_found_by_walls_alone { self.agreement.confirming } else { 1.0 }
+        let least = if self.is_found_by_walls_alone() && !self.is_expected { 0.0 } else { CONFIRMING };
+        self.agreement.confirming.max(least)
+    }
+
+    /// The evidence at the place that is most like it, as a share of that here, 0 to 2.
+    pub fn evidence_elsewhere(&self) -> f64 {
+        let elsewhere = self.rival.map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
+        (elsewhere / self.agreement.evidence.max(LEAST_EVIDENCE)).min(2.0)
+    }
+
+    fn is_found_by_walls_alone(&self) -> bool {
+        matches!(self.origin, Origin::Search { .. }) && !self.found_too
     }
 }
 
@@ -165,12 +174,16 @@ impl Odds {
 
 /// The odds against a place that is like it.
 fn likeness(grounds: &Grounds) -> f64 {
+    let Some(rival) = &grounds.rival else { return f64::INFINITY };
+    if grounds.is_found_by_walls_alone() {
+        return by_walls(&grounds.agreement, grounds.bend_cost) - by_walls(&rival.agreement, rival.bend_cost);
+    }
     // Tags, and another source, tell a place from those that are like it.
     let is_told = grounds.origin == Origin::Tags || grounds.found_too;
-    let like = if is_told { LIKE_SHARE_BESIDE_TAGS } else { LIKE_SHARE };
+    let like = if is_told { LIKE_SHARE } else { LIKE_SHARE_OF_FEW_TAGS };
     let (from, most) = WORSE_AGREEMENT;
-    let worse = (grounds.agreement.wall_agreement() - grounds.agreement_elsewhere - from) / (most - from);
-    BY_SHARE * (like - grounds.evidence_elsewhere) + BY_WORSE_AGREEMENT * worse.clamp(0.0, 1.0)
+    let worse = (grounds.agreement.wall_agreement() - rival.agreement.wall_agreement() - from) / (most - from);
+    BY_SHARE * (like - grounds.evidence_elsewhere()) + BY_WORSE_AGREEMENT * worse.clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
@@ -186,11 +199,13 @@ mod tests {
             wall_across: 0.0,
             evidence,
             confirming: 0.7,
+            walls_either_way: 4,
+            slide: 0.05,
             ..Default::default()
         }
     }
 
-    /// Of maps that fit well in many rooms.
+    /// Of maps that fit well in many rooms, and nowhere else.
     fn grounds(origin: Origin) -> Grounds {
         Grounds {
             origin,
@@ -199,14 +214,19 @@ mod tests {
             is_expected: false,
             agreement: agreement(300.0, 0.9),
             bend_cost: None,
-            evidence_elsewhere: 0.0,
-            agreement_elsewhere: 0.9,
+            rival: None,
         }
     }
 
+    /// Another place at which the maps say that of each other.
+    fn rival(agreement: Agreement) -> Option<Rival> {
+        Some(Rival { shift: 5.0, turn: 0.0, agreement, bend_cost: None })
+    }
+
+    /// The probability of a place of so much evidence, with a rival that has so large a share of it.
     fn probability(evidence: f64, evidence_elsewhere: f64, origin: Origin) -> f64 {
-        let grounds = Grounds { agreement: agreement(evidence, 0.9), evidence_elsewhere, ..grounds(origin) };
-        Odds::new(&grounds).probability()
+        let rival = rival(agreement(evidence_elsewhere * evidence.max(LEAST_EVIDENCE), 0.9));
+        Odds::new(&Grounds { agreement: agreement(evidence, 0.9), rival, ..grounds(origin) }).probability()
     }
 
     /// The probability of a place that a search has found, with some of its agreement changed.
@@ -217,16 +237,11 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_lead_more_to_compare_and_poorer_rivals_make_an_alignment_more_probable() {
-        let searched =
-            |evidence: f64, lead: f64, elsewhere: f64| probability(evidence, elsewhere, Origin::Search { lead });
-        let sure = searched(60.0, 8.0, 0.1);
-        assert!(sure > 0.999, "{sure}");
-        assert!(searched(0.0, 8.0, 0.1) < sure && searched(60.0, 0.0, 0.1) < sure && searched(60.0, 8.0, 0.9) < 0.01);
-        assert!(found(1.0, |agreement| agreement.overlap = 20.0) < 0.99);
-        assert!(found(1.0, |agreement| agreement.overlap = 100.0) > 0.999);
-        assert!((searched(60.0, 1e9, 0.1) - searched(60.0, MOST_LEAD, 0.1)).abs() < 1e-12);
-        assert!(searched(f64::NEG_INFINITY, 1.0, 0.0) == 0.0);
+    fn a_longer_lead_and_more_to_compare_make_a_place_that_walls_have_found_more_probable() {
+        let with = |lead: f64, overlap: f64| found(lead, |agreement| agreement.overlap = overlap);
+        assert!(with(8.0, 100.0) > 0.999 && with(1.0, 100.0) < with(8.0, 100.0));
+        assert!(with(1.0, 10.0) < 0.99 && with(1.0, 200.0) > 0.999);
+        assert_eq!(with(1e9, 30.0), with(MOST_LEAD, 30.0));
     }
 
     #[test]
@@ -235,8 +250,12 @@ mod tests {
         assert!(probability(20.0, 0.0, Origin::FewTags) < 0.999 && probability(60.0, 0.0, Origin::FewTags) > 0.999);
         assert!(probability(60.0, 1.0, Origin::FewTags) < 0.01);
         assert!(probability(-20.0, 0.0, Origin::Tags) < 0.9);
-        let searched = grounds(Origin::Search { lead: 4.0 });
-        let told = Grounds { found_too: true, agreement: agreement(40.0, 0.8), evidence_elsewhere: 1.0, ..searched };
+        let told = Grounds {
+            found_too: true,
+            agreement: agreement(40.0, 0.8),
+            rival: rival(agreement(40.0, 0.8)),
+            ..grounds(Origin::Search { lead: 4.0 })
+        };
         assert!(Odds::new(&told).probability() > 0.999);
     }
 
@@ -270,9 +289,9 @@ mod tests {
         assert!(Odds::new(&of_other).lacks_agreement(0.999));
         // The same share of more wall is more of it.
         let of = |metres: f64| {
-            found(8.0, |agreement| {
+            found(4.0, |agreement| {
                 (agreement.wall_on_wall, agreement.wall_on_free, agreement.wall_across) =
-                    (0.7 * metres, 0.3 * metres, 0.2 * metres);
+                    (0.8 * metres, 0.2 * metres, 0.15 * metres);
             })
         };
         assert!(of(200.0) < of(20.0));
@@ -291,30 +310,29 @@ mod tests {
     }
 
     #[test]
-    fn maps_that_share_one_room_must_agree_in_nearly_all_of_it() {
-        let with = |overlap: f64, share: f64| {
-            found(10.0, |agreement| {
-                agreement.overlap = overlap;
-                (agreement.wall_on_wall, agreement.wall_on_free) = (30.0 * share, 30.0 * (1.0 - share));
-            })
-        };
-        assert!(with(34.0, 0.89) < 0.5 && with(34.0, 1.0) > 0.999);
-        assert!(with(60.0, 0.89) > 0.999);
+    fn a_corner_that_fits_another_says_nothing() {
+        let with = |confirming: f64| found(9.0, |agreement| agreement.confirming = confirming);
+        assert!(with(0.0) < 0.01 && with(0.14) < 0.01 && with(0.7) > 0.999);
     }
 
     #[test]
-    fn a_corner_that_fits_another_says_nothing() {
+    fn walls_that_run_one_way_only_leave_a_place_open() {
         let with =
-            |confirming: f64| found(9.0, |agreement| (agreement.confirming, agreement.overlap) = (confirming, 60.0));
-        assert!(with(0.0) < 0.01 && with(0.14) < 0.01 && with(0.5) > 0.999);
-        assert_eq!(with(0.5), with(0.7));
+            |walls: usize| found(2.0, |agreement| (agreement.walls_either_way, agreement.overlap) = (walls, 40.0));
+        assert!(with(0) < 0.99 && with(0) < with(2) && with(4) > 0.999);
+    }
+
+    #[test]
+    fn parts_that_each_fit_a_little_beside_speak_against_a_place() {
+        let with = |slide: f64| found(4.0, |agreement| agreement.slide = slide);
+        assert!(with(0.02) > 0.999 && with(0.4) < 0.99);
     }
 
     #[test]
     fn next_to_no_wall_is_no_evidence_however_much_space_is_free() {
         let little = |agreement: &mut Agreement| {
-            *agreement = Agreement { overlap: 40.0, wall_on_wall: 1.0, evidence: 2.0, confirming: 0.5, ..*agreement };
-            agreement.wall_on_free = 0.0;
+            (agreement.wall_on_wall, agreement.wall_on_free, agreement.slide) = (1.0, 0.0, 0.0);
+            (agreement.walls_either_way, agreement.overlap) = (1, 40.0);
         };
         assert!(found(5.0, little) < 0.99);
     }
@@ -326,27 +344,29 @@ mod tests {
             grounds.agreement.overlap = 80.0;
             Odds::new(&grounds).probability()
         };
-        assert!(with(Some(0.0)) < with(None) && with(Some(10.0)) > 0.999 && with(Some(1000.0)) < 0.95);
+        assert!(with(Some(0.1)) < with(None) && with(Some(10.0)) > 0.999 && with(Some(1000.0)) < 0.95);
     }
 
     #[test]
-    fn a_place_that_contradicts_itself_more_is_less_like() {
-        let with = |evidence_elsewhere: f64, agreement_elsewhere: f64| {
+    fn a_place_that_contradicts_itself_is_not_like_one_that_does_not_however_much_wall_agrees_there() {
+        let with = |elsewhere: Agreement| {
             let grounds = grounds(Origin::Search { lead: 8.0 });
             let agreement = agreement(80.0, 1.0);
-            Odds::new(&Grounds { agreement, evidence_elsewhere, agreement_elsewhere, ..grounds }).probability()
+            Odds::new(&Grounds { agreement, rival: rival(elsewhere), ..grounds }).probability()
         };
-        assert!(with(0.6, 0.95) < 0.99 && with(0.6, 0.75) > 0.999);
-        assert!(with(0.75, 0.5) < 0.99, "but there is as much that speaks for it");
+        assert!(with(agreement(80.0, 1.0)) <= 0.5, "both may be right");
+        let crossed = Agreement { wall_across: 8.0, walls_either_way: 2, ..agreement(100.0, 0.8) };
+        assert!(with(crossed) > 0.999);
     }
 
     #[test]
     fn where_the_user_knows_the_place_a_small_map_is_enough() {
-        let small = Agreement { overlap: 15.0, ..agreement(20.0, 0.8) };
+        let small = Agreement { overlap: 15.0, wall_on_wall: 4.0, wall_on_free: 1.0, ..agreement(20.0, 0.8) };
+        let small = Agreement { walls_either_way: 1, ..small };
         let small = Grounds { agreement: small, ..grounds(Origin::Search { lead: 3.0 }) };
         let expected = Grounds { is_expected: true, ..small };
         assert!(Odds::new(&small).probability() < 0.99 && Odds::new(&expected).probability() > 0.999);
-        let ambiguous = Grounds { evidence_elsewhere: 0.9, ..expected };
-        assert!(Odds::new(&ambiguous).probability() < 0.01, "it is not known to the metre");
+        let ambiguous = Grounds { rival: rival(small.agreement), ..expected };
+        assert!(Odds::new(&ambiguous).probability() <= 0.5, "it is not known to the metre");
     }
 }

@@ -389,7 +389,7 @@ fn what_everybody_is_shown_of_a_refusal_fits_in_eighty_columns() {
     let lines: Vec<&str> = shown.lines().collect();
     assert!(lines.iter().all(|line| line.len() <= 78), "{shown}");
     assert_eq!(lines[0], "the maps fit at 2 places, and it cannot be told which is right");
-    assert!(lines[1].starts_with("missing: a probability of 0.999 (--set verifier.accept); this is 0.0"), "{shown}");
+    assert!(lines[1].starts_with("missing: a probability of 0.999 (--set verifier.accept); this is 0."), "{shown}");
     assert!(lines[2].starts_with("try: --accept robot2=N") && lines[4].starts_with("  2: x "), "{shown}");
     assert!(whole.starts_with("the maps alone; the maps do not confirm it"), "{whole}");
 }

@@ -11,27 +11,26 @@ use gridweave_stages::merge_verifier::{
 };
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
 
-/// What is told of a hypothesis.
-pub(super) const HEADS: [&str; 18] = [
-    "x",
-    "y",
-    "yaw",
-    "registered",
-    "lead",
-    "share",
+/// What is told of a hypothesis beside what the maps say there.
+const HEADS: [&str; 8] = ["x", "y", "yaw", "registered", "lead", "share", "bend m", "bend cost"];
+/// What the maps say of each other, as they came and as they are bent.
+const AGREEMENT_HEADS: [&str; 9] = [
     "evidence",
     "wall on wall m",
     "wall on free m",
     "wall across m",
     "confirming",
+    "walls either way",
+    "slide m",
     "overlap m2",
-    "bend m",
-    "bend cost",
-    "bent evidence",
-    "bent wall on wall m",
-    "bent wall on free m",
-    "why not",
+    "agreement",
 ];
+
+/// The heads of the columns in which a hypothesis is told.
+pub(super) fn heads() -> impl Iterator<Item = String> {
+    let bent = AGREEMENT_HEADS.iter().map(|head| format!("bent {head}"));
+    HEADS.iter().chain(&AGREEMENT_HEADS).map(ToString::to_string).chain(bent).chain(["why not".to_owned()])
+}
 
 /// The outcome for a pair.
 pub(super) struct Judged {
@@ -73,33 +72,35 @@ pub(super) struct Hypothesis {
 
 impl Hypothesis {
     pub(super) fn cells(&self) -> Vec<String> {
-        let Agreement { evidence, wall_on_wall, wall_on_free, wall_across, confirming, overlap, .. } = self.agreement;
         let place = &self.transform_a_b;
-        let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
         let number = |value: f64| format!("{value:.3}");
-        let bent =
+        let of_bend =
             |value: fn(&BentPlace) -> f64| self.bent.as_ref().map_or_else(String::new, |bent| number(value(bent)));
-        vec![
-            number(x),
-            number(y),
-            number(yaw),
+        let mut cells = vec![
+            number(place.translation.x),
+            number(place.translation.y),
+            number(place.rotation.angle()),
             self.is_registered.to_string(),
             number(self.lead),
             number(self.share),
-            number(evidence),
-            number(wall_on_wall),
-            number(wall_on_free),
-            number(wall_across),
-            number(confirming),
-            number(overlap),
-            bent(|bent| bent.bend),
-            bent(|bent| bent.cost),
-            bent(|bent| bent.agreement.evidence),
-            bent(|bent| bent.agreement.wall_on_wall),
-            bent(|bent| bent.agreement.wall_on_free),
-            self.reason.clone(),
-        ]
+            of_bend(|bent| bent.bend),
+            of_bend(|bent| bent.cost),
+        ];
+        for agreement in [Some(&self.agreement), self.bent.as_ref().map(|bent| &bent.agreement)] {
+            let told = agreement.map(|agreement| agreement_values(agreement).map(number));
+            cells.extend(told.unwrap_or_default());
+        }
+        cells.push(self.reason.clone());
+        cells
     }
+}
+
+/// What stands under [`AGREEMENT_HEADS`].
+fn agreement_values(agreement: &Agreement) -> [f64; AGREEMENT_HEADS.len()] {
+    let Agreement { evidence, wall_on_wall, wall_on_free, wall_across, confirming, slide, overlap, .. } = *agreement;
+    let either_way = agreement.walls_either_way as f64;
+    let share = agreement.wall_agreement();
+    [evidence, wall_on_wall, wall_on_free, wall_across, confirming, either_way, slide, overlap, share]
 }
 
 /// Merges two maps; `with_bends` bends map b onto map a at every hypothesis that was registered, to tell of it.

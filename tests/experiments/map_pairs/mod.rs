@@ -191,8 +191,9 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
     }
     results.table("map_pairs", "Merging pairs of map files", &table)?;
     let mut runs = Table::new(["set", "pair", "outcome", "probability", "refusal"]);
-    let mut hypotheses =
-        Table::new(["set", "pair", "outcome", "hypothesis", "is right"].into_iter().chain(judging::HEADS));
+    let heads: Vec<String> = judging::heads().collect();
+    let of_pair = ["set", "pair", "outcome", "hypothesis", "is right"];
+    let mut hypotheses = Table::new(of_pair.into_iter().chain(heads.iter().map(String::as_str)));
     for trial in trials {
         if let Some((number, maps)) = &trial.wrong_maps {
             for (map, which) in maps.iter().zip(["a", "b"]) {
