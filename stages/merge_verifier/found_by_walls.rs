@@ -90,11 +90,11 @@ pub(super) fn crossings(agreement: &Agreement) -> f64 {
         + BY_CROSSING * across / (agreement.wall_seen() + MORE_WALL)
 }
 
-/// The share of the walls that agree at which a place is as likely to be half of it only: of much wall, as the maps came. Elsewhere 0, as
-/// the walls that cross rooms tell.
-pub(super) fn halves(agreement: &Agreement, is_bent: bool) -> f64 {
+/// The share of the walls that agree at which a place is as likely to be half of it only, where much was seen, as the maps came or as they
+/// are bent. Elsewhere 0, as the walls that cross rooms tell.
+pub(super) fn halves(agreement: &Agreement) -> f64 {
     let seen = agreement.wall_seen();
-    let of_much = AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt();
     let (from, to) = MUCH_WALL;
-    if is_bent { 0.0 } else { ((seen - from) / (to - from)).clamp(0.0, 1.0) * of_much }
+    let how_much = ((seen - from) / (to - from)).clamp(0.0, 1.0);
+    how_much * (AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt())
 }

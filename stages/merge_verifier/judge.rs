@@ -238,6 +238,7 @@ fn judge_one<'a>(
             agree: agreement.wall_on_wall,
             against: agreement.wall_on_free,
             confirming: grounds.confirming(),
+            runs_one_way: is_found_by_walls_alone && agreement.walls_either_way == 0,
             probability: score,
             accept: parameters.accept,
         }),

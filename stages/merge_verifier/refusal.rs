@@ -25,8 +25,11 @@ pub enum Refusal {
         agree: f64,
         /// Metres of wall on free space.
         against: f64,
-        /// The share of the walls that agree which confirm the place and do not only fix it; 1 where something else tells it.
+        /// The share of the walls that agree which confirm the place and do not only fix it; a half at least where something else
+        /// tells it.
         confirming: f64,
+        /// Whether walls alone tell it, and all that agree run one way.
+        runs_one_way: bool,
         /// The probability that it is right.
         probability: f64,
         /// What is asked for.
@@ -105,6 +108,9 @@ impl Refusal {
             Self::Chance { agree, confirming, .. } if *confirming < CONFIRMING => {
                 let fixing = (1.0 - confirming) * agree;
                 format!("{agree:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have")
+            }
+            Self::Chance { agree, runs_one_way: true, .. } => {
+                format!("{agree:.0} m of wall agree, but all run one way: the place along them is open")
             }
             Self::Chance { agree, against, .. } => {
                 format!("{agree:.0} m of wall agree and {against:.0} m contradict, which may be chance")

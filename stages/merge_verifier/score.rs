@@ -148,9 +148,7 @@ impl Odds {
                 let halves = if is_known { AGREEMENT_OF_HALVES_WHERE_KNOWN } else { AGREEMENT_OF_HALVES_BY_TAGS };
                 (PRIOR + BY_EVIDENCE * evidence + BY_LEAD * lead, halves)
             }
-            false => {
-                (log_odds(lead, agreement, grounds.confirming(), bend_cost), halves(agreement, bend_cost.is_some()))
-            }
+            false => (log_odds(lead, agreement, grounds.confirming(), bend_cost), halves(agreement)),
         };
         Self {
             chance,

@@ -40,9 +40,9 @@ pub struct Verdict<'a> {
     pub candidate: Candidate<'a>,
     /// Why it is not accepted; none if it is.
     pub refusal: Option<Refusal>,
-    /// The best place elsewhere, if there is one.
+    /// The place elsewhere that is most like it, if there is one.
     pub rival: Option<Rival>,
-    /// The most evidence for another place, as a share of that for this one.
+    /// The evidence for the other place that is most like it, as a share of that for this one.
     pub evidence_elsewhere: f64,
     /// The probability that it is right, 0 to 1, see [`Odds`](super::Odds).
     pub score: f64,

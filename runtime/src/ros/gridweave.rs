@@ -238,7 +238,7 @@ pub struct Evidence {
     pub wall_on_wall: f64,
     /// The length of walls of one map that lie on free space of the other, metres.
     pub wall_on_free: f64,
-    /// The most evidence for another place, as a share of that for this one.
+    /// The evidence for the other place that is most like it, as a share of that for this one.
     pub evidence_elsewhere: f64,
 }
 

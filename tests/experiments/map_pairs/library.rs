@@ -85,6 +85,21 @@ impl MapOfBuilding {
     }
 }
 
+/// The files of a folder, by name.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
+    files.sort();
+    Ok(files)
+}
+
+/// The last map of each robot of a log.
+pub(super) fn maps_of_log(log: &Path) -> Result<Vec<MapOfBuilding>> {
+    let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let last = last_maps(log)?.into_iter();
+    Ok(last.map(|(topic, map)| MapOfBuilding::new(format!("{name}{topic}"), map)).collect())
+}
+
 /// Maps of many buildings.
 pub(super) struct Library {
     pub(super) maps: Vec<MapOfBuilding>,
@@ -94,21 +109,11 @@ impl Library {
     /// The map files of folders, and the last maps of their logs.
     pub(super) fn of_folders(folders: &[PathBuf]) -> Result<Self> {
         let mut maps = Vec::new();
-        for folder in folders {
-            let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-            let mut files: Vec<PathBuf> =
-                entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
-            files.sort();
-            for file in files {
-                match file.extension().and_then(|extension| extension.to_str()) {
-                    Some("yaml") => maps.push(MapOfBuilding::of_file(&file)?),
-                    Some("mcap") => {
-                        let log = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-                        let last = last_maps(&file)?.into_iter();
-                        maps.extend(last.map(|(topic, map)| MapOfBuilding::new(format!("{log}{topic}"), map)));
-                    }
-                    _ => {}
-                }
+        for file in folders.iter().map(|folder| files(folder)).collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+            match file.extension().and_then(|extension| extension.to_str()) {
+                Some("yaml") => maps.push(MapOfBuilding::of_file(&file)?),
+                Some("mcap") => maps.extend(maps_of_log(&file)?),
+                _ => {}
             }
         }
         Ok(Self { maps })

@@ -26,7 +26,8 @@ use std::path::PathBuf;
 /// What the experiment `map-pairs` is told.
 #[derive(Debug, Args)]
 pub(super) struct MapPairsArgs {
-    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), of which the last maps are taken. What two
+    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a `LOG.truth.json` that names
+    /// common places, of which the last maps are taken. What two
     /// names have in common up to the first `_` or `-` is one building, which is never paired with itself.
     folders: Vec<PathBuf>,
     /// Pairs of parts of maps of different buildings.
@@ -114,20 +115,20 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
 fn with_truth(folder: &std::path::Path, with_bends: bool) -> Result<Vec<Trial>> {
     let pairs = truth::pairs(folder)?;
     let set = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let trial = |pair: &truth::Pair| -> Result<Trial> {
-        let [a, b] = pair.maps(folder)?;
-        let judged = judging::judge_maps(&a, &b, with_bends);
-        Ok(Trial {
+    let trial = |pair: &truth::Pair| {
+        let [a, b] = &pair.maps;
+        let judged = judging::judge_maps(a, b, with_bends);
+        Trial {
             set: set.clone(),
-            pair: pair.name().to_owned(),
+            pair: pair.name.clone(),
             is_right: judged.place().is_some_and(|place| pair.is_right(place)),
             is_unrelated: pair.is_unrelated(),
             wrong_maps: None,
             right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
             judged,
-        })
+        }
     };
-    pairs.par_iter().map(trial).collect()
+    Ok(pairs.par_iter().map(trial).collect())
 }
 
 /// The two robots of a simulated world.
