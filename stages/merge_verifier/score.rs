@@ -279,7 +279,7 @@ mod tests {
         assert!(found(8.0, rough) > 0.999);
         let other = |agreement: &mut Agreement| {
             rough(agreement);
-            agreement.wall_across = 20.0;
+            agreement.wall_across = 24.0;
         };
         assert!(found(8.0, other) < 0.99);
         let mut of_other = grounds(Origin::Search { lead: 8.0 });
