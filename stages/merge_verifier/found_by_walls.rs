@@ -19,7 +19,7 @@
 use super::Agreement;
 
 /// The logarithm of the odds where all else is 0.
-const OF_NOTHING: f64 = -17.5;
+const OF_NOTHING: f64 = -18.1;
 /// Per unit of the lead, up to a lead from which on the model of chance itself is in doubt.
 const BY_LEAD: f64 = 1.34;
 const MOST_LEAD: f64 = 8.0;
