@@ -57,9 +57,17 @@ impl StraightWalls {
     }
 }
 
-/// The points of walls that run along each direction, by where they lie across it.
+/// The points of walls that run along each direction.
 struct Strips {
-    directions: Vec<(Vector2<f64>, Vec<(f64, usize)>)>,
+    directions: Vec<Direction>,
+}
+
+/// The points of walls that run along a direction.
+struct Direction {
+    /// Across it.
+    normal: Vector2<f64>,
+    /// Where they lie along the normal, metres, and their numbers; the least first.
+    offsets: Vec<(f64, usize)>,
 }
 
 impl Strips {
@@ -71,7 +79,7 @@ impl Strips {
             let mut offsets: Vec<(f64, usize)> =
                 alike.map(|(index, wall)| (normal.dot(&wall.point.coords), index)).collect();
             offsets.sort_by(|one, other| one.0.total_cmp(&other.0));
-            (normal, offsets)
+            Direction { normal, offsets }
         };
         Self { directions: (0..DIRECTIONS).map(direction).collect() }
     }
@@ -79,7 +87,7 @@ impl Strips {
     /// The strip that holds most of the walls that are asked for, and how many; none if there are none.
     fn of_most(&self, is_asked_for: impl Fn(usize) -> bool) -> Option<(usize, Strip)> {
         let mut best: Option<(usize, Strip)> = None;
-        for (normal, offsets) in &self.directions {
+        for Direction { normal, offsets } in &self.directions {
             let (mut end, mut count) = (0, 0);
             for &(start, index) in offsets {
                 while let Some((_, last)) = offsets.get(end).filter(|(offset, _)| *offset <= start + WIDTH) {
