@@ -10,6 +10,8 @@ use super::{
 use crate::place_window::PlaceWindow;
 use gridweave_runtime::ros::Alignment;
 
+/// What is less probable is no more probable than anything else: which of such hypotheses is told of goes by the evidence.
+const NEXT_TO_NO_PROBABILITY: f64 = 1e-3;
 /// Another place is like one if the share of the walls that agree is less by this at the most.
 const LIKENESS_MARGIN: f64 = 0.15;
 /// The share of the walls that agree at which nothing speaks against a place.
@@ -29,7 +31,7 @@ pub struct UserKnowledge {
 /// Judges the hypotheses of all sources for one pair. `None` if none of them has a place.
 ///
 /// The first whose probability is as high as is asked for is accepted: those that rest on enough tags come first, and then
-/// the others, by their evidence. If there is none, the most probable is the answer, refused. Where the user knows where the
+/// the others, by their evidence. If there is none, the most probable is the answer, refused; or the first, if none is at all. Where the user knows where the
 /// maps can lie to each other, only what lies there takes part; and where he has chosen a hypothesis, it is accepted.
 pub fn judge<'a>(
     a: &MapView<'_>,
@@ -81,7 +83,11 @@ pub fn judge<'a>(
     // Maps that contradict each other may do so because they are bent, and several places may be one if they are.
     let bent: Vec<Candidate<'a>> = all.iter().map(|candidate| bent(a, b, candidate, is_expected, parameters)).collect();
     let as_bent = best_of(a, b, &bent, is_expected, true, parameters);
-    as_bent.filter(|verdict| verdict.refusal.is_none()).or(Some(rigid))
+    as_bent.filter(|verdict| verdict.refusal.is_none() || is_more_probable(verdict, &rigid)).or(Some(rigid))
+}
+
+fn is_more_probable(one: &Verdict<'_>, other: &Verdict<'_>) -> bool {
+    one.score > other.score.max(NEXT_TO_NO_PROBABILITY)
 }
 
 /// The first hypothesis that is accepted; if none is, the most probable. `may_be_bent` tells that all were bent as far as that
@@ -100,7 +106,7 @@ fn best_of<'a>(
         if verdict.refusal.is_none() {
             return Some(verdict);
         }
-        if best.as_ref().is_none_or(|best| verdict.score > best.score) {
+        if best.as_ref().is_none_or(|best| is_more_probable(&verdict, best)) {
             best = Some(verdict);
         }
     }
@@ -285,4 +291,34 @@ fn listed(all: &[Candidate<'_>]) -> Hypotheses {
         Hypothesis { x, y, yaw, wall_on_wall, wall_on_free }
     };
     Hypotheses(all.iter().map(hypothesis).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::pose;
+    use crate::test_world::floor_plan::{FloorPlan, drawing, seen};
+
+    #[test]
+    fn of_places_that_are_all_hopeless_the_one_with_the_most_evidence_is_told() {
+        let draw = |plan: FloorPlan| plan.draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+        let (a, b) = (draw(FloorPlan::office()), draw(FloorPlan::another_office()));
+        // One on the other, and where they do not meet at all: that does not contradict either.
+        let places = [pose(0.0, 0.0, 0.0), pose(100.0, 0.0, 0.0)];
+        let hypotheses: Vec<Alignment> = (0..)
+            .zip(&places)
+            .map(|(rank, place)| {
+                let source = "maps".to_owned();
+                let mut alignment =
+                    Alignment { source, accepted: true, provisional: true, rank, hypotheses: 2, ..Default::default() };
+                alignment.set_transform_a_b(place);
+                alignment
+            })
+            .collect();
+        let hypotheses: Vec<&Alignment> = hypotheses.iter().collect();
+        let (known, parameters) = (UserKnowledge::default(), MergeVerifierParameters::default());
+        let verdict = judge(&a.view(), &b.view(), &hypotheses, &known, &parameters).unwrap();
+        assert!(verdict.refusal.is_some() && verdict.score < NEXT_TO_NO_PROBABILITY, "{verdict:?}");
+        assert!(verdict.candidate.agreement.wall_on_wall > 1.0, "{verdict:?}");
+    }
 }
