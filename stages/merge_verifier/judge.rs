@@ -31,8 +31,9 @@ pub struct UserKnowledge {
 /// Judges the hypotheses of all sources for one pair. `None` if none of them has a place.
 ///
 /// The first whose probability is as high as is asked for is accepted: those that rest on enough tags come first, and then
-/// the others, by their evidence. If there is none, the most probable is the answer, refused; or the first, if none is at all. Where the user knows where the
-/// maps can lie to each other, only what lies there takes part; and where he has chosen a hypothesis, it is accepted.
+/// the others, by their evidence. If there is none, the most probable is the answer, refused; or the first, if none is
+/// probable at all. Where the user knows where the maps can lie to each other, only what lies there takes part; and where he
+/// has chosen a hypothesis, it is accepted.
 pub fn judge<'a>(
     a: &MapView<'_>,
     b: &MapView<'_>,
