@@ -10,7 +10,8 @@
 //!   maps of one place contradict each other as well; what counts is how much of what contradicts is walls that cross rooms.
 //! - Where one map was bent onto the other, the bend counts.
 //!
-//! One bound on the share of the walls that agree stands beside it, where much wall was seen.
+//! Two bounds on the share of the walls that agree stand beside it: where much wall was seen, and where the maps share no more than a
+//! room.
 //!
 //! The weights were fitted to hypotheses for pairs of published maps, of simulated buildings of eight kinds and of different buildings,
 //! each with the sign that it must have, and then doubled and shifted, so that no pair of different buildings among these reaches a
@@ -57,6 +58,10 @@ const AGREEMENT_OF_HALVES_OF_MUCH_WALL: f64 = 0.62;
 const MORE_OF_LESS_WALL: f64 = 1.6;
 /// From how much wall on that begins to count, and from how much on it counts in full, metres that both maps have seen.
 const MUCH_WALL: (f64, f64) = (60.0, 80.0);
+/// The same where the maps share the area of one room: rooms of other buildings have the same corners and sizes.
+const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
+/// So large is a room, and so large is the area that the maps share if it is surely more than a room, square metres.
+const ROOM: (f64, f64) = (25.0, 40.0);
 
 /// The logarithm of the odds that a place is right which leads all others by so much. `confirming` is the share of the walls that agree
 /// which confirm it, and `bend_cost` is that of the bend if the maps were compared bent.
@@ -99,11 +104,16 @@ pub(super) fn crossings(agreement: &Agreement) -> f64 {
         + BY_CROSSING * across / (agreement.wall_seen() + MORE_WALL)
 }
 
-/// The share of the walls that agree at which a place is as likely to be half of it only, where much was seen, as the maps came or as they
-/// are bent. Elsewhere 0, as the walls that cross rooms tell.
+/// The share of the walls that agree at which a place is as likely to be half of it only, as the maps came or as they are bent: where much
+/// was seen, and in a room. Elsewhere 0, as the walls that cross rooms tell.
 pub(super) fn halves(agreement: &Agreement) -> f64 {
     let seen = agreement.wall_seen();
-    let (from, to) = MUCH_WALL;
-    let how_much = ((seen - from) / (to - from)).clamp(0.0, 1.0);
-    how_much * (AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt())
+    let of_much = AGREEMENT_OF_HALVES_OF_MUCH_WALL + MORE_OF_LESS_WALL / seen.max(1.0).sqrt();
+    let in_room = (1.0 - share_of_way(agreement.overlap, ROOM)) * AGREEMENT_OF_HALVES_IN_A_ROOM;
+    (share_of_way(seen, MUCH_WALL) * of_much).max(in_room)
+}
+
+/// How far a value has come from the first of two to the second, 0 to 1.
+fn share_of_way(value: f64, (from, to): (f64, f64)) -> f64 {
+    ((value - from) / (to - from)).clamp(0.0, 1.0)
 }

@@ -308,6 +308,18 @@ mod tests {
     }
 
     #[test]
+    fn maps_that_share_one_room_must_agree_in_nearly_all_of_it() {
+        let with = |overlap: f64, share: f64| {
+            found(10.0, |agreement| {
+                agreement.overlap = overlap;
+                (agreement.wall_on_wall, agreement.wall_on_free) = (20.0 * share, 20.0 * (1.0 - share));
+            })
+        };
+        assert!(with(25.0, 0.85) < 0.5 && with(25.0, 1.0) > 0.999);
+        assert!(with(40.0, 0.85) > 0.999);
+    }
+
+    #[test]
     fn a_corner_that_fits_another_says_nothing() {
         let with = |confirming: f64| found(9.0, |agreement| agreement.confirming = confirming);
         assert!(with(0.0) < 0.01 && with(0.14) < 0.01 && with(0.7) > 0.999);
