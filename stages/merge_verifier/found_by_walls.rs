@@ -47,8 +47,8 @@ const BY_BEND: f64 = -0.61;
 /// lie on each other by a bend of 124, and no right place that was accepted among the pairs rests on one above 100 but one.
 const DEAR_BEND: f64 = 100.0;
 const BY_DEAR_BEND: f64 = -0.25;
-/// Where less wall than this agrees, metres, so much is taken off for each that is missing. It was not fitted, as no right place among the
-/// pairs has less: a precaution against maps that have much space and hardly any wall in common.
+/// Where less wall than this agrees, metres, so much is taken off for each that is missing. It was not fitted: a precaution against maps
+/// that have much space and hardly any wall in common.
 const LITTLE_WALL: f64 = 5.0;
 const BY_LITTLE_WALL: f64 = -2.0;
 /// The share of the walls that agree at which a place that walls have found is as likely to be half of it only, for any length of wall:
