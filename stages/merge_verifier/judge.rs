@@ -1,7 +1,7 @@
 //! Which of all hypotheses for a pair of robots is right, if any.
 
 use super::bending::BentPlace;
-use super::found_by_walls::by_walls;
+use super::found_by_walls::among_alike;
 use super::refusal::{Hypotheses, Hypothesis};
 use super::verdict::{Candidate, Verdict};
 use super::{
@@ -130,7 +130,7 @@ fn bent<'a>(
     let left_by_bend = Some(place.covariance);
     let is_better = match origin(rigid.alignment) {
         Origin::Search { .. } if !is_expected => {
-            by_walls(&place.agreement, Some(place.cost)) > by_walls(&rigid.agreement, None)
+            among_alike(0.0, &place.agreement, Some(place.cost)) > among_alike(0.0, &rigid.agreement, None)
         }
         _ => place.agreement.evidence - place.cost > evidence,
     };
@@ -177,7 +177,11 @@ fn judge_one<'a>(
     let transform_a_b = candidate.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
         let rival = Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)?;
-        Some(Rival { bend_cost: other.bent.map(|bent| bent.cost), ..rival })
+        let lead = match origin(other.alignment) {
+            Origin::Search { lead } => lead,
+            Origin::Tags | Origin::FewTags => 0.0,
+        };
+        Some(Rival { lead, bend_cost: other.bent.map(|bent| bent.cost), ..rival })
     };
     let others = all.iter().filter(|other| other.alignment.accepted && other.alignment.source != alignment.source);
     let found_too = others.filter(|other| rival_of(other).is_none());
@@ -191,7 +195,7 @@ fn judge_one<'a>(
     let found_by_tags_and_walls = found_too.clone().any(found_by_tags_and_walls);
     let is_found_by_walls_alone = matches!(origin(alignment), Origin::Search { .. }) && found_too_by.is_none();
     let weight = |rival: &Rival| match is_found_by_walls_alone {
-        true => by_walls(&rival.agreement, rival.bend_cost),
+        true => among_alike(rival.lead, &rival.agreement, rival.bend_cost),
         false => rival.agreement.evidence,
     };
     let by_weight = |one: &Rival, other: &Rival| weight(one).total_cmp(&weight(other));

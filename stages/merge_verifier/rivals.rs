@@ -20,6 +20,8 @@ pub struct Rival {
     pub shift: f64,
     /// By how much map b is turned, radians.
     pub turn: f64,
+    /// By how much a search over all places prefers it to all others, see [`Origin::Search`](super::Origin::Search); 0 if none has.
+    pub lead: f64,
     /// What the maps say of each other there.
     pub agreement: Agreement,
     /// If map b is bent there: how unlikely such a bend is, see [`BentPlace`](super::BentPlace).
@@ -38,7 +40,7 @@ impl Rival {
         let change = rival_a_b * transform_a_b.inverse();
         let (shift, turn) = ((change * centre - centre).norm(), change.rotation.angle());
         let is_another = shift >= SAME_PLACE || turn.abs() >= SAME_TURN;
-        is_another.then(|| Self { shift, turn, agreement: compare(), bend_cost: None })
+        is_another.then(|| Self { shift, turn, lead: 0.0, agreement: compare(), bend_cost: None })
     }
 }
 

@@ -139,6 +139,8 @@ impl Library {
 
 /// The last maps of the two robots of a simulated world.
 pub(super) struct SimulatedPair {
+    /// The number of the world among those of its seeds.
+    pub(super) number: u64,
     pub(super) world: PairWorld,
     pub(super) maps: [MapOfBuilding; 2],
 }
@@ -148,7 +150,7 @@ impl SimulatedPair {
         let last = last_maps(&world.world.log).ok()?.into_iter();
         let mut maps = last.map(|(topic, map)| MapOfBuilding::new(format!("{number}-{}{topic}", world.name), map));
         let maps = [maps.next()?, maps.next()?];
-        Some(Self { world, maps })
+        Some(Self { number, world, maps })
     }
 
     /// The kind of building.

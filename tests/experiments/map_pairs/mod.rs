@@ -51,7 +51,7 @@ pub(super) struct MapPairsArgs {
     /// Leave out the pairs with a truth.
     #[arg(long)]
     only_unrelated: bool,
-    /// Write the maps of different buildings that are merged as map files (`wrong_NUMBER_a.yaml`, `_b.yaml`), to look at.
+    /// Write the maps that are merged wrongly as map files (`wrong_NAME_a.yaml`, `_b.yaml`), to look at.
     #[arg(long)]
     keep_wrong: bool,
     /// Compare the maps at every hypothesis as they are bent, too, which takes longer, and write all of them to
@@ -71,8 +71,8 @@ struct Trial {
     judged: Judged,
     /// Whether each hypothesis is right.
     right: Vec<bool>,
-    /// The number of the pair and its maps, of different buildings that were merged, if they are to be kept.
-    wrong_maps: Option<(u64, [MapOfBuilding; 2])>,
+    /// The maps, if they were merged wrongly and are to be kept, and what they are called in the names of their files.
+    wrong_maps: Option<(String, [MapOfBuilding; 2])>,
 }
 
 impl Trial {
@@ -94,7 +94,7 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
     let mut trials = Vec::new();
     if !args.only_unrelated {
         for folder in &args.folders {
-            trials.extend(with_truth(folder, args.hypotheses)?);
+            trials.extend(with_truth(folder, args)?);
         }
     }
     let files = Library::of_folders(&args.folders)?;
@@ -102,7 +102,7 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
     let seeds = if args.tuning { Seeds::Tuning } else { Seeds::HeldOut };
     let pairs = library::simulated_pairs(args.worlds, args.kind.as_deref(), seeds, registry);
     if !args.only_unrelated {
-        trials.extend(pairs.par_iter().map(|pair| of_one_world(pair, args.hypotheses)).collect::<Vec<_>>());
+        trials.extend(pairs.par_iter().map(|pair| of_one_world(pair, args)).collect::<Vec<_>>());
     }
     // The sets by name, each in the order of its worlds.
     trials.sort_by(|one, other| one.set.cmp(&other.set));
@@ -112,18 +112,20 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
 }
 
 /// The pairs that a folder has a truth of.
-fn with_truth(folder: &std::path::Path, with_bends: bool) -> Result<Vec<Trial>> {
+fn with_truth(folder: &std::path::Path, args: &MapPairsArgs) -> Result<Vec<Trial>> {
     let pairs = truth::pairs(folder)?;
     let set = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let trial = |pair: &truth::Pair| {
         let [a, b] = &pair.maps;
-        let judged = judging::judge_maps(a, b, with_bends);
+        let judged = judging::judge_maps(a, b, args.hypotheses);
+        let is_right = judged.place().is_some_and(|place| pair.is_right(place));
+        let is_kept = args.keep_wrong && judged.is_merged() && !is_right;
         Trial {
             set: set.clone(),
             pair: pair.name.clone(),
-            is_right: judged.place().is_some_and(|place| pair.is_right(place)),
+            is_right,
             is_unrelated: pair.is_unrelated(),
-            wrong_maps: None,
+            wrong_maps: is_kept.then(|| (pair.name.clone(), pair.maps.clone())),
             right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
             judged,
         }
@@ -132,15 +134,17 @@ fn with_truth(folder: &std::path::Path, with_bends: bool) -> Result<Vec<Trial>> 
 }
 
 /// The two robots of a simulated world.
-fn of_one_world(pair: &SimulatedPair, with_bends: bool) -> Trial {
+fn of_one_world(pair: &SimulatedPair, args: &MapPairsArgs) -> Trial {
     let [a, b] = &pair.maps;
-    let judged = judging::judge_maps(a, b, with_bends);
+    let judged = judging::judge_maps(a, b, args.hypotheses);
+    let is_right = judged.place().is_some_and(|place| pair.is_right(place));
+    let is_kept = args.keep_wrong && judged.is_merged() && !is_right;
     Trial {
         set: format!("simulated: {}", pair.kind()),
         pair: pair.world.name.clone(),
-        is_right: judged.place().is_some_and(|place| pair.is_right(place)),
+        is_right,
         is_unrelated: false,
-        wrong_maps: None,
+        wrong_maps: is_kept.then(|| (format!("world_{}", pair.number), pair.maps.clone())),
         right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
         judged,
     }
@@ -166,7 +170,7 @@ fn of_different_buildings(
         let is_kept = args.keep_wrong && judged.is_merged();
         Trial {
             set: set.to_owned(),
-            wrong_maps: is_kept.then_some((number, [a, b])),
+            wrong_maps: is_kept.then(|| (number.to_string(), [a, b])),
             pair: format!("{number}: {} and {}", names[0], names[1]),
             is_right: false,
             is_unrelated: true,
@@ -196,9 +200,9 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
     let of_pair = ["set", "pair", "outcome", "hypothesis", "is right"];
     let mut hypotheses = Table::new(of_pair.into_iter().chain(heads.iter().map(String::as_str)));
     for trial in trials {
-        if let Some((number, maps)) = &trial.wrong_maps {
+        if let Some((name, maps)) = &trial.wrong_maps {
             for (map, which) in maps.iter().zip(["a", "b"]) {
-                results.map(&format!("wrong_{number}_{which}"), &map.to_file())?;
+                results.map(&format!("wrong_{name}_{which}"), &map.to_file())?;
             }
         }
         let Trial { set, pair, judged, right, .. } = trial;
