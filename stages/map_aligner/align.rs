@@ -1,7 +1,8 @@
 //! The whole of it: search, judge, refine.
 
 use super::lead::{OTHERS, lead};
-use super::peaks::{JUDGED, change, is_near, overlay};
+use super::peaks::{change, is_near, overlay};
+use super::prepared_map::JUDGED;
 use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, SearchRefusal, covariance, refine_peak};
 use crate::geometry::{Grid, Pose2};
 use crate::place_window::PlaceWindow;

@@ -7,7 +7,7 @@
 //! (Proceedings of the IEEE 2006), judge by the same.
 //!
 //! - [`PreparedMap`]: a map in [`Raster`]s of wider and wider cells, and points on its walls.
-//! - [`search`]: all places in wide cells, by a [`Correlator`] that scores every translation of one map on another.
+//! - [`search`]: all places in wide cells, at some [`Rotations`], by a [`Correlator`] that scores every translation of one map on another.
 //! - [`Peaks`]: the best of them, each followed up to the peak near it and judged in narrower cells by an [`Overlay`].
 //! - [`refine_peak`]: the place to a part of a cell, and [`covariance`], how sure it is.
 //! - [`align_maps`]: all of it.
@@ -27,6 +27,7 @@ mod plan;
 mod prepared_map;
 mod raster;
 mod refusal;
+mod scales;
 mod search;
 mod stage;
 mod statement;
@@ -51,7 +52,7 @@ pub use plan::MergePlan;
 pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::SearchRefusal;
-pub use search::{Place, search};
+pub use search::{Place, Rotations, search};
 pub use statement::Statement;
 
 use gridweave_runtime::stage::StageKind;

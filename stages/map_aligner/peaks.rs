@@ -2,23 +2,16 @@
 
 use super::climb::{Steps, climb};
 use super::overlay::Overlay;
-use super::search::{Place, search};
+use super::prepared_map::JUDGED;
+use super::scales::{Scale, search_scales};
+use super::search::Place;
 use super::{MapAlignerParameters, PreparedMap};
 use crate::geometry::{Point2, Pose2, turn_difference};
 use crate::place_window::PlaceWindow;
 use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-/// Maps that are longer, in cells of the search, are searched in wider ones.
-const MOST_CELLS: usize = 320;
-/// Maps are searched in cells of so many sizes, each twice as wide as the one before: the narrow ones for small maps, of which
-/// little is in common, and the wide ones for those that are bent.
-const SCALES: usize = 2;
-/// The level in whose cells places are judged.
-pub(super) const JUDGED: usize = 1;
-/// As many places are taken from the search in cells of one size.
-const PLACES: usize = 1024;
-/// As many of those in cells of one size, each away from the others, are looked at closely.
+/// As many places of those found in cells of one size, each away from the others, are looked at closely.
 const CANDIDATES: usize = 64;
 
 /// Places that were judged in the same way, the best first.
@@ -39,20 +32,14 @@ impl Peaks {
         parameters: &MapAlignerParameters,
     ) -> Self {
         let penalty = parameters.free_space_penalty;
-        let step = 2.0 * parameters.rotation_step;
-        let half_turns = (PI / step - 1e-9).ceil() as usize;
-        let first = first_level(a, b, step);
-        // A window holds few places, and narrow cells come by the right one.
-        let scales = if window.is_some() { 1 } else { SCALES };
-        let candidates: Vec<(usize, (Pose2, Point2))> = (first..first + scales)
-            .flat_map(|level| {
-                let (coarse_a, coarse_b) = (a.level(level), b.level(level));
-                let places = search(coarse_a, coarse_b, window, half_turns, penalty, parameters.apart, PLACES);
+        let candidates: Vec<(usize, f64, (Pose2, Point2))> = search_scales(a, b, window, parameters)
+            .into_iter()
+            .flat_map(|Scale { level, step, places }| {
                 let apart = apart_from_better(&overlay(a, b, level, penalty), &places, parameters.apart, 2.0 * step);
-                apart.into_iter().map(move |candidate| (level, candidate))
+                apart.into_iter().map(move |candidate| (level, step, candidate))
             })
             .collect();
-        let ways = candidates.par_iter().map(|(level, (start, centre))| {
+        let ways = candidates.par_iter().map(|(level, step, (start, centre))| {
             let mut place = *start;
             for number in (JUDGED..=*level).rev() {
                 let walls = (a.few_walls(), b.few_walls());
@@ -89,20 +76,6 @@ impl Peaks {
         });
         elsewhere.next()
     }
-}
-
-/// The first level in whose cells two maps are searched. Its cells are so wide that maps that are turned by half a step lie
-/// less than one of its cells, which are twice as wide in the search, beside their place at the ends of the shorter of them:
-/// in narrower cells, the right place of large maps lies between two rotations. It is not wider than maps are searched in anyway.
-fn first_level(a: &PreparedMap, b: &PreparedMap, step: f64) -> usize {
-    let least = a.level_of_size(2 * MOST_CELLS).max(b.level_of_size(2 * MOST_CELLS)).max(JUDGED);
-    let radius = |map: &PreparedMap| {
-        let raster = map.level(JUDGED);
-        0.5 * raster.cell * (raster.width as f64).hypot(raster.height as f64)
-    };
-    let radius = radius(a).min(radius(b));
-    let is_fine = |level: &usize| 0.5 * step * radius <= 2.0 * a.level(*level).cell;
-    (least..).take(SCALES).find(is_fine).unwrap_or(least + SCALES - 1)
 }
 
 /// The first of some places within `metres` and `radians`, each with the middle of its walls in common.

@@ -1,7 +1,8 @@
 //! Which maps of many robots are searched, so that not every pair of them must be.
 
 use super::group::{Group, Groups};
-use super::peaks::{JUDGED, is_near, overlay};
+use super::peaks::{is_near, overlay};
+use super::prepared_map::JUDGED;
 use super::statement::{Statement, with_reasons};
 use super::{
     CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,

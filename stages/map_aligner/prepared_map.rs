@@ -6,6 +6,9 @@ use crate::geometry::Grid;
 /// Rasters of a map, each in cells twice as wide as the one before.
 const LEVELS: usize = 6;
 
+/// The level in whose cells places are judged.
+pub(super) const JUDGED: usize = 1;
+
 /// A cell of a raster is at least as many cells of the grid wide: then, however the grid is turned, none in its midst is
 /// left out.
 const LEAST_CELLS: f64 = 1.5;

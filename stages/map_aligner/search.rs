@@ -28,23 +28,67 @@ impl Place {
     }
 }
 
-/// Tries every place of map `b` on map `a`, to a cell of twice the width of those of the rasters, at twice `half_turns`
-/// rotations that are evenly spread over a full turn. Gives the best `most` of the places that are the best at
-/// their rotation within some square of `spacing` metres, the best first. Where there is a `window`, every place in it is
-/// taken, and none outside.
+/// Rotations within half a turn: some or all of those that are spread evenly over it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rotations {
+    /// How many there are in half a turn.
+    count: usize,
+    /// The numbers of those that are meant.
+    numbers: Vec<usize>,
+}
+
+impl Rotations {
+    /// All of those that lie `step` radians apart, or a little less.
+    pub fn all(step: f64) -> Self {
+        let count = (PI / step - 1e-9).ceil() as usize;
+        Self { count, numbers: (0..count).collect() }
+    }
+
+    /// Of those that lie `step` apart the ones that are nearest to rotations at which places were found, to those of the first places
+    /// first, and `most` at the most. The places were found at rotations of `self`.
+    pub fn nearest_to(&self, places: &[Place], step: f64, most: usize) -> Self {
+        let Self { count, mut numbers } = Self::all(step);
+        let nearest = |angle: f64| (angle / self.step()).round().rem_euclid(self.count as f64) as usize;
+        let mut of_each = vec![Vec::new(); self.count];
+        for number in numbers.drain(..) {
+            of_each[nearest(PI * number as f64 / count as f64)].push(number);
+        }
+        for place in places {
+            let near = std::mem::take(&mut of_each[nearest(place.transform_a_b.rotation.angle())]);
+            if numbers.len() + near.len() > most {
+                break;
+            }
+            numbers.extend(near);
+        }
+        numbers.sort_unstable();
+        Self { count, numbers }
+    }
+
+    /// How far they lie apart, radians.
+    pub fn step(&self) -> f64 {
+        PI / self.count as f64
+    }
+
+    fn angles(&self) -> impl Iterator<Item = f64> {
+        self.numbers.iter().map(|number| PI * *number as f64 / self.count as f64)
+    }
+}
+
+/// Tries every place of map `b` on map `a`, to a cell of twice the width of those of the rasters, at the given `rotations` and at half
+/// a turn more. Gives the best `most` of the places that are the best at their rotation within some square of `spacing` metres, the
+/// best first. Where there is a `window`, every place in it is taken, and none outside.
 pub fn search(
     a: &Raster,
     b: &Raster,
     window: Option<&PlaceWindow>,
-    half_turns: usize,
+    rotations: &Rotations,
     penalty: f64,
     spacing: f64,
     most: usize,
 ) -> Vec<Place> {
-    let step = PI / half_turns as f64;
+    let step = rotations.step();
     let may_turn = |angle: f64| window.is_none_or(|window| window.contains_yaw(angle, step));
-    let angles = (0..half_turns).map(|number| PI * number as f64 / half_turns as f64);
-    let angles: Vec<f64> = angles.filter(|angle| may_turn(*angle) || may_turn(angle + PI)).collect();
+    let angles: Vec<f64> = rotations.angles().filter(|angle| may_turn(*angle) || may_turn(angle + PI)).collect();
     let (spacing, most_at_one) = if window.is_some() { (0.0, usize::MAX) } else { (spacing, MOST_AT_ONE) };
     let margin = 2.0 * a.cell;
     let may_lie = |place: &Place| window.is_none_or(|window| window.contains(&place.transform_a_b, margin, step));
@@ -66,4 +110,34 @@ pub fn search(
     places.sort_by(Place::best_first);
     places.truncate(most);
     places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(angles: &[f64]) -> Vec<Place> {
+        angles.iter().map(|angle| Place { transform_a_b: pose(0.0, 0.0, *angle), score: 1.0 }).collect()
+    }
+
+    #[test]
+    fn rotations_are_spread_over_half_a_turn() {
+        let all = Rotations::all(0.03);
+        let angles: Vec<f64> = all.angles().collect();
+        assert_eq!(angles.len(), 105);
+        assert!(all.step() <= 0.03 && angles[0] == 0.0 && angles[104] + all.step() > PI - 1e-9);
+    }
+
+    #[test]
+    fn narrow_rotations_lie_about_the_best_places_of_wide_ones() {
+        let wide = Rotations::all(PI / 90.0);
+        // Half a turn on, a map lies at the same rotation but for a half turn.
+        let near = wide.nearest_to(&places(&[PI / 2.0, -PI / 2.0, 1e-9, 1.0]), PI / 360.0, 9);
+        let angles: Vec<f64> = near.angles().collect();
+        assert_eq!(angles.len(), 8, "the fourth place would be one too many: {angles:?}");
+        let is_near = |angle: &f64| [0.0, PI / 2.0, PI].iter().any(|of| (angle - of).abs() <= PI / 180.0 + 1e-9);
+        assert!(angles.iter().all(is_near), "{angles:?}");
+        assert_eq!(near.step(), PI / 360.0);
+        assert_eq!(wide.nearest_to(&[], PI / 360.0, 9).angles().count(), 0);
+    }
 }

@@ -2,8 +2,8 @@
 //!
 //! A logistic regression on how far the place leads all others, how much both maps know, and what speaks for it and against it:
 //!
-//! - Two straight walls fix a place, and any corner fits any other. So lead and area count as far as walls beside these two agree, too, and
-//!   confirm it.
+//! - Two straight walls fix a place, and any corner fits any other. So lead, area and evidence count as far as walls beside these two agree,
+//!   too, and confirm it.
 //! - Walls that run one way only fit at many places along themselves: straight walls that agree are counted both ways.
 //! - At the right place the parts of a map lie where they should, but for a bend; by chance each of them fits a little beside.
 //! - Walls that cross the other map's free space speak against it. Where furniture was moved, or a wall is drawn roughly or is bent,
@@ -35,7 +35,7 @@ const BY_AREA: f64 = 3.10;
 const MOST_AREA: f64 = 500.0;
 /// Of the share of the walls that agree which confirm the place, and do not only fix it.
 const BY_CONFIRMING: f64 = 9.14;
-/// So large must that share be for lead and area to count in full; and neither counts where none confirms the place.
+/// So large must that share be for lead, area and evidence to count in full; and none of them counts where nothing confirms the place.
 pub(super) const CONFIRMING: f64 = 0.5;
 /// Per unit of the logarithm of 1 and the straight walls that agree in the one of two directions in which there are fewer.
 const BY_WALLS: f64 = 3.05;
@@ -100,7 +100,7 @@ fn of_walls(agreement: &Agreement, confirming: f64, bend_cost: Option<f64>) -> f
         + BY_WALLS * (agreement.walls_either_way as f64).ln_1p()
         + BY_SLIDE * agreement.slide
         + crossings(agreement)
-        + BY_EVIDENCE * (agreement.evidence - bend_cost).max(0.0).sqrt()
+        + confirmed(confirming) * BY_EVIDENCE * (agreement.evidence - bend_cost).max(0.0).sqrt()
         + of_bend(bend_cost)
         + BY_LITTLE_WALL * (LITTLE_WALL - agreement.wall_on_wall).max(0.0)
 }

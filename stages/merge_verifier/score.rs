@@ -322,28 +322,33 @@ mod tests {
 
     #[test]
     fn a_corner_that_fits_another_says_nothing() {
-        let with = |confirming: f64| found(9.0, |agreement| agreement.confirming = confirming);
+        let with = |confirming: f64| {
+            found(9.0, |agreement| (agreement.confirming, agreement.walls_either_way) = (confirming, 1))
+        };
         assert!(with(0.0) < 0.01 && with(0.14) < 0.01 && with(0.7) > 0.999);
     }
 
     #[test]
     fn walls_that_run_one_way_only_leave_a_place_open() {
-        let with =
-            |walls: usize| found(2.0, |agreement| (agreement.walls_either_way, agreement.overlap) = (walls, 40.0));
+        let with = |walls: usize| {
+            found(1.0, |agreement| {
+                (agreement.walls_either_way, agreement.overlap, agreement.evidence) = (walls, 40.0, 30.0);
+            })
+        };
         assert!(with(0) < 0.99 && with(0) < with(2) && with(4) > 0.999);
     }
 
     #[test]
     fn parts_that_each_fit_a_little_beside_speak_against_a_place() {
-        let with = |slide: f64| found(4.0, |agreement| agreement.slide = slide);
-        assert!(with(0.02) > 0.999 && with(0.4) < 0.99);
+        let with = |slide: f64| found(1.0, |agreement| agreement.slide = slide);
+        assert!(with(0.02) > 0.999 && with(0.5) < 0.99);
     }
 
     #[test]
     fn next_to_no_wall_is_no_evidence_however_much_space_is_free() {
         let little = |agreement: &mut Agreement| {
             (agreement.wall_on_wall, agreement.wall_on_free, agreement.slide) = (1.0, 0.0, 0.0);
-            (agreement.walls_either_way, agreement.overlap) = (1, 40.0);
+            (agreement.walls_either_way, agreement.overlap, agreement.evidence) = (1, 40.0, 2.0);
         };
         assert!(found(5.0, little) < 0.99);
     }

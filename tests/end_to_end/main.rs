@@ -19,6 +19,7 @@ mod golden_mistakes;
 mod golden_runner;
 mod group_mapping;
 mod interrupted;
+mod large_buildings;
 mod live;
 mod live_restarts;
 mod log_output;

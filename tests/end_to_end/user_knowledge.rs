@@ -1,53 +1,17 @@
 //! What the user knows of where the maps lie decides where the maps alone do not.
 
-use crate::support::{Ended, gridweave, simulate};
-use gridweave_logs::summary::{Frame, Summary};
+use crate::support::{SimulatedWorld, gridweave};
+use gridweave_logs::summary::Frame;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
 
 /// Two robots in a building that looks the same after half a turn, without tags.
-struct SymmetricWorld {
-    folder: TempDir,
-    truth: PathBuf,
-}
-
-impl SymmetricWorld {
-    fn new() -> Self {
-        let folder = TempDir::new().unwrap();
-        let mut args = vec!["--robots", "2", "--seed", "905"];
-        for setting in ["tags=0", "snapshots=1", "overlap=1.0", "clutter=0.0", "layout=\"symmetric\""] {
-            args.extend(["--set", setting]);
-        }
-        let (_, truth) = simulate(folder.path(), "in.mcap", &args);
-        Self { folder, truth }
-    }
-
-    fn merge(&self, more: &[&str]) -> Ended {
-        let args = [&["merge", "in.mcap", "-o", "out.mcap", "--summary", "summary.json"], more].concat();
-        gridweave(self.folder.path(), &args)
-    }
-
-    /// Where robot 2 is by the truth.
-    fn truth(&self) -> Frame {
-        let truth: Summary = serde_json::from_slice(&fs::read(&self.truth).unwrap()).unwrap();
-        truth.frames["robot2"]
-    }
-
-    fn summary(&self) -> Summary {
-        serde_json::from_slice(&fs::read(self.folder.path().join("summary.json")).unwrap()).unwrap()
-    }
-
-    /// How far from the truth robot 2 was laid, metres.
-    fn error(&self) -> f64 {
-        let (truth, found) = (self.truth(), self.summary().frames["robot2"]);
-        (truth.x - found.x).hypot(truth.y - found.y)
-    }
+fn symmetric_world() -> SimulatedWorld {
+    SimulatedWorld::new("905", &["tags=0", "snapshots=1", "overlap=1.0", "clutter=0.0", "layout=\"symmetric\""])
 }
 
 #[test]
 fn an_initial_pose_tells_one_end_of_a_building_from_the_other() {
-    let world = SymmetricWorld::new();
+    let world = symmetric_world();
     world.merge(&[]).assert(3, &["the maps fit at 2 places", "try: --accept robot2=N", "--initial robot2=X,Y,YAW"]);
     let Frame { x, y, yaw, .. } = world.truth();
     let initial = format!("robot2={},{},{}", x + 0.8, y - 0.6, yaw + 0.2);
@@ -75,7 +39,7 @@ fn an_initial_pose_tells_one_end_of_a_building_from_the_other() {
 
 #[test]
 fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
-    let world = SymmetricWorld::new();
+    let world = symmetric_world();
     let errors = ["1", "2"].map(|number| {
         let headline = format!("hypothesis {number} of 2, which was asked for");
         world.merge(&["--accept", &format!("robot2={number}")]).assert(0, &["merged 2 of 2 robots", &headline]);
@@ -97,7 +61,7 @@ fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
 
 #[test]
 fn a_refusal_is_short_and_the_whole_of_it_is_told_on_demand() {
-    let world = SymmetricWorld::new();
+    let world = symmetric_world();
     let short = world.merge(&[]);
     short.assert(3, &["missing: a probability of 0.999"]);
     let refusal =

@@ -4,6 +4,7 @@ pub(crate) mod golden_cases;
 mod live_run;
 mod merged_log;
 mod readings;
+mod simulated_world;
 
 pub(crate) use gridweave_tests::run_files::{
     DIAMOND, left_over, outcome, part, processes, run_folder, run_name, signal, wait_until,
@@ -12,6 +13,7 @@ pub(crate) use gridweave_tests::{LogBuilder, TestMap};
 pub(crate) use live_run::{LOG, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, read};
 pub(crate) use merged_log::{MARKUP, merged_log};
 pub(crate) use readings::{change_log, change_readings, moved_reading, place_in_map_2};
+pub(crate) use simulated_world::SimulatedWorld;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
