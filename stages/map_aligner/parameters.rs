@@ -14,11 +14,12 @@ pub struct MapAlignerParameters {
     #[schemars(range(min = 0.01, max = 10.0))]
     pub cell: f64,
     /// The rotations at which places are judged lie at most this far apart, radians. The search for them takes steps
-    /// twice as wide.
+    /// twice as wide, and closer ones in large maps, whose ends would else come to lie beside their places.
     #[schemars(range(min = 1e-3, max = PI))]
     pub rotation_step: f64,
     /// How much a cell of wall that lies on known free space of the other map counts against a place, where a cell of
-    /// wall on wall counts 1 for it.
+    /// wall on wall counts 1 for it. In
+    /// the search in cells that are hardly narrower than rooms it counts as much more as it takes for chance to score nothing.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub free_space_penalty: f64,
     /// Another place differs from the best by a rotation of more than this, radians, or by `apart`.
