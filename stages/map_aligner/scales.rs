@@ -31,7 +31,7 @@ pub(super) struct Scale {
     pub(super) places: Vec<Place>,
 }
 
-/// Searches for all places of map b on map a, or all in a window, in narrow cells first.
+/// Searches for all places of map b on map a, or all in a window; the scales from narrow cells to wide ones.
 pub(super) fn search_scales(
     a: &PreparedMap,
     b: &PreparedMap,
@@ -59,11 +59,10 @@ pub(super) fn search_scales(
     }
     let is_close = |level: &usize| step <= close_step(*level);
     let first = (narrowest..narrowest + SCALES).find(is_close).unwrap_or(narrowest + SCALES - 1);
-    let found = search_at(first, &all_rotations(first));
-    let narrow = (first > narrowest).then(|| {
-        let rotations = all_rotations(first).nearest_to(&found.places, close_step(narrowest), NARROW_ROTATIONS);
-        search_at(narrowest, &rotations)
-    });
+    let rotations = all_rotations(first);
+    let found = search_at(first, &rotations);
+    let narrow = (first > narrowest)
+        .then(|| search_at(narrowest, &rotations.nearest_to(&found.places, close_step(narrowest), NARROW_ROTATIONS)));
     let wider = (first + 1..first + SCALES).map(|level| search_at(level, &all_rotations(level)));
     narrow.into_iter().chain([found]).chain(wider).collect()
 }

@@ -25,6 +25,8 @@ mod straight_walls;
 mod verdict;
 
 #[cfg(test)]
+mod score_tests;
+#[cfg(test)]
 mod stage_tests;
 #[cfg(test)]
 mod tests;
