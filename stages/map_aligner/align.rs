@@ -11,6 +11,8 @@ use rayon::prelude::*;
 
 /// More peaks than hypotheses are refined, as some lead to the same place.
 const SPARE: usize = 2;
+/// As many places are taken at which a map lies on itself: a shift comes with the one back.
+const SELF_SIMILAR: usize = 5;
 
 /// A first guess of how two maps lie to each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +109,16 @@ pub fn align_prepared(
             .map_or((0.0, 0.0), |place| change(&best.transform_a_b, &place.transform_a_b, centre)),
         hypotheses: hypotheses.into_iter().map(|found| found.alignment).collect(),
     })
+}
+
+/// Where a map lies on itself best, but for where it is: `T_map_map` of places at which the building may look alike, the best first.
+pub fn self_similar_places(map: &PreparedMap, parameters: &MapAlignerParameters) -> Vec<Pose2> {
+    let (peaks, here) = (Peaks::find(map, map, None, parameters), Pose2::identity());
+    let itself = overlay(map, map, JUDGED, parameters.free_space_penalty).common_walls(&here);
+    let (Some(best), Some(itself)) = (peaks.all().first(), itself) else { return Vec::new() };
+    let all = MapAlignerParameters { max_hypotheses: 1 + SELF_SIMILAR, least_share: 0.0, ..parameters.clone() };
+    let found = hypotheses(&peaks, best.score, map, map, &all).into_iter().map(|found| found.alignment.transform_a_b);
+    found.filter(|place| !is_near(&here, place, &itself.centre, parameters)).collect()
 }
 
 /// The guess at the peak near a place that is known from elsewhere, without a search. `None` if the walls of the maps do

@@ -40,7 +40,7 @@ mod stage_tests;
 #[cfg(test)]
 mod tests;
 
-pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared};
+pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared, self_similar_places};
 pub use climb::{Steps, climb};
 pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use fine_search::refine_peak;

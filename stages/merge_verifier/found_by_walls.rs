@@ -69,7 +69,7 @@ const MUCH_WALL: (f64, f64) = (60.0, 80.0);
 /// The same where the maps share the area of one room: rooms of other buildings have the same corners and sizes.
 const AGREEMENT_OF_HALVES_IN_A_ROOM: f64 = 0.9;
 /// So large is a room, and so large is the area that the maps share if it is surely more than a room, square metres.
-const ROOM: (f64, f64) = (25.0, 40.0);
+pub(super) const ROOM: (f64, f64) = (25.0, 40.0);
 
 /// The logarithm of the odds that a place is right which leads all others by so much. `confirming` is the share of the walls that agree
 /// which confirm it, and `bend_cost` is that of the bend if the maps were compared bent.

@@ -128,7 +128,7 @@ fn bent<'a>(
     let bent = is_worth_it.then(|| BentPlace::new(a, b, &rigid.alignment.transform_a_b(), parameters)).flatten();
     let Some(place) = bent else { return *rigid };
     let left_by_bend = Some(place.covariance);
-    let is_better = match origin(rigid.alignment) {
+    let is_better = match Origin::of(rigid.alignment) {
         Origin::Search { .. } if !is_expected => {
             among_alike(0.0, &place.agreement, Some(place.cost)) > among_alike(0.0, &rigid.agreement, None)
         }
@@ -177,7 +177,7 @@ fn judge_one<'a>(
     let transform_a_b = candidate.transform_a_b();
     let rival_of = |other: &Candidate<'_>| {
         let rival = Rival::of(&transform_a_b, &agreement.centre, &other.transform_a_b(), || other.agreement)?;
-        let lead = match origin(other.alignment) {
+        let lead = match Origin::of(other.alignment) {
             Origin::Search { lead } => lead,
             Origin::Tags | Origin::FewTags => 0.0,
         };
@@ -187,18 +187,20 @@ fn judge_one<'a>(
     let found_too = others.filter(|other| rival_of(other).is_none());
     let found_too_by = found_too.clone().next().map(|other| other.alignment.source.as_str());
     // The best of a search that has not looked at tags, and tags that suffice without walls.
-    let is_best_of_search = |one: &Alignment| matches!(origin(one), Origin::Search { .. }) && one.rank == 0;
+    let is_best_of_search = |one: &Alignment| matches!(Origin::of(one), Origin::Search { .. }) && one.rank == 0;
     let found_by_tags_and_walls = |other: &Candidate<'_>| {
         let pair = [*alignment, other.alignment];
         pair.iter().any(|one| is_best_of_search(one)) && pair.iter().any(|one| one.source == "tags" && !one.provisional)
     };
     let found_by_tags_and_walls = found_too.clone().any(found_by_tags_and_walls);
-    let is_found_by_walls_alone = matches!(origin(alignment), Origin::Search { .. }) && found_too_by.is_none();
+    let is_found_by_walls_alone = matches!(Origin::of(alignment), Origin::Search { .. }) && found_too_by.is_none();
     let weight = |rival: &Rival| match is_found_by_walls_alone {
         true => among_alike(rival.lead, &rival.agreement, rival.bend_cost),
         false => rival.agreement.evidence,
     };
-    let by_weight = |one: &Rival, other: &Rival| weight(one).total_cmp(&weight(other));
+    let outdoes = |rival: &Rival| is_found_by_walls_alone && rival.outdoes(agreement, bent.map(|bent| bent.cost));
+    let by_weight =
+        |one: &Rival, other: &Rival| outdoes(one).cmp(&outdoes(other)).then(weight(one).total_cmp(&weight(other)));
     // Where a bend is no excuse, the maps cannot lie at a place at which they contradict each other, however much of them meets
     // there, if there is one at which they do not.
     let is_refuted = |other: &Candidate<'_>| {
@@ -219,7 +221,7 @@ fn judge_one<'a>(
         rival = rival.into_iter().chain(nearby.filter(is_alike)).max_by(by_weight);
     }
     let grounds = Grounds {
-        origin: origin(alignment),
+        origin: Origin::of(alignment),
         found_too: found_too_by.is_some(),
         found_by_tags_and_walls,
         is_expected,
@@ -256,16 +258,6 @@ fn judge_one<'a>(
     };
     let hypotheses = listed(all);
     Verdict { candidate: *candidate, refusal, rival, evidence_elsewhere, score, found_too_by, chosen: None, hypotheses }
-}
-
-/// What makes an alignment stand out before the maps are compared. A stage that has looked for all other places says by its
-/// score how probable it is that the best of as many would not lead by as much by chance.
-fn origin(alignment: &Alignment) -> Origin {
-    match alignment.hypotheses > 0 && alignment.source == "maps" {
-        true => Origin::Search { lead: -(1.0 - alignment.score.clamp(0.0, 1.0)).max(f64::MIN_POSITIVE).ln() },
-        false if alignment.provisional => Origin::FewTags,
-        false => Origin::Tags,
-    }
 }
 
 /// The refusal for another place that fits as well; or far better, where tags have told this one.

@@ -6,10 +6,12 @@
 //! - [`compare`]: what two maps say of each other at one alignment.
 //! - [`BentPlace`]: the same if the maps are bent, where they contradict each other as they came.
 //! - [`best_rival_nearby`]: where else they fit, for alignments of which nobody has looked for others.
+//! - [`Alias`]: where else map b may lie because the building looks alike there, as each map tells by itself.
 //! - [`judge`]: all hypotheses for a pair against each other; [`Refusal`] says why none is accepted.
 //! - [`Odds`]: how probable it is that an alignment is right.
 
 mod agreement;
+mod aliasing;
 mod bending;
 mod crossings;
 mod found_by_walls;
@@ -20,6 +22,7 @@ mod refusal;
 mod regions;
 mod rivals;
 mod score;
+mod self_similarities;
 mod stage;
 mod straight_walls;
 mod verdict;
@@ -32,6 +35,7 @@ mod stage_tests;
 mod tests;
 
 pub use agreement::{Agreement, MapView, compare, compare_sampled};
+pub use aliasing::{Alias, SelfSimilarity};
 pub use bending::BentPlace;
 pub use judge::{UserKnowledge, judge};
 pub use parameters::MergeVerifierParameters;

@@ -1,5 +1,6 @@
 //! Why two maps are not merged.
 
+use super::Agreement;
 use super::found_by_walls::CONFIRMING;
 use std::fmt;
 
@@ -65,6 +66,23 @@ pub enum Refusal {
         /// All places.
         hypotheses: Hypotheses,
     },
+    /// The building looks alike in two places.
+    #[error(
+        "the building looks alike in two places, and it cannot be told in which of them it is: a map agrees with itself {shift:.1} m and \
+         {turn:.0} degrees away ({:.0} m of wall agree, {:.0} m do not), and with map b moved and turned by as much {:.0} m agree, and \
+         {:.0} m do not",
+        itself.wall_on_wall, itself.wall_on_free, there.wall_on_wall, there.wall_on_free
+    )]
+    Aliased {
+        /// How far the other place is, metres.
+        shift: f64,
+        /// How much map b is turned there, degrees.
+        turn: f64,
+        /// What one of the maps says of itself.
+        itself: Agreement,
+        /// What the maps say of each other at the other place.
+        there: Agreement,
+    },
     /// It lies where the user knows the maps not to lie.
     #[error("it is {shift:.1} m and {turn:.0} degrees away from the initial poses, which is more than they allow")]
     Unexpected {
@@ -127,6 +145,9 @@ impl Refusal {
             Self::Ambiguous { shift, turn, .. } => {
                 format!("the maps fit nearly as well {shift:.1} m and {turn:.0} degrees from there")
             }
+            Self::Aliased { shift, turn, .. } => {
+                format!("the building looks alike {shift:.1} m and {turn:.0} degrees from there")
+            }
             Self::Unexpected { shift, turn } => {
                 format!("the maps fit {shift:.1} m and {turn:.0} degrees from the initial poses only")
             }
@@ -158,6 +179,7 @@ impl Refusal {
             Self::Ambiguous { .. } | Self::Elsewhere { .. } => {
                 format!("more tags that both have seen, or --initial {b}=X,Y,YAW")
             }
+            Self::Aliased { .. } => format!("one tag seen by both, or --initial {b}=X,Y,YAW"),
             Self::Unexpected { .. } => format!("are the poses right? --initial {b}=X,Y,YAW,STDDEV widens them"),
             Self::NoSuchHypothesis { .. } => "leave --accept out to see which there are".to_owned(),
         })

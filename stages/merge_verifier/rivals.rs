@@ -42,6 +42,14 @@ impl Rival {
         let is_another = shift >= SAME_PLACE || turn.abs() >= SAME_TURN;
         is_another.then(|| Self { shift, turn, lead: 0.0, agreement: compare(), bend_cost: None })
     }
+
+    /// Whether more speaks for it than for a place at which the maps say that, bent at that cost, and less against it: then it is as likely
+    /// to be right, whatever else tells them apart.
+    pub fn outdoes(&self, agreement: &Agreement, bend_cost: Option<f64>) -> bool {
+        let evidence = |agreement: &Agreement, cost: Option<f64>| agreement.evidence - cost.unwrap_or_default();
+        evidence(&self.agreement, self.bend_cost) > evidence(agreement, bend_cost)
+            && self.agreement.wall_agreement() > agreement.wall_agreement()
+    }
 }
 
 /// The rival near an alignment `T_a_b` for which the walls speak most, if any do.

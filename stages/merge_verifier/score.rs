@@ -20,6 +20,7 @@
 
 use super::found_by_walls::{CONFIRMING, among_alike, crossings, halves, log_odds};
 use super::{Agreement, Rival};
+use gridweave_runtime::ros::Alignment;
 
 /// No lead says more: from there on the model of chance itself is in doubt.
 pub(super) const MOST_LEAD: f64 = 10.0;
@@ -70,6 +71,16 @@ pub enum Origin {
 }
 
 impl Origin {
+    /// Of an alignment. A stage that has looked for all other places says by its score how probable it is that the best of as many would
+    /// not lead by as much by chance.
+    pub fn of(alignment: &Alignment) -> Self {
+        match alignment.hypotheses > 0 && alignment.source == "maps" {
+            true => Self::Search { lead: -(1.0 - alignment.score.clamp(0.0, 1.0)).max(f64::MIN_POSITIVE).ln() },
+            false if alignment.provisional => Self::FewTags,
+            false => Self::Tags,
+        }
+    }
+
     /// The lead that it stands for, if another source tells the same or not.
     fn lead(self, is_told_too: bool) -> f64 {
         let own = match self {
@@ -175,7 +186,8 @@ fn likeness(grounds: &Grounds) -> f64 {
     let Some(rival) = &grounds.rival else { return f64::INFINITY };
     if let (Origin::Search { lead }, false) = (grounds.origin, grounds.found_too) {
         let here = among_alike(lead, &grounds.agreement, grounds.bend_cost);
-        return here - among_alike(rival.lead, &rival.agreement, rival.bend_cost);
+        let odds = here - among_alike(rival.lead, &rival.agreement, rival.bend_cost);
+        return if rival.outdoes(&grounds.agreement, grounds.bend_cost) { odds.min(0.0) } else { odds };
     }
     // Tags, and another source, tell a place from those that are like it.
     let is_told = grounds.origin == Origin::Tags || grounds.found_too;

@@ -1,6 +1,7 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
 use super::knowledge::{Knowledge, by_initial_poses};
+use super::self_similarities::SelfSimilarities;
 use super::{Agreement, BentPlace, MapView, MergeVerifierParameters, Verdict, judge};
 use crate::geometry::row_by_row;
 use crate::hypotheses::{HypothesisGatherer, Origin};
@@ -42,6 +43,8 @@ pub(super) struct MergeVerifier {
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
+    /// Where maps that were accepted by their walls alone look like themselves.
+    self_similarities: SelfSimilarities,
     sent: BTreeMap<RobotPair, Alignment>,
     /// What was sent last of what the maps say, without headers.
     evidence: BTreeMap<RobotPair, Evidence>,
@@ -56,6 +59,7 @@ impl MergeVerifier {
             maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
+            self_similarities: SelfSimilarities::default(),
             sent: BTreeMap::new(),
             evidence: BTreeMap::new(),
         }
@@ -92,12 +96,17 @@ impl MergeVerifier {
         }
     }
 
-    /// A pair that waits for a map to the end is refused, so that it does not go missing.
+    /// What was accepted is judged once more if the maps have changed since they were searched for places that look alike. And a pair
+    /// that waits for a map to the end is refused, so that it does not go missing.
     pub(super) fn finish(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
+        let changed = self.self_similarities.forget_former(|robot| self.maps.get(robot).map(|map| map.number));
+        let is_concerned = |pair: &&RobotPair| changed.iter().any(|robot| pair.concerns(robot));
+        let concerned: BTreeSet<RobotPair> = self.pairs().filter(is_concerned).cloned().collect();
+        concerned.iter().try_for_each(|pair| self.update(pair, output))?;
         let pairs: BTreeSet<RobotPair> = self.pairs().cloned().collect();
         for pair in pairs {
             let Some(missing) = self.maps.missing(&pair) else { continue };
-            let proposed = self.proposed(&pair);
+            let proposed = proposed(&self.hypotheses, &pair);
             if proposed.iter().all(|alignment| !alignment.accepted) {
                 continue;
             }
@@ -114,16 +123,10 @@ impl MergeVerifier {
         self.hypotheses.keys().map(|origin| &origin.pair)
     }
 
-    /// Everything that was proposed for a pair, by source and rank.
-    fn proposed(&self, pair: &RobotPair) -> Vec<&Alignment> {
-        let of_pair = self.hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
-        of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
-    }
-
     /// Judges a pair, and sends the outcome and what it went by if they are not what was sent last.
     fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
         let known = self.knowledge.of(pair, self.maps.iter().count());
-        let proposed = self.proposed(pair);
+        let proposed = proposed(&self.hypotheses, pair);
         let maps = self.maps.pair(pair);
         if let Some(alignment) = maps.and_then(|(a, _)| by_initial_poses(pair, &known, &a.frame_id)) {
             return self.send(pair, alignment, output);
@@ -132,6 +135,14 @@ impl MergeVerifier {
             return Ok(());
         }
         let verdict = maps.and_then(|(a, b)| judge(&view(a), &view(b), &proposed, &known, &self.parameters));
+        let verdict = verdict.zip(maps).map(|(verdict, (a, b))| {
+            if !verdict.rests_on_walls_alone() {
+                return verdict;
+            }
+            let maps = ((a.number, &view(a)), (b.number, &view(b)));
+            let alias = self.self_similarities.alias(&verdict, maps, known.window.as_ref(), &self.parameters);
+            verdict.against(alias.as_ref(), self.parameters.accept)
+        });
         let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
         let (evidence, alignment) = (
             evidence(verdict, pair, proposed.len()),
@@ -162,6 +173,12 @@ impl MergeVerifier {
         self.sent.insert(pair.clone(), alignment);
         Ok(())
     }
+}
+
+/// Everything of all that was proposed that is for a pair, by source and rank.
+fn proposed<'a>(hypotheses: &'a BTreeMap<Origin, Vec<Alignment>>, pair: &RobotPair) -> Vec<&'a Alignment> {
+    let of_pair = hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
+    of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
 }
 
 fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {

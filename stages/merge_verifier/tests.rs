@@ -60,23 +60,6 @@ fn reason(verdict: &Verdict<'_>) -> String {
     verdict.reason(0.999, "verifier")
 }
 
-/// A building whose two halves are the same but for one short wall.
-fn nearly_symmetric() -> FloorPlan {
-    let mut walls = vec![];
-    for [x1, y1, x2, y2] in [
-        [0.0, 0.0, 20.0, 0.0],
-        [0.0, 0.0, 0.0, 12.0],
-        [4.0, 0.0, 4.0, 4.0],
-        [4.0, 5.0, 9.0, 5.0],
-        [12.0, 0.0, 12.0, 5.0],
-        [15.0, 3.0, 20.0, 3.0],
-    ] {
-        walls.extend([[x1, y1, x2, y2], [20.0 - x1, 12.0 - y1, 20.0 - x2, 12.0 - y2]]);
-    }
-    walls.push([9.0, 8.0, 9.8, 8.0]);
-    FloorPlan::new(&walls)
-}
-
 #[test]
 fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
     let (a, b) = office_maps();
@@ -137,7 +120,7 @@ fn the_map_of_another_building_is_not_bent_to_fit() {
 
 #[test]
 fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
-    let plan = nearly_symmetric();
+    let plan = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
     let truth = a.transform_to(&b);
@@ -187,7 +170,7 @@ fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_te
 
 #[test]
 fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
-    let plan = nearly_symmetric();
+    let plan = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
     let truth = a.transform_to(&b);
@@ -323,7 +306,7 @@ fn the_defaults_are_in_range_and_nonsense_is_not() {
 
 /// The nearly symmetric building, twice, and a place in each of its halves.
 fn ambiguous() -> (DrawnMap, DrawnMap, [Pose2; 2]) {
-    let building = nearly_symmetric();
+    let building = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (building.draw(part, drawing(3.0, 2.0, 0.4)), building.draw(part, drawing(12.0, 6.0, -2.1)));
     let truth = a.transform_to(&b);

@@ -1,7 +1,7 @@
 //! The judgement on all hypotheses for a pair of robots, and what is said of it.
 
 use super::refusal::Hypotheses;
-use super::{Agreement, BentPlace, Refusal, Rival};
+use super::{Agreement, Alias, BentPlace, Origin, Refusal, Rival};
 use crate::geometry::Pose2;
 use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
@@ -55,6 +55,22 @@ pub struct Verdict<'a> {
 }
 
 impl Verdict<'_> {
+    /// Whether it accepts a place for which the walls of the two maps alone speak.
+    pub fn rests_on_walls_alone(&self) -> bool {
+        let is_by_search = matches!(Origin::of(self.candidate.alignment), Origin::Search { .. });
+        self.refusal.is_none() && self.chosen.is_none() && self.found_too_by.is_none() && is_by_search
+    }
+
+    /// The same, where the building looks alike at another place if there is one.
+    pub fn against(self, alias: Option<&Alias>, accept: f64) -> Self {
+        let Some(alias) = alias else { return self };
+        let score = 1.0 / (1.0 / self.score + (-alias.log_odds).exp());
+        let Rival { shift, turn, agreement: there, .. } = alias.rival;
+        let aliased = Refusal::Aliased { shift, turn: turn.to_degrees(), itself: alias.itself, there };
+        let refusal = if score < accept { Some(aliased) } else { self.refusal };
+        Self { score, refusal, ..self }
+    }
+
     /// What speaks for it, or against it, in plain words: a paragraph of short lines for all, and behind an empty line the
     /// whole for those who ask. `accept` is the probability that is asked for, and `stage` the name of this stage.
     pub fn reason(&self, accept: f64, stage: &str) -> String {

@@ -4,7 +4,7 @@ use super::kinds::Kind;
 use super::worlds::PairWorld;
 use crate::log::{last_maps, read_messages};
 use anyhow::{Context, Result};
-use gridweave::evaluate::{Evaluation, RobotOutcome, evaluate_summary};
+use gridweave::evaluate::{Evaluation, RobotOutcome, RobotResult, evaluate_summary};
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
@@ -96,7 +96,7 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
         other => other.unwrap_or(RobotOutcome::NoTruth),
     };
     let Evaluation { robots, .. } = merge.evaluation;
-    let trial = |robot: gridweave::evaluate::RobotResult| PairTrial {
+    let trial = |robot: RobotResult| PairTrial {
         name: format!("{}, {}", pair.name, robot.robot),
         outcome: if is_pair { outcome } else { robot.outcome },
         error_m: robot.error_m,
@@ -111,12 +111,16 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
 }
 
 /// Whether two robots lie to each other as they should: places that both have seen lie within 0.5 m of each other in the median,
-/// and nine of ten within 1 m. Where the truth knows none, the second robot lies within 0.5 m and 1 degree of its place.
+/// and nine of ten within 1 m. Where the truth knows none, the second robot lies within 0.5 m and 3 degrees of its place, as drift turns
+/// maps by that.
 fn is_place_right(evaluation: &Evaluation) -> bool {
-    match &evaluation.common {
-        Some(common) => evaluation.related && common.rigid.median_m < 0.5 && common.rigid.p90_m < 1.0,
-        None => evaluation.related && evaluation.right == 1,
-    }
+    let is_near =
+        |robot: &RobotResult| robot.error_m.is_some_and(|m| m < 0.5) && robot.error_deg.is_some_and(|deg| deg < 3.0);
+    let is_right = match &evaluation.common {
+        Some(common) => common.rigid.median_m < 0.5 && common.rigid.p90_m < 1.0,
+        None => evaluation.robots.first().is_some_and(is_near),
+    };
+    evaluation.related && is_right
 }
 
 impl PairWorld {

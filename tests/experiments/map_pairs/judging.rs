@@ -7,7 +7,7 @@ use gridweave_stages::icp_refiner::{FirstGuess, IcpParameters, refine};
 use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::map_cleaner::{MapCleanerParameters, clean};
 use gridweave_stages::merge_verifier::{
-    Agreement, BentPlace, MapView, MergeVerifierParameters, UserKnowledge, compare, judge,
+    Agreement, Alias, BentPlace, MapView, MergeVerifierParameters, SelfSimilarity, UserKnowledge, compare, judge,
 };
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
 
@@ -145,7 +145,14 @@ pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding, with_bends: bool)
     let alignments: Vec<Alignment> = refined.collect();
     let (view_a, view_b) = (MapView::rigid(a, &walls_a), MapView::rigid(b, &walls_b));
     let proposed: Vec<&Alignment> = alignments.iter().collect();
-    let verdict = judge(&view_a, &view_b, &proposed, &UserKnowledge::default(), &verifier);
+    let verdict = judge(&view_a, &view_b, &proposed, &UserKnowledge::default(), &verifier).map(|verdict| {
+        if !verdict.rests_on_walls_alone() {
+            return verdict;
+        }
+        let [similar_a, similar_b] = [&view_a, &view_b].map(|view| SelfSimilarity::new(view, &verifier));
+        let alias = Alias::of(&verdict, (&view_a, &similar_a), (&view_b, &similar_b), None, &verifier);
+        verdict.against(alias.as_ref(), verifier.accept)
+    });
     let hypotheses = alignments.iter().zip(&found.hypotheses).map(|(alignment, guess)| {
         let transform_a_b = alignment.transform_a_b();
         let may_bend = with_bends && alignment.accepted;
