@@ -15,15 +15,16 @@ pub(super) struct SelfSimilarities(BTreeMap<String, Searched>);
 
 #[derive(Debug)]
 struct Searched {
-    /// The number of the robot's map, and of its known cells.
+    /// The number of the map among those of its robot.
     number: u64,
+    /// How many of its cells are known.
     known_cells: usize,
     found: SelfSimilarity,
 }
 
 impl SelfSimilarities {
-    /// The likeliest alias of a place that was accepted by the walls of two maps, of which each comes with its number among those of its
-    /// robot, and is searched if that is due.
+    /// The likeliest alias of a place that was accepted by the walls of two maps, which are searched if that is due. Each map comes with
+    /// its number among those of its robot.
     pub(super) fn alias(
         &mut self,
         verdict: &Verdict<'_>,
@@ -53,5 +54,27 @@ impl SelfSimilarities {
     /// Forgets what was found in a map that was not the last of its robot, of which `last` gives the number. The robots whose it was.
     pub(super) fn forget_former(&mut self, last: impl Fn(&str) -> Option<u64>) -> Vec<String> {
         self.0.extract_if(.., |robot, searched| last(robot) != Some(searched.number)).map(|(robot, _)| robot).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_world::floor_plan::{FloorPlan, drawing, seen};
+
+    #[test]
+    fn a_map_is_searched_again_once_much_of_it_is_new_and_at_the_end() {
+        let up_to = |x: f64| FloorPlan::hall().draw(seen(-0.2, -0.2, x, 12.2), drawing(3.0, 2.0, 0.4));
+        let parameters = MergeVerifierParameters::default();
+        let mut kept = SelfSimilarities::default();
+        for (number, map, searched) in
+            [(0, up_to(10.0), 0), (1, up_to(11.0), 0), (2, up_to(14.0), 2), (3, up_to(15.0), 2)]
+        {
+            kept.search("robot1", (number, &map.view()), &parameters);
+            assert_eq!(kept.0["robot1"].number, searched, "map {number}");
+        }
+        assert_eq!(kept.forget_former(|_| Some(2)), Vec::<String>::new());
+        assert_eq!(kept.forget_former(|robot| (robot == "robot1").then_some(3)), ["robot1"]);
+        assert!(kept.0.is_empty());
     }
 }

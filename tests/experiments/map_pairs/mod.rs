@@ -91,6 +91,11 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
     if args.folders.is_empty() && args.worlds == 0 {
         bail!("name a folder of maps, or a number of worlds (--worlds)");
     }
+    if args.simulated > 0 && args.worlds < 2 {
+        bail!(
+            "pairs of different simulated buildings (--simulated) are made of simulated worlds (--worlds), two at the least"
+        );
+    }
     let mut trials = Vec::new();
     if !args.only_unrelated {
         for folder in &args.folders {
