@@ -200,6 +200,17 @@ fn of_two_places_that_are_alike_the_one_that_the_search_prefers_is_a_little_more
 }
 
 #[test]
+fn a_place_that_another_outdoes_is_not_probable_whatever_its_contradictions_are() {
+    let with = |elsewhere: Agreement| {
+        let grounds = Grounds { agreement: agreement(110.0, 0.85), ..grounds(Origin::Search { lead: 8.0 }) };
+        Odds::new(&Grounds { rival: rival(elsewhere), ..grounds }).probability()
+    };
+    // What contradicts there crosses rooms.
+    let crossed = |evidence: f64| Agreement { wall_across: 5.0, walls_either_way: 1, ..agreement(evidence, 0.9) };
+    assert!(with(crossed(100.0)) > 0.99 && with(crossed(120.0)) <= 0.5);
+}
+
+#[test]
 fn points_that_meet_speak_for_a_place_less_what_a_bend_costs() {
     let with = |evidence: f64, bend_cost: Option<f64>| {
         let mut grounds = Grounds { bend_cost, ..grounds(Origin::Search { lead: 1.0 }) };
