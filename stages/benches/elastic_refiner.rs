@@ -10,7 +10,7 @@ mod building;
 use building::draw_bent;
 use gridweave_stages::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
 use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, pose};
-use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
+use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
 use std::time::Instant;
 

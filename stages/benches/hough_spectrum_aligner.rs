@@ -10,7 +10,7 @@ mod building;
 use building::draw;
 use gridweave_stages::geometry::Grid;
 use gridweave_stages::hough_spectrum_aligner::{HoughSpectrum, HoughSpectrumParameters, WallCells, align_spectra};
-use gridweave_stages::map_aligner::NamedMap;
+use gridweave_stages::registration::search::NamedMap;
 use std::hint::black_box;
 use std::time::Instant;
 

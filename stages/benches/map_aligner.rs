@@ -9,7 +9,7 @@ mod building;
 
 use building::draw;
 use gridweave_stages::geometry::Grid;
-use gridweave_stages::map_aligner::{MapAlignerParameters, NamedMap, align_maps};
+use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use std::time::Instant;
 
 const RUNS: usize = 7;

@@ -4,7 +4,7 @@ use super::rotation::{Rotation, rotations};
 use super::translation::{Shift, project, shifts};
 use super::{HoughSpectrum, HoughSpectrumParameters, WallCells};
 use crate::geometry::{Pose2, quarter_turn};
-use crate::map_aligner::{NamedMap, SearchRefusal};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::pair_aligner::{Hypothesis, known_area};
 use nalgebra::{Isometry2, Matrix3, UnitComplex, Vector2, Vector3};
 use rayon::prelude::*;

@@ -36,7 +36,7 @@ pub use spectrum::HoughSpectrum;
 pub use translation::{Projection, Shift, project, shifts};
 pub use wall_cells::WallCells;
 
-use crate::map_aligner::{NamedMap, SearchRefusal};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
 use gridweave_runtime::stage::StageKind;
 

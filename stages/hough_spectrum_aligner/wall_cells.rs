@@ -1,7 +1,7 @@
 //! The occupied cells of a map as points.
 
 use crate::geometry::{Cell, Grid, Point2};
-use crate::map_aligner::{NamedMap, SearchRefusal};
+use crate::registration::search::{NamedMap, SearchRefusal};
 
 /// The centres of the occupied cells of a map.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,29 +1,11 @@
-//! Refines the alignment of two maps by ICP on their walls (Tsardoulias et al., section 4.3).
-//!
-//! [`register`] moves map b until its walls lie on those of map a, where they lie near each other; [`IcpRefusal`] says why
-//! the outcome may not be used. [`refine`] does both. Whether the maps agree there is for `merge_verifier` to say.
+//! Refines hypotheses by ICP: the stage round [`registration::icp`](crate::registration::icp).
 
-mod first_guess;
-mod iteration;
-mod normal_equations;
-mod parameters;
-mod refine;
-mod refusal;
-mod registration;
 mod stage;
 
 #[cfg(test)]
 mod stage_tests;
-#[cfg(test)]
-mod tests;
 
-pub use first_guess::FirstGuess;
-pub use parameters::{IcpParameters, Metric, Weighting};
-pub use refine::{Refinement, refine};
-pub use refusal::IcpRefusal;
-pub(crate) use registration::approach;
-pub use registration::{Registration, register};
-
+use crate::registration::icp::IcpParameters;
 use gridweave_runtime::stage::StageKind;
 use stage::IcpRefiner;
 

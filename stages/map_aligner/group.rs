@@ -1,6 +1,6 @@
 //! Robots whose maps are laid together.
 
-use super::{PreparedMap, Raster};
+use crate::registration::search::{PreparedMap, Raster};
 use crate::geometry::Pose2;
 use std::cell::OnceCell;
 use std::cmp::Reverse;

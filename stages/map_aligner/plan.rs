@@ -1,15 +1,13 @@
 //! Which maps of many robots are searched, so that not every pair of them must be.
 
 use super::group::{Group, Groups};
-use super::peaks::{is_near, overlay};
-use super::prepared_map::JUDGED;
 use super::statement::{Statement, with_reasons};
-use super::{
-    CommonWalls, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,
-    align_prepared,
+use crate::registration::search::{
+    CommonWalls, JUDGED, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,
+    align_prepared, is_near, overlay,
 };
 use crate::geometry::{Grid, Pose2};
-use crate::place_window::PlaceWindow;
+use crate::registration::place_window::PlaceWindow;
 use crate::robot_pair::RobotPair;
 use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,6 +1,7 @@
 //! The stage: keeps each robot's last map, and sends what a plan of searches tells of pairs of robots.
 
-use super::{MapAlignerParameters, MergePlan, Statement};
+use super::{MergePlan, Statement};
+use crate::registration::search::MapAlignerParameters;
 use crate::geometry::row_by_row;
 use crate::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};

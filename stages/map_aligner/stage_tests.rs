@@ -1,6 +1,6 @@
 //! The stage from outside: messages in, messages out.
 
-use super::tests::angular_office;
+use crate::registration::search::tests::angular_office;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
 use gridweave_runtime::ros::OccupancyGrid;

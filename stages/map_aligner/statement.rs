@@ -1,6 +1,6 @@
 //! What is told of a pair of robots.
 
-use super::{MapAlignment, MapAlignments};
+use crate::registration::search::{MapAlignment, MapAlignments};
 use crate::robot_pair::RobotPair;
 
 /// What is to be told of a pair of robots.

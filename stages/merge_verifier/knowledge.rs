@@ -1,8 +1,8 @@
 //! What the user knows of robots, as it concerns the judgement on a pair.
 
-use super::{MergeVerifierParameters, UserKnowledge};
+use crate::registration::judgement::{JudgementParameters, UserKnowledge};
 use crate::geometry::row_by_row;
-use crate::place_window::PlaceWindow;
+use crate::registration::place_window::PlaceWindow;
 use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Header};
 use gridweave_runtime::stage::{Context, InitialPoses};
@@ -23,7 +23,7 @@ pub(super) struct Knowledge {
 }
 
 impl Knowledge {
-    pub(super) fn new(parameters: &MergeVerifierParameters, context: &Context) -> Self {
+    pub(super) fn new(parameters: &JudgementParameters, context: &Context) -> Self {
         Self {
             initial_poses: context.initial_poses.clone(),
             reference: context.reference.clone(),

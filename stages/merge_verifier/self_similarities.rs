@@ -1,9 +1,10 @@
 //! What is kept of where the maps of robots look like themselves, so that not every map is searched for it.
 
-use super::{Alias, MapView, MergeVerifierParameters, SelfSimilarity, Verdict};
+use crate::registration::comparison::MapView;
+use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
+use crate::robot_pair::RobotPair;
 use crate::geometry::is_known;
-use crate::place_window::PlaceWindow;
-use gridweave_runtime::ros::Alignment;
+use crate::registration::place_window::PlaceWindow;
 use std::collections::BTreeMap;
 
 /// What was found in a map holds for others of the robot until as large a share of its known area is new, or is gone.
@@ -27,20 +28,20 @@ impl SelfSimilarities {
     /// its number among those of its robot.
     pub(super) fn alias(
         &mut self,
-        verdict: &Verdict<'_>,
+        verdict: &Verdict,
+        pair: &RobotPair,
         (a, b): ((u64, &MapView<'_>), (u64, &MapView<'_>)),
         window: Option<&PlaceWindow>,
-        parameters: &MergeVerifierParameters,
+        parameters: &JudgementParameters,
     ) -> Option<Alias> {
-        let Alignment { a: robot_a, b: robot_b, .. } = verdict.candidate.alignment;
-        self.search(robot_a, a, parameters);
-        self.search(robot_b, b, parameters);
-        let (of_a, of_b) = (self.0.get(robot_a)?, self.0.get(robot_b)?);
-        Alias::of(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters)
+        self.search(&pair.a, a, parameters);
+        self.search(&pair.b, b, parameters);
+        let (of_a, of_b) = (self.0.get(&pair.a)?, self.0.get(&pair.b)?);
+        Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters)
     }
 
     /// Searches a map of a robot if nothing that is known of others of it holds.
-    fn search(&mut self, robot: &str, (number, map): (u64, &MapView<'_>), parameters: &MergeVerifierParameters) {
+    fn search(&mut self, robot: &str, (number, map): (u64, &MapView<'_>), parameters: &JudgementParameters) {
         let known_cells = map.grid.cells.iter().filter(|value| is_known(**value)).count();
         let holds = |searched: &Searched| {
             searched.known_cells.abs_diff(known_cells) as f64 <= LITTLE_CHANGE * searched.known_cells as f64
@@ -65,7 +66,7 @@ mod tests {
     #[test]
     fn a_map_is_searched_again_once_much_of_it_is_new_and_at_the_end() {
         let up_to = |x: f64| FloorPlan::hall().draw(seen(-0.2, -0.2, x, 12.2), drawing(3.0, 2.0, 0.4));
-        let parameters = MergeVerifierParameters::default();
+        let parameters = JudgementParameters::default();
         let mut kept = SelfSimilarities::default();
         for (number, map, searched) in
             [(0, up_to(10.0), 0), (1, up_to(11.0), 0), (2, up_to(14.0), 2), (3, up_to(15.0), 2)]

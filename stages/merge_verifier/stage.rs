@@ -2,7 +2,10 @@
 
 use super::knowledge::{Knowledge, by_initial_poses};
 use super::self_similarities::SelfSimilarities;
-use super::{Agreement, BentPlace, MapView, MergeVerifierParameters, Verdict, judge};
+use super::place_searches::PlaceSearches;
+use crate::registration::Hypothesis;
+use crate::registration::comparison::{Agreement, Deformed, MapView};
+use crate::registration::judgement::{JudgementParameters, Verdict, judge};
 use crate::geometry::row_by_row;
 use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::robot_maps::{RobotMap, RobotMaps};
@@ -38,11 +41,13 @@ impl Outputs for Judgements {
 pub(super) struct MergeVerifier {
     /// The stage's name, as the user may set its parameters.
     name: String,
-    parameters: MergeVerifierParameters,
+    parameters: JudgementParameters,
     knowledge: Knowledge,
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
+    /// Where else the maps fit, of pairs for which nobody else has looked.
+    place_searches: PlaceSearches,
     /// Where maps that were accepted by their walls alone look like themselves.
     self_similarities: SelfSimilarities,
     sent: BTreeMap<RobotPair, Alignment>,
@@ -51,7 +56,7 @@ pub(super) struct MergeVerifier {
 }
 
 impl MergeVerifier {
-    pub(super) fn new(parameters: MergeVerifierParameters, context: &Context) -> Self {
+    pub(super) fn new(parameters: JudgementParameters, context: &Context) -> Self {
         Self {
             name: context.stage.clone(),
             knowledge: Knowledge::new(&parameters, context),
@@ -59,6 +64,7 @@ impl MergeVerifier {
             maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
+            place_searches: PlaceSearches::default(),
             self_similarities: SelfSimilarities::default(),
             sent: BTreeMap::new(),
             evidence: BTreeMap::new(),
@@ -134,19 +140,26 @@ impl MergeVerifier {
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let verdict = maps.and_then(|(a, b)| judge(&view(a), &view(b), &proposed, &known, &self.parameters));
-        let verdict = verdict.zip(maps).map(|(verdict, (a, b))| {
-            if !verdict.rests_on_walls_alone() {
-                return verdict;
+        let verdict = maps.and_then(|(a, b)| {
+            let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
+            if PlaceSearches::is_due(&hypotheses) {
+                let grids = ((a.number, a.grid()), (b.number, b.grid()));
+                hypotheses.extend_from_slice(self.place_searches.of(pair, grids, &known));
             }
-            let maps = ((a.number, &view(a)), (b.number, &view(b)));
-            let alias = self.self_similarities.alias(&verdict, maps, known.window.as_ref(), &self.parameters);
-            verdict.against(alias.as_ref(), self.parameters.accept)
+            let (view_a, view_b) = (view(a), view(b));
+            let verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+            if !verdict.rests_on_maps_alone() {
+                return Some(verdict);
+            }
+            let maps = ((a.number, &view_a), (b.number, &view_b));
+            let alias = self.self_similarities.alias(&verdict, pair, maps, known.window.as_ref(), &self.parameters);
+            Some(verdict.against(alias.as_ref(), &self.parameters))
         });
+        let judged_of: Vec<&Alignment> = proposed.iter().copied().filter(|one| Hypothesis::of(one).is_some()).collect();
         let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
         let (evidence, alignment) = (
             evidence(verdict, pair, proposed.len()),
-            judged(verdict, &proposed, verdict.reason(self.parameters.accept, &self.name)),
+            judged(verdict, &judged_of, &proposed, verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b)),
         );
         if self.evidence.get(pair) != Some(&evidence) {
             let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
@@ -186,28 +199,30 @@ fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
 }
 
 /// What a judgement on a pair goes by, of so many hypotheses, without a header.
-fn evidence(verdict: &Verdict<'_>, pair: &RobotPair, hypotheses: usize) -> Evidence {
-    let Agreement { overlap, wall_on_wall, wall_on_free, .. } = verdict.candidate.agreement;
+fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
+    let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
+    let elsewhere = verdict.rival.as_ref().map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
     Evidence {
         header: Header::default(),
         a: pair.a.clone(),
         b: pair.b.clone(),
         hypotheses: hypotheses as u32,
         overlap,
-        wall_on_wall,
-        wall_on_free,
-        evidence_elsewhere: verdict.evidence_elsewhere,
+        wall_on_wall: inlier_length,
+        wall_on_free: conflict_length,
+        evidence_elsewhere: (elsewhere / evidence.max(1.0)).min(2.0),
     }
 }
 
-/// The outcome for a pair of which a place was proposed.
-fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Alignment {
+/// The outcome for a pair of which a place was proposed: `judged_of` are the alignments that were judged, in the order of the hypotheses.
+fn judged(verdict: &Verdict, judged_of: &[&Alignment], proposed: &[&Alignment], reason: String) -> Alignment {
     let accepted = verdict.refusal.is_none();
-    let mut alignment = verdict.candidate.alignment.clone();
-    if let Some(BentPlace { transform_a_b, .. }) = &verdict.candidate.bent {
+    let source = &verdict.candidate.hypothesis.source;
+    let mut alignment = judged_of.get(verdict.candidate.number).map_or_else(Alignment::default, |one| (*one).clone());
+    if let Some(Deformed { transform_a_b, .. }) = &verdict.candidate.deformed {
         alignment.set_transform_a_b(transform_a_b);
     }
-    if let Some(covariance) = &verdict.candidate.left_by_bend {
+    if let Some(covariance) = &verdict.candidate.left_by_deformation {
         alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
     }
     Alignment {
@@ -215,12 +230,8 @@ fn judged(verdict: &Verdict<'_>, proposed: &[&Alignment], reason: String) -> Ali
         provisional: false,
         rank: 0,
         hypotheses: 0,
-        score: verdict.score,
-        reason: if accepted {
-            reason
-        } else {
-            with_other_sources(reason, &verdict.candidate.alignment.source, proposed)
-        },
+        score: verdict.probability,
+        reason: if accepted { reason } else { with_other_sources(reason, source, proposed) },
         ..alignment
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Criterion, Hypothesis};
 use crate::geometry::{Grid, row_by_row};
-use crate::map_aligner::{NamedMap, SearchRefusal};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};

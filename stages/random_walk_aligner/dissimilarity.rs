@@ -2,7 +2,7 @@
 
 use super::DistanceMap;
 use crate::geometry::{Point2, Pose2};
-use crate::map_aligner::{Content, Raster};
+use crate::registration::search::{Content, Raster};
 
 /// The classes of cells that are compared.
 const CLASSES: [Content; 2] = [Content::Free, Content::Wall];

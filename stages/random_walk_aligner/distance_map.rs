@@ -1,6 +1,6 @@
 //! How far it is from every cell to the nearest one of a class.
 
-use crate::map_aligner::{Content, Raster};
+use crate::registration::search::{Content, Raster};
 use nalgebra::Vector2;
 
 /// The Manhattan distance, in cells, from every cell of a raster to the nearest one of a class: Carpin, Birk and Jucikas 2005,

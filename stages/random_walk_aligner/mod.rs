@@ -30,7 +30,7 @@ pub use distance_map::DistanceMap;
 pub use parameters::RandomWalkParameters;
 pub use walk::{WalkEnd, walk};
 
-use crate::map_aligner::{NamedMap, SearchRefusal};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
 use gridweave_runtime::stage::StageKind;
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geometry::{Grid, GridGeometry, pose};
-use crate::map_aligner::Raster;
+use crate::registration::search::Raster;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::test_world::stage_bench::StageBench;
 use gridweave_runtime::stage::{Context, LoneStage};

@@ -2,7 +2,7 @@
 
 use super::{DrawnMap, ScanBeams, ScanMapperParameters};
 use crate::geometry::{Grid, Point2, Pose2};
-use crate::icp_refiner::{FirstGuess, IcpParameters, refine};
+use crate::registration::icp::{FirstGuess, IcpParameters, refine};
 use crate::scan_grid::SnapshotMap;
 use crate::walls::WallMap;
 use nalgebra::{Matrix3, Vector3};

@@ -10,11 +10,14 @@ const SAMPLE_SPACING: f64 = 0.2;
 /// Side of a bucket of wall points, metres: near the last search radius of a registration, so that nine buckets hold the
 /// answer.
 const BUCKET_SIDE: f64 = 0.2;
+/// As many cells in a row may be unknown between a wall and the space before it: RTAB-Map leaves one or two, and so does the
+/// fringe of a wall whose grey values are neither free nor occupied.
+const MOST_UNKNOWN: isize = 2;
 
 /// A map's walls as points with normals, and samples of its known space.
 #[derive(Clone, Debug)]
 pub struct WallMap {
-    /// The walls: one point for each occupied cell that borders known space, moved onto the line through its
+    /// The walls: one point for each occupied cell that faces known space, moved onto the line through its
     /// neighbours.
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
@@ -41,7 +44,7 @@ impl WallMap {
     /// from less than the cells two away.
     pub fn new(grid: &Grid<'_>, normal_radius: f64) -> Self {
         let resolution = grid.geometry.resolution;
-        let cells: Vec<Cell> = grid.occupied().filter(|cell| borders_known_space(grid, *cell)).collect();
+        let cells: Vec<Cell> = grid.occupied().filter(|cell| faces_known_space(grid, *cell)).collect();
         let rows = CellRows::new(&cells, grid.geometry.height);
         let window = Window::new(normal_radius / resolution);
         let fits: Vec<LineFit> = cells.iter().map(|cell| window.fit(&rows, *cell)).collect();
@@ -63,12 +66,18 @@ impl WallMap {
     }
 }
 
-/// Whether a cell lies beside one that is known and holds no obstacle. The inside of a thick wall, and its far side
-/// that nobody has seen, say nothing about where the wall's face is.
-fn borders_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
-    let rows = cell.row.saturating_sub(1)..=cell.row + 1;
-    rows.flat_map(|row| (cell.column.saturating_sub(1)..=cell.column + 1).map(move |column| Cell { column, row }))
-        .any(|cell| matches!(grid.value(cell), value if is_known(value) && !is_occupied(value)))
+/// Whether a cell faces known space that holds no obstacle. The inside of a thick wall, and its far side that nobody has seen,
+/// say nothing about where the wall's face is. Some mappers leave cells unknown before a wall; across these it faces space, too.
+fn faces_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
+    let directions = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (x, y))).filter(|direction| *direction != (0, 0));
+    let mut directions = directions.map(|(x, y): (isize, isize)| {
+        let ahead = |step: isize| {
+            let column = cell.column.checked_add_signed(step * x)?;
+            Some(grid.value(Cell { column, row: cell.row.checked_add_signed(step * y)? }))
+        };
+        (1..=MOST_UNKNOWN + 1).map_while(ahead).find(|value| is_known(*value))
+    });
+    directions.any(|met| met.is_some_and(|value| !is_occupied(value)))
 }
 
 /// Known cells at about [`SAMPLE_SPACING`], and the area that one stands for.
@@ -137,6 +146,19 @@ mod tests {
         for point in map.walls.points() {
             assert!(((transform * point).x / 0.05 - 20.5).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn unknown_cells_before_a_wall_do_not_hide_its_face() {
+        let map = map_of(|x, _| match x {
+            x if x < 20.0 => 0,
+            x if x < 22.0 => UNKNOWN,
+            x if x < 25.0 => 100,
+            _ => UNKNOWN,
+        });
+        assert_eq!(map.walls.points().len(), SIDE);
+        let transform = pose(1.0, 2.0, 0.3).inverse();
+        assert!(map.walls.points().iter().all(|point| ((transform * point).x / 0.05 - 22.5).abs() < 1e-9));
     }
 
     #[test]

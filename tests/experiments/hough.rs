@@ -8,7 +8,7 @@ use clap::Args;
 use gridweave::table::Table;
 use gridweave_stages::geometry::{Grid, GridGeometry};
 use gridweave_stages::hough_spectrum_aligner::{HoughSpectrum, WallCells, correlate_spectra, rotations};
-use gridweave_stages::map_aligner::NamedMap;
+use gridweave_stages::registration::search::NamedMap;
 use std::path::PathBuf;
 
 /// Directions of half a turn: half a degree apart.

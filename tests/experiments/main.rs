@@ -13,6 +13,7 @@ mod direction;
 mod edges;
 mod few_tags;
 mod hough;
+mod judgement;
 mod localization;
 mod log;
 mod map_pairs;
@@ -54,6 +55,8 @@ enum Experiment {
     Align(align::AlignArgs),
     /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
     MapPairs(map_pairs::MapPairsArgs),
+    /// Fits the weights of the judgement to pairs of maps, cross-validated by place, and writes them.
+    FitJudgement(judgement::FitJudgementArgs),
     /// The energy of the Radon transform over the angle, of the maps of a log (Saeedi et al., "Group mapping").
     Radon(radon::RadonArgs),
     /// The Hough spectra of the maps of a log (Carpin, "Fast and accurate map merging").
@@ -75,6 +78,7 @@ fn main() -> Result<()> {
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::Align(args) => align::run(args, &registry, &mut results),
         Experiment::MapPairs(args) => map_pairs::run(args, &registry, &mut results),
+        Experiment::FitJudgement(args) => judgement::run(args, &registry, &mut results),
         Experiment::Radon(args) => radon::run(args, &mut results),
         Experiment::Hough(args) => hough::run(args, &mut results),
         Experiment::Edges(args) => edges::run(args, &mut results),

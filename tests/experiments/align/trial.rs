@@ -9,6 +9,7 @@ use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
+use crate::map_pairs::truth::{Closeness, NEAR, NEAR_DEGREES};
 use gridweave_stages::geometry::{Pose2, pose};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;
@@ -125,12 +126,33 @@ fn is_place_right(evaluation: &Evaluation) -> bool {
 
 impl PairWorld {
     /// Whether robot b lies rightly to robot a at `T_a_b`, by the world's truth.
-    pub(crate) fn is_right(&self, [a, b]: [&str; 2], transform_a_b: &Pose2) -> Result<bool> {
+    pub(crate) fn is_right(&self, robots: [&str; 2], transform_a_b: &Pose2) -> Result<bool> {
+        Ok(is_place_right(&self.evaluation(robots, transform_a_b)?))
+    }
+
+    /// How near robot b lies to its place by robot a at `T_a_b`, by the world's truth.
+    pub(crate) fn closeness(&self, robots: [&str; 2], transform_a_b: &Pose2) -> Result<Closeness> {
+        let evaluation = self.evaluation(robots, transform_a_b)?;
+        let is_near = match &evaluation.common {
+            Some(common) => common.rigid.median_m < NEAR,
+            None => evaluation.robots.first().is_some_and(|robot| {
+                robot.error_m.is_some_and(|metres| metres < NEAR)
+                    && robot.error_deg.is_some_and(|degrees| degrees < NEAR_DEGREES)
+            }),
+        };
+        Ok(match is_place_right(&evaluation) {
+            true => Closeness::Right,
+            false if evaluation.related && is_near => Closeness::Near,
+            false => Closeness::Wrong,
+        })
+    }
+
+    fn evaluation(&self, [a, b]: [&str; 2], transform_a_b: &Pose2) -> Result<Evaluation> {
         let (x, y, yaw) = (transform_a_b.translation.x, transform_a_b.translation.y, transform_a_b.rotation.angle());
         let placed = Frame { x, y, yaw, ..Default::default() };
         let frames = BTreeMap::from([(a.to_owned(), Frame::default()), (b.to_owned(), placed)]);
         let placed = Summary { reference: Some(a.to_owned()), frames, ..Default::default() };
-        Ok(is_place_right(&evaluate_summary(&placed, &self.world.truth)?))
+        evaluate_summary(&placed, &self.world.truth)
     }
 }
 

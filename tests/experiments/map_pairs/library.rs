@@ -3,6 +3,7 @@
 use crate::align::kinds::Kind;
 use crate::align::worlds::{self, PairWorld, Seeds};
 use crate::log::last_maps;
+use crate::map_pairs::truth::Closeness;
 use anyhow::{Context, Result};
 use gridweave_logs::map_file::{GridMap, load};
 use gridweave_runtime::ros::Time;
@@ -11,6 +12,7 @@ use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, p
 use nalgebra::Point2;
 use rand::{Rng, RngExt};
 use rayon::prelude::*;
+use serde::Deserialize;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -21,9 +23,11 @@ const MOST_WIDER: f64 = 1.3;
 
 /// A map, and which building it is of.
 #[derive(Clone, Debug)]
-pub(super) struct MapOfBuilding {
-    pub(super) building: String,
-    pub(super) name: String,
+pub(crate) struct MapOfBuilding {
+    pub(crate) building: String,
+    /// What it may be one building with; none if it surely is none.
+    doubt: Option<String>,
+    pub(crate) name: String,
     geometry: GridGeometry,
     cells: Vec<i8>,
 }
@@ -31,27 +35,32 @@ pub(super) struct MapOfBuilding {
 impl MapOfBuilding {
     fn new(name: String, map: GridMap) -> Self {
         let building = name.split(['_', '-']).next().unwrap_or(&name).to_owned();
-        Self { building, name, geometry: GridGeometry::from(&map.info), cells: map.cells }
+        Self { building, doubt: None, name, geometry: GridGeometry::from(&map.info), cells: map.cells }
+    }
+
+    /// Whether another map is surely of another building.
+    pub(crate) fn is_of_another_building(&self, other: &Self) -> bool {
+        self.building != other.building && (self.doubt.is_none() || self.doubt != other.doubt)
     }
 
     /// The map in a file.
-    pub(super) fn of_file(yaml: &Path) -> Result<Self> {
+    pub(crate) fn of_file(yaml: &Path) -> Result<Self> {
         let map = load(yaml).with_context(|| format!("cannot read {}", yaml.display()))?;
         Ok(Self::new(yaml.file_stem().unwrap_or_default().to_string_lossy().into_owned(), map))
     }
 
     /// Its cells.
-    pub(super) fn grid(&self) -> Result<Grid<'_>> {
+    pub(crate) fn grid(&self) -> Result<Grid<'_>> {
         Grid::new(self.geometry, &self.cells).with_context(|| format!("the map {} cannot be used", self.name))
     }
 
     /// It as it is written to a file.
-    pub(super) fn to_file(&self) -> GridMap {
+    pub(crate) fn to_file(&self) -> GridMap {
         GridMap { info: self.geometry.meta_data(Time::default()), cells: self.cells.clone() }
     }
 
     /// A part of it, turned, in other cells.
-    pub(super) fn part(&self, random: &mut impl Rng) -> Self {
+    pub(crate) fn part(&self, random: &mut impl Rng) -> Self {
         let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
         let (width, height) = (self.geometry.width, self.geometry.height);
         let known = (0..self.cells.len()).filter(|index| is_known(self.cells[*index]));
@@ -85,8 +94,28 @@ impl MapOfBuilding {
     }
 }
 
+/// What the `index.json` of a collection says of a map.
+#[derive(Debug, Deserialize)]
+struct Indexed {
+    name: String,
+    place: String,
+    doubt: Option<String>,
+}
+
+/// The maps of a collection: those that its `index.json` names, in the folder `maps`.
+fn of_collection(folder: &Path, index: &Path) -> Result<Vec<MapOfBuilding>> {
+    let text = std::fs::read(index).with_context(|| format!("cannot read {}", index.display()))?;
+    let indexed: Vec<Indexed> =
+        serde_json::from_slice(&text).with_context(|| format!("cannot read {}", index.display()))?;
+    let map = |Indexed { name, place, doubt }: Indexed| {
+        let map = MapOfBuilding::of_file(&folder.join("maps").join(format!("{name}.yaml")))?;
+        Ok(MapOfBuilding { building: place, doubt, ..map })
+    };
+    indexed.into_iter().map(map).collect()
+}
+
 /// The files of a folder, by name.
-pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
     files.sort();
@@ -94,21 +123,27 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// The last map of each robot of a log.
-pub(super) fn maps_of_log(log: &Path) -> Result<Vec<MapOfBuilding>> {
+pub(crate) fn maps_of_log(log: &Path) -> Result<Vec<MapOfBuilding>> {
     let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let last = last_maps(log)?.into_iter();
     Ok(last.map(|(topic, map)| MapOfBuilding::new(format!("{name}{topic}"), map)).collect())
 }
 
 /// Maps of many buildings.
-pub(super) struct Library {
-    pub(super) maps: Vec<MapOfBuilding>,
+pub(crate) struct Library {
+    pub(crate) maps: Vec<MapOfBuilding>,
 }
 
 impl Library {
     /// The map files of folders, and the last maps of their logs.
-    pub(super) fn of_folders(folders: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn of_folders(folders: &[PathBuf]) -> Result<Self> {
         let mut maps = Vec::new();
+        for folder in folders {
+            let index = folder.join("index.json");
+            if index.exists() {
+                maps.extend(of_collection(folder, &index)?);
+            }
+        }
         for file in folders.iter().map(|folder| files(folder)).collect::<Result<Vec<_>>>()?.into_iter().flatten() {
             match file.extension().and_then(|extension| extension.to_str()) {
                 Some("yaml") => maps.push(MapOfBuilding::of_file(&file)?),
@@ -120,29 +155,29 @@ impl Library {
     }
 
     /// The maps of simulated worlds, each of which is a building of its own.
-    pub(super) fn of_worlds(pairs: Vec<SimulatedPair>) -> Self {
+    pub(crate) fn of_worlds(pairs: Vec<SimulatedPair>) -> Self {
         Self { maps: pairs.into_iter().flat_map(|pair| pair.maps).collect() }
     }
 
     /// Whether there are maps of two buildings.
-    pub(super) fn has_two_buildings(&self) -> bool {
-        self.maps.iter().any(|map| map.building != self.maps[0].building)
+    pub(crate) fn has_two_buildings(&self) -> bool {
+        self.maps.iter().any(|map| map.is_of_another_building(&self.maps[0]))
     }
 
     /// Any two maps of different buildings, of which there are two.
-    pub(super) fn two_buildings(&self, random: &mut impl Rng) -> [&MapOfBuilding; 2] {
+    pub(crate) fn two_buildings(&self, random: &mut impl Rng) -> [&MapOfBuilding; 2] {
         let first = &self.maps[random.random_range(0..self.maps.len())];
-        let others: Vec<&MapOfBuilding> = self.maps.iter().filter(|map| map.building != first.building).collect();
+        let others: Vec<&MapOfBuilding> = self.maps.iter().filter(|map| map.is_of_another_building(first)).collect();
         [first, others[random.random_range(0..others.len())]]
     }
 }
 
 /// The last maps of the two robots of a simulated world.
-pub(super) struct SimulatedPair {
+pub(crate) struct SimulatedPair {
     /// The number of the world among those of its seeds.
-    pub(super) number: u64,
-    pub(super) world: PairWorld,
-    pub(super) maps: [MapOfBuilding; 2],
+    pub(crate) number: u64,
+    pub(crate) world: PairWorld,
+    pub(crate) maps: [MapOfBuilding; 2],
 }
 
 impl SimulatedPair {
@@ -154,18 +189,23 @@ impl SimulatedPair {
     }
 
     /// The kind of building.
-    pub(super) fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         self.world.kind.map_or("", Kind::name)
     }
 
+    /// How near `T_a_b` is to the truth.
+    pub(crate) fn closeness(&self, transform_a_b: &Pose2) -> Closeness {
+        self.world.closeness(worlds::ROBOTS, transform_a_b).unwrap_or(Closeness::Wrong)
+    }
+
     /// Whether `T_a_b` lays what both robots have seen on each other.
-    pub(super) fn is_right(&self, transform_a_b: &Pose2) -> bool {
+    pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
         self.world.is_right(worlds::ROBOTS, transform_a_b).unwrap_or(false)
     }
 }
 
 /// The robots of so many simulated worlds, of one kind if that is named. Worlds in which robots find no way are left out.
-pub(super) fn simulated_pairs(count: u64, kind: Option<&str>, seeds: Seeds, registry: &Registry) -> Vec<SimulatedPair> {
+pub(crate) fn simulated_pairs(count: u64, kind: Option<&str>, seeds: Seeds, registry: &Registry) -> Vec<SimulatedPair> {
     let is_wanted = |number: &u64| kind.is_none_or(|kind| Kind::of(*number).name() == kind);
     // A kind that there is not makes no worlds, and must not be looked for without end.
     let kinds = Kind::ALL.len() as u64;

@@ -6,9 +6,9 @@
 //!
 //! No log is written, so that thousands of pairs are done in an hour.
 
-mod judging;
-mod library;
-mod truth;
+pub(crate) mod judging;
+pub(crate) mod library;
+pub(crate) mod truth;
 
 use super::align::worlds::Seeds;
 use super::results::Results;
@@ -54,10 +54,6 @@ pub(super) struct MapPairsArgs {
     /// Write the maps that are merged wrongly as map files (`wrong_NAME_a.yaml`, `_b.yaml`), to look at.
     #[arg(long)]
     keep_wrong: bool,
-    /// Compare the maps at every hypothesis as they are bent, too, which takes longer, and write all of them to
-    /// `map_pairs_hypotheses.csv`.
-    #[arg(long)]
-    hypotheses: bool,
 }
 
 /// What came out of a pair.
@@ -69,8 +65,6 @@ struct Trial {
     /// Whether the maps have nothing in common.
     is_unrelated: bool,
     judged: Judged,
-    /// Whether each hypothesis is right.
-    right: Vec<bool>,
     /// The maps, if they were merged wrongly and are to be kept, and what they are called in the names of their files.
     wrong_maps: Option<(String, [MapOfBuilding; 2])>,
 }
@@ -122,26 +116,27 @@ fn with_truth(folder: &std::path::Path, args: &MapPairsArgs) -> Result<Vec<Trial
     let set = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let trial = |pair: &truth::Pair| {
         let [a, b] = &pair.maps;
-        let judged = judging::judge_maps(a, b, args.hypotheses);
+        let judged = judging::judge_maps(a, b);
         let is_right = judged.place().is_some_and(|place| pair.is_right(place));
         let is_kept = args.keep_wrong && judged.is_merged() && !is_right;
         Trial {
-            set: set.clone(),
+            set: pair.quality.as_ref().map_or_else(|| set.clone(), |quality| format!("{set}, {quality}")),
             pair: pair.name.clone(),
             is_right,
             is_unrelated: pair.is_unrelated(),
             wrong_maps: is_kept.then(|| (pair.name.clone(), pair.maps.clone())),
-            right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
-            judged,
+                judged,
         }
     };
-    Ok(pairs.par_iter().map(trial).collect())
+    let mut trials: Vec<Trial> = pairs.par_iter().map(trial).collect();
+    trials.sort_by(|one, other| one.set.cmp(&other.set));
+    Ok(trials)
 }
 
 /// The two robots of a simulated world.
 fn of_one_world(pair: &SimulatedPair, args: &MapPairsArgs) -> Trial {
     let [a, b] = &pair.maps;
-    let judged = judging::judge_maps(a, b, args.hypotheses);
+    let judged = judging::judge_maps(a, b);
     let is_right = judged.place().is_some_and(|place| pair.is_right(place));
     let is_kept = args.keep_wrong && judged.is_merged() && !is_right;
     Trial {
@@ -150,7 +145,6 @@ fn of_one_world(pair: &SimulatedPair, args: &MapPairsArgs) -> Trial {
         is_right,
         is_unrelated: false,
         wrong_maps: is_kept.then(|| (format!("world_{}", pair.number), pair.maps.clone())),
-        right: judged.hypotheses.iter().map(|one| pair.is_right(&one.transform_a_b)).collect(),
         judged,
     }
 }
@@ -171,7 +165,7 @@ fn of_different_buildings(
         let maps = library.two_buildings(&mut random);
         let names = maps.map(|map| map.name.as_str());
         let [a, b] = maps.map(|map| if in_parts { map.part(&mut random) } else { map.clone() });
-        let judged = judging::judge_maps(&a, &b, args.hypotheses);
+        let judged = judging::judge_maps(&a, &b);
         let is_kept = args.keep_wrong && judged.is_merged();
         Trial {
             set: set.to_owned(),
@@ -179,7 +173,6 @@ fn of_different_buildings(
             pair: format!("{number}: {} and {}", names[0], names[1]),
             is_right: false,
             is_unrelated: true,
-            right: vec![false; judged.hypotheses.len()],
             judged,
         }
     };
@@ -190,27 +183,22 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
     let mut sets: Vec<&str> = trials.iter().map(|trial| trial.set.as_str()).collect();
     sets.dedup();
     let mut table =
-        Table::new(["set", "pairs", "right", "wrong", "refused", "rightly refused", "right place among hypotheses"]);
+        Table::new(["set", "pairs", "right", "wrong", "refused", "rightly refused"]);
     for set in sets {
         let of_set: Vec<&Trial> = trials.iter().filter(|trial| trial.set == set).collect();
         let count = |outcome: &str| of_set.iter().filter(|trial| trial.outcome() == outcome).count();
-        let proposed = of_set.iter().filter(|trial| trial.right.contains(&true)).count();
-        let counts =
-            [of_set.len(), count("right"), count("wrong"), count("refused"), count("rightly refused"), proposed];
+        let counts = [of_set.len(), count("right"), count("wrong"), count("refused"), count("rightly refused")];
         table.row([set.to_owned()].into_iter().chain(counts.map(|count| count.to_string())));
     }
     results.table("map_pairs", "Merging pairs of map files", &table)?;
     let mut runs = Table::new(["set", "pair", "outcome", "probability", "refusal"]);
-    let heads: Vec<String> = judging::heads().collect();
-    let of_pair = ["set", "pair", "outcome", "hypothesis", "is right"];
-    let mut hypotheses = Table::new(of_pair.into_iter().chain(heads.iter().map(String::as_str)));
     for trial in trials {
         if let Some((name, maps)) = &trial.wrong_maps {
             for (map, which) in maps.iter().zip(["a", "b"]) {
                 results.map(&format!("wrong_{name}_{which}"), &map.to_file())?;
             }
         }
-        let Trial { set, pair, judged, right, .. } = trial;
+        let Trial { set, pair, judged, .. } = trial;
         let outcome = trial.outcome().to_owned();
         runs.row([
             set.clone(),
@@ -219,11 +207,6 @@ fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
             format!("{:.6}", judged.probability),
             judged.refusal.clone().unwrap_or_default(),
         ]);
-        for (number, (one, right)) in judged.hypotheses.iter().zip(right).enumerate() {
-            let of_pair = [set.clone(), pair.clone(), outcome.clone(), (number + 1).to_string(), right.to_string()];
-            hypotheses.row(of_pair.into_iter().chain(one.cells()));
-        }
     }
-    results.data("map_pairs_runs", &runs)?;
-    results.data("map_pairs_hypotheses", &hypotheses)
+    results.data("map_pairs_runs", &runs)
 }

@@ -8,11 +8,28 @@ use nalgebra::Point2;
 use serde::Deserialize;
 use std::path::Path;
 
+/// A place within this of the truth, metres, is the right one, but not exactly: maps that drift lie so far beside each other. Places
+/// that are alike lie farther from each other.
+pub(crate) const NEAR: f64 = 1.5;
+/// And turned by less than this, degrees.
+pub(crate) const NEAR_DEGREES: f64 = 5.0;
+
+/// How near a place is to the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Closeness {
+    Right,
+    /// The right place, too inexactly to count as right.
+    Near,
+    Wrong,
+}
+
 /// Two maps of one building or of two, and the places that they have in common.
 #[derive(Debug)]
-pub(super) struct Pair {
-    pub(super) name: String,
-    pub(super) maps: [MapOfBuilding; 2],
+pub(crate) struct Pair {
+    pub(crate) name: String,
+    /// How sure the truth is, if that is said.
+    pub(crate) quality: Option<String>,
+    pub(crate) maps: [MapOfBuilding; 2],
     truth: Truth,
 }
 
@@ -34,19 +51,21 @@ struct PairOfFiles {
     pair: String,
     a: String,
     b: String,
+    quality: Option<String>,
     #[serde(flatten)]
     truth: Truth,
 }
 
 /// The pairs that a folder has a truth of: those of its `pairs.json`, and the last maps of the first two robots of each log whose
 /// `LOG.truth.json` names common places. None if it has neither.
-pub(super) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
+pub(crate) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     let listed = folder.join("pairs.json");
     if listed.exists() {
-        for PairOfFiles { pair, a, b, truth } in read::<Vec<PairOfFiles>>(&listed)? {
-            let map = |name: &str| MapOfBuilding::of_file(&folder.join(format!("{name}.yaml")));
-            pairs.push(Pair { name: pair, maps: [map(&a)?, map(&b)?], truth });
+        for PairOfFiles { pair, a, b, quality, truth } in read::<Vec<PairOfFiles>>(&listed)? {
+            let maps = if folder.join("maps").is_dir() { folder.join("maps") } else { folder.to_owned() };
+            let map = |name: &str| MapOfBuilding::of_file(&maps.join(format!("{name}.yaml")));
+            pairs.push(Pair { name: pair, quality, maps: [map(&a)?, map(&b)?], truth });
         }
     }
     for log in files(folder)?.into_iter().filter(|file| file.extension().is_some_and(|extension| extension == "mcap")) {
@@ -58,7 +77,7 @@ pub(super) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
         let mut maps = maps_of_log(&log)?.into_iter();
         if let (Some(a), Some(b)) = (maps.next(), maps.next()) {
             let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            pairs.push(Pair { name, maps: [a, b], truth });
+            pairs.push(Pair { name, quality: None, maps: [a, b], truth });
         }
     }
     Ok(pairs)
@@ -88,18 +107,32 @@ fn read<T: serde::de::DeserializeOwned>(file: &Path) -> Result<T> {
 
 impl Pair {
     /// Whether the maps have nothing in common.
-    pub(super) fn is_unrelated(&self) -> bool {
+    pub(crate) fn is_unrelated(&self) -> bool {
         self.truth.common.is_empty()
     }
 
     /// Whether `T_a_b` lays the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond what the
     /// best rigid transform leaves.
-    pub(super) fn is_right(&self, transform_a_b: &Pose2) -> bool {
-        let Truth { common, rigid_median, rigid_p90 } = &self.truth;
-        let errors = common
-            .iter()
-            .map(|[x_b, y_b, x_a, y_a]| (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm());
-        let errors: Vec<f64> = errors.collect();
+    pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
+        let Truth { rigid_median, rigid_p90, .. } = &self.truth;
+        let errors = self.errors(transform_a_b);
         !errors.is_empty() && quantile(&errors, 0.5) < 0.5 + rigid_median && quantile(&errors, 0.9) < 1.0 + rigid_p90
+    }
+
+    /// How near `T_a_b` is to the truth.
+    pub(crate) fn closeness(&self, transform_a_b: &Pose2) -> Closeness {
+        let errors = self.errors(transform_a_b);
+        match self.is_right(transform_a_b) {
+            true => Closeness::Right,
+            false if !errors.is_empty() && quantile(&errors, 0.5) < NEAR + self.truth.rigid_median => Closeness::Near,
+            false => Closeness::Wrong,
+        }
+    }
+
+    /// How far `T_a_b` lays the common places from each other, metres.
+    fn errors(&self, transform_a_b: &Pose2) -> Vec<f64> {
+        let error =
+            |[x_b, y_b, x_a, y_a]: &[f64; 4]| (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm();
+        self.truth.common.iter().map(error).collect()
     }
 }

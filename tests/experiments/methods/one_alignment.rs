@@ -9,9 +9,10 @@ use gridweave_runtime::pipeline::{Overrides, Pipeline};
 use gridweave_runtime::ros::{CommonTag, CommonTags, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::geometry::{Grid, Pose2};
-use gridweave_stages::icp_refiner::{self, IcpParameters, refine};
+use gridweave_stages::registration::icp::{self, IcpParameters, refine};
 use gridweave_stages::line_extractor::{LineExtractorParameters, extract_segments};
-use gridweave_stages::merge_verifier::{MapView, MergeVerifierParameters, compare};
+use gridweave_stages::registration::comparison::{MapView, compare};
+use gridweave_stages::registration::judgement::JudgementParameters;
 use gridweave_stages::quadrant_classifier::{QuadrantClassifierParameters, first_guess, map_direction};
 use gridweave_stages::walls::WallMap;
 use serde::de::DeserializeOwned;
@@ -35,7 +36,7 @@ pub(super) struct Aligner {
     /// Those of the ICP refiner, if the pipeline has one.
     icp: Option<IcpParameters>,
     /// Those of the merge verifier, if the pipeline has one.
-    verifier: Option<MergeVerifierParameters>,
+    verifier: Option<JudgementParameters>,
 }
 
 /// The alignment of two maps.
@@ -109,7 +110,7 @@ impl Aligner {
         let guess = guess?.ok()?;
         let (refined, icp_time) = timed(self.icp.as_ref(), |parameters| {
             let [a, b] = [&maps.a, &maps.b].map(|map| WallMap::new(map, parameters.normal_radius));
-            let guess = icp_refiner::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
+            let guess = icp::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
             let transform_a_b = refine(&a, &b, &guess, parameters).registration.transform_a_b;
             if let Some(parameters) = &self.verifier {
                 let (a, b) = (MapView::rigid(maps.a, &a), MapView::rigid(maps.b, &b));

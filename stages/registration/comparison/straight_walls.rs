@@ -1,0 +1,205 @@
+//! What the walls that agree have to say of a place, counted in straight walls: neighbouring points of one wall say the same thing.
+//!
+//! Two walls that are not parallel fix a place in all directions: any corner fits any other corner. So the two straight walls of
+//! which most agrees say nothing of whether the place is right; what agrees beside them does. And walls that run one way only, as
+//! those of a corridor or of a row of shelves, leave the place along them open: what counts is how many there are the other way.
+
+use super::regions::ComparedWall;
+use nalgebra::Vector2;
+use std::f64::consts::PI;
+
+/// So many directions of straight walls are looked at.
+const DIRECTIONS: usize = 36;
+/// The least cosine of the angle between the normals of a straight wall and of what belongs to it (10 degrees).
+const SAME_DIRECTION: f64 = 0.985;
+/// The largest cosine of the angle between the normals of two walls that fix a place in all directions (45 degrees).
+const ANOTHER_DIRECTION: f64 = 0.707;
+/// What belongs to a straight wall lies in a strip that is so wide: its two sides, and what it is bent by, metres.
+const WIDTH: f64 = 0.3;
+/// Of less than this much agreement is no straight wall, metres.
+const LEAST_LENGTH: f64 = 0.5;
+/// More walls than this in a direction tell no more.
+const MOST_WALLS: usize = 4;
+
+/// What some walls that agree amount to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct StraightWalls {
+    /// The share of them that does not belong to the two walls that fix the place, 0 to 1; 0 if there are none.
+    pub(super) confirming: f64,
+    /// The number of straight walls in the one of two directions in which there are fewer: along the longest, and across it.
+    /// Not more than four.
+    pub(super) either_way: usize,
+}
+
+impl StraightWalls {
+    /// Of points of walls that each stand for so many metres.
+    pub(super) fn of(walls: &[ComparedWall], spacing: f64) -> Self {
+        let strips = Strips::new(walls);
+        let mut left = vec![true; walls.len()];
+        let Some((_, longest)) = strips.of_most(|index| left[index]) else { return Self::default() };
+        let crosses = |index: usize| walls[index].normal.dot(&longest.normal).abs() < ANOTHER_DIRECTION;
+        longest.take_from(walls, &mut left);
+        let second = strips.of_most(|index| left[index] && crosses(index));
+        let is_beside = |index: usize| left[index] && !second.as_ref().is_some_and(|(_, one)| one.holds(&walls[index]));
+        let confirming = (0..walls.len()).filter(|index| is_beside(*index)).count();
+        // The longest is one of those along it.
+        let (mut along, mut across) = (1, 0);
+        while along.min(across) < MOST_WALLS {
+            let Some((count, strip)) = strips.of_most(|index| left[index]) else { break };
+            if (count as f64) * spacing < LEAST_LENGTH {
+                break;
+            }
+            strip.take_from(walls, &mut left);
+            let runs_along = strip.normal.dot(&longest.normal).abs() > ANOTHER_DIRECTION;
+            *(if runs_along { &mut along } else { &mut across }) += 1;
+        }
+        Self { confirming: confirming as f64 / walls.len() as f64, either_way: along.min(across) }
+    }
+}
+
+/// The points of walls that run along each direction.
+struct Strips {
+    directions: Vec<Direction>,
+}
+
+/// The points of walls that run along a direction.
+struct Direction {
+    /// Across it.
+    normal: Vector2<f64>,
+    /// Where they lie along the normal, metres, and their numbers; the least first.
+    offsets: Vec<(f64, usize)>,
+}
+
+impl Strips {
+    fn new(walls: &[ComparedWall]) -> Self {
+        let direction = |number: usize| {
+            let (sine, cosine) = (PI * number as f64 / DIRECTIONS as f64).sin_cos();
+            let normal = Vector2::new(cosine, sine);
+            let alike = walls.iter().enumerate().filter(|(_, wall)| runs_along(wall, &normal));
+            let mut offsets: Vec<(f64, usize)> =
+                alike.map(|(index, wall)| (normal.dot(&wall.point.coords), index)).collect();
+            offsets.sort_by(|one, other| one.0.total_cmp(&other.0));
+            Direction { normal, offsets }
+        };
+        Self { directions: (0..DIRECTIONS).map(direction).collect() }
+    }
+
+    /// The strip that holds most of the walls that are asked for, and how many; none if there are none.
+    fn of_most(&self, is_asked_for: impl Fn(usize) -> bool) -> Option<(usize, Strip)> {
+        let mut best: Option<(usize, Strip)> = None;
+        for Direction { normal, offsets } in &self.directions {
+            let (mut end, mut count) = (0, 0);
+            for &(start, index) in offsets {
+                while let Some((_, last)) = offsets.get(end).filter(|(offset, _)| *offset <= start + WIDTH) {
+                    count += usize::from(is_asked_for(*last));
+                    end += 1;
+                }
+                if !is_asked_for(index) {
+                    continue;
+                }
+                if best.as_ref().is_none_or(|(most, _)| count > *most) {
+                    best = Some((count, Strip { normal: *normal, start }));
+                }
+                count -= 1;
+            }
+        }
+        best
+    }
+}
+
+/// Where a straight wall runs.
+struct Strip {
+    normal: Vector2<f64>,
+    /// Along the normal, metres.
+    start: f64,
+}
+
+impl Strip {
+    fn holds(&self, wall: &ComparedWall) -> bool {
+        let offset = self.normal.dot(&wall.point.coords);
+        runs_along(wall, &self.normal) && (self.start..=self.start + WIDTH).contains(&offset)
+    }
+
+    /// Takes what belongs to it out of those that are left.
+    fn take_from(&self, walls: &[ComparedWall], left: &mut [bool]) {
+        walls.iter().zip(left).filter(|(wall, _)| self.holds(wall)).for_each(|(_, left)| *left = false);
+    }
+}
+
+fn runs_along(wall: &ComparedWall, normal: &Vector2<f64>) -> bool {
+    wall.normal.dot(normal).abs() >= SAME_DIRECTION
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point2;
+    use super::super::regions::Finding;
+
+    const SPACING: f64 = 0.1;
+
+    /// A straight wall, a point every 0.1 m.
+    fn wall(from: (f64, f64), to: (f64, f64)) -> Vec<ComparedWall> {
+        let (from, to) = (Point2::new(from.0, from.1), Point2::new(to.0, to.1));
+        let along = to - from;
+        let normal = Vector2::new(-along.y, along.x).normalize();
+        let count = (along.norm() / SPACING).round() as usize;
+        let point = |index: usize| ComparedWall {
+            of_b: true,
+            point: from + along * (index as f64 / count as f64),
+            normal,
+            finding: Finding::Inlier,
+        };
+        (0..count).map(point).collect()
+    }
+
+    fn of(walls: &[ComparedWall]) -> StraightWalls {
+        StraightWalls::of(walls, SPACING)
+    }
+
+    #[test]
+    fn a_corner_fixes_a_place_and_confirms_nothing() {
+        assert_eq!(of(&[]), StraightWalls::default());
+        assert_eq!(of(&wall((0.0, 0.0), (10.0, 0.0))), StraightWalls::default());
+        let corner = StraightWalls { confirming: 0.0, either_way: 1 };
+        assert_eq!(of(&[wall((0.0, 0.0), (10.0, 0.0)), wall((0.0, 0.0), (0.0, 6.0))].concat()), corner);
+        // Turned, and interrupted by a door.
+        let slanted =
+            [wall((1.0, 1.0), (4.0, 4.0)), wall((5.0, 5.0), (8.0, 8.0)), wall((1.0, 1.0), (-2.0, 4.0))].concat();
+        assert_eq!(of(&slanted), corner);
+    }
+
+    #[test]
+    fn the_walls_across_a_room_confirm_its_corner() {
+        let room = [
+            wall((0.0, 0.0), (10.0, 0.0)),
+            wall((0.0, 0.0), (0.0, 6.0)),
+            wall((0.0, 6.0), (10.0, 6.0)),
+            wall((10.0, 0.0), (10.0, 6.0)),
+        ];
+        let room = of(&room.concat());
+        assert!((room.confirming - 0.5).abs() < 0.01 && room.either_way == 2, "{room:?}");
+    }
+
+    #[test]
+    fn walls_that_run_one_way_only_are_none_the_other_way() {
+        let rows: Vec<ComparedWall> =
+            (0..8).flat_map(|row| wall((0.0, 2.0 * f64::from(row)), (10.0, 2.0 * f64::from(row)))).collect();
+        assert_eq!(of(&rows).either_way, 0);
+        let with_a_post = [rows, wall((10.0, 0.0), (10.0, 0.3))].concat();
+        assert_eq!(of(&with_a_post).either_way, 0, "what is as short as a post is no wall");
+    }
+
+    #[test]
+    fn doors_part_no_wall_and_more_walls_than_four_tell_no_more() {
+        let rooms: Vec<ComparedWall> = (0..7)
+            .flat_map(|number| {
+                let x = 4.0 * f64::from(number);
+                [wall((x, 0.0), (x, 3.0)), wall((x, 4.0), (x, 7.0)), wall((x, 0.0), (x + 3.0, 0.0))].concat()
+            })
+            .collect();
+        assert_eq!(of(&rooms).either_way, 1, "one long wall with doors, and seven across");
+        let shifted: Vec<ComparedWall> = (0..7).flat_map(|row| wall((0.0, f64::from(row)), (28.0, f64::from(row)))).collect();
+        assert_eq!(of(&[rooms, shifted].concat()).either_way, 4);
+    }
+}

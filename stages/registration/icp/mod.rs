@@ -1,0 +1,21 @@
+//! Refines the alignment of two maps by ICP on their walls (Tsardoulias et al., section 4.3).
+//!
+//! [`register`] moves map b until its walls lie on those of map a, where they lie near each other; [`IcpRefusal`] says why
+//! the outcome may not be used. [`refine`] does both.
+
+mod first_guess;
+mod iteration;
+mod normal_equations;
+mod parameters;
+mod refine;
+mod refusal;
+mod registration;
+
+#[cfg(test)]
+mod tests;
+
+pub use first_guess::FirstGuess;
+pub use parameters::{IcpParameters, Metric, Weighting};
+pub use refine::{Refinement, refine};
+pub use refusal::IcpRefusal;
+pub use registration::{Registration, register};

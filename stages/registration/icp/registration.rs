@@ -1,0 +1,137 @@
+//! ICP: moves map b so that its walls lie on those of map a.
+
+use super::iteration::Iteration;
+use super::{FirstGuess, IcpParameters};
+use crate::geometry::{Point2, Pose2};
+use crate::walls::{WallMap, stride};
+use nalgebra::{Matrix3, Vector3};
+
+/// No more than this many rotations to either side of the first guess are tried.
+const MOST_STARTS: usize = 10;
+
+/// The outcome of a registration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registration {
+    /// `T_a_b`, refined: `T_icp * T_initial` (Tsardoulias et al., equations 10 to 13).
+    pub transform_a_b: Pose2,
+    /// Whether the last iteration moved the points by less than the bound.
+    pub converged: bool,
+    /// Iterations made, from the start that was best.
+    pub iterations: usize,
+    /// For each of them the root of the weighted mean of the squared residuals before its step, metres.
+    pub errors: Vec<f64>,
+    /// Points of map b that have a partner in map a.
+    pub inliers: usize,
+    /// Weighted mean of the squared residuals of the last iteration, square metres.
+    pub mean_square_error: f64,
+    /// What the maps alone say about (x, y, yaw): the inverse of a covariance, which need not exist. In a bare corridor
+    /// it is zero along the corridor.
+    pub information: Matrix3<f64>,
+    /// Covariance of (x, y, yaw), metres and radians, from the maps and the first guess together.
+    pub covariance: Matrix3<f64>,
+    /// The middle of the common section, frame a.
+    pub centre: Point2,
+    /// Covariance of the place of that middle and of the turn about it (x, y, yaw), metres and radians.
+    pub centre_covariance: Matrix3<f64>,
+    /// How far the paired points lie from there, the root of the mean square, metres.
+    pub radius: f64,
+    /// Distance from the first guess in standard deviations of the first guess, slack included.
+    pub step: f64,
+}
+
+/// Registers map b on map a, starting at the first guess.
+///
+/// Only points that lie near each other count (the common section of section 4.3). The first guess takes part with its
+/// covariance, so that what the maps cannot see, such as the place along a bare corridor, stays as the first guess has
+/// it.
+///
+/// Far from the middle of the maps a small turn moves a wall by more than the distance to the next wall. So where the
+/// first guess's rotation is vague, several rotations are tried on a sample of the points, and the one that brings most
+/// of them to a wall goes on.
+pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
+    let mut iteration = Iteration::new(a, b, first_guess, parameters);
+    let stride = stride(b.walls.points().len(), parameters.coarse_points);
+    let mut best: Option<(f64, Pose2, Vec<f64>)> = None;
+    for start in starts(&mut iteration, first_guess, stride, parameters) {
+        let (transform_a_b, errors) = draw_near(&mut iteration, start, stride, parameters);
+        let matched = iteration.matched(&transform_a_b, stride);
+        if best.as_ref().is_none_or(|(most, ..)| matched > *most) {
+            best = Some((matched, transform_a_b, errors));
+        }
+    }
+    let (mut transform_a_b, mut errors) =
+        best.map_or((first_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
+    let (mut converged, mut last_change) = (false, 0.0);
+    for _ in 0..parameters.max_iterations {
+        let Some(change) = iteration.run(&transform_a_b, parameters.min_distance, 1) else { break };
+        transform_a_b = change.transform_a_b;
+        errors.push(iteration.error());
+        last_change = change.length;
+        converged = change.length < parameters.convergence;
+        if converged {
+            break;
+        }
+    }
+    iteration.measure_by_lines(&transform_a_b);
+    let state = iteration.into_state();
+    let frame = state.frame;
+    // What swings between partners on two sides is known as well as it swings.
+    let unsettled = if converged { 0.0 } else { last_change.powi(2) };
+    let covariance = state.covariance + Matrix3::from_diagonal_element(unsettled);
+    let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));
+    let metres_to_radians = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / frame.scale));
+    Registration {
+        transform_a_b,
+        converged,
+        iterations: errors.len(),
+        errors,
+        inliers: state.inliers,
+        mean_square_error: state.mean_square_error,
+        information: inverse.transpose() * state.information * inverse,
+        covariance: jacobian * covariance * jacobian.transpose(),
+        centre: frame.centre,
+        centre_covariance: metres_to_radians * covariance * metres_to_radians,
+        radius: frame.scale,
+        step: first_guess.distance(&transform_a_b, &frame, parameters),
+    }
+}
+
+/// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the error
+/// of each iteration, metres.
+fn draw_near(
+    iteration: &mut Iteration<'_>,
+    start: Pose2,
+    stride: usize,
+    parameters: &IcpParameters,
+) -> (Pose2, Vec<f64>) {
+    let (mut transform_a_b, mut distance, mut errors) = (start, parameters.max_distance, Vec::new());
+    while distance > parameters.min_distance {
+        let Some(change) = iteration.run(&transform_a_b, distance, stride) else { break };
+        transform_a_b = change.transform_a_b;
+        distance *= parameters.shrink;
+        errors.push(iteration.error());
+    }
+    (transform_a_b, errors)
+}
+
+/// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as
+/// two standard deviations to either side.
+fn starts(
+    iteration: &mut Iteration<'_>,
+    first_guess: &FirstGuess,
+    stride: usize,
+    parameters: &IcpParameters,
+) -> Vec<Pose2> {
+    let initial = first_guess.transform_a_b;
+    let deviation = first_guess.covariance.m33.sqrt();
+    let count = (2.0 * deviation / parameters.start_spacing).round() as usize;
+    let mut starts = vec![initial];
+    if count > 0 {
+        let frame = iteration.common_section(&initial, stride);
+        for side in 1..=count.min(MOST_STARTS) {
+            let turn = side as f64 * parameters.start_spacing * frame.scale;
+            starts.extend([turn, -turn].map(|turn| frame.moved(&initial, &Vector3::new(0.0, 0.0, turn))));
+        }
+    }
+    starts
+}

@@ -1,0 +1,224 @@
+//! Registration and judgement on drawn floor plans.
+
+use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
+use crate::geometry::{Grid, GridGeometry, Pose2, pose};
+use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
+use crate::walls::WallMap;
+use gridweave_runtime::stage::Parameters;
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use std::f64::consts::FRAC_PI_2;
+
+/// The west and the east of the office, in frames of their own.
+fn office_maps() -> (DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b)
+}
+
+fn assert_near(found: &Pose2, truth: &Pose2, map_b: &DrawnMap) {
+    let (metres, radians) = apart(found, truth, map_b);
+    assert!(metres < 0.02, "{metres} m");
+    assert!(radians < 0.003, "{radians} rad");
+}
+
+#[test]
+fn starts_half_a_metre_and_five_degrees_off_find_the_truth() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    for (x, y, degrees) in [(0.0, 0.0, 0.0), (0.5, 0.0, 5.0), (0.0, -0.5, 5.0), (-0.35, 0.35, -5.0), (0.3, 0.4, -5.0)] {
+        let first_guess = guess(truth, x, y, f64::to_radians(degrees));
+        let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+        assert_near(&refinement.registration.transform_a_b, &truth, &b);
+        assert_eq!(refinement.refusal, None);
+        assert!(refinement.registration.covariance.cholesky().is_some());
+    }
+}
+
+#[test]
+fn registering_the_other_way_round_finds_the_inverse() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let first_guess = guess(truth.inverse(), 0.2, -0.1, 0.03);
+    let registration = register(&b.walls, &a.walls, &first_guess, &IcpParameters::default());
+    assert!(registration.converged);
+    assert_near(&registration.transform_a_b.inverse(), &truth, &b);
+}
+
+#[test]
+fn moving_the_frames_moves_the_result_along() {
+    let office = FloorPlan::office();
+    for (x, y, yaw) in [(40.0, -70.0, 3.0), (-5.0, 0.5, FRAC_PI_2), (0.01, 0.02, -0.7)] {
+        let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(x, y, yaw));
+        let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(-y, x, yaw - 2.0));
+        let truth = a.transform_to(&b);
+        let turned = guess(truth, 0.0, 0.0, 0.0).transform_a_b * pose(0.1, -0.1, 0.0);
+        let registration = register(
+            &a.walls,
+            &b.walls,
+            &FirstGuess { transform_a_b: turned, ..guess(truth, 0.0, 0.0, 0.0) },
+            &IcpParameters::default(),
+        );
+        assert_near(&registration.transform_a_b, &truth, &b);
+    }
+}
+
+#[test]
+fn resolutions_and_grid_yaws_may_differ() {
+    let office = FloorPlan::office();
+    let fine = Drawing { resolution: 0.04, grid_yaw: 0.3, ..drawing(3.0, 2.0, 0.4) };
+    let coarse = Drawing { resolution: 0.1, grid_yaw: -1.2, ..drawing(12.0, 6.0, -2.1) };
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), fine);
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), coarse);
+    let truth = a.transform_to(&b);
+    let refinement = refine(&a.walls, &b.walls, &guess(truth, 0.2, 0.2, 0.03), &IcpParameters::default());
+    assert_near(&refinement.registration.transform_a_b, &truth, &b);
+    assert_eq!(refinement.refusal, None);
+}
+
+#[test]
+fn every_metric_and_weighting_finds_the_truth() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    for metric in [Metric::PointToLine, Metric::PointToPoint] {
+        for weighting in [Weighting::GemanMcclure, Weighting::Huber, Weighting::None] {
+            let parameters = IcpParameters { metric, weighting, ..Default::default() };
+            let registration = register(&a.walls, &b.walls, &guess(truth, 0.1, 0.1, 0.02), &parameters);
+            let (metres, radians) = apart(&registration.transform_a_b, &truth, &b);
+            assert!(metres < 0.03 && radians < 0.005, "{metric:?} {weighting:?}: {metres} m, {radians} rad");
+        }
+    }
+}
+
+#[test]
+fn a_refinement_is_the_same_every_time() {
+    let (a, b) = office_maps();
+    let first_guess = guess(a.transform_to(&b), 0.2, -0.3, 0.05);
+    let refined = || refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+    assert_eq!(refined(), refined());
+}
+
+#[test]
+fn a_map_without_walls_is_refused() {
+    let (a, _) = office_maps();
+    let geometry = GridGeometry { width: 40, height: 40, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
+    let one_wall_cell: Vec<i8> = (0..1600).map(|cell| if cell == 820 { 100 } else { 0 }).collect();
+    for cells in [vec![-1; 1600], vec![0; 1600], vec![100; 1600], one_wall_cell] {
+        let grid = Grid::new(geometry, &cells).unwrap();
+        let b = WallMap::new(&grid, 0.2);
+        for (one, other) in [(&a.walls, &b), (&b, &a.walls), (&b, &b)] {
+            let refinement = refine(one, other, &guess(Pose2::identity(), 0.0, 0.0, 0.0), &IcpParameters::default());
+            assert!(refinement.refusal.is_some());
+            assert!(refinement.registration.transform_a_b.translation.vector.iter().all(|value| value.is_finite()));
+            assert!(!refinement.reason().contains("NaN"), "{}", refinement.reason());
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_grid_and_no_first_guess_makes_it_fail(
+        cells in prop::collection::vec(any::<i8>(), 24 * 18),
+        resolution in prop_oneof![0.01..1.0, Just(1e-300), Just(1e300)],
+        origin in prop::array::uniform3(prop_oneof![-9.0..9.0, Just(1e20), Just(-1e200), Just(f64::MAX)]),
+        start in prop::array::uniform3(prop_oneof![-9.0..9.0, Just(1e20), Just(f64::MAX), Just(f64::NAN)]),
+        covariance in prop::array::uniform3(prop_oneof![0.0..9.0, Just(1e-300), Just(1e300), Just(f64::NAN)]),
+    ) {
+        let geometry = GridGeometry { width: 24, height: 18, resolution, origin: pose(origin[0], origin[1], origin[2]) };
+        if let Ok(grid) = Grid::new(geometry, &cells) {
+            let map = WallMap::new(&grid, 0.2);
+            let parameters = IcpParameters::default();
+            let start = pose(start[0], start[1], start[2]);
+            let first_guess = FirstGuess::new(start, Matrix3::from_diagonal(&covariance.into()), &parameters);
+            let refinement = refine(&map, &map, &first_guess, &parameters);
+            prop_assert!(!refinement.reason().is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_grid_without_cells_is_refused() {
+    let geometry = GridGeometry { width: 0, height: 0, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
+    let grid = Grid::new(geometry, &[]).unwrap();
+    let map = WallMap::new(&grid, 0.2);
+    let refinement = refine(&map, &map, &guess(Pose2::identity(), 0.0, 0.0, 0.0), &IcpParameters::default());
+    assert_eq!(refinement.refusal, Some(IcpRefusal::NoWalls));
+}
+
+#[test]
+fn along_a_bare_corridor_the_first_guess_stays_and_says_how_well_it_is_known() {
+    let corridor = FloorPlan::corridor();
+    let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
+    let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
+    let truth = a.transform_to(&b);
+    // Half a metre along the corridor, which runs at -0.5 rad in map a, and a little across.
+    let mut first_guess = guess(truth, 0.5 * f64::cos(0.5) + 0.05, -0.5 * f64::sin(0.5), 0.01);
+    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
+    let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+    let registration = &refinement.registration;
+    let along = Vector3::new(f64::cos(0.5), -f64::sin(0.5), 0.0);
+    let across = Vector3::new(f64::sin(0.5), f64::cos(0.5), 0.0);
+    let centre_deviation = |axis: &Vector3<f64>| axis.dot(&(registration.centre_covariance * axis)).sqrt();
+    assert!(centre_deviation(&along) > 0.5, "{}", centre_deviation(&along));
+    assert!(centre_deviation(&across) < 0.02, "{}", centre_deviation(&across));
+    let known_to = |axis: &Vector3<f64>| axis.dot(&(registration.information * axis)).sqrt().recip();
+    assert!(known_to(&along) > 0.5, "the maps alone tell the place along the corridor to {} m", known_to(&along));
+    assert!(known_to(&across) < 0.02, "{}", known_to(&across));
+    let shift = a.transform_world_map.rotation
+        * (registration.transform_a_b * b.transform_world_map.inverse() * nalgebra::Point2::new(30.0, 0.0)
+            - truth * b.transform_world_map.inverse() * nalgebra::Point2::new(30.0, 0.0));
+    assert!(shift.y.abs() < 0.02, "{shift}");
+    assert!((shift.x - 0.5).abs() < 0.15, "{shift}");
+    let Some(IcpRefusal::OpenPosition { direction, .. }) = refinement.refusal else {
+        panic!("{:?}", refinement.refusal)
+    };
+    assert!((direction.to_radians() + 0.5).abs() < 0.02, "{direction}");
+    assert!(refinement.reason().contains("bare corridor"));
+}
+
+#[test]
+fn points_that_pull_on_points_do_not_close_a_bare_corridor() {
+    let corridor = FloorPlan::corridor();
+    let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
+    let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
+    let mut first_guess = guess(a.transform_to(&b), 0.0, 0.0, 0.0);
+    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
+    let parameters = IcpParameters { metric: Metric::PointToPoint, max_iterations: 200, ..Default::default() };
+    let refinement = refine(&a.walls, &b.walls, &first_guess, &parameters);
+    assert!(matches!(refinement.refusal, Some(IcpRefusal::OpenPosition { .. })), "{}", refinement.reason());
+}
+
+#[test]
+fn along_a_bare_corridor_a_good_first_guess_suffices() {
+    let corridor = FloorPlan::corridor();
+    let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
+    let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
+    let mut first_guess = guess(a.transform_to(&b), 0.03, 0.02, 0.005);
+    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.05 * 0.05, 0.05 * 0.05, 0.01 * 0.01));
+    let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+    assert_eq!(refinement.refusal, None);
+}
+
+#[test]
+fn maps_that_fit_far_from_a_sure_first_guess_are_refused() {
+    let (a, b) = office_maps();
+    let mut first_guess = guess(a.transform_to(&b), 0.3, 0.3, 0.0);
+    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 1e-4, 1e-6));
+    let parameters = IcpParameters { max_step: 3.0, ..Default::default() };
+    let refinement = refine(&a.walls, &b.walls, &first_guess, &parameters);
+    assert!(matches!(refinement.refusal, Some(IcpRefusal::Step { .. })), "{}", refinement.reason());
+}
+
+#[test]
+fn the_defaults_are_in_range_and_nonsense_is_not() {
+    assert!(IcpParameters::default().check().is_empty());
+    let nonsense = IcpParameters {
+        shrink: 1.0,
+        max_distance: 0.01,
+        max_iterations: 0,
+        normal_radius: f64::NAN,
+        ..Default::default()
+    };
+    assert_eq!(nonsense.check().len(), 4);
+}

@@ -1,0 +1,178 @@
+//! Which of all hypotheses for a pair of maps is right, if any.
+
+use super::priors::prior;
+use super::verdict::{Rival, Verdict};
+use super::{Candidate, JudgementParameters, Listed, Refusal, Term};
+use crate::registration::comparison::MapView;
+use crate::registration::place_window::PlaceWindow;
+use crate::registration::{Basis, Hypothesis};
+
+/// What the user knows of a pair of robots.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UserKnowledge {
+    /// Where the maps can lie to each other; none if it is not known.
+    pub window: Option<PlaceWindow>,
+    /// The number of the hypothesis that is right, from 1, as they are listed in the reason of a refusal.
+    pub hypothesis: Option<usize>,
+}
+
+/// Judges the hypotheses of all sources for one pair; `None` without any.
+///
+/// The most probable is the answer, and it is refused if it is not as probable as is asked for. Where the user knows where the maps can
+/// lie to each other, only what lies there takes part; and a hypothesis that he has chosen is accepted.
+pub fn judge(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    hypotheses: &[Hypothesis],
+    known: &UserKnowledge,
+    parameters: &JudgementParameters,
+) -> Option<Verdict> {
+    let mut all = compared(a, b, hypotheses, parameters);
+    if let Some(window) = &known.window {
+        let is_possible = |candidate: &Candidate| window.contains(&candidate.hypothesis.transform_a_b, 0.0, 0.0);
+        if !all.iter().any(is_possible) {
+            return all.into_iter().next().map(|candidate| unexpected(candidate, window));
+        }
+        all.retain(is_possible);
+    }
+    let listed = Listed::of(&all);
+    if let Some(asked) = known.hypothesis {
+        let count = all.len();
+        let chosen = asked.checked_sub(1).and_then(|index| all.get(index).cloned());
+        let refusal = chosen.is_none().then_some(Refusal::NoSuchHypothesis { asked, count });
+        let candidate = chosen.or_else(|| all.into_iter().next())?.deform(a, b, parameters);
+        let chosen = refusal.is_none().then_some((asked, count));
+        return Some(Verdict { refusal, chosen, listed, ..Verdict::of(candidate) });
+    }
+    let candidates = deformed(united(all), a, b, parameters);
+    let log_odds: Vec<f64> =
+        candidates.iter().map(|candidate| log_odds(candidate, known.window.is_some())).collect();
+    let probabilities = posterior(&log_odds);
+    let most_probable = |numbers: &mut dyn Iterator<Item = usize>| {
+        numbers.reduce(|best, other| if log_odds[other] > log_odds[best] { other } else { best })
+    };
+    let best = most_probable(&mut (0..candidates.len()).filter(|number| !candidates[*number].hypothesis.is_rival))?;
+    let rival = most_probable(&mut (0..candidates.len()).filter(|number| *number != best));
+    let rival = rival.map(|other| Rival::new(&candidates[best], &candidates[other], probabilities[other]));
+    let probability = probabilities[best];
+    let candidate = candidates.into_iter().nth(best)?;
+    let mut verdict = Verdict { probability, rival, listed, prior: prior(&candidate, known.window.is_some()), ..Verdict::of(candidate) };
+    verdict.refusal = refusal(&verdict, parameters.accept);
+    Some(verdict)
+}
+
+/// The places that hypotheses propose, each once, and what the maps say there: what [`judge`] sums up where nothing else is known.
+pub fn candidates(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    hypotheses: &[Hypothesis],
+    parameters: &JudgementParameters,
+) -> Vec<Candidate> {
+    deformed(united(compared(a, b, hypotheses, parameters)), a, b, parameters)
+}
+
+/// What the maps say at each hypothesis as they came, the best first.
+fn compared(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    hypotheses: &[Hypothesis],
+    parameters: &JudgementParameters,
+) -> Vec<Candidate> {
+    let compare = |numbered| Candidate::new(numbered, a, b, parameters);
+    let mut all: Vec<Candidate> = hypotheses.iter().enumerate().map(compare).collect();
+    // What tags fix comes first, then what most speaks for; equals stay in the order of their sources and ranks.
+    all.sort_by(|one, other| {
+        let is_by_maps = |candidate: &Candidate| candidate.hypothesis.basis != Basis::Tags;
+        let by_evidence = other.agreement.evidence.total_cmp(&one.agreement.evidence);
+        is_by_maps(one).cmp(&is_by_maps(other)).then(by_evidence)
+    });
+    all
+}
+
+fn deformed(
+    places: Vec<Candidate>,
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    parameters: &JudgementParameters,
+) -> Vec<Candidate> {
+    places.into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect()
+}
+
+/// The probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum of exp(s_j))`.
+pub fn posterior(log_odds: &[f64]) -> Vec<f64> {
+    let most = log_odds.iter().copied().fold(0.0, f64::max);
+    let sum = (-most).exp() + log_odds.iter().map(|odds| (odds - most).exp()).sum::<f64>();
+    log_odds.iter().map(|odds| (odds - most).exp() / sum).collect()
+}
+
+/// Each place once, the first hypothesis at it standing for all.
+fn united(all: Vec<Candidate>) -> Vec<Candidate> {
+    let mut places: Vec<Candidate> = Vec::new();
+    for candidate in all {
+        let is_usable = !candidate.hypothesis.is_refused;
+        let same = places.iter_mut().find(|place| {
+            is_usable && !place.hypothesis.is_refused && place.is_at(&candidate.hypothesis.transform_a_b)
+        });
+        match same {
+            // What was proposed stands for its place, and not what only stands against others.
+            Some(place) if place.hypothesis.is_rival && !candidate.hypothesis.is_rival => {
+                let mut candidate = candidate;
+                std::mem::swap(place, &mut candidate);
+                place.others.append(&mut candidate.others);
+                place.others.push(candidate.hypothesis);
+            }
+            Some(place) => place.others.push(candidate.hypothesis),
+            None => places.push(candidate),
+        }
+    }
+    places
+}
+
+fn log_odds(candidate: &Candidate, is_expected: bool) -> f64 {
+    match candidate.hypothesis.is_refused {
+        true => f64::NEG_INFINITY,
+        false => candidate.terms().log_odds() + prior(candidate, is_expected),
+    }
+}
+
+/// The judgement on a place at which the maps cannot lie by what the user knows.
+fn unexpected(candidate: Candidate, window: &PlaceWindow) -> Verdict {
+    let (shift, turn) = window.change(&candidate.hypothesis.transform_a_b);
+    let refusal = match candidate.hypothesis.is_refused {
+        false => Refusal::Unexpected { shift, turn: turn.to_degrees() },
+        true => Refusal::Before(candidate.hypothesis.reason.clone()),
+    };
+    Verdict { refusal: Some(refusal), ..Verdict::of(candidate) }
+}
+
+/// Why a verdict is no acceptance; none if it is as probable as is asked for.
+fn refusal(verdict: &Verdict, accept: f64) -> Option<Refusal> {
+    let Verdict { candidate, probability, rival, .. } = verdict;
+    if candidate.hypothesis.is_refused {
+        return Some(Refusal::Before(candidate.hypothesis.reason.clone()));
+    }
+    if *probability >= accept {
+        return None;
+    }
+    // What is missing lies with another place, or with none.
+    let of_none = 1.0 - probability - rival.as_ref().map_or(0.0, |rival| rival.probability);
+    if let Some(rival) = rival.as_ref().filter(|rival| rival.probability > of_none) {
+        let (shift, turn) = (rival.shift, rival.turn.to_degrees());
+        let told_otherwise = rival.is_by_tags != candidate.rests_on(Basis::is_by_tags);
+        return Some(match told_otherwise {
+            true => Refusal::Elsewhere {
+                source_of_rival: rival.source.clone(),
+                shift,
+                turn,
+                rival: rival.agreement.inlier_length,
+                here: candidate.agreement.inlier_length,
+            },
+            false => Refusal::Ambiguous { shift, turn, probability: rival.probability, listed: verdict.listed.clone() },
+        });
+    }
+    let agreement = candidate.agreement;
+    Some(match verdict.weakest_term() {
+        Term::Residual | Term::CrossingConflicts | Term::Crossings => Refusal::Contradiction { agreement },
+        weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },
+    })
+}

@@ -1,0 +1,251 @@
+//! Perceptual aliasing: whether the building looks alike in two places, so that a robot may have been in either.
+//!
+//! Where two robots have seen the opposite ends of a symmetric building, much of their maps agrees half a turn off, and little at the
+//! right place, where only the middle is in both. No search for other places finds that, as more wall agrees at the wrong one. But each
+//! map that reaches beyond the middle shows that the building is alike there: it agrees with itself, half a turn off.
+//!
+//! So an accepted place has an alias wherever a map agrees with itself, and the alias is a hypothesis like any other, with odds of its own
+//! against the place:
+//!
+//! - Likeness must explain all that agrees at the place, and a map that is like itself in little says little of that.
+//! - Where parts of a building are alike but not the same, walls that agree by likeness contradict each other as often as the map
+//!   contradicts itself; and walls that are the same contradict each other for noise alone, which is less.
+
+use super::weights::ALIAS;
+use super::{JudgementParameters, Verdict};
+use crate::geometry::Pose2;
+use crate::registration::comparison::{Agreement, MapView, compare};
+use crate::registration::icp::{FirstGuess, IcpParameters, refine};
+use crate::registration::place_window::PlaceWindow;
+use crate::registration::search::{MapAlignerParameters, PreparedMap, self_similar_places};
+use crate::walls::{CORRELATION_LENGTH, WallMap};
+use nalgebra::Matrix3;
+
+/// Where a map looks like itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SelfSimilarity {
+    /// Places at which the map lies on itself, `T_map_map`, and what it says of itself there.
+    places: Vec<(Pose2, Agreement)>,
+}
+
+impl SelfSimilarity {
+    /// Searches for it in a map.
+    pub fn new(map: &MapView<'_>, parameters: &JudgementParameters) -> Self {
+        let aligner = MapAlignerParameters::default();
+        let cell = PreparedMap::least_cell(&map.grid).max(0.5 * aligner.cell);
+        let prepared = PreparedMap::new("", &map.grid, cell, aligner.max_extent);
+        let places = prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_places(&prepared, &aligner));
+        let registered = places.iter().map(|place| registered(map.walls, map.walls, place));
+        Self { places: registered.map(|place| (place, compare(map, map, &place, parameters))).collect() }
+    }
+}
+
+/// Another place of map b that may be the right one, as the building is alike there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alias {
+    /// How far the middle of the inliers is moved there, metres.
+    pub shift: f64,
+    /// By how much map b is turned there, radians.
+    pub turn: f64,
+    /// `T_a_b` there.
+    pub transform_a_b: Pose2,
+    /// What the maps say of each other there.
+    pub there: Agreement,
+    /// What the one map that is alike says of itself.
+    pub itself: Agreement,
+    /// What the log-odds are a weighted sum of, after the 1 that the first weight stands for.
+    pub terms: [f64; 2],
+    /// The log-odds that it is right and not the place that it is an alias of.
+    pub log_odds: f64,
+}
+
+impl Alias {
+    /// The alias of an accepted place that is likeliest to be the right one; none if the building is alike nowhere.
+    pub fn likeliest(
+        verdict: &Verdict,
+        a: (&MapView<'_>, &SelfSimilarity),
+        b: (&MapView<'_>, &SelfSimilarity),
+        window: Option<&PlaceWindow>,
+        parameters: &JudgementParameters,
+    ) -> Option<Self> {
+        let all = Self::all(verdict, a, b, window, parameters).into_iter();
+        all.max_by(|one, other| one.log_odds.total_cmp(&other.log_odds))
+    }
+
+    /// All aliases of a place, or those in a window. Each map comes with where it looks like itself.
+    pub fn all(
+        verdict: &Verdict,
+        (a, similar_a): (&MapView<'_>, &SelfSimilarity),
+        (b, similar_b): (&MapView<'_>, &SelfSimilarity),
+        window: Option<&PlaceWindow>,
+        parameters: &JudgementParameters,
+    ) -> Vec<Self> {
+        let (place, here) = (verdict.candidate.transform_a_b(), verdict.candidate.agreement);
+        let by_a = similar_a.places.iter().map(|(change, itself)| (change * place, itself));
+        let by_b = similar_b.places.iter().map(|(change, itself)| (place * change, itself));
+        let alias = |(guess, itself): (Pose2, &Agreement)| {
+            let transform_a_b = registered(a.walls, b.walls, &guess);
+            let is_possible = window.is_none_or(|window| window.contains(&transform_a_b, 0.0, 0.0));
+            if !is_possible || verdict.candidate.is_at(&transform_a_b) {
+                return None;
+            }
+            let (shift, turn) = verdict.candidate.change(&transform_a_b);
+            let there = compare(a, b, &transform_a_b, parameters);
+            let terms = [extent(&here, itself), by_contradiction(&here, &there, itself)];
+            let log_odds = ALIAS[0] + ALIAS[1] * terms[0] + ALIAS[2] * terms[1];
+            Some(Self { shift, turn, transform_a_b, there, itself: *itself, terms, log_odds })
+        };
+        by_a.chain(by_b).filter_map(alias).collect()
+    }
+}
+
+/// The logarithm of the self-similar length as a share of the inliers at the place: likeness must explain all of them.
+fn extent(here: &Agreement, itself: &Agreement) -> f64 {
+    ((itself.inlier_length + 1.0) / (here.inlier_length + 1.0)).ln().min(0.0)
+}
+
+/// The place near a guess at which the walls of the maps lie on each other.
+fn registered(a: &WallMap, b: &WallMap, guess: &Pose2) -> Pose2 {
+    let icp = IcpParameters::default();
+    refine(a, b, &FirstGuess::new(*guess, Matrix3::zeros(), &icp), &icp).registration.transform_a_b
+}
+
+/// The logarithm of how much likelier it is that the maps contradict each other `here` for noise, and `there` as the building contradicts
+/// `itself` in likeness, than the other way round. Each length at which walls are independent of each other is one sample.
+fn by_contradiction(here: &Agreement, there: &Agreement, itself: &Agreement) -> f64 {
+    let [here, there, itself] =
+        [here, there, itself].map(|agreement| (agreement.inlier_length, agreement.conflict_length));
+    let right = log_likelihood_of_noise_and_likeness(here, sum(there, itself));
+    let wrong = log_likelihood_of_noise_and_likeness(there, sum(here, itself));
+    (right - wrong) / CORRELATION_LENGTH
+}
+
+/// Lengths of wall that agree and that contradict, metres.
+type Lengths = (f64, f64);
+
+fn sum(one: Lengths, other: Lengths) -> Lengths {
+    (one.0 + other.0, one.1 + other.1)
+}
+
+/// Of two places, by the shares of contradiction that are likeliest, where that of likeness, which has noise as well, is at least that of
+/// noise.
+fn log_likelihood_of_noise_and_likeness(noise: Lengths, likeness: Lengths) -> f64 {
+    match noise.1 * likeness.0 <= likeness.1 * noise.0 {
+        true => log_likelihood(noise) + log_likelihood(likeness),
+        false => log_likelihood(sum(noise, likeness)),
+    }
+}
+
+/// By the share of contradiction that is likeliest.
+fn log_likelihood((agree, contradict): Lengths) -> f64 {
+    let of = |length: f64| if length > 0.0 { length * (length / (agree + contradict)).ln() } else { 0.0 };
+    of(agree) + of(contradict)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Point2, pose};
+    use crate::registration::judgement::{Refusal, UserKnowledge, judge};
+    use crate::registration::{Basis, Hypothesis};
+    use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+    use gridweave_runtime::stage::InitialPose;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    /// The west and the east of a building, both with its middle.
+    fn ends(plan: &FloorPlan) -> (DrawnMap, DrawnMap) {
+        let west = plan.draw(seen(-0.2, -0.2, 15.0, 12.2), drawing(3.0, 2.0, 0.4));
+        (west, plan.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1)))
+    }
+
+    /// The judgement on a place that stands out from all others by the walls alone, first without its alias, and then with it.
+    fn judged(a: &DrawnMap, b: &DrawnMap, place: &Pose2, window: Option<&PlaceWindow>) -> [Option<Refusal>; 2] {
+        let hypothesis = Hypothesis {
+            transform_a_b: *place,
+            covariance: Matrix3::identity(),
+            basis: Basis::Search { significance: 30.0 },
+            source: "maps".to_owned(),
+            reason: String::new(),
+            is_refused: false,
+            is_rival: false,
+        };
+        let parameters = JudgementParameters::default();
+        let (a, b) = (a.view(), b.view());
+        let verdict = judge(&a, &b, &[hypothesis], &UserKnowledge::default(), &parameters).unwrap();
+        let alone = verdict.refusal.clone();
+        assert_eq!(verdict.rests_on_maps_alone(), alone.is_none());
+        let [similar_a, similar_b] = [&a, &b].map(|map| SelfSimilarity::new(map, &parameters));
+        let alias = Alias::likeliest(&verdict, (&a, &similar_a), (&b, &similar_b), window, &parameters);
+        [alone, verdict.against(alias.as_ref(), &parameters).refusal]
+    }
+
+    /// Half a turn about the middle of the buildings.
+    fn half_turn() -> Pose2 {
+        pose(20.0, 12.0, PI)
+    }
+
+    #[test]
+    fn the_ends_of_a_symmetric_building_are_not_taken_for_each_other() {
+        let (a, b) = ends(&FloorPlan::nearly_symmetric());
+        let wrong = a.transform_world_map.inverse() * half_turn() * b.transform_world_map;
+        let [alone, with_alias] = judged(&a, &b, &wrong, None);
+        assert_eq!(alone, None, "the walls agree nearly everywhere");
+        let Some(Refusal::Aliased { alias }) = with_alias else { panic!("{with_alias:?}") };
+        assert!((alias.turn.abs() - PI).abs() < 0.02 && alias.shift < 10.0, "{alias:?}");
+        assert!(alias.itself.inlier_ratio() > 0.9 && alias.there.inlier_ratio() > 0.9, "{alias:?}");
+    }
+
+    #[test]
+    fn an_alias_that_the_user_rules_out_is_none() {
+        let (a, b) = ends(&FloorPlan::nearly_symmetric());
+        let right = a.transform_to(&b);
+        let initial = InitialPose { yaw_stddev: 0.2, ..InitialPose::default() };
+        let at = |place: &Pose2| {
+            let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
+            PlaceWindow::between(&initial, &InitialPose { x, y, yaw, ..initial })
+        };
+        assert!(judged(&a, &b, &right, None)[1].is_some());
+        assert_eq!(judged(&a, &b, &right, Some(&at(&right)))[1], None);
+    }
+
+    #[test]
+    fn a_building_that_is_alike_in_little_is_told_from_what_it_is_like() {
+        let (a, b) = ends(&FloorPlan::office());
+        assert_eq!(judged(&a, &b, &a.transform_to(&b), None), [None, None]);
+    }
+
+    #[test]
+    fn a_place_without_contradiction_is_told_from_one_that_is_only_like_it() {
+        // One half has rooms that the other has not.
+        let plan =
+            FloorPlan::nearly_symmetric().with(&[[0.0, 8.0, 3.0, 8.0], [6.0, 9.0, 6.0, 12.0], [14.0, 9.5, 17.0, 9.5]]);
+        let (a, b) = ends(&plan);
+        let right = a.transform_to(&b);
+        assert_eq!(judged(&a, &b, &right, None), [None, None]);
+    }
+
+    fn walls(inlier_length: f64, conflict_length: f64) -> Agreement {
+        Agreement { inlier_length, conflict_length, centre: Point2::origin(), ..Default::default() }
+    }
+
+    #[test]
+    fn what_contradicts_as_likeness_does_is_the_alias() {
+        let itself = walls(80.0, 8.0);
+        assert!(by_contradiction(&walls(160.0, 0.5), &walls(50.0, 6.0), &itself) > 10.0);
+        assert!(by_contradiction(&walls(160.0, 15.0), &walls(50.0, 0.2), &itself) < -5.0);
+        // However well the building is like itself, it is no reason to contradict more at the right place.
+        assert!(by_contradiction(&walls(160.0, 1.0), &walls(90.0, 25.0), &walls(50.0, 0.5)) > 10.0);
+        assert!(by_contradiction(&walls(160.0, 15.0), &walls(50.0, 5.0), &itself).abs() < 1.0);
+        assert_eq!(by_contradiction(&walls(0.0, 0.0), &walls(0.0, 0.0), &itself), 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn the_odds_of_a_place_against_its_alias_are_those_of_the_alias_turned_round(lengths: [u16; 6]) {
+            let [here, there, itself] = [0, 2, 4].map(|at| walls(f64::from(lengths[at]), f64::from(lengths[at + 1])));
+            let (odds, turned) = (by_contradiction(&here, &there, &itself), by_contradiction(&there, &here, &itself));
+            prop_assert!(odds.is_finite() && (odds + turned).abs() <= 1e-6 * (1.0 + odds.abs()));
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The terms of the sum.
+
+use super::weights::{INTERCEPT, WEIGHTS};
+use crate::registration::comparison::Agreement;
+
+/// So large must the independent share of the inliers be for what speaks for a place to count in full: two walls fit any corner.
+const FULL_SHARE: f64 = 0.5;
+/// From there on the model of chance itself is in doubt.
+const MOST_SIGNIFICANCE: f64 = 8.0;
+/// A larger area says no more, square metres.
+const MOST_AREA: f64 = 500.0;
+/// So many metres that contradict, and that agree, are taken to be there in any case: a share of little is a small one.
+const MORE_CONFLICT: f64 = 5.0;
+const MORE_WALL: f64 = 40.0;
+
+/// The number of terms.
+pub const COUNT: usize = 9;
+
+/// A term of the log-odds that a hypothesis is right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Term {
+    /// How far the peak of the search stands out, in units of the spread of all others.
+    PeakSignificance,
+    /// The logarithm of the area that both maps know.
+    CommonArea,
+    /// The share of the inliers that does not belong to the two walls that fix the place.
+    IndependentInliers,
+    /// The logarithm of the number of independent constraints in the weaker direction.
+    Constraints,
+    /// The local residual, metres.
+    Residual,
+    /// The share of the conflicts that crosses free space.
+    CrossingConflicts,
+    /// The share of all compared walls that crosses free space.
+    Crossings,
+    /// The root of the cost of the deformation.
+    Deformation,
+    /// The root of the log-likelihood ratio of the walls, less the cost of the deformation.
+    Evidence,
+}
+
+impl Term {
+    /// All, in the order of [`Terms`].
+    pub const ALL: [Self; COUNT] = [
+        Self::PeakSignificance,
+        Self::CommonArea,
+        Self::IndependentInliers,
+        Self::Constraints,
+        Self::Residual,
+        Self::CrossingConflicts,
+        Self::Crossings,
+        Self::Deformation,
+        Self::Evidence,
+    ];
+
+    /// What it is called, in the explanation of a verdict and in the tables of the fit.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PeakSignificance => "peak significance",
+            Self::CommonArea => "common area",
+            Self::IndependentInliers => "independent inliers",
+            Self::Constraints => "constraints in the weaker direction",
+            Self::Residual => "local residual",
+            Self::CrossingConflicts => "conflicts that are walls",
+            Self::Crossings => "walls through free space",
+            Self::Deformation => "deformation",
+            Self::Evidence => "evidence of the walls",
+        }
+    }
+
+    /// The sign that its weight must have.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::PeakSignificance
+            | Self::CommonArea
+            | Self::IndependentInliers
+            | Self::Constraints
+            | Self::Evidence => 1.0,
+            Self::Residual | Self::CrossingConflicts | Self::Crossings | Self::Deformation => -1.0,
+        }
+    }
+}
+
+/// The values of all terms for a hypothesis, in the order of [`Term::ALL`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms(pub [f64; COUNT]);
+
+impl Terms {
+    /// Of a place whose peak in the search has a significance, at which the maps agree so, with map b deformed at that cost.
+    pub fn new(significance: f64, agreement: &Agreement, deformation_cost: f64) -> Self {
+        let Agreement { overlap, conflict_length, crossing_length, independent_share, constraints, residual, .. } =
+            *agreement;
+        let cost = deformation_cost.max(0.0);
+        let confirmed = (independent_share / FULL_SHARE).min(1.0);
+        Self([
+            confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE),
+            confirmed * overlap.clamp(1.0, MOST_AREA).ln(),
+            independent_share,
+            (constraints as f64).ln_1p(),
+            residual,
+            crossing_length / (conflict_length + MORE_CONFLICT),
+            crossing_length / (agreement.compared_length() + MORE_WALL),
+            cost.sqrt(),
+            confirmed * (agreement.evidence - cost).max(0.0).sqrt(),
+        ])
+    }
+
+    /// What each term adds to the log-odds.
+    pub fn contributions(&self) -> [f64; COUNT] {
+        std::array::from_fn(|index| WEIGHTS[index] * self.0[index])
+    }
+
+    /// The log-odds by the maps.
+    pub fn log_odds(&self) -> f64 {
+        INTERCEPT + self.contributions().iter().sum::<f64>()
+    }
+}

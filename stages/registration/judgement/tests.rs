@@ -1,0 +1,351 @@
+//! Comparison and judgement on drawn floor plans.
+
+use super::{JudgementParameters, Refusal, UserKnowledge, Verdict, judge};
+use crate::geometry::{Point2, Pose2, point_jacobian, pose};
+use crate::registration::comparison::compare;
+use crate::registration::{Basis, Hypothesis};
+use crate::registration::place_window::PlaceWindow;
+use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
+use gridweave_runtime::stage::{InitialPose, Parameters};
+use nalgebra::{Matrix3, Vector2};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// The west and the east of the office, in frames of their own.
+fn office_maps() -> (DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b)
+}
+
+/// A hypothesis that rests on enough tags.
+fn by_tags(transform_a_b: &Pose2) -> Hypothesis {
+    Hypothesis {
+        transform_a_b: *transform_a_b,
+        covariance: Matrix3::identity() * 1e-4,
+        basis: Basis::Tags,
+        source: "tags".into(),
+        reason: "four tags".into(),
+        is_refused: false,
+        is_rival: false,
+    }
+}
+
+/// Hypotheses of the maps alone, of which the first stands out.
+fn by_maps(places: &[Pose2]) -> Vec<Hypothesis> {
+    let hypothesis = |(rank, place): (usize, &Pose2)| Hypothesis {
+        basis: Basis::Search { significance: if rank == 0 { 7.0 } else { 0.0 } },
+        source: "maps".into(),
+        reason: "the maps alone".into(),
+        ..by_tags(place)
+    };
+    places.iter().enumerate().map(hypothesis).collect()
+}
+
+fn judged(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis]) -> Verdict {
+    judged_knowing(a, b, hypotheses, &UserKnowledge::default())
+}
+
+fn judged_knowing(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis], known: &UserKnowledge) -> Verdict {
+    judge(&a.view(), &b.view(), hypotheses, known, &JudgementParameters::default()).unwrap()
+}
+
+fn reason(verdict: &Verdict) -> String {
+    verdict.reason(JudgementParameters::default().accept, "verifier", "robot1", "robot2")
+}
+
+#[test]
+fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let tags = [by_tags(&truth)];
+    let verdict = judged(&a, &b, &tags);
+    assert_eq!(verdict.refusal, None);
+    assert!(verdict.candidate.agreement.inlier_ratio() > 0.95);
+    assert!(reason(&verdict).contains("\n\nfour tags; the maps confirm it"), "{}", reason(&verdict));
+    let elsewhere = pose(1.5, 0.0, 0.0) * truth;
+    let maps = by_maps(&[elsewhere, truth]);
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, 1), "{}", reason(&verdict));
+    assert!(verdict.rival.as_ref().is_some_and(|rival| (rival.shift - 1.5).abs() < 0.05));
+    assert!(verdict.probability > 0.999);
+}
+
+#[test]
+fn a_bent_map_is_compared_as_it_is_bent_and_laid_where_all_of_it_is_nearest() {
+    const MOST: f64 = 1.3;
+    let a = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let b = a.bent(MOST);
+    // Where one part of it fits, and where another does.
+    let maps = by_maps(&[pose(-0.65, -0.9, 0.0), pose(-0.75, 0.0, -0.04)]);
+    let rigid = JudgementParameters { bend: 0.0, ..Default::default() };
+    let verdict = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &rigid).unwrap();
+    assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
+    assert!(reason(&verdict).contains("as the maps are bent by 0.5"), "{}", reason(&verdict));
+    let bent = verdict.candidate.deformed.unwrap();
+    assert!(bent.agreement.inlier_ratio() > 0.95 && bent.cost > 1.0, "{bent:?}");
+    let places: Vec<Point2> =
+        (1..20).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect();
+    let off = places.iter().map(|place| bent.transform_a_b * (place + bend_at(MOST, place)) - place);
+    let off: Vec<Vector2<f64>> = off.collect();
+    let mean = off.iter().sum::<Vector2<f64>>() / off.len() as f64;
+    let variance = off.iter().map(|off| off.norm_squared()).sum::<f64>() / off.len() as f64;
+    assert!(mean.norm() < 0.1, "{mean}");
+    assert!((bent.bend / variance.sqrt() - 1.0).abs() < 0.2, "{} {}", bent.bend, variance.sqrt());
+    let about_middle = point_jacobian(&bent.transform_a_b, &Point2::new(10.0, 6.0));
+    let covariance = about_middle * bent.covariance * about_middle.transpose();
+    assert!((covariance.trace() / variance - 1.0).abs() < 0.5, "{covariance} {variance}");
+}
+
+#[test]
+fn the_map_of_another_building_is_not_bent_to_fit() {
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let a = FloorPlan::office().draw(part, drawing(0.0, 0.0, 0.0));
+    let b = FloorPlan::another_office().draw(part, drawing(0.0, 0.0, 0.0));
+    for place in [pose(1.5, 0.0, 0.0), pose(-3.0, 1.0, 0.1), pose(12.0, 0.0, PI / 2.0)] {
+        let maps = by_maps(&[place]);
+        let verdict = judged(&a, &b, &maps);
+        assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
+    }
+}
+
+#[test]
+fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
+    let plan = FloorPlan::nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
+    let truth = a.transform_to(&b);
+    let turned = pose(0.0, 0.0, PI) * truth;
+    let maps = by_maps(&[truth, turned]);
+    let verdict = judged(&a, &b, &maps);
+    let Some(Refusal::Ambiguous { turn, probability, listed, .. }) = &verdict.refusal else { panic!("{verdict:?}") };
+    assert!((turn.abs() - 180.0).abs() < 0.1 && *probability > 0.01 && listed.0.len() == 2);
+    assert!(reason(&verdict).contains("it cannot be told which is right"), "{}", reason(&verdict));
+
+    let both: Vec<Hypothesis> = [vec![by_tags(&truth)], by_maps(&[turned, truth])].concat();
+    let verdict = judged(&a, &b, &both);
+    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
+    assert!(verdict.candidate.hypothesis.transform_a_b == truth);
+    assert!(verdict.found_too_by().is_some());
+}
+
+#[test]
+fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let hypotheses: Vec<Hypothesis> = [vec![by_tags(&(pose(1.5, 0.0, 0.0) * truth))], by_maps(&[truth])].concat();
+    let verdict = judged(&a, &b, &hypotheses);
+    assert!(verdict.refusal.is_none() && verdict.candidate.hypothesis.source == "maps");
+}
+
+/// Furniture was moved all over the building, so that the maps contradict each other in much at their right place.
+#[test]
+fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_tell_the_same() {
+    let places = (0..10).flat_map(|x| [1.1, 2.6, 3.9, 8.2, 9.6, 11.0].map(|y| (0.9 + 1.9 * f64::from(x), y)));
+    let turned = |(x, y): (f64, f64)| ([x - 0.6, y, x + 0.6, y], [x, y - 0.6, x, y + 0.6]);
+    let (before, after): (Vec<_>, Vec<_>) = places.map(turned).unzip();
+    let a = FloorPlan::office().with(&before).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(3.0, 2.0, 0.4));
+    let b = FloorPlan::office().with(&after).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
+    let truth = a.transform_to(&b);
+    let tags = by_tags(&truth);
+    let verdict = judged(&a, &b, std::slice::from_ref(&tags));
+    assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
+    let maps = by_maps(&[truth, pose(4.0, 0.0, 0.0) * truth]);
+    let together = [std::slice::from_ref(&tags), &maps].concat();
+    assert_eq!(judged(&a, &b, &together).refusal, None);
+    let second = [std::slice::from_ref(&tags), &by_maps(&[pose(4.0, 0.0, 0.0) * truth, truth])].concat();
+    assert!(judged(&a, &b, &second).refusal.is_some(), "the search has come to another place first");
+    let few = Hypothesis { basis: Basis::FewTags, ..tags };
+    assert!(judged(&a, &b, &[&[few], maps.as_slice()].concat()).refusal.is_some(), "too few tags");
+}
+
+#[test]
+fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
+    let plan = FloorPlan::nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
+    let truth = a.transform_to(&b);
+    let mut maps = by_maps(&[truth, pose(0.0, 0.0, PI) * truth]);
+    maps[0].is_refused = true;
+    maps[0].reason = "ICP has not settled".into();
+    let verdict = judged(&a, &b, &maps);
+    assert_eq!(reason(&verdict), "ICP has not settled");
+    let (known, parameters) = (UserKnowledge::default(), JudgementParameters::default());
+    assert!(judge(&a.view(), &b.view(), &[], &known, &parameters).is_none());
+}
+
+#[test]
+fn walls_on_free_space_are_refused() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    for (x, y, yaw) in [(1.5, 0.0, 0.0), (0.0, 2.0, 0.0), (-1.2, 1.2, 0.0)] {
+        let wrong = pose(x, y, 0.0) * truth;
+        let agreement = compare(&a.view(), &b.view(), &wrong, &JudgementParameters::default());
+        assert!(agreement.inlier_ratio() < 0.7 && agreement.evidence < 10.0, "{x} {y} {yaw}: {agreement:?}");
+        let hypotheses = [by_tags(&wrong)];
+        assert!(judged(&a, &b, &hypotheses).refusal.is_some(), "{x} {y} {yaw}");
+    }
+}
+
+#[test]
+fn a_mirrored_map_and_another_building_are_refused() {
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let a = FloorPlan::office().draw(part, drawing(3.0, 2.0, 0.4));
+    for other in [FloorPlan::office().mirrored(6.0), FloorPlan::another_office()] {
+        let b = other.draw(part, drawing(12.0, 6.0, -2.1));
+        let hypotheses = [by_tags(&a.transform_to(&b))];
+        let verdict = judged(&a, &b, &hypotheses);
+        assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
+    }
+}
+
+#[test]
+fn maps_that_hardly_overlap_are_refused() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 8.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(7.7, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let hypotheses = [by_tags(&a.transform_to(&b))];
+    let verdict = judged(&a, &b, &hypotheses);
+    assert!(matches!(verdict.refusal, Some(Refusal::Chance { .. })), "{}", reason(&verdict));
+}
+
+#[test]
+fn walls_that_are_seen_from_different_sides_are_no_evidence() {
+    // Two rooms on either side of one wall, each map of one of them.
+    let plan = FloorPlan::new(&[
+        [0.0, 0.0, 6.0, 0.0],
+        [6.0, 0.0, 6.0, 10.0],
+        [6.0, 10.0, 0.0, 10.0],
+        [0.0, 10.0, 0.0, 0.0],
+        [0.0, 5.0, 6.0, 5.0],
+    ]);
+    let south = plan.draw(seen(-0.2, -0.2, 6.2, 5.0), drawing(3.0, 2.0, 0.4));
+    let north = plan.draw(seen(-0.2, 5.0, 6.2, 10.2), drawing(3.0, 7.0, -2.1));
+    let truth = south.transform_to(&north);
+    let beside = compare(&south.view(), &north.view(), &truth, &JudgementParameters::default());
+    let same = compare(&south.view(), &south.view(), &Pose2::identity(), &JudgementParameters::default());
+    assert!(beside.inlier_length < 1.0 && same.inlier_length > 15.0, "{beside:?} {same:?}");
+}
+
+#[test]
+fn a_region_may_slide_a_little_and_not_far() {
+    let (a, b) = office_maps();
+    let truth = a.transform_to(&b);
+    let evidence = |shift: f64| {
+        let moved = pose(shift, 0.0, 0.0) * truth;
+        compare(&a.view(), &b.view(), &moved, &JudgementParameters::default()).evidence
+    };
+    assert!(evidence(0.12) > 0.8 * evidence(0.0), "{} {}", evidence(0.12), evidence(0.0));
+    assert!(evidence(0.6) < 0.3 * evidence(0.0), "{} {}", evidence(0.6), evidence(0.0));
+}
+
+#[test]
+fn what_is_accepted_follows_from_the_probability_that_is_asked_for() {
+    let (a, b) = office_maps();
+    let hypotheses = by_maps(&[a.transform_to(&b)]);
+    for (accept, is_accepted) in [(0.0, true), (0.999, true), (1.0, false)] {
+        let parameters = JudgementParameters { accept, ..Default::default() };
+        let verdict = judge(&a.view(), &b.view(), &hypotheses, &UserKnowledge::default(), &parameters).unwrap();
+        assert_eq!(verdict.refusal.is_none(), is_accepted, "{accept}: {}", reason(&verdict));
+    }
+}
+
+#[test]
+fn the_wrong_quarter_is_refused() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.0));
+    let b = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.3));
+    for turn in [FRAC_PI_2, PI, -FRAC_PI_2] {
+        let hypotheses = [by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)))];
+        let verdict = judged(&a, &b, &hypotheses);
+        assert!(verdict.refusal.is_some(), "{turn}: {}", reason(&verdict));
+    }
+}
+
+#[test]
+fn the_defaults_are_in_range_and_nonsense_is_not() {
+    assert!(JudgementParameters::default().check().is_empty());
+    let nonsense = JudgementParameters {
+        accept: 1.5,
+        wall_tolerance: 0.0,
+        region: f64::NAN,
+        region_deviation: -1.0,
+        bend: 1e-200,
+        turn: 0.0,
+        ..JudgementParameters::default()
+    };
+    assert_eq!(nonsense.check().len(), 6);
+}
+
+/// The nearly symmetric building, twice, and a place in each of its halves.
+fn ambiguous() -> (DrawnMap, DrawnMap, [Pose2; 2]) {
+    let building = FloorPlan::nearly_symmetric();
+    let part = seen(-0.2, -0.2, 20.2, 12.2);
+    let (a, b) = (building.draw(part, drawing(3.0, 2.0, 0.4)), building.draw(part, drawing(12.0, 6.0, -2.1)));
+    let truth = a.transform_to(&b);
+    let world_a = a.transform_world_map;
+    let half_turn = world_a.inverse() * pose(20.0, 12.0, PI) * world_a * truth;
+    (a, b, [truth, half_turn])
+}
+
+/// An initial pose of map b that is known to half a metre, with map a at the origin.
+fn window_at(place: &Pose2) -> UserKnowledge {
+    let known = InitialPose {
+        x: place.translation.x + 0.4,
+        y: place.translation.y - 0.3,
+        yaw: place.rotation.angle() + 0.1,
+        stddev: 0.5,
+        yaw_stddev: 0.1,
+    };
+    UserKnowledge { window: Some(PlaceWindow::between(&InitialPose::ORIGIN, &known)), hypothesis: None }
+}
+
+#[test]
+fn an_initial_pose_decides_between_places_that_are_alike() {
+    let (a, b, places) = ambiguous();
+    let hypotheses = by_maps(&places);
+    assert!(matches!(judged(&a, &b, &hypotheses).refusal, Some(Refusal::Ambiguous { .. })));
+    for (rank, place) in (0..).zip(&places) {
+        let verdict = judged_knowing(&a, &b, &hypotheses, &window_at(place));
+        assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, rank), "{}", reason(&verdict));
+    }
+    let elsewhere = window_at(&(pose(5.0, 0.0, 0.0) * places[0]));
+    let verdict = judged_knowing(&a, &b, &hypotheses, &elsewhere);
+    assert!(matches!(verdict.refusal, Some(Refusal::Unexpected { shift, .. }) if (shift - 5.0).abs() < 1.0));
+    assert!(reason(&verdict).contains("from the initial poses only\ntry: "), "{}", reason(&verdict));
+}
+
+#[test]
+fn a_hypothesis_that_was_listed_can_be_chosen() {
+    let (a, b, places) = ambiguous();
+    let hypotheses = by_maps(&places);
+    let refused = judged(&a, &b, &hypotheses);
+    let listed = &refused.listed.0;
+    assert_eq!(listed.len(), 2);
+    for (number, place) in (1..).zip(listed) {
+        let known = UserKnowledge { hypothesis: Some(number), ..UserKnowledge::default() };
+        let verdict = judged_knowing(&a, &b, &hypotheses, &known);
+        assert_eq!(verdict.refusal, None);
+        let translation = verdict.candidate.hypothesis.transform_a_b.translation;
+        assert_eq!((place.x, place.y), (translation.x, translation.y));
+        assert!(reason(&verdict).starts_with(&format!("hypothesis {number} of 2, which was asked for")));
+    }
+    let known = UserKnowledge { hypothesis: Some(3), ..UserKnowledge::default() };
+    let refusal = judged_knowing(&a, &b, &hypotheses, &known).refusal;
+    assert_eq!(refusal, Some(Refusal::NoSuchHypothesis { asked: 3, count: 2 }));
+}
+
+#[test]
+fn what_everybody_is_shown_of_a_refusal_fits_in_eighty_columns() {
+    let (a, b, places) = ambiguous();
+    let reason = reason(&judged(&a, &b, &by_maps(&places)));
+    let (shown, whole) = reason.split_once("\n\n").unwrap();
+    let lines: Vec<&str> = shown.lines().collect();
+    assert!(lines.iter().all(|line| line.len() <= 78), "{shown}");
+    assert_eq!(lines[0], "the maps fit at 2 places, and it cannot be told which is right");
+    assert!(lines[1].starts_with("missing: a probability of 0.999 (--set verifier.accept); this is 0."), "{shown}");
+    assert!(lines[2].starts_with("try: --accept robot2=N") && lines[4].starts_with("  2: x "), "{shown}");
+    assert!(whole.starts_with("the maps alone; the maps do not confirm it"), "{whole}");
+}

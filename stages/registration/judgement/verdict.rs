@@ -1,0 +1,193 @@
+//! The judgement on all hypotheses for a pair of maps, and its reason in words.
+
+use super::weights::{INTERCEPT, TYPICAL, WEIGHTS};
+use super::{Alias, Candidate, JudgementParameters, Listed, Refusal, Term};
+use crate::registration::comparison::{Agreement, Deformed};
+use crate::registration::{Basis, Hypothesis};
+use std::fmt::Write;
+
+/// The second most probable place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rival {
+    /// How far the middle of the inliers is moved there, metres.
+    pub shift: f64,
+    /// By how much map b is turned there, radians.
+    pub turn: f64,
+    /// What the maps say of each other there.
+    pub agreement: Agreement,
+    /// How probable it is.
+    pub probability: f64,
+    /// What it rests on, for people.
+    pub source: String,
+    /// Whether tags propose it.
+    pub is_by_tags: bool,
+}
+
+impl Rival {
+    /// One candidate as the rival of another.
+    pub(super) fn new(best: &Candidate, other: &Candidate, probability: f64) -> Self {
+        let (shift, turn) = best.change(&other.transform_a_b());
+        Self {
+            shift,
+            turn,
+            agreement: other.agreement,
+            probability,
+            source: other.hypothesis.source.clone(),
+            is_by_tags: other.rests_on(Basis::is_by_tags),
+        }
+    }
+}
+
+/// The judgement on all hypotheses for a pair.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The place that is right, or came nearest to it.
+    pub candidate: Candidate,
+    /// Why it is not accepted; none if it is.
+    pub refusal: Option<Refusal>,
+    /// The second most probable place, if there is one.
+    pub rival: Option<Rival>,
+    /// The probability that it is right, 0 to 1.
+    pub probability: f64,
+    /// The log-odds of it before the maps were compared, by tags and by what the user knows.
+    pub prior: f64,
+    /// If the user has chosen it: its number, and of how many.
+    pub chosen: Option<(usize, usize)>,
+    /// All hypotheses that took part, in the order in which the user can choose one.
+    pub listed: Listed,
+}
+
+impl Verdict {
+    /// Of a place that was not judged.
+    pub(super) fn of(candidate: Candidate) -> Self {
+        Self {
+            candidate,
+            refusal: None,
+            rival: None,
+            probability: 0.0,
+            prior: 0.0,
+            chosen: None,
+            listed: Listed::default(),
+        }
+    }
+
+    /// Whether it accepts a place for which the maps alone speak.
+    pub fn rests_on_maps_alone(&self) -> bool {
+        self.refusal.is_none() && self.chosen.is_none() && !self.candidate.rests_on(Basis::is_by_tags)
+    }
+
+    /// The same verdict where the building looks alike at another place, if there is one: the alias takes part in the sum.
+    pub fn against(self, alias: Option<&Alias>, parameters: &JudgementParameters) -> Self {
+        let Some(alias) = alias else { return self };
+        // The odds against all others, and the alias beside them.
+        let others = (1.0 - self.probability) / self.probability;
+        let probability = 1.0 / (1.0 + others + alias.log_odds.exp());
+        let refusal = match probability < parameters.accept {
+            true => Some(Refusal::Aliased { alias: alias.clone() }),
+            false => self.refusal,
+        };
+        Self { probability, refusal, ..self }
+    }
+
+    /// The term by which it falls short most of a usual right place.
+    pub(super) fn weakest_term(&self) -> Term {
+        let terms = self.candidate.terms();
+        let shortfall = |index: &usize| WEIGHTS[*index] * (TYPICAL[*index] - terms.0[*index]);
+        let weakest = (0..WEIGHTS.len()).max_by(|one, other| shortfall(one).total_cmp(&shortfall(other)));
+        Term::ALL[weakest.unwrap_or_default()]
+    }
+
+    /// Another source that proposes the same place.
+    pub fn found_too_by(&self) -> Option<&Hypothesis> {
+        let source = &self.candidate.hypothesis.source;
+        self.candidate.others.iter().find(|other| other.source != *source)
+    }
+
+    /// The reason of the verdict: a paragraph of short lines for all, and behind an empty line the whole for those who ask.
+    /// `accept` is the probability that is asked for, and `stage` the name of the stage that asks.
+    pub fn reason(&self, accept: f64, stage: &str, robot_a: &str, robot_b: &str) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = match &self.refusal {
+            None => self.write_acceptance(&mut text),
+            Some(Refusal::Before(reason)) => write!(text, "{reason}"),
+            Some(refusal) => self.write_refusal(refusal, accept, stage, (robot_a, robot_b), &mut text),
+        };
+        text
+    }
+
+    fn write_acceptance(&self, text: &mut String) -> std::fmt::Result {
+        let Agreement { inlier_length, conflict_length, overlap, .. } = self.candidate.agreement;
+        let agree = format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, in {overlap:.0} m2");
+        match self.chosen {
+            Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, which was asked for: {agree}")?,
+            None => writeln!(text, "{agree} that both know")?,
+        }
+        if let Some(Deformed { bend, .. }) = self.candidate.deformed {
+            writeln!(text, "as the maps are bent by {bend:.2} m against each other")?;
+        }
+        write!(text, "\n{}", self.candidate.hypothesis.reason)?;
+        if let Some(other) = self.found_too_by() {
+            write!(text, ", found by the {}, too", other.source)?;
+        }
+        if self.chosen.is_some() {
+            return Ok(());
+        }
+        write!(text, "; the maps confirm it")?;
+        if let Some(Rival { agreement, .. }) = &self.rival {
+            let share = 100.0 * agreement.inlier_ratio();
+            write!(text, "; at the best of other places {share:.0} % of {:.0} m agree", agreement.compared_length())?;
+        }
+        self.write_sum(text)
+    }
+
+    fn write_refusal(
+        &self,
+        refusal: &Refusal,
+        accept: f64,
+        stage: &str,
+        (robot_a, robot_b): (&str, &str),
+        text: &mut String,
+    ) -> std::fmt::Result {
+        writeln!(text, "{}", refusal.headline())?;
+        let is_judged = !matches!(refusal, Refusal::Unexpected { .. } | Refusal::NoSuchHypothesis { .. });
+        if is_judged {
+            // Rounded down, so that what is too little is not shown as enough.
+            let probability = (1000.0 * self.probability).floor() / 1000.0;
+            writeln!(text, "missing: a probability of {accept} (--set {stage}.accept); this is {probability:.3}")?;
+        }
+        if let Some(advice) = refusal.advice(robot_b) {
+            writeln!(text, "try: {advice}")?;
+        }
+        let listed = self.listed.to_string();
+        if matches!(refusal, Refusal::Ambiguous { .. }) && self.listed.0.len() > 1 {
+            write!(text, "{listed}")?;
+        }
+        write!(text, "\n{}; the maps do not confirm it: {refusal}", self.candidate.hypothesis.reason)?;
+        if is_judged {
+            self.write_sum(text)?;
+        }
+        if !listed.is_empty() {
+            write!(text, "\nplaces of the map of {robot_b} on that of {robot_a}:\n{}", listed.trim_end())?;
+        }
+        Ok(())
+    }
+
+    /// The sum term by term.
+    fn write_sum(&self, text: &mut String) -> std::fmt::Result {
+        let terms = self.candidate.terms();
+        write!(text, "\nlog-odds that it is right:")?;
+        write!(text, "\n  {:<36} {INTERCEPT:>7.1}", "before anything is known")?;
+        if self.prior != 0.0 {
+            write!(text, "\n  {:<36} {:>7.1}", "tags and initial poses", self.prior)?;
+        }
+        for ((term, value), contribution) in Term::ALL.iter().zip(terms.0).zip(terms.contributions()) {
+            write!(text, "\n  {:<36} {contribution:>7.1}   ({value:.2})", term.name())?;
+        }
+        write!(text, "\n  {:<36} {:>7.1}", "sum", terms.log_odds() + self.prior)?;
+        if let Some(Rival { probability, .. }) = &self.rival {
+            write!(text, "\n  probability {:.6}, of the best other place {probability:.6}", self.probability)?;
+        }
+        Ok(())
+    }
+}

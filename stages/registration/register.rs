@@ -1,0 +1,102 @@
+//! The whole way from two maps to a verdict.
+
+use super::comparison::MapView;
+use super::icp::{FirstGuess, IcpParameters, IcpRefusal, refine};
+use super::judgement::{Alias, JudgementParameters, SelfSimilarity, UserKnowledge, Verdict, judge};
+use super::search::{MapAlignerParameters, MapAlignment, PreparedMap, SearchRefusal, align_prepared};
+use super::{Basis, Hypothesis};
+use crate::geometry::Grid;
+use crate::walls::{NORMAL_RADIUS, WallMap};
+
+/// Two maps, each prepared once for all steps.
+pub struct PreparedPair<'a> {
+    grids: [Grid<'a>; 2],
+    rasters: [PreparedMap; 2],
+    walls: [WallMap; 2],
+}
+
+impl<'a> PreparedPair<'a> {
+    /// Prepares two maps.
+    ///
+    /// # Errors
+    /// A map without walls, or larger than what is searched.
+    pub fn new(a: Grid<'a>, b: Grid<'a>, parameters: &MapAlignerParameters) -> Result<Self, SearchRefusal> {
+        let least = PreparedMap::least_cell(&a).max(PreparedMap::least_cell(&b));
+        let cell = least.max(0.5 * parameters.cell);
+        let prepare = |robot: &str, grid: &Grid<'_>| PreparedMap::new(robot, grid, cell, parameters.max_extent);
+        let (raster_a, raster_b) = rayon::join(|| prepare("a", &a), || prepare("b", &b));
+        let (walls_a, walls_b) = rayon::join(|| WallMap::new(&a, NORMAL_RADIUS), || WallMap::new(&b, NORMAL_RADIUS));
+        Ok(Self { grids: [a, b], rasters: [raster_a?, raster_b?], walls: [walls_a, walls_b] })
+    }
+
+    /// Their cells and walls, as they are compared.
+    pub fn views(&self) -> [MapView<'_>; 2] {
+        [0, 1].map(|index| MapView::rigid(self.grids[index], &self.walls[index]))
+    }
+
+    /// Searches for all places of map b on map a, or all that the user thinks possible, and refines them.
+    ///
+    /// # Errors
+    /// The maps fit nowhere.
+    pub fn hypotheses(
+        &self,
+        known: &UserKnowledge,
+        parameters: &MapAlignerParameters,
+        icp: &IcpParameters,
+    ) -> Result<Vec<Hypothesis>, SearchRefusal> {
+        let [a, b] = &self.rasters;
+        let found = align_prepared(a, b, known.window.as_ref(), parameters)?;
+        let guesses = found.hypotheses.iter().enumerate();
+        Ok(guesses.map(|(rank, guess)| self.refined(guess, found.reason(rank), icp)).collect())
+    }
+
+    /// A place that the search has found, refined.
+    fn refined(&self, guess: &MapAlignment, reason: String, icp: &IcpParameters) -> Hypothesis {
+        let start = FirstGuess::new(guess.transform_a_b, guess.covariance, icp);
+        let [a, b] = &self.walls;
+        let refinement = refine(a, b, &start, icp);
+        let registration = &refinement.registration;
+        let refusal = refinement.refusal.clone().or_else(|| IcpRefusal::of_search(&start, registration, icp));
+        Hypothesis {
+            transform_a_b: registration.transform_a_b,
+            covariance: registration.covariance,
+            basis: Basis::Search { significance: guess.lead.max(0.0) },
+            source: "maps".to_owned(),
+            reason: refusal.as_ref().map_or(reason, ToString::to_string),
+            is_refused: refusal.is_some(),
+            is_rival: false,
+        }
+    }
+}
+
+/// The parameters of all steps.
+#[derive(Clone, Debug, Default)]
+pub struct RegistrationParameters {
+    /// Of the search.
+    pub search: MapAlignerParameters,
+    /// Of the refinement.
+    pub icp: IcpParameters,
+    /// Of the comparison and the judgement.
+    pub judgement: JudgementParameters,
+}
+
+/// Registers two maps: where map b lies on map a, if it can be known.
+///
+/// # Errors
+/// The maps fit nowhere.
+pub fn register(
+    pair: &PreparedPair<'_>,
+    known: &UserKnowledge,
+    parameters: &RegistrationParameters,
+) -> Result<Option<Verdict>, SearchRefusal> {
+    let RegistrationParameters { search, icp, judgement } = parameters;
+    let hypotheses = pair.hypotheses(known, search, icp)?;
+    let [a, b] = pair.views();
+    let Some(verdict) = judge(&a, &b, &hypotheses, known, judgement) else { return Ok(None) };
+    if !verdict.rests_on_maps_alone() {
+        return Ok(Some(verdict));
+    }
+    let [similar_a, similar_b] = [&a, &b].map(|view| SelfSimilarity::new(view, judgement));
+    let alias = Alias::likeliest(&verdict, (&a, &similar_a), (&b, &similar_b), known.window.as_ref(), judgement);
+    Ok(Some(verdict.against(alias.as_ref(), judgement)))
+}

@@ -1,0 +1,120 @@
+//! What the weights are fitted to.
+
+use super::FitJudgementArgs;
+use crate::align::worlds::Seeds;
+use crate::map_pairs::judging::candidates_of;
+use crate::map_pairs::library::{self, Library, MapOfBuilding, SimulatedPair};
+use crate::map_pairs::truth::{self, Closeness};
+use anyhow::Result;
+use gridweave_runtime::stage::Registry;
+use gridweave_stages::geometry::Pose2;
+use gridweave_stages::registration::comparison::Agreement;
+use gridweave_stages::registration::judgement::{Alias, Candidate, Terms};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+/// Aliases are looked for where a place is more probable than this: only what may be accepted has any.
+const LIKELY: f64 = 0.5;
+
+/// Two maps, and the places that are judged.
+pub(super) struct Example {
+    pub(super) set: String,
+    pub(super) pair: String,
+    /// What is kept together in the cross-validation.
+    pub(super) place: String,
+    /// Whether the maps belong together.
+    pub(super) is_related: bool,
+    /// The places.
+    pub(super) places: Vec<Place>,
+    /// The aliases of the most probable of them, and how near each is to the truth.
+    pub(super) aliases: Vec<([f64; 2], Closeness)>,
+}
+
+/// A place that is judged.
+pub(super) struct Place {
+    pub(super) terms: Terms,
+    pub(super) agreement: Agreement,
+    /// Whether ICP has refused it.
+    pub(super) is_refused: bool,
+    pub(super) closeness: Closeness,
+}
+
+impl Example {
+    fn new(
+        names: [&str; 3],
+        is_related: bool,
+        (places, aliases): (Vec<Candidate>, Vec<Alias>),
+        closeness: impl Fn(&Pose2) -> Closeness,
+    ) -> Self {
+        let [set, pair, place] = names.map(str::to_owned);
+        let places = places.into_iter().map(|candidate| Place {
+            terms: candidate.terms(),
+            agreement: candidate.agreement,
+            is_refused: candidate.hypothesis.is_refused,
+            closeness: closeness(&candidate.transform_a_b()),
+        });
+        let aliases = aliases.into_iter().map(|alias| (alias.terms, closeness(&alias.transform_a_b)));
+        Self { set, pair, place, is_related, places: places.collect(), aliases: aliases.collect() }
+    }
+
+    /// The places that may be accepted.
+    pub(super) fn usable(&self) -> impl Iterator<Item = &Place> {
+        self.places.iter().filter(|place| !place.is_refused)
+    }
+
+    /// Whether a place is the right one, but none exactly: which place it is can be learnt from that no more than that it is none.
+    pub(super) fn is_inexact(&self) -> bool {
+        let has = |closeness: Closeness| self.usable().any(|place| place.closeness == closeness);
+        has(Closeness::Near) && !has(Closeness::Right)
+    }
+
+    /// Whether an alias is the right place.
+    pub(super) fn is_aliased(&self) -> bool {
+        self.aliases.iter().any(|(_, closeness)| *closeness != Closeness::Wrong)
+    }
+}
+
+/// The pairs of maps that the experiment is told of.
+pub(super) fn gather(args: &FitJudgementArgs, registry: &Registry) -> Result<Vec<Example>> {
+    let mut examples = Vec::new();
+    for folder in &args.folders {
+        let set = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let pairs = truth::pairs(folder)?;
+        let example = |pair: &truth::Pair| {
+            let [a, b] = &pair.maps;
+            let set = pair.quality.as_ref().map_or_else(|| set.clone(), |quality| format!("{set}, {quality}"));
+            let names = [set.as_str(), pair.name.as_str(), a.building.as_str()];
+            Example::new(names, !pair.is_unrelated(), candidates_of(a, b, LIKELY), |place| pair.closeness(place))
+        };
+        examples.extend(pairs.par_iter().map(example).collect::<Vec<_>>());
+    }
+    let files = Library::of_folders(&args.folders)?;
+    examples.extend(of_different_buildings("different buildings", &files, args.unrelated, true, args.seed));
+    let worlds = library::simulated_pairs(args.worlds, None, Seeds::Tuning, registry);
+    let example = |pair: &SimulatedPair| {
+        let [a, b] = &pair.maps;
+        let set = format!("simulated: {}", pair.kind());
+        let names = [set.as_str(), pair.world.name.as_str(), a.building.as_str()];
+        Example::new(names, true, candidates_of(a, b, LIKELY), |place| pair.closeness(place))
+    };
+    examples.extend(worlds.par_iter().map(example).collect::<Vec<_>>());
+    let worlds = Library::of_worlds(worlds);
+    examples.extend(of_different_buildings("different simulated buildings", &worlds, args.simulated, false, args.seed));
+    Ok(examples)
+}
+
+fn of_different_buildings(set: &str, library: &Library, count: u64, in_parts: bool, seed: u64) -> Vec<Example> {
+    if !library.has_two_buildings() {
+        return Vec::new();
+    }
+    let example = |number: u64| {
+        let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1 << 32).wrapping_add(number));
+        let maps = library.two_buildings(&mut random);
+        let pair = format!("{number}: {} and {}", maps[0].name, maps[1].name);
+        let place = maps[0].building.clone();
+        let [a, b] = maps.map(|map: &MapOfBuilding| if in_parts { map.part(&mut random) } else { map.clone() });
+        Example::new([set, &pair, &place], false, candidates_of(&a, &b, LIKELY), |_| Closeness::Wrong)
+    };
+    (0..count).into_par_iter().map(example).collect()
+}

@@ -1,0 +1,224 @@
+//! The conditional logit (McFadden 1974) that the weights come from.
+
+use super::examples::Example;
+use crate::map_pairs::truth::Closeness;
+use anyhow::{Result, bail};
+use gridweave_stages::registration::judgement::{COUNT, Term, posterior};
+use nalgebra::{DMatrix, DVector};
+
+/// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that the data leave
+/// open.
+const REGULARISATION: f64 = 1.0;
+/// Newton's method has converged when no weight changes by more.
+const CONVERGENCE: f64 = 1e-9;
+const MOST_ITERATIONS: usize = 200;
+
+/// Alternatives, of which one is right, some that are one, or none.
+pub(super) struct Choice {
+    pub(super) weight: f64,
+    /// The values of the terms of each, and whether it is right.
+    pub(super) alternatives: Vec<(Vec<f64>, bool)>,
+}
+
+/// A linear function of terms.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Linear {
+    pub(super) intercept: f64,
+    pub(super) weights: Vec<f64>,
+}
+
+impl Linear {
+    pub(super) fn of(&self, values: &[f64]) -> f64 {
+        self.intercept + self.weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>()
+    }
+
+    /// The likeliest one for which each weight has its sign; a sign of 0 allows both.
+    pub(super) fn fit(choices: &[Choice], signs: &[f64]) -> Result<Self> {
+        let mut kept: Vec<usize> = (0..signs.len()).collect();
+        loop {
+            let fitted = fit_unbounded(choices, &kept)?;
+            let mut weights = vec![0.0; signs.len()];
+            kept.iter().zip(&fitted.weights).for_each(|(index, weight)| weights[*index] = *weight);
+            // A term whose weight has the wrong sign says nothing.
+            let Some(worst) = kept.iter().position(|index| weights[*index] * signs[*index] < 0.0) else {
+                return Ok(Self { weights, ..fitted });
+            };
+            kept.remove(worst);
+        }
+    }
+}
+
+/// Newton's method on the terms that are kept, scaled to a spread of one, with the expected information.
+fn fit_unbounded(choices: &[Choice], kept: &[usize]) -> Result<Linear> {
+    let values = || choices.iter().flat_map(|choice| choice.alternatives.iter().map(|(values, _)| values));
+    let count = values().count() as f64;
+    if count == 0.0 {
+        bail!("there is nothing to fit to: name folders with pairs of maps");
+    }
+    let moments = kept.iter().map(|index| {
+        let mean = values().map(|values| values[*index]).sum::<f64>() / count;
+        let variance = values().map(|values| (values[*index] - mean).powi(2)).sum::<f64>() / count;
+        (mean, variance.sqrt().max(1e-9))
+    });
+    let moments: Vec<(f64, f64)> = moments.collect();
+    // The intercept is the first.
+    let scaled = |values: &[f64]| {
+        let terms = kept.iter().zip(&moments).map(|(index, (mean, spread))| (values[*index] - mean) / spread);
+        DVector::from_iterator(kept.len() + 1, std::iter::once(1.0).chain(terms))
+    };
+    let choices: Vec<(f64, Vec<(DVector<f64>, bool)>)> = choices
+        .iter()
+        .map(|choice| {
+            let alternatives = choice.alternatives.iter().map(|(values, right)| (scaled(values), *right));
+            (choice.weight, alternatives.collect())
+        })
+        .collect();
+    let mut penalty = DMatrix::identity(kept.len() + 1, kept.len() + 1) * REGULARISATION;
+    penalty[(0, 0)] = 0.0;
+    let mut parameters = DVector::zeros(kept.len() + 1);
+    let (mut loss, mut gradient, mut information) = derivatives(&choices, &parameters, &penalty);
+    for _ in 0..MOST_ITERATIONS {
+        let Some(step) = information.clone().cholesky().map(|cholesky| cholesky.solve(&gradient)) else {
+            bail!("the terms depend on each other, so that no weights are the likeliest");
+        };
+        // Half of it, until it is better.
+        let mut share = 1.0;
+        let next = loop {
+            let next = &parameters - &step * share;
+            let (next_loss, next_gradient, next_information) = derivatives(&choices, &next, &penalty);
+            if next_loss <= loss || share < 1e-6 {
+                (loss, gradient, information) = (next_loss, next_gradient, next_information);
+                break next;
+            }
+            share *= 0.5;
+        };
+        let change = (&next - &parameters).amax();
+        parameters = next;
+        if change < CONVERGENCE {
+            break;
+        }
+    }
+    let weights: Vec<f64> = moments.iter().enumerate().map(|(index, (_, spread))| parameters[index + 1] / spread).collect();
+    let shift = weights.iter().zip(&moments).map(|(weight, (mean, _))| weight * mean).sum::<f64>();
+    Ok(Linear { intercept: parameters[0] - shift, weights })
+}
+
+/// The negative logarithm of the likelihood, its gradient, and the expected information.
+fn derivatives(
+    choices: &[(f64, Vec<(DVector<f64>, bool)>)],
+    parameters: &DVector<f64>,
+    penalty: &DMatrix<f64>,
+) -> (f64, DVector<f64>, DMatrix<f64>) {
+    let mut loss = 0.5 * parameters.dot(&(penalty * parameters));
+    let mut gradient = penalty * parameters;
+    let mut information = penalty.clone();
+    for (weight, alternatives) in choices {
+        let log_odds: Vec<f64> = alternatives.iter().map(|(values, _)| parameters.dot(values)).collect();
+        let probabilities = posterior(&log_odds);
+        let none = 1.0 - probabilities.iter().sum::<f64>();
+        let has_right = alternatives.iter().any(|(_, right)| *right);
+        let of_right: f64 = alternatives.iter().zip(&probabilities).filter(|((_, right), _)| *right).map(|(_, p)| p).sum();
+        let right = if has_right { of_right } else { none }.max(f64::MIN_POSITIVE);
+        loss -= weight * right.ln();
+        let mut mean: DVector<f64> = DVector::zeros(parameters.len());
+        for ((values, is_right), probability) in alternatives.iter().zip(&probabilities) {
+            let pull = probability - if *is_right { probability / right } else { 0.0 };
+            gradient.axpy(weight * pull, values, 1.0);
+            information.ger(weight * probability, values, values, 1.0);
+            mean.axpy(*probability, values, 1.0);
+        }
+        information.ger(-weight, &mean, &mean, 1.0);
+    }
+    (loss, gradient, information)
+}
+
+/// The weights of the judgement.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Weights {
+    pub(super) places: Linear,
+    pub(super) aliases: Linear,
+    /// The mean of each term over right places.
+    pub(super) typical: [f64; COUNT],
+}
+
+impl Weights {
+    /// The likeliest ones.
+    pub(super) fn fit(examples: &[&Example]) -> Result<Self> {
+        let related = examples.iter().filter(|example| example.is_related).count() as f64;
+        let unrelated = examples.len() as f64 - related;
+        let choice = |example: &&Example| Choice {
+            weight: if example.is_related { 1.0 } else { related / unrelated },
+            alternatives: example
+                .usable()
+                .map(|place| (place.terms.0.to_vec(), place.closeness != Closeness::Wrong))
+                .collect(),
+        };
+        // What is the right place inexactly, and what is an alias, would be taken for wrong.
+        let clear = examples.iter().copied().filter(|example| !example.is_inexact() && !example.is_aliased());
+        let choices: Vec<Choice> = clear.map(|example| choice(&example)).collect();
+        let places = Linear::fit(&choices, &Term::ALL.map(Term::sign))?;
+        let aliases: Vec<Choice> = examples.iter().filter_map(|example| choice_of_alias(example, &places)).collect();
+        let aliases = Linear::fit(&aliases, &[1.0, -1.0])?;
+        let right: Vec<[f64; COUNT]> = examples
+            .iter()
+            .flat_map(|example| example.usable())
+            .filter(|place| place.closeness == Closeness::Right)
+            .map(|place| place.terms.0)
+            .collect();
+        let typical = std::array::from_fn(|index| {
+            right.iter().map(|terms| terms[index]).sum::<f64>() / right.len().max(1) as f64
+        });
+        Ok(Self { places, aliases, typical })
+    }
+}
+
+/// The choice between the most probable place and its likeliest alias; none where neither is right.
+fn choice_of_alias(example: &Example, places: &Linear) -> Option<Choice> {
+    let best = example.usable().max_by(|one, other| places.of(&one.terms.0).total_cmp(&places.of(&other.terms.0)))?;
+    if example.aliases.is_empty() || (best.closeness == Closeness::Wrong) != example.is_aliased() {
+        return None;
+    }
+    let alternatives = example.aliases.iter().map(|(terms, closeness)| (terms.to_vec(), *closeness != Closeness::Wrong));
+    Some(Choice { weight: 1.0, alternatives: alternatives.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One alternative for each choice, right with the probability of a known function of two terms.
+    fn choices() -> Vec<Choice> {
+        let place = |number: u32| {
+            let (x, y) = (f64::from(number % 21) - 10.0, f64::from(number / 21 % 21) - 10.0);
+            let probability = 1.0 / (1.0 + (1.0 - 0.5 * x).exp());
+            let alternatives = |right: bool| vec![(vec![x, y], right)];
+            [(probability, true), (1.0 - probability, false)]
+                .map(|(weight, right)| Choice { weight, alternatives: alternatives(right) })
+        };
+        (0..441).flat_map(place).collect()
+    }
+
+    #[test]
+    fn a_known_function_is_found() {
+        let found = Linear::fit(&choices(), &[0.0, 0.0]).unwrap();
+        assert!((found.intercept + 1.0).abs() < 0.05 && (found.weights[0] - 0.5).abs() < 0.02, "{found:?}");
+        assert!(found.weights[1].abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_weight_of_the_wrong_sign_is_left_out() {
+        let found = Linear::fit(&choices(), &[-1.0, 0.0]).unwrap();
+        assert_eq!(found.weights[0], 0.0);
+        assert!(Linear::fit(&[], &[1.0]).is_err());
+    }
+
+    #[test]
+    fn of_alternatives_the_one_with_more_of_a_term_is_preferred() {
+        let choice = |first: f64, second: f64| Choice {
+            weight: 1.0,
+            alternatives: vec![(vec![first], first > second), (vec![second], second > first)],
+        };
+        let choices: Vec<Choice> = (0..20).map(|number| choice(f64::from(number % 5), f64::from(number % 3) + 0.5)).collect();
+        assert!(Linear::fit(&choices, &[1.0]).unwrap().weights[0] > 0.5);
+    }
+}
