@@ -18,6 +18,7 @@
 //! (Sumner et al. 2007). That walls are drawn onto walls of the other map everywhere at once, and not region by region, is
 //! the optimisation of Shahbandi, Magnusson and Iagnemma (2018), with points and lines in place of a distance map's gradient.
 
+mod anchor;
 mod block_cholesky;
 mod body;
 mod contacts;

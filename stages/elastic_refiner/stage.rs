@@ -1,5 +1,6 @@
 //! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
 
+use super::anchor::anchor;
 use super::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
 use crate::deformation::Lattice;
 use crate::geometry::row_by_row;
@@ -138,7 +139,9 @@ impl ElasticRefiner {
                 .collect();
             match refine(&bodies, &self.parameters) {
                 Some(bends) => {
-                    let bends = bends.if_likelier();
+                    let mut bends = bends.if_likelier();
+                    let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
+                    reference.into_iter().for_each(|reference| anchor(&mut bends, &bodies, reference));
                     let sharpness = sharpness(&bodies, &bends, &self.parameters);
                     for (((frame, map), bend), sharpness) in placed.iter().zip(&bends).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());

@@ -1,5 +1,6 @@
 //! What bends do to made-up maps.
 
+use super::anchor::anchor;
 use super::{Bend, Bends, Body, ElasticRefinerParameters, kind, refine};
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, UNKNOWN, pose};
@@ -28,6 +29,23 @@ fn apart(bends: &[Bend], bodies: &[Body<'_>], most: f64, places: &[Point2]) -> (
 
 fn places() -> Vec<Point2> {
     (1..19).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect()
+}
+
+#[test]
+fn the_reference_stays_where_it_is_in_the_mean_and_the_others_with_it() {
+    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let bent = map.bent(0.4);
+    let bodies = [body(&map, pose(3.0, -2.0, 0.7)), body(&bent, pose(3.0, -2.0, 0.7))];
+    let before = refine(&bodies, &PARAMETERS()).unwrap().bends;
+    for reference in [0, 1] {
+        let mut bends = before.clone();
+        anchor(&mut bends, &bodies, reference);
+        let moves = &bends[reference].deformation.moves;
+        let mean = moves.iter().sum::<nalgebra::Vector3<f64>>() / moves.len() as f64;
+        assert!(mean.xy().norm() < 1e-9, "{mean}");
+        let [apart_before, apart_after] = [&before, &bends].map(|bends| apart(bends, &bodies, 0.4, &places()).0);
+        assert!((apart_before - apart_after).abs() < 1e-3, "{apart_before} {apart_after}");
+    }
 }
 
 #[test]

@@ -36,8 +36,8 @@ pub use spectrum::HoughSpectrum;
 pub use translation::{Projection, Shift, project, shifts};
 pub use wall_cells::WallCells;
 
-use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use gridweave_runtime::stage::StageKind;
 
 /// The stage kind `hough_spectrum_aligner`.

@@ -1,9 +1,9 @@
 //! The stage: keeps each robot's map with its walls, and refines the first guesses for a pair when one of the maps or the
 //! guesses change.
 
-use crate::registration::icp::{FirstGuess, IcpParameters, IcpRefusal, Refinement, refine};
 use crate::geometry::{row_by_row, wrap_angle};
 use crate::hypotheses::{HypothesisGatherer, Origin, has_covariance_of_fit};
+use crate::registration::icp::{FirstGuess, IcpParameters, IcpRefusal, Refinement, refine};
 use crate::robot_maps::RobotMaps;
 use crate::walls::WallsOnDemand;
 use gridweave_runtime::message::LogTime;

@@ -1,7 +1,7 @@
 //! Robots whose maps are laid together.
 
-use crate::registration::search::{PreparedMap, Raster};
 use crate::geometry::Pose2;
+use crate::registration::search::{PreparedMap, Raster};
 use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;

@@ -2,12 +2,12 @@
 
 use super::group::{Group, Groups};
 use super::statement::{Statement, with_reasons};
+use crate::geometry::{Grid, Pose2};
+use crate::registration::place_window::PlaceWindow;
 use crate::registration::search::{
     CommonWalls, JUDGED, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,
     align_prepared, is_near, overlay,
 };
-use crate::geometry::{Grid, Pose2};
-use crate::registration::place_window::PlaceWindow;
 use crate::robot_pair::RobotPair;
 use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};

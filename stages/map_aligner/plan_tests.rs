@@ -1,9 +1,9 @@
 //! Robots in one building, and how many searches they take.
 
 use super::{MergePlan, Statement};
+use crate::geometry::Grid;
 use crate::registration::search::MapAlignerParameters;
 use crate::registration::search::tests::angular_office;
-use crate::geometry::Grid;
 use crate::robot_pair::RobotPair;
 use crate::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use gridweave_runtime::stage::InitialPoses;

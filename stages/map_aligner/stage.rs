@@ -1,8 +1,8 @@
 //! The stage: keeps each robot's last map, and sends what a plan of searches tells of pairs of robots.
 
 use super::{MergePlan, Statement};
-use crate::registration::search::MapAlignerParameters;
 use crate::geometry::row_by_row;
+use crate::registration::search::MapAlignerParameters;
 use crate::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{InitialPoses, Out, Output, OutputPorts, Outputs, Received, StageError};

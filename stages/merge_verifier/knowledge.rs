@@ -1,7 +1,7 @@
 //! What the user knows of robots, as it concerns the judgement on a pair.
 
-use crate::registration::judgement::{JudgementParameters, UserKnowledge};
 use crate::geometry::row_by_row;
+use crate::registration::judgement::{JudgementParameters, UserKnowledge};
 use crate::registration::place_window::PlaceWindow;
 use crate::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Header};

@@ -1,10 +1,10 @@
 //! What is kept of where the maps of robots look like themselves, so that not every map is searched for it.
 
+use crate::geometry::is_known;
 use crate::registration::comparison::MapView;
 use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
-use crate::robot_pair::RobotPair;
-use crate::geometry::is_known;
 use crate::registration::place_window::PlaceWindow;
+use crate::robot_pair::RobotPair;
 use std::collections::BTreeMap;
 
 /// What was found in a map holds for others of the robot until as large a share of its known area is new, or is gone.

@@ -1,13 +1,13 @@
 //! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
 
 use super::knowledge::{Knowledge, by_initial_poses};
-use super::self_similarities::SelfSimilarities;
 use super::place_searches::PlaceSearches;
+use super::self_similarities::SelfSimilarities;
+use crate::geometry::row_by_row;
+use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::registration::Hypothesis;
 use crate::registration::comparison::{Agreement, Deformed, MapView};
 use crate::registration::judgement::{JudgementParameters, Verdict, judge};
-use crate::geometry::row_by_row;
-use crate::hypotheses::{HypothesisGatherer, Origin};
 use crate::robot_maps::{RobotMap, RobotMaps};
 use crate::robot_pair::RobotPair;
 use crate::walls::{NORMAL_RADIUS, WallsOnDemand};
@@ -159,7 +159,12 @@ impl MergeVerifier {
         let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
         let (evidence, alignment) = (
             evidence(verdict, pair, proposed.len()),
-            judged(verdict, &judged_of, &proposed, verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b)),
+            judged(
+                verdict,
+                &judged_of,
+                &proposed,
+                verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b),
+            ),
         );
         if self.evidence.get(pair) != Some(&evidence) {
             let header = Header::new(output.log_time(), alignment.header.frame_id.clone());

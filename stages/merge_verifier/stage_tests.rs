@@ -92,6 +92,41 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
     assert!(sent[0].accepted && sent[0].method == "tags", "{sent:?}");
 }
 
+/// What another crate's aligner, which knows no doubt, sends of a place.
+fn by_a_plug_in(transform_a_b: &Pose2) -> Alignment {
+    Alignment { score: 1.0, hypotheses: 1, method: "tags".into(), ..proposed("a plug-in", transform_a_b) }
+}
+
+#[test]
+fn a_plug_in_that_proposes_nonsense_is_not_believed_however_sure_it_is() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let truth = a.transform_to(&b);
+    for wrong in [pose(1.5, 0.0, 0.0), pose(0.0, -3.0, 0.3), pose(100.0, 0.0, 0.0), pose(0.0, 0.0, 3.1)] {
+        let sent = bench.give(&by_a_plug_in(&(wrong * truth)));
+        assert!(!sent[0].accepted && sent[0].score < 0.5, "{wrong}: {sent:?}");
+    }
+}
+
+#[test]
+fn a_plug_in_is_believed_where_a_search_of_the_maps_finds_the_same_place_alone() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));
+    assert!(sent[0].accepted && sent[0].source == "a plug-in", "{sent:?}");
+    // A hall fits half a turn on, too, and only a search shows that.
+    let draw = |at| FloorPlan::hall().draw(seen(-0.2, -0.2, 20.2, 12.2), at);
+    let (a, b) = (draw(drawing(3.0, 2.0, 0.4)), draw(drawing(12.0, 6.0, -2.1)));
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));
+    assert!(!sent[0].accepted && sent[0].score < 0.9, "{sent:?}");
+}
+
 #[test]
 fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
     let mut bench = StageBench::new(&super::kind(), "");

@@ -3,8 +3,8 @@
 use super::walk::{WalkEnd, walk};
 use super::{ClassifiedMap, RandomWalkParameters, dissimilarity};
 use crate::geometry::{Pose2, quarter_turn};
-use crate::registration::search::{Content, NamedMap, PreparedMap, Raster, SearchRefusal};
 use crate::pair_aligner::{Hypothesis, known_area};
+use crate::registration::search::{Content, NamedMap, PreparedMap, Raster, SearchRefusal};
 use nalgebra::{Isometry2, Matrix3, UnitComplex, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -30,8 +30,8 @@ pub use distance_map::DistanceMap;
 pub use parameters::RandomWalkParameters;
 pub use walk::{WalkEnd, walk};
 
-use crate::registration::search::{NamedMap, SearchRefusal};
 use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
+use crate::registration::search::{NamedMap, SearchRefusal};
 use gridweave_runtime::stage::StageKind;
 
 /// The stage kind `random_walk_aligner`.

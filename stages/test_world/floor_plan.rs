@@ -1,8 +1,8 @@
 //! Floor plans for tests, and maps of them as robots would draw them.
 
 use crate::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN};
-use crate::registration::icp::FirstGuess;
 use crate::registration::comparison::MapView;
+use crate::registration::icp::FirstGuess;
 use crate::walls::{NORMAL_RADIUS, WallMap};
 use gridweave_runtime::ros::MapMetaData;
 use nalgebra::{Matrix3, Vector2, Vector3};

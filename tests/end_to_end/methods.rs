@@ -94,3 +94,65 @@ fn the_experiment_writes_its_tables_and_plots() {
         assert!(read(plot).ends_with("</svg>\n"));
     }
 }
+
+/// Published methods that propose, and the verifier that judges what they propose.
+const VERIFIED: &str = r#"
+[pipeline]
+name = "verified"
+
+[robots]
+map = "/{robot}/map"
+
+[stages.log]
+kind = "mcap_source"
+
+[stages.cleaner]
+kind = "map_cleaner"
+inputs = ["log.map"]
+
+[stages.radon]
+kind = "radon_aligner"
+inputs = ["cleaner"]
+
+[stages.topology]
+kind = "topology_extractor"
+inputs = ["cleaner"]
+
+[stages.matcher]
+kind = "topology_matcher"
+inputs = ["topology"]
+
+[stages.icp]
+kind = "icp_refiner"
+inputs = ["cleaner", "radon.hypotheses", "matcher.hypotheses"]
+
+[stages.verifier]
+kind = "merge_verifier"
+inputs = ["cleaner", "icp.alignment"]
+
+[stages.frames]
+kind = "frame_solver"
+inputs = ["log.map", "verifier"]
+
+[stages.output]
+kind = "mcap_sink"
+inputs = ["radon.alignment", "matcher.alignment", "topology", "icp.*", "verifier.*", "frames.*"]
+"#;
+
+#[test]
+fn what_published_methods_propose_is_merged_only_where_the_verifier_finds_it_alone() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("verified.toml"), VERIFIED).unwrap();
+    for seed in ["2", "3", "4"] {
+        simulate(folder, "in.mcap", &[&SMALL_BUILDING[..], &["--seed", seed]].concat());
+        let run = ["run", "verified.toml", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
+        let status = gridweave(folder, &run).status;
+        assert!(matches!(status, 0 | 3), "seed {seed}: {status}");
+        let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
+        let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+        assert_eq!(evaluation["wrong"], 0, "seed {seed}: {evaluation}");
+        let proposed = json(&folder.join("summary.json"))["alignments"][0]["method"].clone();
+        assert!(["radon+icp", "topology+icp"].contains(&proposed.as_str().unwrap()), "seed {seed}: {proposed}");
+    }
+}

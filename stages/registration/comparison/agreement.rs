@@ -90,19 +90,11 @@ impl Agreement {
 }
 
 /// Compares two maps with map b at `transform_a_b`.
-pub fn compare(
-    a: &MapView<'_>,
-    b: &MapView<'_>,
-    transform_a_b: &Pose2,
-    parameters: &JudgementParameters,
-) -> Agreement {
+pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, parameters: &JudgementParameters) -> Agreement {
     let coarser = a.grid.geometry.resolution.max(b.grid.geometry.resolution);
     let tolerance = parameters.wall_tolerance.max(LEAST_TOLERANCE * coarser);
-    let comparison = RegionComparison {
-        side: parameters.region,
-        region_deviation: parameters.region_deviation,
-        tolerance,
-    };
+    let comparison =
+        RegionComparison { side: parameters.region, region_deviation: parameters.region_deviation, tolerance };
     let Found { regions, walls: compared } = comparison.compare(a, b, transform_a_b);
     let found = |of_b: bool, finding: Finding| -> Vec<ComparedWall> {
         compared.iter().filter(|wall| wall.of_b == of_b && wall.finding == finding).copied().collect()

@@ -132,9 +132,9 @@ fn runs_along(wall: &ComparedWall, normal: &Vector2<f64>) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::regions::Finding;
     use super::*;
     use crate::geometry::Point2;
-    use super::super::regions::Finding;
 
     const SPACING: f64 = 0.1;
 
@@ -199,7 +199,8 @@ mod tests {
             })
             .collect();
         assert_eq!(of(&rooms).either_way, 1, "one long wall with doors, and seven across");
-        let shifted: Vec<ComparedWall> = (0..7).flat_map(|row| wall((0.0, f64::from(row)), (28.0, f64::from(row)))).collect();
+        let shifted: Vec<ComparedWall> =
+            (0..7).flat_map(|row| wall((0.0, f64::from(row)), (28.0, f64::from(row)))).collect();
         assert_eq!(of(&[rooms, shifted].concat()).either_way, 4);
     }
 }

@@ -1,7 +1,7 @@
 //! A place of map b that hypotheses propose, and what the maps say there.
 
 use super::{JudgementParameters, Terms};
-use crate::geometry::{Point2, Pose2};
+use crate::geometry::{Point2, Pose2, point_jacobian};
 use crate::registration::comparison::{Agreement, Deformed, MapView, compare};
 use crate::registration::{Basis, Hypothesis};
 use nalgebra::Matrix3;
@@ -81,7 +81,18 @@ impl Candidate {
             Basis::Tags | Basis::FewTags | Basis::Unknown => None,
         });
         let cost = self.deformed.map_or(0.0, |deformed| deformed.cost);
-        Terms::new(significance.fold(0.0, f64::max), &self.agreement, cost)
+        Terms::new(significance.fold(0.0, f64::max), self.deviation(), &self.agreement, cost)
+    }
+
+    /// The standard deviation of the middle of the inliers in its least known direction, metres.
+    fn deviation(&self) -> f64 {
+        let Hypothesis { transform_a_b, covariance, .. } = &self.hypothesis;
+        let jacobian = point_jacobian(transform_a_b, &(transform_a_b.inverse() * self.agreement.centre));
+        let of_centre = jacobian * covariance * jacobian.transpose();
+        let (mean, half) = (0.5 * (of_centre.m11 + of_centre.m22), 0.5 * (of_centre.m11 - of_centre.m22));
+        let widest = (mean + half.hypot(of_centre.m12)).sqrt();
+        // What is no number is not known.
+        if widest.is_finite() { widest } else { f64::INFINITY }
     }
 
     /// How far another place is: the shift of the middle of the inliers, metres, and the turn, radians.

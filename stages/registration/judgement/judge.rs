@@ -45,8 +45,7 @@ pub fn judge(
         return Some(Verdict { refusal, chosen, listed, ..Verdict::of(candidate) });
     }
     let candidates = deformed(united(all), a, b, parameters);
-    let log_odds: Vec<f64> =
-        candidates.iter().map(|candidate| log_odds(candidate, known.window.is_some())).collect();
+    let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, known.window.is_some())).collect();
     let probabilities = posterior(&log_odds);
     let most_probable = |numbers: &mut dyn Iterator<Item = usize>| {
         numbers.reduce(|best, other| if log_odds[other] > log_odds[best] { other } else { best })
@@ -56,8 +55,14 @@ pub fn judge(
     let rival = rival.map(|other| Rival::new(&candidates[best], &candidates[other], probabilities[other]));
     let probability = probabilities[best];
     let candidate = candidates.into_iter().nth(best)?;
-    let mut verdict = Verdict { probability, rival, listed, prior: prior(&candidate, known.window.is_some()), ..Verdict::of(candidate) };
-    verdict.refusal = refusal(&verdict, parameters.accept);
+    let mut verdict = Verdict {
+        probability,
+        rival,
+        listed,
+        prior: prior(&candidate, known.window.is_some()),
+        ..Verdict::of(candidate)
+    };
+    verdict.refusal = refusal(&verdict, parameters);
     Some(verdict)
 }
 
@@ -128,11 +133,9 @@ fn united(all: Vec<Candidate>) -> Vec<Candidate> {
     places
 }
 
+/// Those that a stage before has refused take part: the maps may lie there, though it is not known well enough.
 fn log_odds(candidate: &Candidate, is_expected: bool) -> f64 {
-    match candidate.hypothesis.is_refused {
-        true => f64::NEG_INFINITY,
-        false => candidate.terms().log_odds() + prior(candidate, is_expected),
-    }
+    candidate.terms().log_odds() + prior(candidate, is_expected)
 }
 
 /// The judgement on a place at which the maps cannot lie by what the user knows.
@@ -146,13 +149,15 @@ fn unexpected(candidate: Candidate, window: &PlaceWindow) -> Verdict {
 }
 
 /// Why a verdict is no acceptance; none if it is as probable as is asked for.
-fn refusal(verdict: &Verdict, accept: f64) -> Option<Refusal> {
+fn refusal(verdict: &Verdict, parameters: &JudgementParameters) -> Option<Refusal> {
+    let JudgementParameters { accept, max_bend: most, .. } = *parameters;
     let Verdict { candidate, probability, rival, .. } = verdict;
     if candidate.hypothesis.is_refused {
         return Some(Refusal::Before(candidate.hypothesis.reason.clone()));
     }
     if *probability >= accept {
-        return None;
+        let bend = candidate.deformed.map(|deformed| deformed.bend);
+        return bend.filter(|bend| *bend > most).map(|bend| Refusal::Bent { bend, most });
     }
     // What is missing lies with another place, or with none.
     let of_none = 1.0 - probability - rival.as_ref().map_or(0.0, |rival| rival.probability);
@@ -172,7 +177,9 @@ fn refusal(verdict: &Verdict, accept: f64) -> Option<Refusal> {
     }
     let agreement = candidate.agreement;
     Some(match verdict.weakest_term() {
-        Term::Residual | Term::CrossingConflicts | Term::Crossings => Refusal::Contradiction { agreement },
+        Term::Residual | Term::InliersToCrossings | Term::CrossingConflicts | Term::Crossings => {
+            Refusal::Contradiction { agreement }
+        }
         weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },
     })
 }

@@ -26,6 +26,10 @@ pub struct JudgementParameters {
     /// metre between them; more than `elastic_refiner` has, as maps of any sensor are to be told from those of other places. Maps that
     /// contradict each other are compared once more with one bent onto the other. 0 compares them as they came.
     pub bend: f64,
+    /// Maps that are bent by more than this against each other, the root mean square, have no one place, and are refused, metres. Each of
+    /// them may be right in every room; a greater value merges them where most of map b lies nearest.
+    #[schemars(range(min = 0.0, max = 1e3))]
+    pub max_bend: f64,
     /// How maps turn: standard deviation of the turn of two places of a map against each other,
     /// radians for the root of each metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
@@ -38,11 +42,12 @@ pub struct JudgementParameters {
 impl Default for JudgementParameters {
     fn default() -> Self {
         Self {
-            accept: 0.999,
+            accept: 0.98,
             wall_tolerance: 0.1,
             region: 3.0,
             region_deviation: 0.12,
             bend: 0.1,
+            max_bend: 0.5,
             turn: 0.02,
             hypotheses: BTreeMap::new(),
         }

@@ -68,6 +68,17 @@ pub enum Refusal {
         /// The other place.
         alias: Alias,
     },
+    /// It is the place, but no rigid frame fits it.
+    #[error(
+        "the maps fit at one place only, but they are bent by {bend:.2} m against each other, and {most:.2} m are allowed (max_bend): \
+         wherever map b is laid as a whole, parts of it lie beside their place"
+    )]
+    Bent {
+        /// The root mean square of how far places of map b lie beside the nearest rigid place, metres.
+        bend: f64,
+        /// What is allowed, metres.
+        most: f64,
+    },
     /// It lies where the user knows the maps not to lie.
     #[error("it is {shift:.1} m and {turn:.0} degrees away from the initial poses, which is more than they allow")]
     Unexpected {
@@ -114,10 +125,15 @@ impl Refusal {
             Self::Chance { agreement, weakest: Term::IndependentInliers, .. } => {
                 let Agreement { inlier_length, independent_share, .. } = agreement;
                 let fixing = (1.0 - independent_share) * inlier_length;
-                format!("{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have")
+                format!(
+                    "{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have"
+                )
             }
             Self::Chance { agreement, .. } if agreement.constraints == 0 => {
-                format!("{:.0} m of wall agree, but all run one way: the place along them is open", agreement.inlier_length)
+                format!(
+                    "{:.0} m of wall agree, but all run one way: the place along them is open",
+                    agreement.inlier_length
+                )
             }
             Self::Chance { agreement, weakest: Term::PeakSignificance, .. } => {
                 let Agreement { inlier_length, .. } = agreement;
@@ -132,7 +148,9 @@ impl Refusal {
             }
             Self::Contradiction { agreement } => {
                 let Agreement { inlier_length, conflict_length, .. } = agreement;
-                format!("the maps contradict each other: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not")
+                format!(
+                    "the maps contradict each other: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not"
+                )
             }
             Self::Ambiguous { listed: Listed(all), .. } if all.len() > 1 => {
                 format!("the maps fit at {} places, and it cannot be told which is right", all.len())
@@ -142,6 +160,9 @@ impl Refusal {
             }
             Self::Aliased { alias: Alias { shift, turn, .. } } => {
                 format!("the building looks alike {shift:.1} m and {:.0} degrees from there", turn.to_degrees())
+            }
+            Self::Bent { bend, .. } => {
+                format!("the maps belong together, but are bent by {bend:.1} m against each other")
             }
             Self::Unexpected { shift, turn } => {
                 format!("the maps fit {shift:.1} m and {turn:.0} degrees from the initial poses only")
@@ -159,7 +180,9 @@ impl Refusal {
     pub fn advice(&self, b: &str) -> Option<String> {
         Some(match self {
             Self::Before(_) => return None,
-            Self::Contradiction { agreement } | Self::Chance { agreement, .. } if agreement.inlier_length < LITTLE_WALL => {
+            Self::Contradiction { agreement } | Self::Chance { agreement, .. }
+                if agreement.inlier_length < LITTLE_WALL =>
+            {
                 "drive one robot on where the other was, or one tag seen by both".to_owned()
             }
             Self::Chance { .. } => {
@@ -173,6 +196,9 @@ impl Refusal {
             }
             Self::Ambiguous { .. } | Self::Elsewhere { .. } => {
                 format!("more tags that both have seen, or --initial {b}=X,Y,YAW")
+            }
+            Self::Bent { .. } => {
+                "close loops in the SLAM of one robot, or allow it with --set verifier.max_bend=1".to_owned()
             }
             Self::Aliased { .. } => format!("one tag seen by both, or --initial {b}=X,Y,YAW"),
             Self::Unexpected { .. } => format!("are the poses right? --initial {b}=X,Y,YAW,STDDEV widens them"),

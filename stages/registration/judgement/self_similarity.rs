@@ -21,6 +21,13 @@ use crate::registration::search::{MapAlignerParameters, PreparedMap, self_simila
 use crate::walls::{CORRELATION_LENGTH, WallMap};
 use nalgebra::Matrix3;
 
+/// Two places are alike if so large a share of the walls agrees where they are laid on each other, and so many metres, in more than a room:
+/// rooms of one building are alike, and less wall meets at many places by chance.
+const ALIKE_SHARE: f64 = 0.75;
+const ALIKE_WALL: f64 = 20.0;
+/// So large is a room, square metres.
+const ROOM: f64 = 25.0;
+
 /// Where a map looks like itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SelfSimilarity {
@@ -36,7 +43,8 @@ impl SelfSimilarity {
         let prepared = PreparedMap::new("", &map.grid, cell, aligner.max_extent);
         let places = prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_places(&prepared, &aligner));
         let registered = places.iter().map(|place| registered(map.walls, map.walls, place));
-        Self { places: registered.map(|place| (place, compare(map, map, &place, parameters))).collect() }
+        let compared = registered.map(|place| (place, compare(map, map, &place, parameters)));
+        Self { places: compared.filter(|(_, agreement)| is_alike(agreement)).collect() }
     }
 }
 
@@ -91,12 +99,20 @@ impl Alias {
             }
             let (shift, turn) = verdict.candidate.change(&transform_a_b);
             let there = compare(a, b, &transform_a_b, parameters);
+            if !is_alike(&there) {
+                return None;
+            }
             let terms = [extent(&here, itself), by_contradiction(&here, &there, itself)];
             let log_odds = ALIAS[0] + ALIAS[1] * terms[0] + ALIAS[2] * terms[1];
             Some(Self { shift, turn, transform_a_b, there, itself: *itself, terms, log_odds })
         };
         by_a.chain(by_b).filter_map(alias).collect()
     }
+}
+
+fn is_alike(agreement: &Agreement) -> bool {
+    let is_much = agreement.inlier_length >= ALIKE_WALL && agreement.overlap >= ROOM;
+    is_much && agreement.inlier_ratio() >= ALIKE_SHARE
 }
 
 /// The logarithm of the self-similar length as a share of the inliers at the place: likeness must explain all of them.

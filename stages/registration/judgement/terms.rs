@@ -6,7 +6,9 @@ use crate::registration::comparison::Agreement;
 /// So large must the independent share of the inliers be for what speaks for a place to count in full: two walls fit any corner.
 const FULL_SHARE: f64 = 0.5;
 /// From there on the model of chance itself is in doubt.
-const MOST_SIGNIFICANCE: f64 = 8.0;
+const MOST_SIGNIFICANCE: f64 = 300.0;
+/// No place is known better, metres.
+const LEAST_DEVIATION: f64 = 0.01;
 /// A larger area says no more, square metres.
 const MOST_AREA: f64 = 500.0;
 /// So many metres that contradict, and that agree, are taken to be there in any case: a share of little is a small one.
@@ -14,13 +16,17 @@ const MORE_CONFLICT: f64 = 5.0;
 const MORE_WALL: f64 = 40.0;
 
 /// The number of terms.
-pub const COUNT: usize = 9;
+pub const COUNT: usize = 11;
 
 /// A term of the log-odds that a hypothesis is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
-    /// How far the peak of the search stands out, in units of the spread of all others.
+    /// The logarithm of how far the peak of the search stands out, in units of the spread of all others.
     PeakSignificance,
+    /// The logarithm of the standard deviation of the place in its least known direction, metres.
+    Deviation,
+    /// The logarithm of the inliers, as a multiple of the walls that cross free space.
+    InliersToCrossings,
     /// The logarithm of the area that both maps know.
     CommonArea,
     /// The share of the inliers that does not belong to the two walls that fix the place.
@@ -43,6 +49,8 @@ impl Term {
     /// All, in the order of [`Terms`].
     pub const ALL: [Self; COUNT] = [
         Self::PeakSignificance,
+        Self::Deviation,
+        Self::InliersToCrossings,
         Self::CommonArea,
         Self::IndependentInliers,
         Self::Constraints,
@@ -57,6 +65,8 @@ impl Term {
     pub fn name(self) -> &'static str {
         match self {
             Self::PeakSignificance => "peak significance",
+            Self::Deviation => "standard deviation of the place",
+            Self::InliersToCrossings => "inliers to walls through free space",
             Self::CommonArea => "common area",
             Self::IndependentInliers => "independent inliers",
             Self::Constraints => "constraints in the weaker direction",
@@ -72,11 +82,12 @@ impl Term {
     pub fn sign(self) -> f64 {
         match self {
             Self::PeakSignificance
+            | Self::InliersToCrossings
             | Self::CommonArea
             | Self::IndependentInliers
             | Self::Constraints
             | Self::Evidence => 1.0,
-            Self::Residual | Self::CrossingConflicts | Self::Crossings | Self::Deformation => -1.0,
+            Self::Deviation | Self::Residual | Self::CrossingConflicts | Self::Crossings | Self::Deformation => -1.0,
         }
     }
 }
@@ -86,14 +97,25 @@ impl Term {
 pub struct Terms(pub [f64; COUNT]);
 
 impl Terms {
-    /// Of a place whose peak in the search has a significance, at which the maps agree so, with map b deformed at that cost.
-    pub fn new(significance: f64, agreement: &Agreement, deformation_cost: f64) -> Self {
-        let Agreement { overlap, conflict_length, crossing_length, independent_share, constraints, residual, .. } =
-            *agreement;
+    /// Of a place whose peak in the search has a significance, that is known to a deviation, metres, and at which the maps agree so, with
+    /// map b deformed at that cost.
+    pub fn new(significance: f64, deviation: f64, agreement: &Agreement, deformation_cost: f64) -> Self {
+        let Agreement {
+            overlap,
+            inlier_length,
+            conflict_length,
+            crossing_length,
+            independent_share,
+            constraints,
+            residual,
+            ..
+        } = *agreement;
         let cost = deformation_cost.max(0.0);
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
-            confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE),
+            confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
+            (LEAST_DEVIATION + deviation).min(1.0).ln(),
+            confirmed * ((1.0 + inlier_length) / (1.0 + crossing_length)).ln(),
             confirmed * overlap.clamp(1.0, MOST_AREA).ln(),
             independent_share,
             (constraints as f64).ln_1p(),

@@ -118,7 +118,8 @@ impl Verdict {
 
     fn write_acceptance(&self, text: &mut String) -> std::fmt::Result {
         let Agreement { inlier_length, conflict_length, overlap, .. } = self.candidate.agreement;
-        let agree = format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, in {overlap:.0} m2");
+        let agree =
+            format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, in {overlap:.0} m2");
         match self.chosen {
             Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, which was asked for: {agree}")?,
             None => writeln!(text, "{agree} that both know")?,
@@ -151,7 +152,8 @@ impl Verdict {
     ) -> std::fmt::Result {
         writeln!(text, "{}", refusal.headline())?;
         let is_judged = !matches!(refusal, Refusal::Unexpected { .. } | Refusal::NoSuchHypothesis { .. });
-        if is_judged {
+        let lacks_probability = is_judged && !matches!(refusal, Refusal::Bent { .. });
+        if lacks_probability {
             // Rounded down, so that what is too little is not shown as enough.
             let probability = (1000.0 * self.probability).floor() / 1000.0;
             writeln!(text, "missing: a probability of {accept} (--set {stage}.accept); this is {probability:.3}")?;

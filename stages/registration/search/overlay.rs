@@ -47,7 +47,8 @@ impl Walls {
 
 /// The direction to the space before a wall; none of a wall that is free on both sides or on neither.
 fn face(raster: &Raster, wall: &Point2) -> Option<Vector2<f64>> {
-    let around = (-AROUND..=AROUND).flat_map(|x| (-AROUND..=AROUND).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
+    let around =
+        (-AROUND..=AROUND).flat_map(|x| (-AROUND..=AROUND).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
     let free = around.filter(|offset| raster.at(&(wall + offset * raster.cell)) == Content::Free);
     let direction = free.fold(Vector2::zeros(), |sum, offset| sum + offset);
     // What is free all around has no side.

@@ -11,6 +11,8 @@ use crate::registration::place_window::PlaceWindow;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
+/// Less than this share of the walls in common is seen from the same side where two buildings lie back to back.
+const FACED: f64 = 0.5;
 /// As many places of those found in cells of one size, each away from the others, are looked at closely.
 const CANDIDATES: usize = 64;
 
@@ -79,8 +81,8 @@ impl Peaks {
     }
 }
 
-/// The first of some places within `apart` and `radians` at which the maps have seen enough walls from the same side, each with the middle
-/// of its walls in common.
+/// The first of some places within `apart` and `radians` at which most walls in common are seen from the same side, each with the
+/// middle of its walls in common.
 fn apart_from_better(
     overlay: &Overlay<'_>,
     places: &[Place],
@@ -95,7 +97,7 @@ fn apart_from_better(
         };
         if kept.iter().all(is_apart) {
             let common = overlay.common_walls(transform_a_b);
-            let common = common.filter(|common| common.faced_length >= parameters.min_wall_length);
+            let common = common.filter(|common| common.faced_length >= FACED * common.length);
             kept.extend(common.map(|common| (*transform_a_b, common.centre)));
         }
         if kept.len() == CANDIDATES {

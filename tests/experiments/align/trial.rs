@@ -3,13 +3,13 @@
 use super::kinds::Kind;
 use super::worlds::PairWorld;
 use crate::log::{last_maps, read_messages};
+use crate::map_pairs::truth::{Closeness, NEAR, NEAR_DEGREES};
 use anyhow::{Context, Result};
 use gridweave::evaluate::{Evaluation, RobotOutcome, RobotResult, evaluate_summary};
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
-use crate::map_pairs::truth::{Closeness, NEAR, NEAR_DEGREES};
 use gridweave_stages::geometry::{Pose2, pose};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;

@@ -19,13 +19,14 @@ pub(super) struct Judged {
 impl Judged {
     /// Judges a pair.
     pub(super) fn new(example: &Example, weights: &Weights) -> Self {
-        let places: Vec<_> = example.usable().collect();
-        let log_odds: Vec<f64> = places.iter().map(|place| weights.places.of(&place.terms.0)).collect();
+        let places = &example.places;
+        let log_odds: Vec<f64> = places.iter().map(|place| weights.places.of(&place.terms)).collect();
         let best = (0..places.len()).max_by(|one, other| log_odds[*one].total_cmp(&log_odds[*other]));
         let Some(best) = best else { return Self { probability: 0.0, closeness: Closeness::Wrong } };
         let of_aliases = example.aliases.iter().map(|(terms, _)| weights.aliases.of(terms));
         let alias = of_aliases.fold(f64::NEG_INFINITY, f64::max).exp();
-        let probability = 1.0 / (1.0 / posterior(&log_odds)[best] + alias);
+        // What ICP has refused is not merged, whatever its probability.
+        let probability = if places[best].is_refused { 0.0 } else { 1.0 / (1.0 / posterior(&log_odds)[best] + alias) };
         Self { probability, closeness: places[best].closeness }
     }
 }

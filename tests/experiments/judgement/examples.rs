@@ -5,19 +5,21 @@ use crate::align::worlds::Seeds;
 use crate::map_pairs::judging::candidates_of;
 use crate::map_pairs::library::{self, Library, MapOfBuilding, SimulatedPair};
 use crate::map_pairs::truth::{self, Closeness};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::geometry::Pose2;
-use gridweave_stages::registration::comparison::Agreement;
-use gridweave_stages::registration::judgement::{Alias, Candidate, Terms};
+use gridweave_stages::registration::judgement::{Alias, COUNT, Candidate};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Aliases are looked for where a place is more probable than this: only what may be accepted has any.
 const LIKELY: f64 = 0.5;
 
 /// Two maps, and the places that are judged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Example {
     pub(super) set: String,
     pub(super) pair: String,
@@ -32,9 +34,10 @@ pub(super) struct Example {
 }
 
 /// A place that is judged.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Place {
-    pub(super) terms: Terms,
-    pub(super) agreement: Agreement,
+    /// The values of the terms, to four digits behind the point.
+    pub(super) terms: [f64; COUNT],
     /// Whether ICP has refused it.
     pub(super) is_refused: bool,
     pub(super) closeness: Closeness,
@@ -49,12 +52,11 @@ impl Example {
     ) -> Self {
         let [set, pair, place] = names.map(str::to_owned);
         let places = places.into_iter().map(|candidate| Place {
-            terms: candidate.terms(),
-            agreement: candidate.agreement,
+            terms: candidate.terms().0.map(rounded),
             is_refused: candidate.hypothesis.is_refused,
             closeness: closeness(&candidate.transform_a_b()),
         });
-        let aliases = aliases.into_iter().map(|alias| (alias.terms, closeness(&alias.transform_a_b)));
+        let aliases = aliases.into_iter().map(|alias| (alias.terms.map(rounded), closeness(&alias.transform_a_b)));
         Self { set, pair, place, is_related, places: places.collect(), aliases: aliases.collect() }
     }
 
@@ -65,8 +67,18 @@ impl Example {
 
     /// Whether a place is the right one, but none exactly: which place it is can be learnt from that no more than that it is none.
     pub(super) fn is_inexact(&self) -> bool {
-        let has = |closeness: Closeness| self.usable().any(|place| place.closeness == closeness);
+        let has = |closeness: Closeness| self.places.iter().any(|place| place.closeness == closeness);
         has(Closeness::Near) && !has(Closeness::Right)
+    }
+
+    /// Whether the maps are simulated.
+    pub(super) fn is_simulated(&self) -> bool {
+        self.set.contains("simulated")
+    }
+
+    /// Whether both robots were in one building whose parts are alike.
+    pub(super) fn has_parts_alike(&self) -> bool {
+        ["symmetric", "repeated"].iter().any(|kind| self.set.starts_with(&format!("simulated: {kind}")))
     }
 
     /// Whether an alias is the right place.
@@ -75,7 +87,27 @@ impl Example {
     }
 }
 
-/// The pairs of maps that the experiment is told of.
+/// So that a file holds what the weights are fitted to.
+fn rounded(value: f64) -> f64 {
+    (1e4 * value).round() / 1e4
+}
+
+/// The examples in a file: a line of JSON for each.
+pub(super) fn read(file: &Path) -> Result<Vec<Example>> {
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
+    let example = |(number, line): (usize, &str)| {
+        serde_json::from_str(line).with_context(|| format!("line {} of {} is no example", number + 1, file.display()))
+    };
+    text.lines().enumerate().map(example).collect()
+}
+
+/// Examples as lines of JSON.
+pub(super) fn to_lines(examples: &[Example]) -> Result<String> {
+    let lines = examples.iter().map(|example| Ok(serde_json::to_string(example)? + "\n"));
+    lines.collect()
+}
+
+/// The examples of the pairs of maps that the experiment is given.
 pub(super) fn gather(args: &FitJudgementArgs, registry: &Registry) -> Result<Vec<Example>> {
     let mut examples = Vec::new();
     for folder in &args.folders {

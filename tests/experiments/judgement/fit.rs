@@ -9,6 +9,8 @@ use nalgebra::{DMatrix, DVector};
 /// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that the data leave
 /// open.
 const REGULARISATION: f64 = 1.0;
+/// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not recorded.
+const SIMULATED: f64 = 0.5;
 /// Newton's method has converged when no weight changes by more.
 const CONVERGENCE: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 200;
@@ -98,7 +100,8 @@ fn fit_unbounded(choices: &[Choice], kept: &[usize]) -> Result<Linear> {
             break;
         }
     }
-    let weights: Vec<f64> = moments.iter().enumerate().map(|(index, (_, spread))| parameters[index + 1] / spread).collect();
+    let weights: Vec<f64> =
+        moments.iter().enumerate().map(|(index, (_, spread))| parameters[index + 1] / spread).collect();
     let shift = weights.iter().zip(&moments).map(|(weight, (mean, _))| weight * mean).sum::<f64>();
     Ok(Linear { intercept: parameters[0] - shift, weights })
 }
@@ -117,7 +120,8 @@ fn derivatives(
         let probabilities = posterior(&log_odds);
         let none = 1.0 - probabilities.iter().sum::<f64>();
         let has_right = alternatives.iter().any(|(_, right)| *right);
-        let of_right: f64 = alternatives.iter().zip(&probabilities).filter(|((_, right), _)| *right).map(|(_, p)| p).sum();
+        let of_right: f64 =
+            alternatives.iter().zip(&probabilities).filter(|((_, right), _)| *right).map(|(_, p)| p).sum();
         let right = if has_right { of_right } else { none }.max(f64::MIN_POSITIVE);
         loss -= weight * right.ln();
         let mut mean: DVector<f64> = DVector::zeros(parameters.len());
@@ -144,26 +148,42 @@ pub(super) struct Weights {
 impl Weights {
     /// The likeliest ones.
     pub(super) fn fit(examples: &[&Example]) -> Result<Self> {
-        let related = examples.iter().filter(|example| example.is_related).count() as f64;
-        let unrelated = examples.len() as f64 - related;
-        let choice = |example: &&Example| Choice {
-            weight: if example.is_related { 1.0 } else { related / unrelated },
+        // What is the right place inexactly, and what is an alias, would be taken for wrong; and buildings whose parts are alike are for
+        // the aliases.
+        let is_clear = |example: &Example| !example.is_inexact() && !example.is_aliased() && !example.has_parts_alike();
+        let clear: Vec<&Example> = examples.iter().copied().filter(|example| is_clear(example)).collect();
+        let count = |is_related: bool, is_simulated: bool| {
+            let is_meant = |example: &&&Example| {
+                (example.is_related, example.is_simulated()) == (is_related, is_simulated) && !example.places.is_empty()
+            };
+            clear.iter().filter(is_meant).count() as f64
+        };
+        let weight = |example: &Example| {
+            let (recorded, simulated) = (count(true, false), count(true, true));
+            let of_simulated = if recorded > 0.0 { SIMULATED * recorded } else { simulated };
+            match (example.is_related, example.is_simulated()) {
+                (true, false) => 1.0,
+                (true, true) => of_simulated / simulated,
+                (false, _) => (recorded + of_simulated) / (count(false, false) + count(false, true)),
+            }
+        };
+        let choice = |example: &Example| Choice {
+            weight: weight(example),
             alternatives: example
-                .usable()
-                .map(|place| (place.terms.0.to_vec(), place.closeness != Closeness::Wrong))
+                .places
+                .iter()
+                .map(|place| (place.terms.to_vec(), place.closeness != Closeness::Wrong))
                 .collect(),
         };
-        // What is the right place inexactly, and what is an alias, would be taken for wrong.
-        let clear = examples.iter().copied().filter(|example| !example.is_inexact() && !example.is_aliased());
-        let choices: Vec<Choice> = clear.map(|example| choice(&example)).collect();
+        let choices: Vec<Choice> = clear.iter().map(|example| choice(example)).collect();
         let places = Linear::fit(&choices, &Term::ALL.map(Term::sign))?;
-        let aliases: Vec<Choice> = examples.iter().filter_map(|example| choice_of_alias(example, &places)).collect();
+        let aliases: Vec<Choice> = examples.iter().flat_map(|example| choices_of_aliases(example, &places)).collect();
         let aliases = Linear::fit(&aliases, &[1.0, -1.0])?;
         let right: Vec<[f64; COUNT]> = examples
             .iter()
-            .flat_map(|example| example.usable())
+            .flat_map(|example| &example.places)
             .filter(|place| place.closeness == Closeness::Right)
-            .map(|place| place.terms.0)
+            .map(|place| place.terms)
             .collect();
         let typical = std::array::from_fn(|index| {
             right.iter().map(|terms| terms[index]).sum::<f64>() / right.len().max(1) as f64
@@ -172,19 +192,39 @@ impl Weights {
     }
 }
 
-/// The choice between the most probable place and its likeliest alias; none where neither is right.
-fn choice_of_alias(example: &Example, places: &Linear) -> Option<Choice> {
-    let best = example.usable().max_by(|one, other| places.of(&one.terms.0).total_cmp(&places.of(&other.terms.0)))?;
-    if example.aliases.is_empty() || (best.closeness == Closeness::Wrong) != example.is_aliased() {
-        return None;
-    }
-    let alternatives = example.aliases.iter().map(|(terms, closeness)| (terms.to_vec(), *closeness != Closeness::Wrong));
-    Some(Choice { weight: 1.0, alternatives: alternatives.collect() })
+/// The choices between the most probable place and each of its aliases, where one of both is right.
+fn choices_of_aliases(example: &Example, places: &Linear) -> Vec<Choice> {
+    let best = example.places.iter().max_by(|one, other| places.of(&one.terms).total_cmp(&places.of(&other.terms)));
+    let Some(best) = best.filter(|best| best.closeness != Closeness::Wrong || example.is_aliased()) else {
+        return Vec::new();
+    };
+    let is_right = |closeness: Closeness| closeness != Closeness::Wrong && best.closeness == Closeness::Wrong;
+    let told =
+        example.aliases.iter().filter(|(_, closeness)| best.closeness != Closeness::Wrong || is_right(*closeness));
+    told.map(|(terms, closeness)| Choice { weight: 1.0, alternatives: vec![(terms.to_vec(), is_right(*closeness))] })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judgement::examples;
+    use gridweave_stages::registration::judgement::weights::{ALIAS, INTERCEPT, TYPICAL, WEIGHTS};
+    use std::path::Path;
+
+    #[test]
+    fn the_weights_that_ship_are_those_of_the_examples_that_are_kept_beside() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/results/judgement_examples.jsonl");
+        let examples = examples::read(&file).unwrap();
+        let fitted = Weights::fit(&examples.iter().collect::<Vec<_>>()).unwrap();
+        let Linear { intercept, weights } = &fitted.aliases;
+        let found =
+            [&[fitted.places.intercept], fitted.places.weights.as_slice(), &fitted.typical, &[*intercept], weights];
+        let shipped = [&[INTERCEPT], WEIGHTS.as_slice(), &TYPICAL, &ALIAS];
+        for (found, shipped) in found.concat().iter().zip(shipped.concat()) {
+            assert!((found - shipped).abs() <= 1e-3 * (1.0 + shipped.abs()), "{fitted:?}");
+        }
+    }
 
     /// One alternative for each choice, right with the probability of a known function of two terms.
     fn choices() -> Vec<Choice> {
@@ -218,7 +258,8 @@ mod tests {
             weight: 1.0,
             alternatives: vec![(vec![first], first > second), (vec![second], second > first)],
         };
-        let choices: Vec<Choice> = (0..20).map(|number| choice(f64::from(number % 5), f64::from(number % 3) + 0.5)).collect();
+        let choices: Vec<Choice> =
+            (0..20).map(|number| choice(f64::from(number % 5), f64::from(number % 3) + 0.5)).collect();
         assert!(Linear::fit(&choices, &[1.0]).unwrap().weights[0] > 0.5);
     }
 }

@@ -21,6 +21,9 @@ use std::path::PathBuf;
 pub(super) struct FitJudgementArgs {
     /// Folders of map files and of logs, as those of `map-pairs`.
     folders: Vec<PathBuf>,
+    /// Fit to the examples in this file, which an earlier fit has written, and not to maps.
+    #[arg(long, value_name = "FILE", conflicts_with = "folders")]
+    from: Option<PathBuf>,
     /// Pairs of parts of maps of different buildings.
     #[arg(long, default_value_t = 3000)]
     unrelated: u64,
@@ -43,11 +46,15 @@ pub(super) struct FitJudgementArgs {
 
 /// Does the experiment.
 pub(super) fn run(args: &FitJudgementArgs, registry: &Registry, results: &mut Results) -> Result<()> {
-    let examples = examples::gather(args, registry)?;
+    let examples = match &args.from {
+        Some(file) => examples::read(file)?,
+        None => examples::gather(args, registry)?,
+    };
     let judged = cross_validation::judge(&examples, args.folds)?;
     report::report(&examples, &judged, results)?;
+    results.file("judgement_examples.jsonl", examples::to_lines(&examples)?.as_bytes())?;
     let weights = fit::Weights::fit(&examples.iter().collect::<Vec<_>>())?;
-    let source = report::weights_source(&weights, &examples, args);
+    let source = report::weights_source(&weights, &examples);
     match &args.write {
         Some(file) => std::fs::write(file, source).with_context(|| format!("cannot write {}", file.display())),
         None => results.file("judgement_weights.rs", source.as_bytes()),

@@ -1,6 +1,5 @@
 //! What came of the fit: tables, the reliability diagram, the curve of right against wrong merges, and the weights.
 
-use super::FitJudgementArgs;
 use super::cross_validation::Judged;
 use super::examples::Example;
 use super::fit::Weights;
@@ -10,7 +9,6 @@ use crate::results::Results;
 use crate::statistics::{mean, wilson_interval};
 use anyhow::Result;
 use gridweave::table::Table;
-use gridweave_stages::registration::comparison::Agreement;
 use gridweave_stages::registration::judgement::Term;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -42,8 +40,7 @@ pub(super) fn report(examples: &[Example], judged: &[Judged], results: &mut Resu
     }
     results.table("judgement", "What is merged from a probability on, cross-validated by place", &table)?;
     reliability(judged, results)?;
-    right_against_wrong(judged, results)?;
-    results.data("judgement_places", &places(examples, judged))
+    right_against_wrong(judged, results)
 }
 
 /// How often the best place is right, by its probability, each bin ten times the odds of the one before.
@@ -106,35 +103,8 @@ fn right_against_wrong(judged: &[Judged], results: &mut Results) -> Result<()> {
     results.plot("judgement_right_against_wrong", &plot)
 }
 
-/// Every place that was judged.
-fn places(examples: &[Example], judged: &[Judged]) -> Table {
-    let heads = ["set", "pair", "place", "related", "probability of the pair", "refused", "closeness"];
-    let more = ["overlap", "inlier", "conflict", "crossing", "evidence", "aliases"];
-    let mut table = Table::new(heads.into_iter().chain(Term::ALL.map(Term::name)).chain(more).collect::<Vec<_>>());
-    for (example, judged) in examples.iter().zip(judged) {
-        for place in &example.places {
-            let of_pair = [example.set.clone(), example.pair.clone(), example.place.clone()];
-            let more = [
-                example.is_related.to_string(),
-                format!("{:.6}", judged.probability),
-                place.is_refused.to_string(),
-                format!("{:?}", place.closeness),
-            ];
-            let Agreement { overlap, inlier_length, conflict_length, crossing_length, evidence, .. } = place.agreement;
-            let agreement = [overlap, inlier_length, conflict_length, crossing_length, evidence];
-            let values = place.terms.0.iter().chain(&agreement).map(|value| format!("{value:.4}"));
-            let aliases = example.aliases.iter().map(|(terms, closeness)| {
-                format!("{:.3} {:.3} {closeness:?}", terms[0], terms[1])
-            });
-            let aliases = aliases.collect::<Vec<_>>().join("; ");
-            table.row(of_pair.into_iter().chain(more).chain(values).chain([aliases]).collect::<Vec<_>>());
-        }
-    }
-    table
-}
-
 /// The file that holds the weights, as Rust.
-pub(super) fn weights_source(weights: &Weights, examples: &[Example], args: &FitJudgementArgs) -> String {
+pub(super) fn weights_source(weights: &Weights, examples: &[Example]) -> String {
     let related = examples.iter().filter(|example| example.is_related).count();
     let places: BTreeSet<&str> =
         examples.iter().filter(|example| example.is_related).map(|example| example.place.as_str()).collect();
@@ -145,14 +115,14 @@ pub(super) fn weights_source(weights: &Weights, examples: &[Example], args: &Fit
         "//! The weights of the judgement. Written by `experiments fit-judgement`; do not edit.\n\
          //!\n\
          //! Fitted to {related} pairs of maps of {} places that belong together, {} of them simulated, and to {} pairs of different\n\
-         //! buildings (seed {}); `tests/experiments/README.md` has the command and what came of it.\n\n",
+         //! buildings; `tests/experiments/README.md` has the command and what came of it.\n\n",
         places.len(),
         examples.iter().filter(|example| example.is_related && example.set.starts_with("simulated")).count(),
         examples.len() - related,
-        args.seed,
     );
     let array = |values: &[f64]| {
-        let lines = Term::ALL.iter().zip(values).map(|(term, value)| format!("    // {}\n    {value:.4},\n", term.name()));
+        let lines =
+            Term::ALL.iter().zip(values).map(|(term, value)| format!("    // {}\n    {value:.4},\n", term.name()));
         lines.collect::<String>()
     };
     let _ = write!(

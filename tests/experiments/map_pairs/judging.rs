@@ -34,8 +34,8 @@ impl Judged {
 /// Merges two maps.
 pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding) -> Judged {
     let parameters = RegistrationParameters::default();
-    let outcome = with_prepared(a, b, &parameters, |pair| {
-        match register(pair, &UserKnowledge::default(), &parameters) {
+    let outcome =
+        with_prepared(a, b, &parameters, |pair| match register(pair, &UserKnowledge::default(), &parameters) {
             Ok(Some(verdict)) => Judged {
                 merged: verdict.refusal.is_none().then(|| verdict.candidate.transform_a_b()),
                 probability: verdict.probability,
@@ -43,8 +43,7 @@ pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding) -> Judged {
             },
             Ok(None) => Judged::refused("no place was proposed"),
             Err(refusal) => Judged::refused(&refusal.to_string()),
-        }
-    });
+        });
     outcome.unwrap_or_else(|problem| Judged::refused(&problem))
 }
 

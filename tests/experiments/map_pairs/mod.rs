@@ -125,7 +125,7 @@ fn with_truth(folder: &std::path::Path, args: &MapPairsArgs) -> Result<Vec<Trial
             is_right,
             is_unrelated: pair.is_unrelated(),
             wrong_maps: is_kept.then(|| (pair.name.clone(), pair.maps.clone())),
-                judged,
+            judged,
         }
     };
     let mut trials: Vec<Trial> = pairs.par_iter().map(trial).collect();
@@ -182,8 +182,7 @@ fn of_different_buildings(
 fn report(trials: &[Trial], results: &mut Results) -> Result<()> {
     let mut sets: Vec<&str> = trials.iter().map(|trial| trial.set.as_str()).collect();
     sets.dedup();
-    let mut table =
-        Table::new(["set", "pairs", "right", "wrong", "refused", "rightly refused"]);
+    let mut table = Table::new(["set", "pairs", "right", "wrong", "refused", "rightly refused"]);
     for set in sets {
         let of_set: Vec<&Trial> = trials.iter().filter(|trial| trial.set == set).collect();
         let count = |outcome: &str| of_set.iter().filter(|trial| trial.outcome() == outcome).count();

@@ -5,7 +5,7 @@ use crate::statistics::quantile;
 use anyhow::{Context, Result};
 use gridweave_stages::geometry::Pose2;
 use nalgebra::Point2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A place within this of the truth, metres, is the right one, but not exactly: maps that drift lie so far beside each other. Places
@@ -15,7 +15,7 @@ pub(crate) const NEAR: f64 = 1.5;
 pub(crate) const NEAR_DEGREES: f64 = 5.0;
 
 /// How near a place is to the truth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Closeness {
     Right,
     /// The right place, too inexactly to count as right.
@@ -131,8 +131,9 @@ impl Pair {
 
     /// How far `T_a_b` lays the common places from each other, metres.
     fn errors(&self, transform_a_b: &Pose2) -> Vec<f64> {
-        let error =
-            |[x_b, y_b, x_a, y_a]: &[f64; 4]| (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm();
+        let error = |[x_b, y_b, x_a, y_a]: &[f64; 4]| {
+            (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm()
+        };
         self.truth.common.iter().map(error).collect()
     }
 }
