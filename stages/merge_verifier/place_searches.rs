@@ -2,11 +2,14 @@
 
 use crate::geometry::Grid;
 use crate::registration::icp::IcpParameters;
-use crate::registration::judgement::UserKnowledge;
+use crate::registration::judgement::{UserKnowledge, Verdict};
 use crate::registration::search::MapAlignerParameters;
 use crate::registration::{Basis, Hypothesis, PreparedPair};
 use crate::robot_pair::RobotPair;
 use std::collections::BTreeMap;
+
+/// The inlier ratio from which on nothing contradicts what tags say.
+const CLEAR_AGREEMENT: f64 = 0.9;
 
 /// The places that were found of pairs of robots, each for the last two maps that were searched.
 #[derive(Debug, Default)]
@@ -20,12 +23,14 @@ struct Searched {
 }
 
 impl PlaceSearches {
-    /// Whether hypotheses need a search beside them: they propose a place of which nobody has looked whether the maps fit elsewhere as
-    /// well, and no place is fixed by enough tags.
-    pub(super) fn is_due(hypotheses: &[Hypothesis]) -> bool {
+    /// Whether hypotheses need a search beside them: nobody has looked whether the maps fit elsewhere as well, and no place is both fixed by
+    /// enough tags and clear.
+    pub(super) fn is_due(hypotheses: &[Hypothesis], verdict: &Verdict) -> bool {
         let usable = || hypotheses.iter().filter(|hypothesis| !hypothesis.is_refused);
-        let is_fixed = |hypothesis: &Hypothesis| matches!(hypothesis.basis, Basis::Search { .. } | Basis::Tags);
-        usable().next().is_some() && !usable().any(is_fixed)
+        let is_by_search = |hypothesis: &Hypothesis| matches!(hypothesis.basis, Basis::Search { .. });
+        let is_clear = verdict.candidate.agreement.inlier_ratio() >= CLEAR_AGREEMENT
+            && usable().any(|hypothesis| hypothesis.basis == Basis::Tags);
+        usable().next().is_some() && !usable().any(is_by_search) && !is_clear && verdict.chosen.is_none()
     }
 
     /// The places of map b on map a, each map with its number among those of its robot.

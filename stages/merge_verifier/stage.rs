@@ -142,12 +142,13 @@ impl MergeVerifier {
         }
         let verdict = maps.and_then(|(a, b)| {
             let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
-            if PlaceSearches::is_due(&hypotheses) {
+            let (view_a, view_b) = (view(a), view(b));
+            let mut verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+            if PlaceSearches::is_due(&hypotheses, &verdict) {
                 let grids = ((a.number, a.grid()), (b.number, b.grid()));
                 hypotheses.extend_from_slice(self.place_searches.of(pair, grids, &known));
+                verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
             }
-            let (view_a, view_b) = (view(a), view(b));
-            let verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
             if !verdict.rests_on_maps_alone() {
                 return Some(verdict);
             }

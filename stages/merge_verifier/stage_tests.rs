@@ -121,6 +121,7 @@ fn a_plug_in_is_believed_where_a_search_of_the_maps_finds_the_same_place_alone()
     // A hall fits half a turn on, too, and only a search shows that.
     let draw = |at| FloorPlan::hall().draw(seen(-0.2, -0.2, 20.2, 12.2), at);
     let (a, b) = (draw(drawing(3.0, 2.0, 0.4)), draw(drawing(12.0, 6.0, -2.1)));
+    let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));

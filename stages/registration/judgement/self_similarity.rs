@@ -25,6 +25,8 @@ use nalgebra::Matrix3;
 /// rooms of one building are alike, and less wall meets at many places by chance.
 const ALIKE_SHARE: f64 = 0.75;
 const ALIKE_WALL: f64 = 20.0;
+/// More of a log-likelihood ratio of contradictions is no surer: what was moved is in none of them.
+const MOST_CONTRADICTION: f64 = 10.0;
 /// So large is a room, square metres.
 const ROOM: f64 = 25.0;
 
@@ -102,7 +104,8 @@ impl Alias {
             if !is_alike(&there) {
                 return None;
             }
-            let terms = [extent(&here, itself), by_contradiction(&here, &there, itself)];
+            let by_contradiction = by_contradiction(&here, &there, itself);
+            let terms = [extent(&here, itself), by_contradiction.clamp(-MOST_CONTRADICTION, MOST_CONTRADICTION)];
             let log_odds = ALIAS[0] + ALIAS[1] * terms[0] + ALIAS[2] * terms[1];
             Some(Self { shift, turn, transform_a_b, there, itself: *itself, terms, log_odds })
         };
