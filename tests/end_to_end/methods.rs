@@ -124,7 +124,7 @@ inputs = ["topology"]
 
 [stages.icp]
 kind = "icp_refiner"
-inputs = ["cleaner", "radon.hypotheses", "matcher.hypotheses"]
+inputs = ["cleaner", "radon", "matcher.hypotheses"]
 
 [stages.verifier]
 kind = "merge_verifier"
@@ -136,7 +136,7 @@ inputs = ["log.map", "verifier"]
 
 [stages.output]
 kind = "mcap_sink"
-inputs = ["radon.alignment", "matcher.alignment", "topology", "icp.*", "verifier.*", "frames.*"]
+inputs = ["radon", "matcher.alignment", "topology", "icp.*", "verifier.*", "frames.*"]
 "#;
 
 #[test]
@@ -152,7 +152,7 @@ fn what_published_methods_propose_is_merged_only_where_the_verifier_finds_it_alo
         let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
         let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
         assert_eq!(evaluation["wrong"], 0, "seed {seed}: {evaluation}");
-        let proposed = json(&folder.join("summary.json"))["alignments"][0]["method"].clone();
-        assert!(["radon+icp", "topology+icp"].contains(&proposed.as_str().unwrap()), "seed {seed}: {proposed}");
+        let method = json(&folder.join("summary.json"))["alignments"][0]["method"].to_string();
+        assert!(method.contains("radon") || method.contains("topology"), "seed {seed}: {method}");
     }
 }

@@ -63,7 +63,7 @@ fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
 fn a_refusal_is_short_and_the_whole_of_it_is_told_on_demand() {
     let world = symmetric_world();
     let short = world.merge(&[]);
-    short.assert(3, &["missing: a probability of 0.999"]);
+    short.assert(3, &["missing: a probability of 0.98"]);
     let refusal =
         short.stdout.lines().skip_while(|line| !line.starts_with("not merged")).take_while(|line| !line.is_empty());
     refusal.for_each(|line| assert!(line.len() <= 80, "{line}"));

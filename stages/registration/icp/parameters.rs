@@ -116,7 +116,7 @@ impl Default for IcpParameters {
             position_slack: 0.1,
             yaw_slack: 0.02,
             max_step: 5.0,
-            max_deviation: 0.5,
+            max_deviation: 0.3,
             reuse_within: 0.05,
             reuse_within_yaw: 0.01,
         }

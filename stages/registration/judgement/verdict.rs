@@ -92,8 +92,12 @@ impl Verdict {
     /// The term by which it falls short most of a usual right place.
     pub(super) fn weakest_term(&self) -> Term {
         let terms = self.candidate.terms();
+        // What no search has proposed has no peak to fall short by.
+        let is_by_search = self.candidate.rests_on(|basis| matches!(basis, Basis::Search { .. }));
+        let counts = |index: &usize| is_by_search || Term::ALL[*index] != Term::PeakSignificance;
         let shortfall = |index: &usize| WEIGHTS[*index] * (TYPICAL[*index] - terms.0[*index]);
-        let weakest = (0..WEIGHTS.len()).max_by(|one, other| shortfall(one).total_cmp(&shortfall(other)));
+        let weakest =
+            (0..WEIGHTS.len()).filter(counts).max_by(|one, other| shortfall(one).total_cmp(&shortfall(other)));
         Term::ALL[weakest.unwrap_or_default()]
     }
 

@@ -22,11 +22,11 @@ mod overlay;
 mod parameters;
 mod peak_shape;
 mod peaks;
+mod places;
 mod prepared_map;
 mod raster;
 mod refusal;
 mod scales;
-mod search;
 mod walk;
 
 #[cfg(test)]
@@ -41,8 +41,8 @@ pub use parameters::MapAlignerParameters;
 pub use peak_shape::covariance;
 pub use peaks::Peaks;
 pub(crate) use peaks::{is_near, overlay};
+pub use places::{Place, Rotations, search};
 pub(crate) use prepared_map::JUDGED;
 pub use prepared_map::PreparedMap;
 pub use raster::{Content, Raster};
 pub use refusal::SearchRefusal;
-pub use search::{Place, Rotations, search};

@@ -2,9 +2,9 @@
 
 use super::climb::{Steps, climb};
 use super::overlay::Overlay;
+use super::places::Place;
 use super::prepared_map::JUDGED;
 use super::scales::{Scale, search_scales};
-use super::search::Place;
 use super::{MapAlignerParameters, PreparedMap};
 use crate::geometry::{Point2, Pose2, turn_difference};
 use crate::registration::place_window::PlaceWindow;

@@ -3,8 +3,8 @@
 //! Large maps are searched in wide cells first, which bear with bends, and then in narrow ones, in which rooms can still be told from each
 //! other: of a building that is much longer than its rooms, wide cells show hardly anything but walls.
 
+use super::places::{Place, Rotations, search};
 use super::prepared_map::JUDGED;
-use super::search::{Place, Rotations, search};
 use super::{Content, MapAlignerParameters, PreparedMap, Raster};
 use crate::registration::place_window::PlaceWindow;
 

@@ -50,6 +50,9 @@ impl Linear {
     }
 }
 
+/// The weight of a choice, and for each alternative its scaled terms behind a 1 for the intercept, and whether it is right.
+type Scaled = (f64, Vec<(DVector<f64>, bool)>);
+
 /// Newton's method on the terms that are kept, scaled to a spread of one, with the expected information.
 fn fit_unbounded(choices: &[Choice], kept: &[usize]) -> Result<Linear> {
     let values = || choices.iter().flat_map(|choice| choice.alternatives.iter().map(|(values, _)| values));
@@ -68,7 +71,7 @@ fn fit_unbounded(choices: &[Choice], kept: &[usize]) -> Result<Linear> {
         let terms = kept.iter().zip(&moments).map(|(index, (mean, spread))| (values[*index] - mean) / spread);
         DVector::from_iterator(kept.len() + 1, std::iter::once(1.0).chain(terms))
     };
-    let choices: Vec<(f64, Vec<(DVector<f64>, bool)>)> = choices
+    let choices: Vec<Scaled> = choices
         .iter()
         .map(|choice| {
             let alternatives = choice.alternatives.iter().map(|(values, right)| (scaled(values), *right));
@@ -108,7 +111,7 @@ fn fit_unbounded(choices: &[Choice], kept: &[usize]) -> Result<Linear> {
 
 /// The negative logarithm of the likelihood, its gradient, and the expected information.
 fn derivatives(
-    choices: &[(f64, Vec<(DVector<f64>, bool)>)],
+    choices: &[Scaled],
     parameters: &DVector<f64>,
     penalty: &DMatrix<f64>,
 ) -> (f64, DVector<f64>, DMatrix<f64>) {
