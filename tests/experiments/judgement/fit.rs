@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn a_known_function_is_found() {
         let found = Linear::fit(&choices(), &[0.0, 0.0]).unwrap();
-        assert!((found.intercept + 1.0).abs() < 0.05 && (found.weights[0] - 0.5).abs() < 0.02, "{found:?}");
+        assert!((found.intercept + 1.0).abs() < 0.1 && (found.weights[0] - 0.5).abs() < 0.05, "{found:?}");
         assert!(found.weights[1].abs() < 1e-3, "{found:?}");
     }
 
