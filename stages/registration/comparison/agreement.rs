@@ -1,11 +1,11 @@
 //! How well two maps agree where both know something.
 
+use super::ComparisonParameters;
 use super::conflicts::points_of_walls;
 use super::regions::{ComparedWall, Finding, Found, Region, RegionComparison};
 use super::straight_walls::StraightWalls;
 use crate::deformation::Deformation;
 use crate::geometry::{Grid, Point2, Pose2, is_known};
-use crate::registration::judgement::JudgementParameters;
 use crate::walls::WallMap;
 use nalgebra::Vector2;
 
@@ -90,7 +90,12 @@ impl Agreement {
 }
 
 /// Compares two maps with map b at `transform_a_b`.
-pub fn compare(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, parameters: &JudgementParameters) -> Agreement {
+pub fn compare(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    transform_a_b: &Pose2,
+    parameters: &ComparisonParameters,
+) -> Agreement {
     let coarser = a.grid.geometry.resolution.max(b.grid.geometry.resolution);
     let tolerance = parameters.wall_tolerance.max(LEAST_TOLERANCE * coarser);
     let comparison =
@@ -160,6 +165,7 @@ fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::pose;
+    use crate::registration::judgement::JudgementParameters;
     use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
 
     #[test]
@@ -170,7 +176,7 @@ mod tests {
             let draw = |plan: FloorPlan| plan.draw(seen, Drawing { resolution, ..fine });
             let (a, another) = (draw(FloorPlan::office()), draw(FloorPlan::another_office()));
             let compared = |b: &DrawnMap, shift: f64| {
-                compare(&a.view(), &b.view(), &pose(shift, shift, 0.0), &JudgementParameters::default())
+                compare(&a.view(), &b.view(), &pose(shift, shift, 0.0), &JudgementParameters::default().comparison())
             };
             let tolerance = (1.5 * resolution).max(JudgementParameters::default().wall_tolerance);
             let beside = compared(&a, tolerance + 0.2);

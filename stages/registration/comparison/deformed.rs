@@ -1,11 +1,11 @@
 //! A map bent onto another, as far as the maps of a SLAM bend: what is compared where two maps contradict each other as
 //! they came.
 
+use super::ComparisonParameters;
 use super::agreement::{Agreement, MapView, compare};
 use crate::deformation::Deformation;
 use crate::elastic_refiner::{Body, ElasticRefinerParameters, refine};
 use crate::geometry::{PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
-use crate::registration::judgement::JudgementParameters;
 use crate::walls::{WallMap, stride};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::f64::consts::SQRT_2;
@@ -35,7 +35,7 @@ impl Deformed {
         a: &MapView<'_>,
         b: &MapView<'_>,
         transform_a_b: &Pose2,
-        parameters: &JudgementParameters,
+        parameters: &ComparisonParameters,
     ) -> Option<Self> {
         // All is laid on map a, which is bent as well.
         let elastic = ElasticRefinerParameters {

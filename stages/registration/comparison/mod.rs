@@ -9,8 +9,10 @@
 mod agreement;
 mod conflicts;
 mod deformed;
+mod parameters;
 mod regions;
 mod straight_walls;
 
 pub use agreement::{Agreement, MapView, compare};
 pub use deformed::Deformed;
+pub use parameters::ComparisonParameters;

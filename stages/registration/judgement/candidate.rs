@@ -1,8 +1,8 @@
 //! A place of map b that hypotheses propose, and what the maps say there.
 
-use super::{JudgementParameters, Terms};
+use super::Terms;
 use crate::geometry::{Point2, Pose2, point_jacobian};
-use crate::registration::comparison::{Agreement, Deformed, MapView, compare};
+use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed, MapView, compare};
 use crate::registration::{Basis, Hypothesis};
 use nalgebra::Matrix3;
 
@@ -23,6 +23,8 @@ pub struct Candidate {
     pub number: usize,
     /// Others at the same place.
     pub others: Vec<Hypothesis>,
+    /// The numbers of those.
+    numbers: Vec<usize>,
     /// What the maps say, as map b is deformed if it is.
     pub agreement: Agreement,
     /// Where map b lies deformed, if that explains more than it costs.
@@ -38,15 +40,16 @@ impl Candidate {
         (number, hypothesis): (usize, &Hypothesis),
         a: &MapView<'_>,
         b: &MapView<'_>,
-        parameters: &JudgementParameters,
+        parameters: &ComparisonParameters,
     ) -> Self {
         let agreement = compare(a, b, &hypothesis.transform_a_b, parameters);
         let hypothesis = hypothesis.clone();
-        Self { hypothesis, number, others: Vec::new(), agreement, deformed: None, left_by_deformation: None }
+        let (others, numbers) = (Vec::new(), Vec::new());
+        Self { hypothesis, number, others, numbers, agreement, deformed: None, left_by_deformation: None }
     }
 
     /// The same with map b deformed, where that can explain what contradicts.
-    pub(super) fn deform(mut self, a: &MapView<'_>, b: &MapView<'_>, parameters: &JudgementParameters) -> Self {
+    pub(super) fn deform(mut self, a: &MapView<'_>, b: &MapView<'_>, parameters: &ComparisonParameters) -> Self {
         let is_worth_it = parameters.bend > 0.0
             && !self.hypothesis.is_refused
             && self.agreement.evidence > 0.0
@@ -57,6 +60,23 @@ impl Candidate {
             deformed.filter(|deformed| deformed.agreement.evidence - deformed.cost > self.agreement.evidence);
         self.agreement = self.deformed.map_or(self.agreement, |deformed| deformed.agreement);
         self
+    }
+
+    /// This and another one at the same place as one. What was proposed and not refused stands for it, of two such the first.
+    pub(super) fn unite(&mut self, mut other: Self) {
+        let rank = |candidate: &Self| (candidate.hypothesis.is_refused, candidate.hypothesis.is_rival);
+        if rank(&other) < rank(self) {
+            std::mem::swap(self, &mut other);
+        }
+        self.others.push(other.hypothesis);
+        self.others.append(&mut other.others);
+        self.numbers.push(other.number);
+        self.numbers.append(&mut other.numbers);
+    }
+
+    /// Whether the hypothesis of a number proposes the place.
+    pub(super) fn has(&self, number: usize) -> bool {
+        self.number == number || self.numbers.contains(&number)
     }
 
     /// Where map b lies: `T_a_b`.

@@ -3,7 +3,7 @@
 use super::priors::prior;
 use super::verdict::{Rival, Verdict};
 use super::{Candidate, JudgementParameters, Listed, Refusal, Term};
-use crate::registration::comparison::MapView;
+use crate::registration::comparison::{ComparisonParameters, MapView};
 use crate::registration::place_window::PlaceWindow;
 use crate::registration::{Basis, Hypothesis};
 
@@ -27,7 +27,8 @@ pub fn judge(
     known: &UserKnowledge,
     parameters: &JudgementParameters,
 ) -> Option<Verdict> {
-    let mut all = compared(a, b, hypotheses, parameters);
+    let comparison = parameters.comparison();
+    let mut all = compared(a, b, hypotheses, &comparison);
     if let Some(window) = &known.window {
         let is_possible = |candidate: &Candidate| window.contains(&candidate.hypothesis.transform_a_b, 0.0, 0.0);
         if !all.iter().any(is_possible) {
@@ -36,17 +37,22 @@ pub fn judge(
         all.retain(is_possible);
     }
     let listed = Listed::of(&all);
-    if let Some(asked) = known.hypothesis {
-        let count = all.len();
-        let chosen = asked.checked_sub(1).and_then(|index| all.get(index).cloned());
-        let refusal = chosen.is_none().then_some(Refusal::NoSuchHypothesis { asked, count });
-        let candidate = chosen.or_else(|| all.into_iter().next())?.deform(a, b, parameters);
-        let chosen = refusal.is_none().then_some((asked, count));
-        return Some(Verdict { refusal, chosen, listed, ..Verdict::of(candidate) });
-    }
-    let candidates = deformed(united(all), a, b, parameters);
-    let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, known.window.is_some())).collect();
+    let is_expected = known.window.is_some();
+    let count = all.len();
+    let chosen = known.hypothesis.map(|asked| (asked, asked.checked_sub(1).and_then(|index| all.get(index).cloned())));
+    let candidates = places(all, a, b, &comparison);
+    let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
     let probabilities = posterior(&log_odds);
+    if let Some((asked, chosen)) = chosen {
+        let number = chosen.as_ref().map_or(0, |chosen| chosen.number);
+        let (place, probability) =
+            candidates.iter().zip(&probabilities).find(|(place, _)| chosen.is_none() || place.has(number))?;
+        let refusal = chosen.is_none().then_some(Refusal::NoSuchHypothesis { asked, count });
+        // It lies where it was listed, and not where another at the place does.
+        let candidate = chosen.map_or_else(|| place.clone(), |chosen| chosen.deform(a, b, &comparison));
+        let chosen = refusal.is_none().then_some((asked, count));
+        return Some(Verdict { refusal, chosen, listed, probability: *probability, ..Verdict::of(candidate) });
+    }
     let most_probable = |numbers: &mut dyn Iterator<Item = usize>| {
         numbers.reduce(|best, other| if log_odds[other] > log_odds[best] { other } else { best })
     };
@@ -55,13 +61,8 @@ pub fn judge(
     let rival = rival.map(|other| Rival::new(&candidates[best], &candidates[other], probabilities[other]));
     let probability = probabilities[best];
     let candidate = candidates.into_iter().nth(best)?;
-    let mut verdict = Verdict {
-        probability,
-        rival,
-        listed,
-        prior: prior(&candidate, known.window.is_some()),
-        ..Verdict::of(candidate)
-    };
+    let mut verdict =
+        Verdict { probability, rival, listed, prior: prior(&candidate, is_expected), ..Verdict::of(candidate) };
     verdict.refusal = refusal(&verdict, parameters);
     Some(verdict)
 }
@@ -71,9 +72,9 @@ pub fn candidates(
     a: &MapView<'_>,
     b: &MapView<'_>,
     hypotheses: &[Hypothesis],
-    parameters: &JudgementParameters,
+    parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    deformed(united(compared(a, b, hypotheses, parameters)), a, b, parameters)
+    places(compared(a, b, hypotheses, parameters), a, b, parameters)
 }
 
 /// What the maps say at each hypothesis as they came, the best first.
@@ -81,7 +82,7 @@ fn compared(
     a: &MapView<'_>,
     b: &MapView<'_>,
     hypotheses: &[Hypothesis],
-    parameters: &JudgementParameters,
+    parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
     let compare = |numbered| Candidate::new(numbered, a, b, parameters);
     let mut all: Vec<Candidate> = hypotheses.iter().enumerate().map(compare).collect();
@@ -94,13 +95,14 @@ fn compared(
     all
 }
 
-fn deformed(
-    places: Vec<Candidate>,
+/// Each place once, deformed. Several places may be one once map b is deformed.
+fn places(
+    compared: Vec<Candidate>,
     a: &MapView<'_>,
     b: &MapView<'_>,
-    parameters: &JudgementParameters,
+    parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    places.into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect()
+    united(united(compared).into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
 }
 
 /// The probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum of exp(s_j))`.
@@ -110,23 +112,12 @@ pub fn posterior(log_odds: &[f64]) -> Vec<f64> {
     log_odds.iter().map(|odds| (odds - most).exp() / sum).collect()
 }
 
-/// Each place once, the first hypothesis at it standing for all.
+/// Each place once, where map b lies deformed if it is.
 fn united(all: Vec<Candidate>) -> Vec<Candidate> {
     let mut places: Vec<Candidate> = Vec::new();
     for candidate in all {
-        let is_usable = !candidate.hypothesis.is_refused;
-        let same = places.iter_mut().find(|place| {
-            is_usable && !place.hypothesis.is_refused && place.is_at(&candidate.hypothesis.transform_a_b)
-        });
-        match same {
-            // What was proposed stands for its place, and not what only stands against others.
-            Some(place) if place.hypothesis.is_rival && !candidate.hypothesis.is_rival => {
-                let mut candidate = candidate;
-                std::mem::swap(place, &mut candidate);
-                place.others.append(&mut candidate.others);
-                place.others.push(candidate.hypothesis);
-            }
-            Some(place) => place.others.push(candidate.hypothesis),
+        match places.iter_mut().find(|place| place.is_at(&candidate.transform_a_b())) {
+            Some(place) => place.unite(candidate),
             None => places.push(candidate),
         }
     }

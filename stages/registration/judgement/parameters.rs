@@ -1,5 +1,6 @@
 //! The parameters of the stage.
 
+use crate::registration::comparison::ComparisonParameters;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,11 +16,11 @@ pub struct JudgementParameters {
     /// Two walls agree when they lie within this distance, metres; never less than 1.5 cells of the coarser map.
     #[schemars(range(min = 1e-3, max = 10.0))]
     pub wall_tolerance: f64,
-    /// Maps are compared in squares of this side, each of which may slide a little: a map is right in every room and bent as
+    /// Maps are compared in squares of this side, each of which may be moved a little: a map is right in every room and bent as
     /// a whole. Metres.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub region: f64,
-    /// Standard deviation of how far a region slides, metres.
+    /// Standard deviation of how far a region is moved, metres.
     #[schemars(range(min = 1e-3, max = 10.0))]
     pub region_deviation: f64,
     /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of each
@@ -51,6 +52,14 @@ impl Default for JudgementParameters {
             turn: 0.02,
             hypotheses: BTreeMap::new(),
         }
+    }
+}
+
+impl JudgementParameters {
+    /// Those of the comparison.
+    pub fn comparison(&self) -> ComparisonParameters {
+        let Self { wall_tolerance, region, region_deviation, bend, turn, .. } = *self;
+        ComparisonParameters { wall_tolerance, region, region_deviation, bend, turn }
     }
 }
 

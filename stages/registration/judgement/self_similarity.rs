@@ -45,7 +45,7 @@ impl SelfSimilarity {
         let prepared = PreparedMap::new("", &map.grid, cell, aligner.max_extent);
         let places = prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_places(&prepared, &aligner));
         let registered = places.iter().map(|place| registered(map.walls, map.walls, place));
-        let compared = registered.map(|place| (place, compare(map, map, &place, parameters)));
+        let compared = registered.map(|place| (place, compare(map, map, &place, &parameters.comparison())));
         Self { places: compared.filter(|(_, agreement)| is_alike(agreement)).collect() }
     }
 }
@@ -100,7 +100,7 @@ impl Alias {
                 return None;
             }
             let (shift, turn) = verdict.candidate.change(&transform_a_b);
-            let there = compare(a, b, &transform_a_b, parameters);
+            let there = compare(a, b, &transform_a_b, &parameters.comparison());
             if !is_alike(&there) {
                 return None;
             }

@@ -189,7 +189,7 @@ fn walls_on_free_space_are_refused() {
     let truth = a.transform_to(&b);
     for (x, y, yaw) in [(1.5, 0.0, 0.0), (0.0, 2.0, 0.0), (-1.2, 1.2, 0.0)] {
         let wrong = pose(x, y, 0.0) * truth;
-        let agreement = compare(&a.view(), &b.view(), &wrong, &JudgementParameters::default());
+        let agreement = compare(&a.view(), &b.view(), &wrong, &JudgementParameters::default().comparison());
         assert!(agreement.inlier_ratio() < 0.7 && agreement.evidence < 10.0, "{x} {y} {yaw}: {agreement:?}");
         let hypotheses = [by_tags(&wrong)];
         assert!(judged(&a, &b, &hypotheses).refusal.is_some(), "{x} {y} {yaw}");
@@ -231,8 +231,8 @@ fn walls_that_are_seen_from_different_sides_are_no_evidence() {
     let south = plan.draw(seen(-0.2, -0.2, 6.2, 5.0), drawing(3.0, 2.0, 0.4));
     let north = plan.draw(seen(-0.2, 5.0, 6.2, 10.2), drawing(3.0, 7.0, -2.1));
     let truth = south.transform_to(&north);
-    let beside = compare(&south.view(), &north.view(), &truth, &JudgementParameters::default());
-    let same = compare(&south.view(), &south.view(), &Pose2::identity(), &JudgementParameters::default());
+    let beside = compare(&south.view(), &north.view(), &truth, &JudgementParameters::default().comparison());
+    let same = compare(&south.view(), &south.view(), &Pose2::identity(), &JudgementParameters::default().comparison());
     assert!(beside.inlier_length < 1.0 && same.inlier_length > 15.0, "{beside:?} {same:?}");
 }
 
@@ -242,7 +242,7 @@ fn a_region_may_slide_a_little_and_not_far() {
     let truth = a.transform_to(&b);
     let evidence = |shift: f64| {
         let moved = pose(shift, 0.0, 0.0) * truth;
-        compare(&a.view(), &b.view(), &moved, &JudgementParameters::default()).evidence
+        compare(&a.view(), &b.view(), &moved, &JudgementParameters::default().comparison()).evidence
     };
     assert!(evidence(0.12) > 0.8 * evidence(0.0), "{} {}", evidence(0.12), evidence(0.0));
     assert!(evidence(0.6) < 0.3 * evidence(0.0), "{} {}", evidence(0.6), evidence(0.0));

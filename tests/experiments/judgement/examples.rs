@@ -1,6 +1,7 @@
 //! What the weights are fitted to.
 
 use super::FitJudgementArgs;
+use crate::align::kinds::Kind;
 use crate::align::worlds::Seeds;
 use crate::map_pairs::judging::candidates_of;
 use crate::map_pairs::library::{self, Library, MapOfBuilding, SimulatedPair};
@@ -13,10 +14,19 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Aliases are looked for where a place is more probable than this: only what may be accepted has any.
 const LIKELY: f64 = 0.5;
+
+/// Kinds of buildings whose parts are alike.
+const ALIKE: [Kind; 2] = [Kind::Symmetric, Kind::Repeated];
+
+/// What the pairs of simulated buildings of a kind are called.
+fn set_of(kind: Kind) -> String {
+    format!("simulated: {}", kind.name())
+}
 
 /// Two maps, and the places that are judged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,7 +88,7 @@ impl Example {
 
     /// Whether both robots were in one building whose parts are alike.
     pub(super) fn has_parts_alike(&self) -> bool {
-        ["symmetric", "repeated"].iter().any(|kind| self.set.starts_with(&format!("simulated: {kind}")))
+        ALIKE.iter().any(|kind| self.set == set_of(*kind))
     }
 
     /// Whether an alias is the right place.
@@ -123,10 +133,17 @@ pub(super) fn gather(args: &FitJudgementArgs, registry: &Registry) -> Result<Vec
     }
     let files = Library::of_folders(&args.folders)?;
     examples.extend(of_different_buildings("different buildings", &files, args.unrelated, true, args.seed));
-    let worlds = library::simulated_pairs(args.worlds, None, Seeds::Tuning, registry);
+    let mut worlds = library::simulated_pairs(args.worlds, None, Seeds::Tuning, registry);
+    let numbers: BTreeSet<u64> = worlds.iter().map(|pair| pair.number).collect();
+    for kind in ALIKE {
+        // The first of them are among the others.
+        let count = args.alike + args.worlds / Kind::ALL.len() as u64;
+        let more = library::simulated_pairs(count, Some(kind.name()), Seeds::Tuning, registry);
+        worlds.extend(more.into_iter().filter(|pair| !numbers.contains(&pair.number)));
+    }
     let example = |pair: &SimulatedPair| {
         let [a, b] = &pair.maps;
-        let set = format!("simulated: {}", pair.kind());
+        let set = pair.world.kind.map_or_else(String::new, set_of);
         let names = [set.as_str(), pair.world.name.as_str(), a.building.as_str()];
         Example::new(names, true, candidates_of(a, b, LIKELY), |place| pair.closeness(place))
     };

@@ -25,13 +25,16 @@ pub(super) struct FitJudgementArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "folders")]
     from: Option<PathBuf>,
     /// Pairs of parts of maps of different buildings.
-    #[arg(long, default_value_t = 3000)]
+    #[arg(long, default_value_t = 2000)]
     unrelated: u64,
     /// Simulated worlds of any kind, of the seeds on which parameters are chosen.
-    #[arg(long, default_value_t = 400)]
+    #[arg(long, default_value_t = 240)]
     worlds: u64,
+    /// So many simulated worlds more of each kind whose parts are alike, for the aliases.
+    #[arg(long, default_value_t = 120)]
+    alike: u64,
     /// Pairs of maps of different simulated worlds.
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = 1000)]
     simulated: u64,
     /// What pairs, parts and turns are drawn from.
     #[arg(long, default_value_t = 1)]

@@ -60,7 +60,7 @@ pub(crate) fn candidates_of(a: &MapOfBuilding, b: &MapOfBuilding, likely: f64) -
             let [similar_a, similar_b] = [&a, &b].map(|view| SelfSimilarity::new(view, judgement));
             Alias::all(&verdict, (&a, &similar_a), (&b, &similar_b), None, judgement)
         });
-        (candidates(&a, &b, &hypotheses, judgement), aliases.unwrap_or_default())
+        (candidates(&a, &b, &hypotheses, &judgement.comparison()), aliases.unwrap_or_default())
     });
     found.unwrap_or_default()
 }

@@ -114,7 +114,7 @@ impl Aligner {
             let transform_a_b = refine(&a, &b, &guess, parameters).registration.transform_a_b;
             if let Some(parameters) = &self.verifier {
                 let (a, b) = (MapView::rigid(maps.a, &a), MapView::rigid(maps.b, &b));
-                std::hint::black_box(compare(&a, &b, &transform_a_b, parameters));
+                std::hint::black_box(compare(&a, &b, &transform_a_b, &parameters.comparison()));
             }
             transform_a_b
         });
