@@ -129,7 +129,8 @@ impl Terms {
 
     /// What each term adds to the log-odds.
     pub fn contributions(&self) -> [f64; COUNT] {
-        std::array::from_fn(|index| WEIGHTS[index] * self.0[index])
+        // Not -0.
+        std::array::from_fn(|index| WEIGHTS[index] * self.0[index] + 0.0)
     }
 
     /// The log-odds by the maps.
