@@ -1,84 +1,37 @@
-//! The stages of Gridweave, a folder each: the algorithm as plain functions on slices and nalgebra types, and beside
-//! it `stage.rs`, the thin adapter that turns messages into calls. What several stages share is
-//! in `geometry`, `walls`, `acceptance_index`, `deformation`, `hypotheses`, `log_odds`, `placement`, `robot_maps`, `robot_pair`,
-//! `scan_grid` and `skeleton`.
+//! The stages of Gridweave, in rooms that follow the way of a map through a pipeline:
+//!
+//! 1. [`mapping`]: the map of one robot, from its scans or as it published it;
+//! 2. [`tags`] and [`topology`]: hypotheses of the relative pose of two maps, from tags and from topological maps;
+//! 3. [`registration`]: hypotheses from the maps alone, their refinement, and the judgement of all;
+//! 4. [`merge`]: one pose for each robot, and one map.
+//!
+//! [`published`] holds methods of other authors, [`simulator`] and [`python_stage`] are stages of their own, and
+//! [`shared`] is what the rooms have in common. A stage is a folder: the algorithm as plain functions on slices and
+//! nalgebra types, and beside it `stage.rs`, the thin adapter that turns messages into calls.
 
 #![forbid(unsafe_code)]
 
-pub mod acceptance_index;
-pub mod deformation;
-pub mod edge_matcher;
-pub mod elastic_refiner;
-pub mod entropy_fuser;
-pub mod frame_solver;
-pub mod geometry;
-pub mod grid_fuser;
-pub mod hough_spectrum_aligner;
-pub mod hypotheses;
-pub mod icp_refiner;
-pub mod line_extractor;
-pub mod log_odds;
-pub mod map_aligner;
-pub mod map_cleaner;
-pub mod map_placer;
-pub mod map_selector;
-pub mod marker_maker;
-pub mod merge_verifier;
-pub mod pair_aligner;
-pub mod path_placer;
-pub mod pgvd_extractor;
-pub mod placement;
+pub mod mapping;
+pub mod merge;
+pub mod published;
 pub mod python_stage;
-pub mod quadrant_classifier;
-pub mod radon_aligner;
-pub mod random_walk_aligner;
 pub mod registration;
-pub mod robot_maps;
-pub mod robot_pair;
-pub mod scan_grid;
-pub mod scan_mapper;
+pub mod shared;
 pub mod simulator;
-pub mod skeleton;
-pub mod tag_filter;
-pub mod tag_localizer;
-#[cfg(test)]
-mod test_world;
-pub mod topology_extractor;
-pub mod topology_matcher;
-pub mod uncertain_transform;
-pub mod walls;
+pub mod tags;
+pub mod topology;
 
 use gridweave_runtime::stage::StageKind;
 
-/// All stage kinds of this crate.
+/// All stage kinds of this crate, by name.
 pub fn kinds() -> Vec<StageKind> {
-    vec![
-        edge_matcher::kind(),
-        elastic_refiner::kind(),
-        entropy_fuser::kind(),
-        frame_solver::kind(),
-        grid_fuser::kind(),
-        hough_spectrum_aligner::kind(),
-        icp_refiner::kind(),
-        line_extractor::kind(),
-        map_aligner::kind(),
-        map_cleaner::kind(),
-        map_placer::kind(),
-        map_selector::kind(),
-        marker_maker::kind(),
-        merge_verifier::kind(),
-        path_placer::kind(),
-        pgvd_extractor::kind(),
-        python_stage::kind(),
-        quadrant_classifier::kind(),
-        radon_aligner::kind(),
-        random_walk_aligner::kind(),
-        scan_mapper::kind(),
-        simulator::kind(),
-        tag_filter::kind(),
-        tag_localizer::kind(),
-        topology_extractor::kind(),
-        topology_matcher::kind(),
-        uncertain_transform::kind(),
-    ]
+    let mut kinds = vec![python_stage::kind(), simulator::kind()];
+    kinds.extend(mapping::kinds());
+    kinds.extend(merge::kinds());
+    kinds.extend(published::kinds());
+    kinds.extend(registration::kinds());
+    kinds.extend(tags::kinds());
+    kinds.extend(topology::kinds());
+    kinds.sort_by_key(|kind| kind.name);
+    kinds
 }

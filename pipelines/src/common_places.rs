@@ -2,8 +2,8 @@
 
 use gridweave_logs::summary::{Bend, Frame, Summary};
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
-use gridweave_stages::deformation::Deformation;
-use gridweave_stages::geometry::{PointPair, fit_rigid};
+use gridweave_stages::shared::deformation::Deformation;
+use gridweave_stages::shared::geometry::{PointPair, fit_rigid};
 use nalgebra::{Isometry2, Matrix3, Point2, Vector2, Vector3};
 use serde::Serialize;
 use std::fmt;

@@ -8,10 +8,10 @@
 mod building;
 
 use building::draw_bent;
-use gridweave_stages::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
-use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, pose};
+use gridweave_stages::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
-use gridweave_stages::walls::{NORMAL_RADIUS, WallMap};
+use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, pose};
+use gridweave_stages::shared::walls::{NORMAL_RADIUS, WallMap};
 use std::time::Instant;
 
 const RUNS: usize = 7;

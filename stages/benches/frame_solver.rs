@@ -9,11 +9,12 @@
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::ros::encode;
 use gridweave_runtime::stage::LoneStage;
-use gridweave_stages::{frame_solver, geometry};
+use gridweave_stages::merge;
+use gridweave_stages::shared;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-#[path = "../frame_solver/team.rs"]
+#[path = "../merge/frame_solver/team.rs"]
 mod team;
 use team::Team;
 
@@ -55,15 +56,15 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
         let team = if agreeing { team.with_agreeing_mistakes(share) } else { team.with_mistakes(share) };
         let names: BTreeSet<String> = (0..robots).map(Team::name).collect();
         let alignments =
-            (0..team.edges.len()).filter_map(|index| frame_solver::solution::by_name(team.alignment(index)));
+            (0..team.edges.len()).filter_map(|index| merge::frame_solver::solution::by_name(team.alignment(index)));
         let parameters =
-            frame_solver::FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..Default::default() };
-        let solution = frame_solver::solve::solve(
+            merge::frame_solver::FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..Default::default() };
+        let solution = merge::frame_solver::solve::solve(
             &names,
             &alignments.collect(),
             &Team::name(0),
             &parameters,
-            &frame_solver::solution::Solution::default(),
+            &merge::frame_solver::solution::Solution::default(),
         );
         for robot in 1..robots {
             if let Some(frame) = solution.frames.get(&Team::name(robot)) {
@@ -72,7 +73,7 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
             }
         }
         let right = |index: usize| !team.wrong.contains(&index);
-        let reached = frame_solver::graph::Forest::grow(robots, &team.edges, 0, right).poses(&team.edges, 0);
+        let reached = merge::frame_solver::graph::Forest::grow(robots, &team.edges, 0, right).poses(&team.edges, 0);
         connected += reached.iter().flatten().count() - 1;
     }
     let all = teams as usize * (robots - 1);
@@ -93,7 +94,7 @@ fn time(robots: usize, nearest: usize, name: &str, share: f64) {
         .map(|index| Message::from_vec(MessageHeader::default(), encode(&team.alignment(index)).unwrap()))
         .collect();
     let run = || {
-        let mut stage = LoneStage::new(&frame_solver::kind(), "").unwrap();
+        let mut stage = LoneStage::new(&merge::frame_solver::kind(), "").unwrap();
         let mut slowest = Duration::ZERO;
         let start = Instant::now();
         for message in &messages {

@@ -8,15 +8,17 @@
 
 mod building;
 
-use gridweave_stages::edge_matcher::{EdgeMatcherParameters, edges, match_edges};
-use gridweave_stages::entropy_fuser::{fuse, lay_over};
-use gridweave_stages::geometry::{Grid, Point2, Pose2};
-use gridweave_stages::grid_fuser::layout::Lattice;
-use gridweave_stages::grid_fuser::{KnownArea, PlacedGrid};
-use gridweave_stages::log_odds::LogOdds;
-use gridweave_stages::pgvd_extractor::{PgvdExtractorParameters, topological_map};
-use gridweave_stages::radon_aligner::{NamedMap, PreparedMap, RadonAlignerParameters, WallPoints, align, energy};
-use gridweave_stages::uncertain_transform::{UncertainTransformParameters, transform};
+use gridweave_stages::merge::grid_fuser::layout::Lattice;
+use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
+use gridweave_stages::published::edge_matcher::{EdgeMatcherParameters, edges, match_edges};
+use gridweave_stages::published::entropy_fuser::{fuse, lay_over};
+use gridweave_stages::published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
+use gridweave_stages::published::radon_aligner::{
+    NamedMap, PreparedMap, RadonAlignerParameters, WallPoints, align, energy,
+};
+use gridweave_stages::published::uncertain_transform::{UncertainTransformParameters, transform};
+use gridweave_stages::shared::geometry::{Grid, Point2, Pose2};
+use gridweave_stages::shared::log_odds::LogOdds;
 use nalgebra::{Matrix3, UnitComplex, Vector3};
 use std::time::Instant;
 

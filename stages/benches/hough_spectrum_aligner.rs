@@ -8,9 +8,11 @@
 mod building;
 
 use building::draw;
-use gridweave_stages::geometry::Grid;
-use gridweave_stages::hough_spectrum_aligner::{HoughSpectrum, HoughSpectrumParameters, WallCells, align_spectra};
+use gridweave_stages::published::hough_spectrum_aligner::{
+    HoughSpectrum, HoughSpectrumParameters, WallCells, align_spectra,
+};
 use gridweave_stages::registration::search::NamedMap;
+use gridweave_stages::shared::geometry::Grid;
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -8,8 +8,8 @@
 mod building;
 
 use building::draw;
-use gridweave_stages::geometry::Grid;
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
+use gridweave_stages::shared::geometry::Grid;
 use std::time::Instant;
 
 const RUNS: usize = 7;

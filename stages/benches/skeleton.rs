@@ -7,8 +7,8 @@
 
 mod building;
 
-use gridweave_stages::geometry::Grid;
-use gridweave_stages::skeleton::{DistanceMap, FreeSpace, Skeleton, SkeletonGraph, SkeletonParameters};
+use gridweave_stages::shared::geometry::Grid;
+use gridweave_stages::topology::skeleton::{DistanceMap, FreeSpace, Skeleton, SkeletonGraph, SkeletonParameters};
 use std::time::Instant;
 
 const RUNS: usize = 21;

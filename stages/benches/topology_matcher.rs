@@ -5,8 +5,8 @@
 // A bench that cannot go on has nothing better to do than to stop.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use gridweave_stages::geometry::{Point2, pose};
-use gridweave_stages::topology_matcher::{Topology, TopologyMatcherParameters, exhaustive, icp_svd};
+use gridweave_stages::shared::geometry::{Point2, pose};
+use gridweave_stages::topology::topology_matcher::{Topology, TopologyMatcherParameters, exhaustive, icp_svd};
 use std::time::Instant;
 
 const RUNS: usize = 11;

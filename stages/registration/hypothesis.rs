@@ -1,6 +1,6 @@
 //! A proposed place of map b on map a.
 
-use crate::geometry::Pose2;
+use crate::shared::geometry::Pose2;
 use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 

@@ -1,7 +1,7 @@
 //! Where one map can lie on another by what the user knows of both.
 
-use crate::geometry::{Pose2, pose, turn_difference};
-use crate::robot_pair::RobotPair;
+use crate::shared::geometry::{Pose2, pose, turn_difference};
+use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::stage::{InitialPose, InitialPoses};
 use std::f64::consts::TAU;
 

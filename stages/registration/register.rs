@@ -5,8 +5,8 @@ use super::icp::{FirstGuess, IcpParameters, IcpRefusal, refine};
 use super::judgement::{Alias, JudgementParameters, SelfSimilarity, UserKnowledge, Verdict, judge};
 use super::search::{MapAlignerParameters, MapAlignment, PreparedMap, SearchRefusal, align_prepared};
 use super::{Basis, Hypothesis};
-use crate::geometry::Grid;
-use crate::walls::{NORMAL_RADIUS, WallMap};
+use crate::shared::geometry::Grid;
+use crate::shared::walls::{NORMAL_RADIUS, WallMap};
 
 /// Two maps, each prepared once for all steps.
 pub struct PreparedPair<'a> {

@@ -10,8 +10,8 @@ use super::floor_plan::{BuildingSize, FloorPlan};
 use super::room::WALL;
 use super::scanned_map::{ScanSettings, scan_building};
 use super::shape::{Rectangle, Solid, between};
-use crate::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
-use crate::scan_grid::SnapshotMap;
+use crate::shared::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use crate::shared::scan_grid::SnapshotMap;
 use nalgebra::Vector2;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -260,7 +260,7 @@ fn hidden_stretches(length: f64, rate: f64, random: &mut impl Rng) -> Vec<(f64, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::is_occupied;
+    use crate::shared::geometry::is_occupied;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     const STYLES: [WallStyle; 5] =

@@ -1,6 +1,6 @@
 //! How a robot follows its way: poses at a fixed rate, with limits of speed, acceleration and turn rate.
 
-use crate::geometry::{Point2, Pose2, pose, wrap_angle};
+use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 
 /// Poses, scans and readings come at 10 Hz.
 pub const TICK_SECONDS: f64 = 0.1;

@@ -7,7 +7,7 @@
 use super::furniture::{furnish_corridor, furnish_room, shelve_room};
 use super::room::{Door, Room, WALL};
 use super::shape::{Rectangle, Solid, between};
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use rand::{Rng, RngExt};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::floor_plan::FloorPlan;
 use super::shape::{Rectangle, Solid};
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use std::collections::VecDeque;
 
 /// A robot is a disc of this radius, metres.

@@ -5,7 +5,7 @@
 
 use super::room::Room;
 use super::shape::{Rectangle, Solid, between};
-use crate::geometry::{Point2, pose};
+use crate::shared::geometry::{Point2, pose};
 use rand::{Rng, RngExt};
 use std::f64::consts::FRAC_PI_2;
 

@@ -5,7 +5,7 @@
 //! the lidar's reach, and one in so many at random, returns nothing. The robot does not move during a scan.
 
 use super::ray_caster::RayCaster;
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
@@ -66,7 +66,7 @@ impl Lidar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
+    use crate::shared::geometry::pose;
     use crate::simulator::shape::{Rectangle, Solid};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;

@@ -2,8 +2,8 @@
 
 use super::lidar::Beam;
 use super::shape::Rectangle;
-use crate::geometry::{GridGeometry, Point2, Pose2};
-use crate::scan_grid::{BeamEvidence, CellBeam, ScanGrid, SnapshotMap};
+use crate::shared::geometry::{GridGeometry, Point2, Pose2};
+use crate::shared::scan_grid::{BeamEvidence, CellBeam, ScanGrid, SnapshotMap};
 use nalgebra::Vector2;
 
 /// A beam's end has the log-odds of 70 %, and a cell that it has passed those of 40 %. Log-odds are held within 1.8 % and 98.2 %.
@@ -55,7 +55,7 @@ impl Mapper {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{is_free, is_occupied, pose};
+    use crate::shared::geometry::{is_free, is_occupied, pose};
 
     fn mapper() -> Mapper {
         Mapper::new(&Rectangle::new(-2.0, -2.0, 6.0, 2.0), 0.05)

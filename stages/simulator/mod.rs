@@ -49,4 +49,4 @@ pub use tags::{Tag, TagReading};
 pub use truth::Truth;
 pub use world::SimulationError;
 
-pub use crate::scan_grid::SnapshotMap;
+pub use crate::shared::scan_grid::SnapshotMap;

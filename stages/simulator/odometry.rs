@@ -4,7 +4,7 @@
 //! loop closures take drift back. The error of every coordinate is so a mean-reverting random walk (an
 //! Ornstein-Uhlenbeck process in the length of the way): maps are bent a little, and do not drift away.
 
-use crate::geometry::{Pose2, pose, wrap_angle};
+use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 

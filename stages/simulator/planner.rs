@@ -1,7 +1,7 @@
 //! The way from one place to another: A* over the raster of free space, kept away from walls, and then smoothed.
 
 use super::free_space::{FREE_CLEARANCE, FreeSpace, ROBOT_RADIUS};
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

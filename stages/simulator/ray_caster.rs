@@ -1,7 +1,7 @@
 //! How far one sees in a direction: rays against the sides of solids, found through a grid of buckets.
 
 use super::shape::{Rectangle, Solid};
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use nalgebra::Vector2;
 
 /// The side of a bucket, metres.
@@ -134,7 +134,7 @@ fn step_index(index: &mut usize, direction: f64, count: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
+    use crate::shared::geometry::pose;
     use proptest::prelude::*;
     use std::f64::consts::PI;
 

@@ -9,8 +9,8 @@ use super::route::plan_route;
 use super::shape::{Rectangle, between};
 use super::tags::TagReading;
 use super::world::{SimulationError, Stream, World};
-use crate::geometry::{Point2, Pose2, is_free, pose};
-use crate::scan_grid::SnapshotMap;
+use crate::shared::geometry::{Point2, Pose2, is_free, pose};
+use crate::shared::scan_grid::SnapshotMap;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! A room and its doors.
 
 use super::shape::Rectangle;
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 
 /// How thick walls are, metres.
 pub(super) const WALL: f64 = 0.15;

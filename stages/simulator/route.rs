@@ -4,7 +4,7 @@ use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
 use super::planner::{plan_path, smooth_path};
 use super::room::Room;
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 

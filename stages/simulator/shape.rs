@@ -1,6 +1,6 @@
 //! The shapes that buildings are made of.
 
-use crate::geometry::{Point2, Pose2, pose};
+use crate::shared::geometry::{Point2, Pose2, pose};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 

@@ -7,7 +7,7 @@ use super::route::share_rooms;
 use super::tags::Tag;
 use super::truth::Truth;
 use super::world::{SimulationError, World};
-use crate::geometry::{Point2, PointIndex, Pose2};
+use crate::shared::geometry::{Point2, PointIndex, Pose2};
 use gridweave_runtime::stage::Parameters as _;
 use rayon::prelude::*;
 
@@ -100,7 +100,7 @@ fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Cell, Grid, is_occupied};
+    use crate::shared::geometry::{Cell, Grid, is_occupied};
     use gridweave_runtime::stage::ParameterError;
 
     /// A small building with two robots, exact poses and an exact lidar.

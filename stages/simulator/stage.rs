@@ -4,7 +4,7 @@ use super::drive::TICK_SECONDS;
 use super::parameters::SimulatorParameters;
 use super::robot::RobotLog;
 use super::simulation::{Simulation, simulate};
-use crate::geometry::Pose2;
+use crate::shared::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
     GridPrefix, Header, LaserScan, MapMetaData, OccupancyGrid, PoseStamped, SimulationTruth, TFMessage, TagRange,
@@ -226,7 +226,7 @@ fn send_map(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Grid;
+    use crate::shared::geometry::Grid;
     use gridweave_runtime::message::Message;
     use gridweave_runtime::stage::LoneStage;
 

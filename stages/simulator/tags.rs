@@ -9,7 +9,7 @@ use super::free_space::FreeSpace;
 use super::ray_caster::RayCaster;
 use super::room::WALL;
 use super::shape::{Rectangle, between};
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::Vector2;
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
@@ -167,7 +167,7 @@ fn is_visible(plan: &FloorPlan, space: &FreeSpace, world: &RayCaster, place: &Po
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
+    use crate::shared::geometry::pose;
     use crate::simulator::shape::Solid;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;

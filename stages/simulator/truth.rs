@@ -1,6 +1,6 @@
 //! What a merge is measured against.
 
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{CommonPlace, Header, SimulationTruth, TrueFrame, TrueTag};
 
@@ -50,7 +50,7 @@ impl Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
+    use crate::shared::geometry::pose;
 
     #[test]
     fn the_message_says_all_of_the_truth() {

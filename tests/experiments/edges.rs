@@ -7,10 +7,10 @@ use clap::Args;
 use gridweave::table::Table;
 use gridweave_logs::drawing::{Colour, Drawing, Group, Paint, Path};
 use gridweave_logs::map_file::GridMap;
-use gridweave_stages::edge_matcher::{Edge, EdgeMatcherParameters, Election, edges, match_edges, votes};
-use gridweave_stages::geometry::{Grid, GridGeometry, Point2, Pose2};
-use gridweave_stages::pgvd_extractor::{PgvdExtractorParameters, topological_map};
-use gridweave_stages::radon_aligner::{NamedMap, PreparedMap, RadonAlignerParameters, align};
+use gridweave_stages::published::edge_matcher::{Edge, EdgeMatcherParameters, Election, edges, match_edges, votes};
+use gridweave_stages::published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
+use gridweave_stages::published::radon_aligner::{NamedMap, PreparedMap, RadonAlignerParameters, align};
+use gridweave_stages::shared::geometry::{Grid, GridGeometry, Point2, Pose2};
 use image::{Rgb, RgbImage};
 use std::path::PathBuf;
 

@@ -6,9 +6,9 @@ use crate::results::Results;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gridweave::table::Table;
-use gridweave_stages::geometry::{Grid, GridGeometry};
-use gridweave_stages::hough_spectrum_aligner::{HoughSpectrum, WallCells, correlate_spectra, rotations};
+use gridweave_stages::published::hough_spectrum_aligner::{HoughSpectrum, WallCells, correlate_spectra, rotations};
 use gridweave_stages::registration::search::NamedMap;
+use gridweave_stages::shared::geometry::{Grid, GridGeometry};
 use std::path::PathBuf;
 
 /// Directions of half a turn: half a degree apart.

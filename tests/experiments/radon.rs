@@ -6,8 +6,8 @@ use crate::results::Results;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gridweave::table::Table;
-use gridweave_stages::geometry::{Grid, GridGeometry};
-use gridweave_stages::radon_aligner::{QuarterEnergy, WallPoints, energy};
+use gridweave_stages::published::radon_aligner::{QuarterEnergy, WallPoints, energy};
+use gridweave_stages::shared::geometry::{Grid, GridGeometry};
 use std::path::PathBuf;
 
 /// Angles of a quarter turn: a quarter of a degree apart.

@@ -9,7 +9,7 @@ use gridweave_logs::{map_file, picture, summary};
 use gridweave_runtime::engine::RunReport;
 use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use gridweave_runtime::stage::{InputPort, OutputPort, StageKind};
-use gridweave_stages::map_placer;
+use gridweave_stages::merge::map_placer;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 

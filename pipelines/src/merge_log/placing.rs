@@ -3,11 +3,11 @@
 use super::MergeState;
 use gridweave_logs::map_file::GridMap;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, Time};
-use gridweave_stages::deformation::Deformation;
-use gridweave_stages::geometry::{Grid, Point2, Pose2};
-use gridweave_stages::grid_fuser::KnownArea;
-use gridweave_stages::map_placer::PlacedMap;
-use gridweave_stages::placement::Placed;
+use gridweave_stages::merge::grid_fuser::KnownArea;
+use gridweave_stages::merge::map_placer::PlacedMap;
+use gridweave_stages::shared::deformation::Deformation;
+use gridweave_stages::shared::geometry::{Grid, Point2, Pose2};
+use gridweave_stages::shared::placement::Placed;
 use std::collections::BTreeSet;
 
 /// Between maps that lie beside each other, metres.

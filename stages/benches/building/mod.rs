@@ -1,6 +1,6 @@
 //! The map of a building of any size, for benches.
 
-use gridweave_stages::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use gridweave_stages::shared::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use nalgebra::Vector2;
 
 const RESOLUTION: f64 = 0.05;

@@ -4,9 +4,9 @@ use super::ComparisonParameters;
 use super::conflicts::points_of_walls;
 use super::regions::{ComparedWall, Finding, Found, Region, RegionComparison};
 use super::straight_walls::StraightWalls;
-use crate::deformation::Deformation;
-use crate::geometry::{Grid, Point2, Pose2, is_known};
-use crate::walls::WallMap;
+use crate::shared::deformation::Deformation;
+use crate::shared::geometry::{Grid, Point2, Pose2, is_known};
+use crate::shared::walls::WallMap;
 use nalgebra::Vector2;
 
 /// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
@@ -164,9 +164,9 @@ fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
     use crate::registration::judgement::JudgementParameters;
-    use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
+    use crate::shared::geometry::pose;
+    use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
 
     #[test]
     fn walls_that_cross_rooms_are_told_from_those_drawn_beside_in_cells_of_any_size() {

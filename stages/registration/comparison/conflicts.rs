@@ -4,7 +4,7 @@
 //! leg, a person or a chair, and may have moved. What is as long as a door is wide is a wall, as a rule, and two maps of one place
 //! seldom disagree about walls in the middle of their rooms.
 
-use crate::geometry::Point2;
+use crate::shared::geometry::Point2;
 use nalgebra::Vector2;
 use std::collections::{BTreeMap, BTreeSet};
 

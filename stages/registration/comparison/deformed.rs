@@ -3,10 +3,10 @@
 
 use super::ComparisonParameters;
 use super::agreement::{Agreement, MapView, compare};
-use crate::deformation::Deformation;
-use crate::elastic_refiner::{Body, ElasticRefinerParameters, refine};
-use crate::geometry::{PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
-use crate::walls::{WallMap, stride};
+use crate::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine};
+use crate::shared::deformation::Deformation;
+use crate::shared::geometry::{PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
+use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::f64::consts::SQRT_2;
 
@@ -23,7 +23,7 @@ pub struct Deformed {
     pub covariance: Matrix3<f64>,
     /// The root mean square of how far places lie from where that transform has them, metres.
     pub bend: f64,
-    /// How unlikely such a bend is, see [`Bend::cost`](crate::elastic_refiner::Bend::cost).
+    /// How unlikely such a bend is, see [`Bend::cost`](crate::merge::elastic_refiner::Bend::cost).
     pub cost: f64,
     /// What the bent map says.
     pub agreement: Agreement,

@@ -5,8 +5,8 @@
 //! centimetres counts little.
 
 use super::MapView;
-use crate::geometry::{Point2, Pose2, is_free, is_known};
-use crate::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT, WallMap, before_wall, stride};
+use crate::shared::geometry::{Point2, Pose2, is_free, is_known};
+use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT, WallMap, before_wall, stride};
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 

@@ -134,7 +134,7 @@ fn runs_along(wall: &ComparedWall, normal: &Vector2<f64>) -> bool {
 mod tests {
     use super::super::regions::Finding;
     use super::*;
-    use crate::geometry::Point2;
+    use crate::shared::geometry::Point2;
 
     const SPACING: f64 = 0.1;
 

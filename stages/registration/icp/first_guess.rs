@@ -1,7 +1,7 @@
 //! The first guess and how far it can be trusted.
 
 use super::IcpParameters;
-use crate::geometry::{Point2, Pose2, wrap_angle};
+use crate::shared::geometry::{Point2, Pose2, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 
 /// A first guess of `T_a_b`, and the covariance of its x, y and yaw.
@@ -94,7 +94,7 @@ impl FirstGuess {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::pose;
+    use crate::shared::geometry::pose;
     use proptest::prelude::*;
 
     proptest! {

@@ -3,8 +3,8 @@
 use super::first_guess::LocalFrame;
 use super::normal_equations::{Measurement, NormalEquations};
 use super::{FirstGuess, IcpParameters, Metric, Weighting};
-use crate::geometry::{Pose2, quarter_turn};
-use crate::walls::WallMap;
+use crate::shared::geometry::{Pose2, quarter_turn};
+use crate::shared::walls::WallMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
 

@@ -1,6 +1,6 @@
 //! The parameters of the stage.
 
-use crate::walls::NORMAL_RADIUS;
+use crate::shared::walls::NORMAL_RADIUS;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

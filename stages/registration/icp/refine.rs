@@ -1,7 +1,7 @@
 //! The whole of it: register, and judge the registration.
 
 use super::{FirstGuess, IcpParameters, IcpRefusal, Registration, register};
-use crate::walls::WallMap;
+use crate::shared::walls::WallMap;
 
 /// A refined alignment and the judgement on it.
 #[derive(Clone, Debug, PartialEq)]

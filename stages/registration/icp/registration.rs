@@ -2,8 +2,8 @@
 
 use super::iteration::Iteration;
 use super::{FirstGuess, IcpParameters};
-use crate::geometry::{Point2, Pose2};
-use crate::walls::{WallMap, stride};
+use crate::shared::geometry::{Point2, Pose2};
+use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix3, Vector3};
 
 /// No more than this many rotations to either side of the first guess are tried.

@@ -1,9 +1,9 @@
 //! Registration and judgement on drawn floor plans.
 
 use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
-use crate::geometry::{Grid, GridGeometry, Pose2, pose};
-use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
-use crate::walls::WallMap;
+use crate::shared::geometry::{Grid, GridGeometry, Pose2, pose};
+use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
+use crate::shared::walls::WallMap;
 use gridweave_runtime::stage::Parameters;
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

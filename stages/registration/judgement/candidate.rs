@@ -1,9 +1,9 @@
 //! A place of map b that hypotheses propose, and what the maps say there.
 
 use super::Terms;
-use crate::geometry::{Point2, Pose2, point_jacobian};
 use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed, MapView, compare};
 use crate::registration::{Basis, Hypothesis};
+use crate::shared::geometry::{Point2, Pose2, point_jacobian};
 use nalgebra::Matrix3;
 
 /// Hypotheses whose middles lie within this many metres of each other, and that are turned by less than [`SAME_TURN`], are one place:

@@ -13,12 +13,12 @@
 
 use super::weights::ALIAS;
 use super::{JudgementParameters, Verdict};
-use crate::geometry::Pose2;
 use crate::registration::comparison::{Agreement, MapView, compare};
 use crate::registration::icp::{FirstGuess, IcpParameters, refine};
 use crate::registration::place_window::PlaceWindow;
 use crate::registration::search::{MapAlignerParameters, PreparedMap, self_similar_places};
-use crate::walls::{CORRELATION_LENGTH, WallMap};
+use crate::shared::geometry::Pose2;
+use crate::shared::walls::{CORRELATION_LENGTH, WallMap};
 use nalgebra::Matrix3;
 
 /// Two places are alike if so large a share of the walls agrees where they are laid on each other, and so many metres, in more than a room:
@@ -164,10 +164,10 @@ fn log_likelihood((agree, contradict): Lengths) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Point2, pose};
     use crate::registration::judgement::{Refusal, UserKnowledge, judge};
     use crate::registration::{Basis, Hypothesis};
-    use crate::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+    use crate::shared::geometry::{Point2, pose};
+    use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use gridweave_runtime::stage::InitialPose;
     use proptest::prelude::*;
     use std::f64::consts::PI;

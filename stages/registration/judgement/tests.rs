@@ -1,11 +1,11 @@
 //! Comparison and judgement on drawn floor plans.
 
 use super::{JudgementParameters, Refusal, UserKnowledge, Verdict, judge};
-use crate::geometry::{Point2, Pose2, point_jacobian, pose};
 use crate::registration::comparison::compare;
 use crate::registration::place_window::PlaceWindow;
 use crate::registration::{Basis, Hypothesis};
-use crate::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
+use crate::shared::geometry::{Point2, Pose2, point_jacobian, pose};
+use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
 use gridweave_runtime::stage::{InitialPose, Parameters};
 use nalgebra::{Matrix3, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};

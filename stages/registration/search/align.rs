@@ -4,8 +4,8 @@ use super::lead::{OTHERS, lead};
 use super::peaks::{change, is_near, overlay};
 use super::prepared_map::JUDGED;
 use super::{CommonWalls, MapAlignerParameters, Peaks, Place, PreparedMap, SearchRefusal, covariance, refine_peak};
-use crate::geometry::{Grid, Pose2};
 use crate::registration::place_window::PlaceWindow;
+use crate::shared::geometry::{Grid, Pose2};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 

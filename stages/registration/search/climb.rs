@@ -1,7 +1,7 @@
 //! From a place to the peak near it.
 
 use super::Place;
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{UnitComplex, Vector3};
 
 /// A place that still gets better after so many rounds is a slope, not a peak.

@@ -2,7 +2,7 @@
 
 use super::climb::{Steps, climb};
 use super::overlay::Overlay;
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 
 /// How often a cell is halved.
 const HALVINGS: usize = 3;

@@ -1,7 +1,7 @@
 //! How well one map lies on another at one place.
 
 use super::raster::{Content, Raster};
-use crate::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_4;
 

@@ -2,7 +2,7 @@
 
 use super::climb::moved;
 use super::overlay::{CommonWalls, Overlay};
-use crate::geometry::Pose2;
+use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// The variance in a direction is this share of the square of the peak's width, where the width is that of a parabola

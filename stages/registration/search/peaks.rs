@@ -6,8 +6,8 @@ use super::places::Place;
 use super::prepared_map::JUDGED;
 use super::scales::{Scale, search_scales};
 use super::{MapAlignerParameters, PreparedMap};
-use crate::geometry::{Point2, Pose2, turn_difference};
 use crate::registration::place_window::PlaceWindow;
+use crate::shared::geometry::{Point2, Pose2, turn_difference};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 

@@ -2,8 +2,8 @@
 
 use super::correlation::{Correlator, ScoredShift, Workspace};
 use super::raster::Raster;
-use crate::geometry::{Pose2, pose};
 use crate::registration::place_window::PlaceWindow;
+use crate::shared::geometry::{Pose2, pose};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::cmp::Ordering;

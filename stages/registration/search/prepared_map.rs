@@ -1,7 +1,7 @@
 //! A map as the search takes it.
 
 use super::{Raster, SearchRefusal, Walls};
-use crate::geometry::Grid;
+use crate::shared::geometry::Grid;
 
 /// Rasters of a map, each in cells twice as wide as the one before.
 const LEVELS: usize = 6;

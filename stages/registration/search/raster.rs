@@ -1,7 +1,7 @@
 //! A map in wider cells, cropped to what is known.
 
 use super::walk::Walk;
-use crate::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
+use crate::shared::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
 /// Cells round what is known: walls can be dilated into them, and still the outermost are unknown.
@@ -246,7 +246,7 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{GridGeometry, UNKNOWN, pose};
+    use crate::shared::geometry::{GridGeometry, UNKNOWN, pose};
     use proptest::prelude::*;
 
     /// A map of 6 x 4 m with a straight wall through its middle, along x, and an unknown margin.

@@ -1,8 +1,8 @@
 //! Maps of known places, aligned.
 
 use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, SearchRefusal, align_maps};
-use crate::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
-use crate::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
+use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -76,7 +76,7 @@ fn long_building() -> FloorPlan {
     FloorPlan::new(&walls)
 }
 
-fn all() -> crate::test_world::floor_plan::Seen {
+fn all() -> crate::shared::test_world::floor_plan::Seen {
     seen(-0.2, -0.2, 20.2, 12.2)
 }
 

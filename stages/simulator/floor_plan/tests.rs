@@ -1,5 +1,5 @@
 use super::*;
-use crate::geometry::PointIndex;
+use crate::shared::geometry::PointIndex;
 use crate::simulator::free_space::FreeSpace;
 use proptest::prelude::*;
 use rand::SeedableRng;

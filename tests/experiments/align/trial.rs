@@ -10,7 +10,7 @@ use gridweave_logs::map_file::GridMap;
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::ros::{Evidence, RosMessage, decode};
 use gridweave_runtime::stage::Registry;
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde_json::Value;
 use std::collections::BTreeMap;

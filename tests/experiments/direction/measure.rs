@@ -1,10 +1,10 @@
 //! Runs from a map to the direction of its walls, and how far they are off.
 
 use super::settings::Settings;
-use gridweave_stages::geometry::{Grid, turn_difference};
-use gridweave_stages::line_extractor::extract_segments;
-use gridweave_stages::quadrant_classifier::map_direction;
+use gridweave_stages::shared::geometry::{Grid, turn_difference};
 use gridweave_stages::simulator::{DrawnMapSettings, SnapshotMap, WallStyle, draw_map};
+use gridweave_stages::tags::line_extractor::extract_segments;
+use gridweave_stages::tags::quadrant_classifier::map_direction;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use std::time::Instant;

@@ -1,7 +1,7 @@
 //! The parameters under which directions are measured.
 
-use gridweave_stages::line_extractor::{Fit, LineExtractorParameters, Sampling, Scoring};
-use gridweave_stages::quadrant_classifier::{Mean, QuadrantClassifierParameters, Weighting};
+use gridweave_stages::tags::line_extractor::{Fit, LineExtractorParameters, Sampling, Scoring};
+use gridweave_stages::tags::quadrant_classifier::{Mean, QuadrantClassifierParameters, Weighting};
 
 /// The side of a cell of the paper's map, metres.
 const PIXEL: f64 = 0.02;

@@ -9,7 +9,7 @@ use super::reading_counts::readout_name;
 use super::trial::{Conditions, Likelihood, Outcome, outcomes};
 use anyhow::Result;
 use gridweave::table::Table;
-use gridweave_stages::tag_localizer::Readout;
+use gridweave_stages::tags::tag_localizer::Readout;
 
 /// The numbers of readings that are put together.
 const COUNTS: [usize; 7] = [30, 60, 100, 150, 200, 250, 300];

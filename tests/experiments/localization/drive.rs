@@ -1,6 +1,6 @@
 //! Drives past a tag.
 
-use gridweave_stages::geometry::Point2;
+use gridweave_stages::shared::geometry::Point2;
 use nalgebra::{Rotation2, Vector2};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

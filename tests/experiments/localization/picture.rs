@@ -4,8 +4,8 @@ use super::super::results::Results;
 use super::drive::{Drive, REACH, READINGS};
 use super::trial::{Conditions, Likelihood, Recording};
 use anyhow::{Context, Result};
-use gridweave_stages::geometry::Point2;
-use gridweave_stages::tag_localizer::{self, GridSize, Posterior, Reading, ReadingGroups, Readout};
+use gridweave_stages::shared::geometry::Point2;
+use gridweave_stages::tags::tag_localizer::{self, GridSize, Posterior, Reading, ReadingGroups, Readout};
 use image::{ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
 

@@ -7,7 +7,7 @@ use super::score::Score;
 use super::trial::{Conditions, Likelihood, outcomes};
 use anyhow::Result;
 use gridweave::table::Table;
-use gridweave_stages::tag_localizer::Readout;
+use gridweave_stages::tags::tag_localizer::Readout;
 
 /// The numbers of readings of the curves.
 const COUNTS: [usize; 10] = [10, 20, 30, 50, 75, 100, 150, 200, 250, 300];

@@ -7,7 +7,7 @@ use super::score::Score;
 use super::trial::{Conditions, Likelihood, final_outcomes};
 use anyhow::Result;
 use gridweave::table::Table;
-use gridweave_stages::tag_localizer::Readout;
+use gridweave_stages::tags::tag_localizer::Readout;
 
 const SHARES: [f64; 6] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5];
 

@@ -6,7 +6,7 @@ use super::drive::Drive;
 use super::trial::{Conditions, Likelihood, Recording};
 use anyhow::Result;
 use gridweave::table::Table;
-use gridweave_stages::tag_localizer::Readout;
+use gridweave_stages::tags::tag_localizer::Readout;
 use std::time::Instant;
 
 /// So many drives of each shape, one at a time.

@@ -2,8 +2,8 @@
 
 use super::drive::{Drive, READINGS, SPACING, Scene, WAY};
 use gridweave_runtime::message::LogTime;
-use gridweave_stages::geometry::Point2;
-use gridweave_stages::tag_localizer::{Position, Readout, TagLocalizer, TagLocalizerParameters, TagMode};
+use gridweave_stages::shared::geometry::Point2;
+use gridweave_stages::tags::tag_localizer::{Position, Readout, TagLocalizer, TagLocalizerParameters, TagMode};
 use nalgebra::{Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

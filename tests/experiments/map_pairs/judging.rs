@@ -1,10 +1,10 @@
 //! What the stages of `map_merge` make of two maps, without messages.
 
 use super::library::MapOfBuilding;
-use gridweave_stages::geometry::{Grid, Pose2};
-use gridweave_stages::map_cleaner::{MapCleanerParameters, clean};
+use gridweave_stages::mapping::map_cleaner::{MapCleanerParameters, clean};
 use gridweave_stages::registration::judgement::{Alias, Candidate, SelfSimilarity, UserKnowledge, candidates, judge};
 use gridweave_stages::registration::{PreparedPair, RegistrationParameters, register};
+use gridweave_stages::shared::geometry::{Grid, Pose2};
 
 /// The outcome for a pair.
 pub(super) struct Judged {

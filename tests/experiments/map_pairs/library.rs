@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use gridweave_logs::map_file::{GridMap, load};
 use gridweave_runtime::ros::Time;
 use gridweave_runtime::stage::Registry;
-use gridweave_stages::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, pose};
+use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, pose};
 use nalgebra::Point2;
 use rand::{Rng, RngExt};
 use rayon::prelude::*;

@@ -3,7 +3,7 @@
 use super::library::{MapOfBuilding, files, maps_of_log};
 use crate::statistics::quantile;
 use anyhow::{Context, Result};
-use gridweave_stages::geometry::Pose2;
+use gridweave_stages::shared::geometry::Pose2;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

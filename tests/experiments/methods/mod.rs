@@ -23,7 +23,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gridweave_logs::map_file::GridMap;
 use gridweave_runtime::stage::{Registry, RobotTopics, match_robot};
-use gridweave_stages::geometry::{Grid, GridGeometry};
+use gridweave_stages::shared::geometry::{Grid, GridGeometry};
 use one_alignment::{Aligner, PairMaps, last_common_tags};
 use record::Record;
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@ use super::wall_distance::wall_distance;
 use crate::trial::Merge;
 use gridweave::evaluate::{RobotOutcome, RobotResult};
 use gridweave::table::Table;
-use gridweave_stages::geometry::{Grid, Pose2, pose};
+use gridweave_stages::shared::geometry::{Grid, Pose2, pose};
 
 /// The stages whose time is told, by their names in the pipelines.
 pub(super) const STAGES: [&str; 10] =
@@ -171,7 +171,7 @@ fn mean_square_distance(map: &Grid<'_>, one: &Pose2, other: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gridweave_stages::geometry::GridGeometry;
+    use gridweave_stages::shared::geometry::GridGeometry;
 
     #[test]
     fn the_mean_square_distance_is_taken_over_the_occupied_cells() {

@@ -1,8 +1,8 @@
 //! How far the walls of two maps lie apart.
 
 use super::one_alignment::PairMaps;
-use gridweave_stages::geometry::Pose2;
-use gridweave_stages::walls::WallMap;
+use gridweave_stages::shared::geometry::Pose2;
+use gridweave_stages::shared::walls::WallMap;
 
 /// Walls farther apart than this are not the same wall, metres.
 const SAME_WALL: f64 = 0.1;
@@ -27,7 +27,7 @@ pub(super) fn wall_distance(maps: &PairMaps<'_>, transform_a_b: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gridweave_stages::geometry::{Grid, GridGeometry, pose};
+    use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose};
 
     #[test]
     fn walls_that_lie_apart_are_measured_and_others_left_out() {

@@ -1,6 +1,6 @@
 //! Floor plans, and maps of them as robots would draw them.
 
-use gridweave_stages::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use gridweave_stages::shared::geometry::{Cell, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use gridweave_tests::TestMap;
 use nalgebra::Vector2;
 

@@ -4,7 +4,7 @@ use super::Case;
 use super::drawing::FloorPlan;
 use super::grid_fuser::place;
 use super::icp_refiner::{CELL, left, right, truth};
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap};
 
 pub(super) fn cases() -> Vec<Case> {

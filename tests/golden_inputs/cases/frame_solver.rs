@@ -2,7 +2,7 @@
 
 use super::Case;
 use gridweave_runtime::ros::{Alignment, OccupancyGrid};
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 
 pub(super) fn cases() -> Vec<Case> {

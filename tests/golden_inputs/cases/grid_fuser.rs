@@ -3,7 +3,7 @@
 use super::Case;
 use super::drawing::{FloorPlan, View};
 use gridweave_runtime::ros::{RobotFrame, RobotFrames, UnmergedRobot};
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 use nalgebra::{Isometry2, Translation2};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};

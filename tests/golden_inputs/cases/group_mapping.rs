@@ -5,7 +5,7 @@ use super::drawing::{FloorPlan, View};
 use gridweave_runtime::ros::{
     Alignment, Point, RobotFrame, RobotFrames, TopologicalMap, TopologicalNode, TopologicalPath,
 };
-use gridweave_stages::geometry::{Point2, Pose2, UNKNOWN, pose, row_by_row};
+use gridweave_stages::shared::geometry::{Point2, Pose2, UNKNOWN, pose, row_by_row};
 use gridweave_tests::{LogBuilder, TestMap, header};
 use nalgebra::{Matrix3, Vector3};
 

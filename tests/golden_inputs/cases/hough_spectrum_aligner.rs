@@ -3,7 +3,7 @@
 use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::map_aligner::{left, maps, place, right};
-use gridweave_stages::geometry::UNKNOWN;
+use gridweave_stages::shared::geometry::UNKNOWN;
 use gridweave_tests::TestMap;
 
 pub(super) fn cases() -> Vec<Case> {

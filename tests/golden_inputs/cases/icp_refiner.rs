@@ -3,7 +3,7 @@
 use super::Case;
 use super::drawing::{FloorPlan, View};
 use gridweave_runtime::ros::Alignment;
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 use nalgebra::{UnitComplex, Vector2};
 

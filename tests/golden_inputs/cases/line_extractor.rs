@@ -2,7 +2,7 @@
 
 use super::Case;
 use super::drawing::{FloorPlan, View};
-use gridweave_stages::geometry::pose;
+use gridweave_stages::shared::geometry::pose;
 use gridweave_tests::{LogBuilder, TestMap};
 use std::f64::consts::FRAC_PI_4;
 

@@ -5,7 +5,7 @@ use gridweave_runtime::ros::{
     Header, OccupancyGridUpdate, Odometry, Pose, PoseWithCovariance, RosMessage, TFMessage, Transform,
     TransformStamped, encode,
 };
-use gridweave_stages::geometry::pose;
+use gridweave_stages::shared::geometry::pose;
 use gridweave_tests::{LogBuilder, TestMap, header};
 
 pub(super) fn cases() -> Vec<Case> {

@@ -2,7 +2,7 @@
 
 use super::Case;
 use super::drawing::{FloorPlan, View};
-use gridweave_stages::geometry::{Pose2, UNKNOWN, pose};
+use gridweave_stages::shared::geometry::{Pose2, UNKNOWN, pose};
 use gridweave_tests::{LogBuilder, TestMap};
 
 const CELL: f32 = 0.1;

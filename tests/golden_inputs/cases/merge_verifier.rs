@@ -4,7 +4,7 @@ use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::icp_refiner::{CELL, left, maps, off, right, truth};
 use gridweave_runtime::ros::Alignment;
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 
 pub(super) fn cases() -> Vec<Case> {

@@ -3,7 +3,7 @@
 use super::Case;
 use super::grid_fuser::place;
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 
 pub(super) fn cases() -> Vec<Case> {

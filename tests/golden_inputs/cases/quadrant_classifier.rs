@@ -2,7 +2,7 @@
 
 use super::Case;
 use gridweave_runtime::ros::{CommonTag, CommonTags, Segment, Segments};
-use gridweave_stages::geometry::{Point2, Pose2, pose};
+use gridweave_stages::shared::geometry::{Point2, Pose2, pose};
 use gridweave_tests::{LogBuilder, header};
 use std::f64::consts::FRAC_1_SQRT_2;
 

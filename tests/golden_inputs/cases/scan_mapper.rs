@@ -2,7 +2,7 @@
 
 use super::Case;
 use gridweave_runtime::ros::{PoseStamped, PoseWithCovarianceStamped, RangeScan};
-use gridweave_stages::geometry::{Pose2, pose};
+use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, header};
 use std::f64::consts::TAU;
 

@@ -2,7 +2,7 @@
 
 use super::Case;
 use gridweave_runtime::ros::{TagEstimate, TagEstimates};
-use gridweave_stages::geometry::{Point2, Pose2, pose};
+use gridweave_stages::shared::geometry::{Point2, Pose2, pose};
 use gridweave_tests::{LogBuilder, header};
 
 /// Places in the building, metres.

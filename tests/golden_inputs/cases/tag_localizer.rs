@@ -2,7 +2,7 @@
 
 use super::Case;
 use gridweave_runtime::ros::{Pose, PoseStamped, PoseWithCovarianceStamped, TagBearing, TagPosition, TagRange};
-use gridweave_stages::geometry::{Point2, pose};
+use gridweave_stages::shared::geometry::{Point2, pose};
 use gridweave_tests::{LogBuilder, header};
 use nalgebra::Vector2;
 use rand::{RngExt, SeedableRng};

@@ -4,7 +4,7 @@ use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::icp_refiner::{CELL, left};
 use gridweave_runtime::ros::{Point, TopologicalMap, TopologicalNode, TopologicalPath};
-use gridweave_stages::geometry::{Point2, Pose2, pose};
+use gridweave_stages::shared::geometry::{Point2, Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
 
 pub(super) fn cases() -> Vec<Case> {

@@ -1,0 +1,12 @@
+//! The map of one robot: built from its scans, selected among all that it has published, and cleaned.
+
+pub mod map_cleaner;
+pub mod map_selector;
+pub mod scan_mapper;
+
+use gridweave_runtime::stage::StageKind;
+
+/// The stage kinds of this room.
+pub fn kinds() -> Vec<StageKind> {
+    vec![map_cleaner::kind(), map_selector::kind(), scan_mapper::kind()]
+}

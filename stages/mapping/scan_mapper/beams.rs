@@ -1,0 +1,68 @@
+//! The beams of a scan, as the base of the robot sees them.
+
+use super::ScanMapperParameters;
+use crate::shared::geometry::{Pose2, pose};
+use gridweave_runtime::ros::RangeScan;
+
+/// A beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseBeam {
+    /// Its direction from that of the base, radians.
+    pub angle: f64,
+    /// How far it shows what is there, metres.
+    pub range: f64,
+    /// Whether it has met something at its end.
+    pub is_hit: bool,
+    /// When it was sent, seconds from the first one on.
+    pub delay: f64,
+}
+
+/// The beams of a scan that tell something.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanBeams {
+    /// Where the lidar is in the frame of the base.
+    pub transform_base_lidar: Pose2,
+    /// In the order in which they were sent.
+    pub beams: Vec<BaseBeam>,
+    /// Seconds from the first beam of the scan to the last one, whether they tell something or not; 0 if it is not known.
+    pub duration: f64,
+}
+
+impl ScanBeams {
+    /// Those of a scan. What is nearer than the lidar measures, and what is no number, tells nothing; what is farther, or infinite,
+    /// has met nothing (REP 117). `None` if the scan says what cannot be.
+    pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Option<Self> {
+        let RangeScan { x, y, yaw, angle_min, angle_increment, time_increment, .. } = *scan;
+        let numbers = [x, y, yaw, angle_min, angle_increment, time_increment];
+        if !numbers.iter().all(|number| number.is_finite()) || time_increment < 0.0 {
+            return None;
+        }
+        let (nearest, farthest) = (f64::from(scan.range_min), f64::from(scan.range_max));
+        // A lidar that tells no limit has none.
+        let farthest = if farthest > nearest { farthest } else { f64::INFINITY };
+        let seen = |range: f64| match range {
+            range if range < nearest.max(f64::MIN_POSITIVE) => None,
+            range if range.is_nan() => None,
+            range if range > farthest || range.is_infinite() => {
+                let free = parameters.free_without_echo.min(parameters.max_range).min(farthest);
+                (free > 0.0).then_some((free, false))
+            }
+            range if range > parameters.max_range => Some((parameters.max_range, false)),
+            range => Some((range, true)),
+        };
+        let beams = scan.ranges.iter().enumerate().filter_map(|(number, range)| {
+            let (range, is_hit) = seen(f64::from(*range))?;
+            let number = number as f64;
+            let (angle, delay) = (angle_min + number * angle_increment, number * time_increment);
+            Some(BaseBeam { angle, range, is_hit, delay })
+        });
+        let beams = beams.collect();
+        let duration = scan.ranges.len().saturating_sub(1) as f64 * time_increment;
+        Some(Self { transform_base_lidar: pose(x, y, yaw), beams, duration })
+    }
+
+    /// How many beams have met something.
+    pub fn hits(&self) -> usize {
+        self.beams.iter().filter(|beam| beam.is_hit).count()
+    }
+}

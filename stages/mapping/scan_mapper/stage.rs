@@ -1,0 +1,210 @@
+//! The stage `scan_mapper`.
+
+use super::robot::{Fate, Robot};
+use super::{ScanBeams, ScanMapperParameters};
+use crate::shared::geometry::Pose2;
+use crate::tags::tag_localizer::time_of;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The stage kind `scan_mapper`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "scan_mapper",
+        "Draws the maps of robots from the scans of their lidars, for robots without maps: at the poses that a localizer has found, \
+         or, where there is odometry only, each scan matched with those before it. It closes no loops: where a SLAM can be run, its \
+         map is better.",
+        |parameters: ScanMapperParameters, _| {
+            Ok(ScanMapper { parameters, robots: BTreeMap::new(), with_map: BTreeSet::new() })
+        },
+    )
+    .optional_input("pose", "poses of the robots in their maps", ScanMapper::receive_pose)
+    .optional_input("odometry", "where odometry has robots without poses", ScanMapper::receive_odometry)
+    .input("scan", "scans, seen from the bases of the robots", ScanMapper::receive_scan)
+    .optional_input(
+        "map",
+        "maps that robots have sent themselves: none is drawn for these from there on",
+        ScanMapper::receive_map,
+    )
+    .finish(ScanMapper::finish)
+    .build()
+}
+
+struct ScanMapper {
+    parameters: ScanMapperParameters,
+    robots: BTreeMap<String, Robot>,
+    /// The robots that have sent a map of their own.
+    with_map: BTreeSet<String>,
+}
+
+struct Drawn {
+    map: Out<OccupancyGrid<'static>>,
+    pose: Out<PoseWithCovarianceStamped>,
+}
+
+impl Outputs for Drawn {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            map: ports.output_on("/{robot}/drawn_map", "map", "the maps of the robots with scans, growing"),
+            pose: ports.output_on(
+                "/{robot}/matched_pose",
+                "pose",
+                "where robots with odometry only are in the maps that were drawn of their scans",
+            ),
+        }
+    }
+}
+
+impl ScanMapper {
+    fn receive_pose(
+        &mut self,
+        message: Received<'_, PoseWithCovarianceStamped>,
+        output: &Output<Drawn>,
+    ) -> Result<(), StageError> {
+        let time = time_of(message.header.stamp, message.log_time());
+        let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let frame = robot.frame.get_or_insert_with(|| message.header.frame_id.clone());
+        if *frame != message.header.frame_id {
+            output.warn(format!(
+                "poses of {} in frame `{}` are left out, because its first pose is in frame `{frame}`",
+                message.robot(),
+                message.header.frame_id
+            ));
+            return Ok(());
+        }
+        let pose = message.pose.pose.planar();
+        if !is_finite(&pose) || !robot.add_pose(time, &pose) {
+            output.warn(format!(
+                "poses of {} are left out that are no numbers, or late, or came after its map was begun by odometry",
+                message.robot()
+            ));
+            return Ok(());
+        }
+        self.draw_and_send(message.robot(), false, output)
+    }
+
+    fn receive_odometry(
+        &mut self,
+        message: Received<'_, PoseWithCovarianceStamped>,
+        output: &Output<Drawn>,
+    ) -> Result<(), StageError> {
+        let time = time_of(message.header.stamp, message.log_time());
+        let parameters = self.parameters.clone();
+        let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let pose = message.pose.pose.planar();
+        if !is_finite(&pose) || !robot.add_odometry(time, &pose) {
+            output.warn(format!("odometry of {} is left out that is no number, or late", message.robot()));
+            return Ok(());
+        }
+        robot.decide(&parameters, false);
+        self.draw_and_send(message.robot(), false, output)?;
+        match self.robots.get(message.robot()).filter(|robot| robot.is_by_odometry()) {
+            Some(robot) => {
+                let header = Header { stamp: message.header.stamp, frame_id: map_frame(message.robot(), robot) };
+                let pose = PoseStamped { header, pose: robot.in_map(&pose).into() };
+                output.pose.send(message.robot(), &pose.into())
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn receive_scan(&mut self, message: Received<'_, RangeScan>, output: &Output<Drawn>) -> Result<(), StageError> {
+        let time = time_of(message.header.stamp, message.log_time());
+        let scan = ScanBeams::of(&message, &self.parameters);
+        let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let Some(scan) = scan else {
+            output.warn(format!("scans of {} are left out whose angles or times are no numbers", message.robot()));
+            return Ok(());
+        };
+        robot.add_scan(time, scan);
+        self.draw_and_send(message.robot(), false, output)
+    }
+
+    /// A robot has a map of its own: whoever lays maps on each other must not get another one in its place.
+    fn receive_map(
+        &mut self,
+        message: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Drawn>,
+    ) -> Result<(), StageError> {
+        let name = message.robot();
+        if self.with_map.contains(name) {
+            return Ok(());
+        }
+        self.with_map.insert(name.to_owned());
+        if self.robots.remove(name).is_some_and(|robot| robot.sent_until.is_some()) {
+            output.warn(format!(
+                "{name} has sent a map after one was drawn from its scans: from there on its own counts. What was found with the \
+                 drawn one holds only if both are in one frame"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The robot of a name, new if nothing has come from it yet. There must be a name. `None` as well if it has a map of its own.
+    fn robot(&mut self, name: &str, output: &Output<Drawn>) -> Option<&mut Robot> {
+        if name.is_empty() {
+            output.warn("scans and poses without a robot are left out");
+            return None;
+        }
+        if self.with_map.contains(name) {
+            return None;
+        }
+        Some(self.robots.entry(name.to_owned()).or_insert_with(|| Robot::new(&self.parameters)))
+    }
+
+    /// Draws what can be drawn, and sends the map if it is time.
+    fn draw_and_send(&mut self, name: &str, is_end: bool, output: &Output<Drawn>) -> Result<(), StageError> {
+        let Some(robot) = self.robots.get_mut(name) else { return Ok(()) };
+        robot.draw(&self.parameters, is_end, |fate| match fate {
+            Fate::Used => {}
+            Fate::NoPose => output.warn(format!("scans of {name} were left out: nothing says where it was")),
+            Fate::NotMatched => {
+                output.warn(format!("scans of {name} fit its map nowhere near, and were laid where odometry has them"));
+            }
+            Fate::TooLarge => output.warn(format!("scans of {name} were left out: its map would get too large")),
+        });
+        let Some(drawn_until) = robot.drawn_until else { return Ok(()) };
+        let since = robot.sent_until.unwrap_or(*robot.first_drawn.get_or_insert(drawn_until));
+        let is_due = is_end || drawn_until.seconds_since(since) >= self.parameters.interval;
+        if is_due && robot.sent_until != Some(drawn_until) {
+            robot.sent_until = Some(drawn_until);
+            send_map(name, robot, drawn_until, output)?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, output: &Output<Drawn>) -> Result<(), StageError> {
+        let names: Vec<String> = self.robots.keys().cloned().collect();
+        for name in names {
+            if let Some(robot) = self.robots.get_mut(&name) {
+                robot.decide(&self.parameters, true);
+            }
+            self.draw_and_send(&name, true, output)?;
+            if self.robots.get(&name).is_some_and(|robot| robot.drawn_until.is_some() && robot.map.snapshot().is_none())
+            {
+                output.warn(format!(
+                    "no map of {name} was drawn: its scans show nothing within {} m",
+                    self.parameters.max_range
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn send_map(name: &str, robot: &Robot, drawn_until: LogTime, output: &Output<Drawn>) -> Result<(), StageError> {
+    let Some(map) = robot.map.snapshot() else { return Ok(()) };
+    let prefix = map.geometry.prefix(Header::new(drawn_until, map_frame(name, robot)));
+    output.map.send_grid(name, &prefix, |blank| blank.copy_cells(&map.cells))
+}
+
+/// The frame of a robot's map: that of its poses, and without any the usual one.
+fn map_frame(name: &str, robot: &Robot) -> String {
+    robot.frame.clone().unwrap_or_else(|| format!("{name}/map"))
+}
+
+fn is_finite(pose: &Pose2) -> bool {
+    pose.translation.vector.iter().all(|value| value.is_finite()) && pose.rotation.angle().is_finite()
+}

@@ -1,0 +1,115 @@
+//! The order in which the nodes of all maps are eliminated.
+
+use crate::shared::geometry::Point2;
+use std::ops::Range;
+
+/// So few nodes are not divided any further.
+const LEAST_NODES: usize = 16;
+
+/// In which order nodes are eliminated, and what of that has nothing to do with each other.
+#[derive(Clone, Debug)]
+pub(super) struct Dissection {
+    /// Where each node stands in the order.
+    pub(super) places: Vec<usize>,
+    /// All of the order.
+    pub(super) whole: Part,
+}
+
+/// A part of the order, of nodes that stand behind each other.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    /// The places of all its nodes.
+    pub(super) places: Range<usize>,
+    /// Two parts, with which it begins, of nodes that share no equation: what follows, separates them. None if it is not divided.
+    pub(super) sides: Option<Box<[Part; 2]>>,
+}
+
+impl Part {
+    /// A part that is not divided.
+    pub(super) fn undivided(places: Range<usize>) -> Self {
+        Self { places, sides: None }
+    }
+}
+
+impl Dissection {
+    /// The nodes in an order that leaves the factor of their equations sparse: what lies on one side of a line, what lies on the
+    /// other, and last those of one side that have to do with the other; and so on within each side (nested dissection, George
+    /// 1973, by where the nodes lie). `neighbours` are for each node those that it shares an equation with.
+    pub(super) fn new(at: &[Point2], neighbours: &[Vec<usize>]) -> Self {
+        let mut division = Division { at, neighbours, side_of: vec![0; at.len()], sides: 0, order: Vec::new() };
+        let whole = division.divide((0..at.len()).collect());
+        let mut places = vec![0; at.len()];
+        division.order.into_iter().enumerate().for_each(|(place, node)| places[node] = place);
+        Self { places, whole }
+    }
+}
+
+/// What is known while nodes are put in order.
+struct Division<'a> {
+    at: &'a [Point2],
+    neighbours: &'a [Vec<usize>],
+    /// On which side each node lies, of those that were told apart last.
+    side_of: Vec<usize>,
+    sides: usize,
+    order: Vec<usize>,
+}
+
+impl Division<'_> {
+    /// Appends some nodes to the order. Each time half of them is left, so this goes as deep as their number has bits.
+    fn divide(&mut self, mut nodes: Vec<usize>) -> Part {
+        let first = self.order.len();
+        sort_along(&mut nodes, self.at);
+        if nodes.len() <= LEAST_NODES {
+            self.order.extend(nodes);
+            return Part::undivided(first..self.order.len());
+        }
+        let high = nodes.split_off(nodes.len() / 2);
+        self.sides += 1;
+        high.iter().for_each(|&node| self.side_of[node] = self.sides);
+        let borders = |node: &usize| self.neighbours[*node].iter().any(|&other| self.side_of[other] == self.sides);
+        let (mut border, low): (Vec<usize>, Vec<usize>) = nodes.into_iter().partition(borders);
+        let sides = Some(Box::new([self.divide(low), self.divide(high)]));
+        sort_along(&mut border, self.at);
+        self.order.extend(border);
+        Part { places: first..self.order.len(), sides }
+    }
+}
+
+/// Sorts nodes along the longer side of the rectangle that holds them.
+fn sort_along(nodes: &mut [usize], places: &[Point2]) {
+    let Some(&first) = nodes.first() else { return };
+    let corners = (places[first], places[first]);
+    let (low, high) =
+        nodes.iter().fold(corners, |(low, high), &node| (low.inf(&places[node]), high.sup(&places[node])));
+    let is_wide = high.x - low.x > high.y - low.y;
+    let along = |node: usize| if is_wide { (places[node].x, places[node].y) } else { (places[node].y, places[node].x) };
+    nodes.sort_by(|&one, &other| {
+        let (one_at, other_at) = (along(one), along(other));
+        one_at.0.total_cmp(&other_at.0).then(one_at.1.total_cmp(&other_at.1)).then(one.cmp(&other))
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_separates_two_sides_comes_after_both() {
+        // A strip of 8 x 4 nodes, each tied to those beside it.
+        let places: Vec<Point2> = (0..32).map(|node| Point2::new(f64::from(node % 8), f64::from(node / 8))).collect();
+        let is_near = |one: usize, other: usize| (places[one] - places[other]).norm() < 1.1 && one != other;
+        let neighbours: Vec<Vec<usize>> =
+            (0..32).map(|one| (0..32).filter(|&other| is_near(one, other)).collect()).collect();
+        let Dissection { places: order, whole } = Dissection::new(&places, &neighbours);
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert_eq!(all, (0..32).collect::<Vec<_>>(), "each node once");
+        let separates = |node: &usize| order[*node] >= 28;
+        let low = |node: &usize| order[*node] < 12;
+        assert!((0..32).filter(separates).all(|node| places[node].x == 3.0), "{order:?}");
+        assert!((0..32).filter(low).all(|node| places[node].x < 3.0), "{order:?}");
+        let [low, high] = &*whole.sides.expect("it is divided");
+        assert_eq!((low.places.clone(), high.places.clone(), whole.places), (0..12, 12..28, 0..32));
+        assert!(Dissection::new(&[], &[]).places.is_empty());
+    }
+}

@@ -1,0 +1,163 @@
+//! The normal equations of all nodes of all maps, and their solution.
+
+use super::ElasticRefinerParameters;
+use super::block_cholesky::{BlockCholesky, SelectedInverse};
+use super::body::Body;
+use super::dissection::Dissection;
+use super::factoring::{Columns, factor};
+use crate::shared::deformation::Deformation;
+use crate::shared::geometry::Point2;
+use nalgebra::{Matrix3, Vector2, Vector3};
+use std::sync::Arc;
+
+/// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
+/// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
+const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
+/// The same of a map that is not to be bent: as good as nothing.
+const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
+
+/// Normal equations, node by node. The nodes of all bodies are numbered one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Equations {
+    /// The order in which nodes are eliminated.
+    pub(super) order: Arc<Dissection>,
+    columns: Columns,
+    vector: Vec<Vector3<f64>>,
+}
+
+impl Equations {
+    /// What is known of the nodes of the bodies without looking at walls.
+    pub(super) fn of_bends(
+        bodies: &[Body<'_>],
+        order: &Arc<Dissection>,
+        parameters: &ElasticRefinerParameters,
+    ) -> Self {
+        let count = order.places.len();
+        let mut equations =
+            Self { order: Arc::clone(order), columns: vec![Vec::new(); count], vector: vec![Vector3::zeros(); count] };
+        let mut first = 0;
+        for body in bodies {
+            let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
+            let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
+            for node in first..first + body.lattice.len() {
+                equations.add(node, node, || Matrix3::from_diagonal(&of_frame));
+            }
+            for (i, j) in body.lattice.edges() {
+                let (at_i, at_j) = (body.lattice.position(i), body.lattice.position(j));
+                equations.add_edge((first + i, at_i), (first + j, at_j), parameters);
+            }
+            first += body.lattice.len();
+        }
+        equations
+    }
+
+    /// Two nodes side by side: the displacement between them is that of a rigid piece which is turned as they are in the
+    /// mean, and both are turned alike.
+    fn add_edge(
+        &mut self,
+        (i, at_i): (usize, Point2),
+        (j, at_j): (usize, Point2),
+        parameters: &ElasticRefinerParameters,
+    ) {
+        let edge = Edge::new(&(at_j - at_i), parameters);
+        for (row, by_row) in [(i, edge.by_i), (j, edge.by_j)] {
+            for (column, by_column) in [(i, edge.by_i), (j, edge.by_j)] {
+                self.add(row, column, || by_row.transpose() * edge.information * by_column);
+            }
+        }
+    }
+
+    /// Adds a block for two nodes. They are symmetric: what is told of two nodes is to be added both ways round.
+    pub(super) fn add(&mut self, row: usize, column: usize, block: impl FnOnce() -> Matrix3<f64>) {
+        let (row, column) = (self.order.places[row], self.order.places[column]);
+        if row >= column {
+            self.columns[column].push((row, block()));
+        }
+    }
+
+    pub(super) fn add_vector(&mut self, node: usize, part: &Vector3<f64>) {
+        self.vector[self.order.places[node]] += part;
+    }
+
+    /// Solves them. `None` if they have no solution.
+    pub(super) fn solve(&self) -> Option<Solution> {
+        let factor = factor(&self.columns, &self.order.whole)?;
+        let solved = factor.solve(&self.vector);
+        let moves = self.order.places.iter().map(|&place| solved[place]).collect();
+        let explained = self.vector.iter().zip(&solved).map(|(part, by)| part.dot(by)).sum();
+        Some(Solution { moves, explained, order: Arc::clone(&self.order), factor })
+    }
+
+    /// The logarithm of the determinant of their matrix. `None` if they have no solution.
+    pub(super) fn log_determinant(&self) -> Option<f64> {
+        Some(factor(&self.columns, &self.order.whole)?.log_determinant())
+    }
+}
+
+/// What drift says of two nodes i and j that lie side by side.
+pub(super) struct Edge {
+    /// How (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i) changes with what node i does.
+    pub(super) by_i: Matrix3<f64>,
+    /// And with what node j does.
+    pub(super) by_j: Matrix3<f64>,
+    /// The inverse of its covariance.
+    pub(super) information: Matrix3<f64>,
+}
+
+impl Edge {
+    /// Of two nodes with `arm` from i to j.
+    pub(super) fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
+        let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * arm.norm().sqrt();
+        let half = 0.5 * arm;
+        Self {
+            by_i: -Matrix3::new(1.0, 0.0, -half.y, 0.0, 1.0, half.x, 0.0, 0.0, 1.0),
+            by_j: Matrix3::new(1.0, 0.0, half.y, 0.0, 1.0, -half.x, 0.0, 0.0, 1.0),
+            information: Matrix3::from_diagonal(&deviation.map(|deviation| deviation.powi(-2))),
+        }
+    }
+}
+
+/// Half the squared bends between neighbouring nodes, in standard deviations.
+pub(super) fn bend_cost(bend: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
+    let edges = bend.lattice.edges().map(|(i, j)| {
+        let edge = Edge::new(&(bend.lattice.position(j) - bend.lattice.position(i)), parameters);
+        let residual = edge.by_i * bend.moves[i] + edge.by_j * bend.moves[j];
+        0.5 * residual.dot(&(edge.information * residual))
+    });
+    edges.sum()
+}
+
+/// What the nodes do.
+pub(super) struct Solution {
+    /// Displacement and turn of each node.
+    pub(super) moves: Vec<Vector3<f64>>,
+    /// By how much the moves lessen the sum of all squares, in variances.
+    pub(super) explained: f64,
+    order: Arc<Dissection>,
+    factor: BlockCholesky,
+}
+
+impl Solution {
+    /// The logarithm of the determinant of the equations' matrix.
+    pub(super) fn log_determinant(&self) -> f64 {
+        self.factor.log_determinant()
+    }
+
+    /// How uncertain the nodes are.
+    pub(super) fn covariances(&self) -> Covariances<'_> {
+        Covariances { places: &self.order.places, inverse: self.factor.selected_inverse() }
+    }
+}
+
+/// How uncertain nodes are, alone and together with those beside them.
+pub(super) struct Covariances<'a> {
+    places: &'a [usize],
+    inverse: SelectedInverse<'a>,
+}
+
+impl Covariances<'_> {
+    /// The covariance of what two nodes do that are one or lie side by side.
+    pub(super) fn of(&self, one: usize, other: usize) -> Matrix3<f64> {
+        self.inverse.at(self.places[one], self.places[other])
+    }
+}

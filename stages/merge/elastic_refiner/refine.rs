@@ -1,0 +1,150 @@
+//! The estimate of all bends together.
+
+use super::ElasticRefinerParameters;
+use super::body::Body;
+use super::contacts::{Bent, Contacts, contacts};
+use super::dissection::Dissection;
+use super::drift::{Drift, drift};
+use super::equations::{Equations, Solution, bend_cost};
+use super::evidence::gain;
+use crate::shared::deformation::Deformation;
+use crate::shared::geometry::Point2;
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// How far walls may lie apart from round to round, as shares of the reach: wide at first, when the maps lie where the rigid
+/// frames have them, and at the end about as far as a wall is drawn wrong.
+const ROUNDS: [f64; 8] = [1.0, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.15];
+
+/// How one map is bent.
+#[derive(Clone, Debug)]
+pub struct Bend {
+    /// Where its places belong.
+    pub deformation: Deformation,
+    /// The covariance of each node: (x, y, turn).
+    pub covariances: Vec<Matrix3<f64>>,
+    /// The length of its walls that lie on walls of others, metres.
+    pub wall_matched: f64,
+    /// How unlikely it is that a map bends so: the logarithm of how much likelier no bend is, half the squared bends between
+    /// neighbouring nodes in standard deviations.
+    pub cost: f64,
+    /// How it bends; none if its walls tell too little of that.
+    pub drift: Option<Drift>,
+}
+
+/// How all maps are bent.
+#[derive(Clone, Debug)]
+pub struct Bends {
+    /// Of each body.
+    pub bends: Vec<Bend>,
+    /// How much likelier what the walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm.
+    /// Not above 0 the maps are rather not bent, and what is in `bends` is the walls' noise.
+    pub gain: f64,
+}
+
+impl Bends {
+    /// The bends if they are likelier than none; else none, as uncertain as they are.
+    #[must_use]
+    pub fn if_likelier(self) -> Vec<Bend> {
+        if self.gain > 0.0 { self.bends } else { self.bends.into_iter().map(Bend::unbent).collect() }
+    }
+}
+
+impl Bend {
+    fn unbent(self) -> Self {
+        let deformation = Deformation::none(self.deformation.lattice);
+        Self { deformation, cost: 0.0, drift: None, ..self }
+    }
+}
+
+/// What was found in one round.
+pub(super) struct Round {
+    /// What the walls say, pair by pair.
+    pub(super) walls: Vec<Contacts>,
+    /// What is known without looking at walls.
+    pub(super) of_bends: Equations,
+    /// What follows from both.
+    pub(super) solution: Solution,
+}
+
+/// Bends placed maps, so that walls that several show lie on each other. `None` if numbers are so large that the equations have
+/// no solution.
+pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Bends> {
+    let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
+    let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
+    let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
+    let meet = |a: usize, b: usize| {
+        a != b && boxes[a].zip(boxes[b]).is_some_and(|(a, b)| is_below(&a[0], &b[1]) && is_below(&b[0], &a[1]))
+    };
+    let pairs: Vec<(usize, usize)> =
+        (0..bodies.len()).flat_map(|a| (0..bodies.len()).map(move |b| (a, b))).filter(|&(a, b)| meet(a, b)).collect();
+    let firsts: Vec<usize> =
+        bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
+    let find = |bends: &[Deformation], share: f64| -> Vec<Contacts> {
+        let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };
+        pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect()
+    };
+    let mut last: Option<Round> = None;
+    for share in ROUNDS {
+        let walls = find(&bends, share);
+        // What is tied to what changes from round to round, and with it the order that leaves the factor sparse.
+        let order = Arc::new(order(bodies, &firsts, &walls));
+        let of_bends = Equations::of_bends(bodies, &order, parameters);
+        let mut equations = of_bends.clone();
+        walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
+        let solution = equations.solve()?;
+        for (bend, &first) in bends.iter_mut().zip(&firsts) {
+            let count = bend.moves.len();
+            bend.moves.copy_from_slice(&solution.moves[first..first + count]);
+        }
+        last = Some(Round { walls, of_bends, solution });
+    }
+    let last = last?;
+    let gain = gain(bodies, &last, parameters)?;
+    let mut matched = vec![0.0; bodies.len()];
+    pairs.iter().zip(&last.walls).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
+    let covariances = last.solution.covariances();
+    let bend = |((deformation, wall_matched), &first): ((Deformation, f64), &usize)| Bend {
+        covariances: (first..first + deformation.moves.len()).map(|node| covariances.of(node, node)).collect(),
+        cost: bend_cost(&deformation, parameters),
+        drift: drift(&deformation, first, &covariances, parameters),
+        deformation,
+        wall_matched,
+    };
+    let is_finite = bends.iter().flat_map(|bend| &bend.moves).all(|by| by.iter().all(|value| value.is_finite()));
+    is_finite.then(|| Bends { bends: bends.into_iter().zip(matched).zip(&firsts).map(bend).collect(), gain })
+}
+
+/// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.
+fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
+    let mut points = body.walls.walls.points().iter().map(|point| body.transform_world_map * point);
+    let first = points.next()?;
+    let [low, high] = points.fold([first; 2], |[low, high], point| [low.inf(&point), high.sup(&point)]);
+    let margin = nalgebra::Vector2::repeat(reach);
+    Some([low - margin, high + margin])
+}
+
+/// The order in which the nodes of all bodies are eliminated.
+fn order(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Dissection {
+    let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
+    let at: Vec<Point2> =
+        bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
+    let mut neighbours = vec![Vec::new(); at.len()];
+    for (body, first) in bodies.iter().zip(firsts) {
+        for (i, j) in body.lattice.edges() {
+            neighbours[first + i].push(first + j);
+            neighbours[first + j].push(first + i);
+        }
+    }
+    for nodes in walls.iter().flat_map(Contacts::nodes) {
+        for &one in nodes {
+            neighbours[one].extend(nodes.iter().filter(|&&other| other != one));
+        }
+    }
+    for of_node in &mut neighbours {
+        of_node.sort_unstable();
+        of_node.dedup();
+    }
+    Dissection::new(&at, &neighbours)
+}

@@ -1,0 +1,175 @@
+//! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
+
+use super::anchor::anchor;
+use super::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
+use crate::shared::deformation::Lattice;
+use crate::shared::geometry::row_by_row;
+use crate::shared::robot_maps::{RobotMap, RobotMaps};
+use crate::shared::walls::{NORMAL_RADIUS, WallsOnDemand};
+use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames, Sharpness};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
+use std::collections::BTreeMap;
+
+/// What the stage sends.
+pub(super) struct Deformations {
+    deformation: Out<MapDeformation>,
+    frames: Out<RobotFrames>,
+}
+
+impl Outputs for Deformations {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            deformation: ports.output("deformation", "How the map of each placed robot is bent."),
+            frames: ports.side_output(
+                "frames",
+                "The frames as they came, sent after the bends that belong to them: for stages that need both.",
+            ),
+        }
+    }
+}
+
+/// Bends the maps of placed robots.
+pub(super) struct ElasticRefiner {
+    parameters: ElasticRefinerParameters,
+    maps: RobotMaps<WallsOnDemand>,
+    frames: RobotFrames,
+    /// The frames in which the maps were bent last.
+    bent_frames: RobotFrames,
+    /// The maps that were bent last, by robot.
+    bent_maps: BTreeMap<String, BentMap>,
+    /// Whether any bend was sent.
+    has_sent: bool,
+}
+
+/// A map as it was when it was bent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct BentMap {
+    /// Which of its robot's maps it was.
+    number: u64,
+    /// How many nodes its lattice had.
+    nodes: usize,
+}
+
+impl ElasticRefiner {
+    pub(super) fn new(parameters: ElasticRefinerParameters) -> Self {
+        Self {
+            parameters,
+            maps: RobotMaps::default(),
+            frames: RobotFrames::default(),
+            bent_frames: RobotFrames::default(),
+            bent_maps: BTreeMap::new(),
+            has_sent: false,
+        }
+    }
+
+    /// Maps wait for frames, or for the end: a map that has grown a little is bent as the last one was until then.
+    pub(super) fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Deformations>,
+    ) -> Result<(), StageError> {
+        self.maps.keep(&map, output, |_| WallsOnDemand::new());
+        Ok(())
+    }
+
+    pub(super) fn receive_frames(
+        &mut self,
+        frames: Received<'_, RobotFrames>,
+        output: &Output<Deformations>,
+    ) -> Result<(), StageError> {
+        self.frames = frames.into_content();
+        // What changes little waits for the end: bends are told in the map's own frame, and hold in a frame that lies beside.
+        if self.is_near() { output.frames.send("", &self.frames) } else { self.bend(output) }
+    }
+
+    pub(super) fn finish(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
+        let numbers = self.bent_maps.iter().map(|(robot, map)| (robot, map.number));
+        let is_bent = self.frames.frames == self.bent_frames.frames
+            && self.placed().map(|(robot, map)| (robot, map.number)).eq(numbers);
+        if is_bent { Ok(()) } else { self.bend(output) }
+    }
+
+    /// Whether the robots are about where they were when their maps were bent, and know about as much.
+    fn is_near(&self) -> bool {
+        let (before, after) = (&self.bent_frames, &self.frames);
+        let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
+        let mut pairs = before.frames.iter().zip(&after.frames);
+        before.reference == after.reference
+            && before.frames.len() == after.frames.len()
+            && self.placed().map(|(robot, _)| robot).eq(self.bent_maps.keys())
+            && pairs.all(|(one, next)| one.is_near(next, min_move, min_turn))
+            && self.placed().zip(self.bent_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
+    }
+
+    /// Whether a map knows so much that it did not when it was bent that it is to be bent again.
+    fn has_grown(&self, before: &BentMap, map: &RobotMap<WallsOnDemand>) -> bool {
+        let ElasticRefinerParameters { min_growth, spacing, .. } = self.parameters;
+        let most = before.nodes as f64 * (1.0 + min_growth);
+        map.number != before.number && Lattice::over(&map.grid(), spacing).len() as f64 > most
+    }
+
+    /// The maps of the placed robots, by their names.
+    fn placed(&self) -> impl Iterator<Item = (&String, &RobotMap<WallsOnDemand>)> {
+        let placed: BTreeMap<&String, &RobotMap<WallsOnDemand>> =
+            self.frames.frames.iter().filter_map(|frame| Some((&frame.robot, self.maps.get(&frame.robot)?))).collect();
+        placed.into_iter()
+    }
+
+    fn bend(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
+        self.bent_frames = self.frames.clone();
+        let spacing = self.parameters.spacing;
+        let of_map = |(robot, map): (&String, &RobotMap<WallsOnDemand>)| {
+            (robot.clone(), BentMap { number: map.number, nodes: Lattice::over(&map.grid(), spacing).len() })
+        };
+        self.bent_maps = self.placed().map(of_map).collect();
+        let frames = self.frames.frames.iter();
+        let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
+        // What is alone is not bent, which is news if it was.
+        let has_news = placed.len() > 1 || self.has_sent;
+        if self.parameters.enabled && has_news {
+            self.has_sent = true;
+            let bodies: Vec<Body<'_>> = placed
+                .iter()
+                .map(|(frame, map)| {
+                    let (grid, walls) = (map.grid(), map.walls(NORMAL_RADIUS));
+                    let body = Body::new(&grid, walls, frame.transform_reference_robot(), self.parameters.spacing);
+                    let is_kept = self.parameters.keep_reference && frame.robot == self.frames.reference;
+                    if is_kept { body.kept() } else { body }
+                })
+                .collect();
+            match refine(&bodies, &self.parameters) {
+                Some(bends) => {
+                    let mut bends = bends.if_likelier();
+                    let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
+                    reference.into_iter().for_each(|reference| anchor(&mut bends, &bodies, reference));
+                    let sharpness = sharpness(&bodies, &bends, &self.parameters);
+                    for (((frame, map), bend), sharpness) in placed.iter().zip(&bends).zip(sharpness) {
+                        let header = Header::new(output.log_time(), map.frame_id.clone());
+                        output.deformation.send(&frame.robot, &message(header, &frame.robot, bend, sharpness))?;
+                    }
+                }
+                None => output.warn("the maps cannot be bent onto each other: a frame lies too far away for numbers"),
+            }
+        }
+        output.frames.send("", &self.frames)
+    }
+}
+
+fn message(header: Header, robot: &str, bend: &Bend, [sharpness_rigid, sharpness]: [Sharpness; 2]) -> MapDeformation {
+    let nodes = bend.deformation.moves.iter().zip(&bend.covariances).enumerate();
+    let node = |(number, (by, covariance)): (usize, (&nalgebra::Vector3<f64>, _))| {
+        let at = bend.deformation.lattice.position(number);
+        DeformationNode { x: at.x, y: at.y, dx: by.x, dy: by.y, dyaw: by.z, covariance: row_by_row(covariance) }
+    };
+    MapDeformation {
+        header,
+        robot: robot.to_owned(),
+        spacing: bend.deformation.lattice.spacing(),
+        nodes: nodes.map(node).collect(),
+        wall_matched: bend.wall_matched,
+        sharpness_rigid,
+        sharpness,
+        bend: bend.drift.map_or(0.0, |drift| drift.bend),
+        turn: bend.drift.map_or(0.0, |drift| drift.turn),
+    }
+}

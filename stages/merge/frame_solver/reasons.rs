@@ -1,0 +1,126 @@
+//! Why an alignment was left out, and why a robot is not merged, in plain words.
+
+use super::UncertainPose;
+use super::solution::{Alignments, OpenCycle, Solution};
+use crate::shared::robot_pair::RobotPair;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The reason of an alignment that the others show to be wrong.
+pub(super) fn contradicts(cycle: &OpenCycle) -> String {
+    format!("it contradicts other alignments, which agree with each other ({})", gap(cycle))
+}
+
+/// The reason of an alignment of which it cannot be told whether it is wrong.
+pub(super) fn disputed(cycle: &OpenCycle) -> String {
+    format!("alignments contradict each other, and it cannot be told which is wrong ({})", gap(cycle))
+}
+
+fn gap(cycle: &OpenCycle) -> String {
+    let pairs: Vec<String> = cycle.pairs.iter().map(|pair| pair.robots().join("-")).collect();
+    format!(
+        "{} do not close by {:.2} m and {:.1} degrees, {:.0} standard deviations",
+        list(&pairs),
+        cycle.metres,
+        cycle.radians.to_degrees(),
+        cycle.deviations
+    )
+}
+
+/// The reason for every robot that the solution has no frame for.
+pub(super) fn unmerged(
+    robots: &BTreeSet<String>,
+    solution: &Solution,
+    alignments: &Alignments,
+    disputed: &BTreeMap<String, String>,
+) -> BTreeMap<String, String> {
+    let Solution { frames, groups, left_out, .. } = solution;
+    let outside: BTreeSet<&str> =
+        robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
+    let refusals = UnusedAlignments::new(&outside, alignments, left_out);
+    let reason = |robot: &str| {
+        if let Some(reason) = disputed.get(robot) {
+            return reason.clone();
+        }
+        let Some(group) = groups.iter().find(|group| group.frames.contains_key(robot)) else {
+            return no_tie(robot, frames, &refusals);
+        };
+        let others: Vec<String> = group.frames.keys().filter(|other| *other != robot).cloned().collect();
+        // What keeps the group apart may be known of another member only.
+        let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
+        let known = members.clone().find_map(|member| disputed.get(member).cloned());
+        let refused = || members.clone().find_map(|member| refusals.telling(member, frames));
+        let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
+        format!("it is tied to {} only, not to the reference: {why}", list(&others))
+    };
+    outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
+}
+
+fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
+    refusals.telling(robot, frames).unwrap_or_else(|| {
+        format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that others know")
+    })
+}
+
+/// An alignment that was not used, as one of its robots sees it.
+#[derive(Clone, Copy)]
+struct UnusedAlignment<'a> {
+    other: &'a str,
+    score: f64,
+    reason: &'a str,
+}
+
+/// For every robot outside, its alignments that were not used. Gathered once: there are as many as pairs of robots.
+struct UnusedAlignments<'a>(BTreeMap<&'a str, Vec<UnusedAlignment<'a>>>);
+
+impl<'a> UnusedAlignments<'a> {
+    fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<RobotPair, String>) -> Self {
+        let mut by_robot: BTreeMap<&str, Vec<UnusedAlignment<'_>>> =
+            outside.iter().map(|robot| (*robot, Vec::new())).collect();
+        for (pair, alignment) in alignments {
+            let reason = match alignment.accepted {
+                true => left_out.get(pair),
+                false => Some(&alignment.reason),
+            };
+            let Some(reason) = reason else { continue };
+            for (robot, other) in [(&pair.a, &pair.b), (&pair.b, &pair.a)] {
+                if let Some(refusals) = by_robot.get_mut(robot.as_str()) {
+                    refusals.push(UnusedAlignment { other, score: alignment.score, reason });
+                }
+            }
+        }
+        Self(by_robot)
+    }
+
+    /// The most telling of a robot's: towards merged robots if there are any, and of these the one that came nearest to
+    /// being accepted. `None` if none was tried.
+    fn telling(&self, robot: &str, frames: &BTreeMap<String, UncertainPose>) -> Option<String> {
+        let mut refusals = self.0.get(robot)?.clone();
+        if refusals.iter().any(|refusal| frames.contains_key(refusal.other)) {
+            refusals.retain(|refusal| frames.contains_key(refusal.other));
+        }
+        refusals.sort_by(|one, next| next.score.total_cmp(&one.score).then_with(|| one.other.cmp(next.other)));
+        let telling = refusals.first()?;
+        let same: Vec<String> = refusals
+            .iter()
+            .filter(|refusal| refusal.reason == telling.reason)
+            .map(|refusal| refusal.other.to_owned())
+            .collect();
+        let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
+        // A reason of several lines begins on a line of its own.
+        let gap = if reason.contains('\n') { "\n" } else { " " };
+        Some(format!("no alignment with {}:{gap}{reason}", list(&same)))
+    }
+}
+
+/// "a", "a and b", "a, b and c"; of many the first, and how many others.
+pub(super) fn list(names: &[String]) -> String {
+    const MOST: usize = 6;
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., _] if first.len() >= MOST => {
+            format!("{} and {} others", first[..MOST - 2].join(", "), names.len() - (MOST - 2))
+        }
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

@@ -1,0 +1,134 @@
+//! From alignments of pairs to one pose for every robot.
+
+use super::consistency::{EdgeVerdict, judge};
+use super::graph::{Cycle, Edge, Forest};
+use super::reasons;
+use super::solution::{Alignments, Group, OpenCycle, Solution};
+use super::{FrameSolverParameters, UncertainPose, optimize, uncertain::error_vector};
+use crate::shared::robot_pair::RobotPair;
+use gridweave_runtime::ros::Alignment;
+use nalgebra::Matrix3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A length (metres) or variance beyond which a value of an alignment is taken for garbage.
+const ABSURD: f64 = 1e7;
+
+/// Solves for the frames of all `robots` in the frame of `reference`, which must be one of them.
+///
+/// Alignments that cannot be right, given the others, are left out; a robot that is tied to the reference only through
+/// alignments of which it cannot be told whether they are right is not merged. What remains is solved by weighted
+/// least squares, from the poses along the paths of least variance; so is each group of robots that are tied to each
+/// other only.
+///
+/// `before` is the solution of the last call, if there was one: groups keep their references, and what has been found
+/// to agree is not looked at again.
+pub fn solve(
+    robots: &BTreeSet<String>,
+    alignments: &Alignments,
+    reference: &str,
+    parameters: &FrameSolverParameters,
+    before: &Solution,
+) -> Solution {
+    let names: Vec<&str> = robots.iter().map(String::as_str).collect();
+    let index_of = |name: &str| names.binary_search(&name).ok();
+    let Some(root) = index_of(reference) else { return Solution::default() };
+
+    let mut left_out = BTreeMap::new();
+    let mut edges = Vec::new();
+    let mut pairs = Vec::new();
+    for (pair, alignment) in alignments.iter().filter(|(_, alignment)| alignment.accepted) {
+        let (Some(a), Some(b)) = (index_of(&pair.a), index_of(&pair.b)) else { continue };
+        match usable(alignment, parameters) {
+            Ok(transform_a_b) => {
+                edges.push(Edge { a, b, transform_a_b });
+                pairs.push(pair);
+            }
+            Err(reason) => {
+                left_out.insert(pair.clone(), format!("left out: {reason}"));
+            }
+        }
+    }
+
+    let known: Vec<bool> =
+        pairs.iter().zip(&edges).map(|(pair, edge)| before.used.get(*pair) == Some(&edge.transform_a_b)).collect();
+    let verdicts = judge(names.len(), &edges, &known, parameters.gate);
+    let mut disputed = BTreeMap::new();
+    for ((verdict, edge), pair) in verdicts.iter().zip(&edges).zip(&pairs) {
+        let reason = match verdict {
+            EdgeVerdict::Right => continue,
+            EdgeVerdict::Wrong(cycle) => reasons::contradicts(&describe(cycle, &pairs)),
+            EdgeVerdict::Disputed(cycle) => {
+                let reason = reasons::disputed(&describe(cycle, &pairs));
+                for robot in [edge.a, edge.b] {
+                    disputed.entry(names[robot].to_owned()).or_insert_with(|| reason.clone());
+                }
+                reason
+            }
+        };
+        left_out.insert((*pair).clone(), format!("left out: {reason}"));
+    }
+
+    let is_right = |verdict: &EdgeVerdict| matches!(verdict, EdgeVerdict::Right);
+    let right: Vec<Edge> =
+        verdicts.iter().zip(&edges).filter(|(verdict, _)| is_right(verdict)).map(|(_, edge)| *edge).collect();
+    let used = verdicts.iter().zip(&edges).zip(&pairs).filter(|((verdict, _), _)| is_right(verdict));
+    let used = used.map(|((_, edge), pair)| ((*pair).clone(), edge.transform_a_b)).collect();
+
+    let frames = place(&names, &right, root);
+    let mut tied: BTreeSet<usize> = right.iter().flat_map(|edge| [edge.a, edge.b]).collect();
+    let mut groups = Vec::new();
+    let references = before.groups.iter().filter_map(|group| index_of(&group.reference));
+    tied.retain(|&robot| !frames.contains_key(names[robot]));
+    for root in references.chain(tied.clone()) {
+        if tied.contains(&root) {
+            let frames = place(&names, &right, root);
+            tied.retain(|&robot| !frames.contains_key(names[robot]));
+            groups.push(Group { reference: names[root].to_owned(), frames });
+        }
+    }
+    groups.sort_by(|one, other| one.reference.cmp(&other.reference));
+    let mut solution = Solution { frames, groups, left_out, used, ..Solution::default() };
+    solution.unmerged = reasons::unmerged(robots, &solution, alignments, &disputed);
+    solution
+}
+
+/// `T_root_robot` for all robots that the edges tie to the root.
+fn place(names: &[&str], edges: &[Edge], root: usize) -> BTreeMap<String, UncertainPose> {
+    let along_tree = Forest::grow(names.len(), edges, root, |_| true).poses(edges, root);
+    let poses = optimize::optimize(&along_tree, edges, root).unwrap_or(along_tree);
+    names.iter().zip(poses).filter_map(|(name, pose)| Some(((*name).to_owned(), pose?))).collect()
+}
+
+/// The transform of an alignment with the floors added, or why it cannot be used.
+fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<UncertainPose, String> {
+    if alignment.provisional {
+        return Err(format!(
+            "it is provisional, and no stage between has confirmed it by the walls of the maps, as merge_verifier does ({})",
+            alignment.reason
+        ));
+    }
+    let values = [alignment.x, alignment.y, alignment.yaw].into_iter().chain(alignment.covariance);
+    if !values.into_iter().all(|value| value.abs() < ABSURD) {
+        return Err("its transform or covariance holds a value that is no finite number or absurdly large".into());
+    }
+    let covariance = Matrix3::from_row_slice(&alignment.covariance);
+    let symmetric = (covariance + covariance.transpose()) / 2.0;
+    let transform_a_b = UncertainPose { pose: alignment.transform_a_b(), covariance: symmetric }
+        .with_floor(parameters.position_floor, parameters.yaw_floor);
+    match transform_a_b.covariance.cholesky() {
+        Some(_) => Ok(transform_a_b),
+        None => Err("its covariance is none: it has a negative variance in some direction".into()),
+    }
+}
+
+fn describe(cycle: &Cycle, pairs: &[&RobotPair]) -> OpenCycle {
+    let error = error_vector(&cycle.remainder.pose);
+    let mut on_cycle: Vec<RobotPair> = cycle.edges.iter().map(|&index| pairs[index].clone()).collect();
+    on_cycle.sort();
+    OpenCycle {
+        pairs: on_cycle,
+        metres: error.xy().norm(),
+        radians: error.z.abs(),
+        deviations: cycle.remainder.distance_from_identity(),
+    }
+}

@@ -1,0 +1,118 @@
+//! The stage from outside.
+
+mod messages;
+mod solutions;
+mod tree;
+
+use super::kind;
+use crate::shared::geometry::{Pose2, pose, wrap_angle};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts};
+use gridweave_runtime::stage::{Context, LoneStage, StageError};
+
+struct Run {
+    stage: LoneStage,
+    /// What was sent last.
+    latest: Option<RobotFrames>,
+    verdicts: Option<Verdicts>,
+}
+
+impl Run {
+    fn new(reference: Option<&str>) -> Self {
+        let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
+        let stage = LoneStage::with_context(&kind(), "", &context).unwrap();
+        Self { stage, latest: None, verdicts: None }
+    }
+
+    fn map(&mut self, robot: &str, frame_id: &str) {
+        let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), ..Default::default() };
+        self.stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(5), &map).unwrap();
+    }
+
+    fn align(&mut self, alignment: &Alignment) {
+        self.stage.give::<Alignment>("alignment", "", LogTime(5), alignment).unwrap();
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.stage.finish(LogTime(6))
+    }
+
+    /// The frames sent since the last look.
+    fn frames(&mut self) -> Vec<RobotFrames> {
+        let frames: Vec<RobotFrames> = self.stage.take("frames").unwrap();
+        self.latest = frames.last().cloned().or_else(|| self.latest.take());
+        frames
+    }
+
+    /// The frames sent last.
+    fn latest(&mut self) -> Option<RobotFrames> {
+        self.frames();
+        self.latest.clone()
+    }
+
+    /// The frames as they are solved: they are sent when the run ends.
+    fn solved(&mut self) -> RobotFrames {
+        self.finish().unwrap();
+        self.latest().unwrap()
+    }
+
+    /// The verdicts when the run ends.
+    fn verdicts(&mut self) -> Vec<Verdict> {
+        self.finish().unwrap();
+        self.verdicts = self.stage.take("verdicts").unwrap().pop().or_else(|| self.verdicts.take());
+        self.verdicts.clone().unwrap_or_default().verdicts
+    }
+
+    fn pose_of(&mut self, robot: &str) -> Option<Pose2> {
+        let solved = self.solved();
+        let frame = solved.frames.iter().find(|frame| frame.robot == robot)?;
+        Some(pose(frame.x, frame.y, frame.yaw))
+    }
+
+    fn reason(&mut self, robot: &str) -> String {
+        let latest = self.latest().unwrap();
+        latest.unmerged.into_iter().find(|unmerged| unmerged.robot == robot).unwrap_or_default().reason
+    }
+}
+
+const COVARIANCE: [f64; 9] = [1e-4, 2e-5, 0.0, 2e-5, 2e-4, 1e-6, 0.0, 1e-6, 1e-6];
+
+fn accepted(a: &str, b: &str, transform_a_b: Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        a: a.into(),
+        b: b.into(),
+        covariance: COVARIANCE,
+        score: 0.9,
+        method: "icp".into(),
+        accepted: true,
+        reason: "3 tags agree".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(&transform_a_b);
+    alignment
+}
+
+fn refused(a: &str, b: &str, score: f64, reason: &str) -> Alignment {
+    Alignment { a: a.into(), b: b.into(), score, reason: reason.into(), ..Default::default() }
+}
+
+fn is_near(one: &Pose2, other: &Pose2, tolerance: f64) -> bool {
+    (one.translation.vector - other.translation.vector).norm() < tolerance
+        && wrap_angle(one.rotation.angle() - other.rotation.angle()).abs() < tolerance
+}
+
+/// Where robot `n` (from 1) is in these tests.
+fn place(robot: usize) -> Pose2 {
+    let n = robot as f64 - 1.0;
+    pose(4.0 * n, -3.0 * n * n % 11.0, 0.8 * n)
+}
+
+fn between(a: usize, b: usize) -> Alignment {
+    accepted(&format!("robot{a}"), &format!("robot{b}"), place(a).inverse() * place(b))
+}
+
+fn near(a: usize, b: usize, metres: f64) -> Alignment {
+    let mut alignment = between(a, b);
+    alignment.x += metres;
+    alignment
+}

@@ -1,0 +1,218 @@
+//! Where the robots are placed, in spite of wrong alignments.
+
+use super::*;
+use crate::merge::frame_solver::FrameSolverParameters;
+use crate::merge::frame_solver::solution::{Solution, by_name};
+use crate::merge::frame_solver::solve::solve;
+use crate::merge::frame_solver::team::Team;
+use crate::merge::frame_solver::uncertain::error_vector;
+use proptest::prelude::*;
+
+#[test]
+fn a_later_alignment_replaces_the_earlier_one() {
+    let mut run = Run::new(None);
+    run.align(&accepted("robot1", "robot2", pose(9.0, 9.0, 1.0)));
+    run.align(&between(1, 2));
+    assert!(is_near(&run.pose_of("robot2").unwrap(), &place(2), 1e-9));
+    run.align(&refused("robot1", "robot2", 0.3, "the larger maps disagree"));
+    assert_eq!(run.reason("robot2"), "no alignment with robot1: the larger maps disagree");
+}
+
+#[test]
+fn a_contradiction_that_cannot_be_told_leaves_its_robots_out() {
+    let mut run = Run::new(None);
+    let mut wrong = between(2, 3);
+    wrong.x += 3.0;
+    [between(1, 2), between(1, 3), wrong, between(3, 4)].iter().for_each(|alignment| run.align(alignment));
+    assert_eq!(run.latest().unwrap().frames.len(), 1);
+    assert!(run.reason("robot2").contains("it cannot be told which is wrong"), "{}", run.reason("robot2"));
+    assert!(run.reason("robot4").contains("it is tied to robot3 only"), "{}", run.reason("robot4"));
+    let accepted: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.alignment.accepted).collect();
+    assert_eq!(accepted, [false, false, false, true]);
+}
+
+#[test]
+fn a_wrong_alignment_is_left_out_when_the_others_agree() {
+    let mut run = Run::new(None);
+    for a in 1..=4 {
+        (a + 1..=4).for_each(|b| run.align(&between(a, b)));
+    }
+    let mut wrong = between(1, 3);
+    wrong.yaw += 1.5;
+    run.align(&wrong);
+    for robot in 2..=4 {
+        assert!(is_near(&run.pose_of(&format!("robot{robot}")).unwrap(), &place(robot), 1e-6));
+    }
+    let (left_out, others): (Vec<Verdict>, Vec<Verdict>) =
+        run.verdicts().into_iter().partition(|verdict| !verdict.alignment.accepted);
+    assert_eq!((left_out.len(), others.len()), (1, 5));
+    let left_out = &left_out[0].alignment;
+    assert_eq!((left_out.a.as_str(), left_out.b.as_str(), left_out.yaw), ("robot1", "robot3", wrong.yaw));
+    assert!(left_out.reason.contains("contradicts"), "{}", left_out.reason);
+}
+
+#[test]
+fn a_certain_alignment_counts_for_more() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    run.align(&between(2, 3));
+    let mut vague = between(1, 3);
+    vague.x += 0.5;
+    vague.covariance = std::array::from_fn(|index| if index % 4 == 0 { 1.0 } else { 0.0 });
+    run.align(&vague);
+    assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 0.02));
+}
+
+#[test]
+fn robots_that_were_sent_stay_until_the_alignments_fit_much_better() {
+    let mut run = Run::new(None);
+    run.align(&between(1, 2));
+    let sent = run.frames().pop().unwrap().frames[1].clone();
+    run.align(&near(1, 2, 0.01));
+    assert!(run.frames().is_empty());
+    run.align(&between(2, 3));
+    let with_another = run.frames().pop().unwrap();
+    assert_eq!(
+        (with_another.frames[1].x, with_another.frames[1].yaw),
+        (sent.x, sent.yaw),
+        "another robot is no reason"
+    );
+    assert_eq!(with_another.frames.len(), 3);
+    run.align(&near(1, 2, 0.3));
+    let moved = run.frames().pop().unwrap();
+    assert!((moved.frames[1].x - sent.x - 0.3).abs() < 1e-9);
+    run.align(&near(1, 2, 0.31));
+    assert!(run.frames().is_empty());
+    run.finish().unwrap();
+    let last = run.frames().pop().unwrap();
+    assert!((last.frames[1].x - sent.x - 0.31).abs() < 1e-9, "the best is sent at the end");
+}
+
+#[test]
+fn robots_tied_to_each_other_only_are_placed_in_a_frame_of_their_own() {
+    let mut run = Run::new(None);
+    (1..=6).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
+    run.align(&between(4, 5));
+    run.align(&between(3, 4));
+    let message = run.frames().pop().unwrap();
+    assert_eq!(message.frames.len(), 1);
+    assert_eq!(message.unmerged.len(), 5);
+    assert_eq!(message.groups.len(), 1);
+    let group = &message.groups[0];
+    assert_eq!(group.reference, "robot4", "the reference stays when another robot joins");
+    let robots: Vec<&str> = group.frames.iter().map(|frame| frame.robot.as_str()).collect();
+    assert_eq!((group.frame_id.as_str(), robots), ("world/robot4", vec!["robot3", "robot4", "robot5"]));
+    for (frame, robot) in group.frames.iter().zip(3..) {
+        assert!(is_near(&frame.transform_reference_robot(), &(place(4).inverse() * place(robot)), 1e-9));
+    }
+    run.align(&between(1, 5));
+    assert!(run.latest().unwrap().groups.is_empty());
+    assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 1e-9));
+}
+
+#[test]
+fn an_alignment_in_no_cycle_is_not_checked() {
+    let mut run = Run::new(None);
+    [between(1, 2), between(1, 3), between(2, 3), between(3, 4)].iter().for_each(|alignment| run.align(alignment));
+    run.align(&refused("robot1", "robot4", 0.0, "no tags in common"));
+    let checked: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.checked).collect();
+    assert_eq!(checked, [true, true, false, true, false]);
+}
+
+#[test]
+fn robots_are_placed_right_in_spite_of_wrong_alignments() {
+    let team = Team::new(10, 5, 7).with_mistakes(0.1);
+    let mut run = Run::new(None);
+    (0..team.edges.len()).for_each(|index| run.align(&team.alignment(index)));
+    let placed: Vec<(usize, Pose2)> =
+        (1..10).filter_map(|robot| Some((robot, run.pose_of(&Team::name(robot))?))).collect();
+    assert!(placed.len() >= 8, "{}", placed.len());
+    assert!(placed.iter().all(|(robot, pose)| !team.is_wrong(*robot, pose)));
+}
+
+#[test]
+fn covariances_say_how_far_off_the_frames_are() {
+    let parameters =
+        FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..FrameSolverParameters::default() };
+    let robots = 12;
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for seed in 0..60 {
+        let team = Team::new(robots, 4, seed);
+        let names = (0..robots).map(Team::name).collect();
+        let alignments = (0..team.edges.len()).filter_map(|index| by_name(team.alignment(index))).collect();
+        let solution = solve(&names, &alignments, &Team::name(0), &parameters, &Solution::default());
+        for robot in 1..robots {
+            let Some(frame) = solution.frames.get(&Team::name(robot)) else { continue };
+            let truth = team.places[0].inverse() * team.places[robot];
+            let mut error = error_vector(&frame.pose) - error_vector(&truth);
+            error.z = wrap_angle(error.z);
+            sum += error.dot(&(frame.covariance.try_inverse().unwrap() * error));
+            count += 1.0;
+        }
+    }
+    // The squared error in standard deviations is 3 in the mean if the covariances are right: one for each of x, y and
+    // yaw. The robots of one team are off together, so the mean of 60 teams scatters by about 0.25.
+    let mean = sum / count;
+    assert!((2.3..3.7).contains(&mean), "{mean}");
+}
+
+proptest! {
+    #[test]
+    fn neither_the_order_nor_the_direction_of_alignments_matters(
+        order in Just((0..10usize).collect::<Vec<_>>()).prop_shuffle(),
+        turned in prop::collection::vec(any::<bool>(), 10),
+        noise in prop::collection::vec(-0.02..0.02, 10),
+    ) {
+        let pairs: Vec<(usize, usize)> = (1..=5).flat_map(|a| (a + 1..=5).map(move |b| (a, b))).collect();
+        let alignment = |index: usize, turned: bool| {
+            let (a, b) = pairs[index];
+            let mut alignment = between(a, b);
+            alignment.x += noise[index];
+            alignment.yaw += noise[(index + 3) % 10] / 10.0;
+            if turned {
+                let transform_b_a = crate::merge::frame_solver::UncertainPose {
+                    pose: alignment.transform_a_b(),
+                    covariance: nalgebra::Matrix3::from_row_slice(&alignment.covariance),
+                }.inverse();
+                std::mem::swap(&mut alignment.a, &mut alignment.b);
+                alignment.set_transform_a_b(&transform_b_a.pose);
+                alignment.covariance = crate::shared::geometry::row_by_row(&transform_b_a.covariance);
+            }
+            alignment
+        };
+        let (mut plain, mut mixed) = (Run::new(Some("robot1")), Run::new(Some("robot1")));
+        (0..10).for_each(|index| plain.align(&alignment(index, false)));
+        order.iter().for_each(|&index| mixed.align(&alignment(index, turned[index])));
+        for robot in ["robot1", "robot2", "robot3", "robot4", "robot5"] {
+            let (one, other) = (plain.pose_of(robot).unwrap(), mixed.pose_of(robot).unwrap());
+            prop_assert!(is_near(&one, &other, 1e-7), "{} {} {}", robot, one, other);
+        }
+        // In the same directions it is the same to the last bit.
+        let mut shuffled = Run::new(Some("robot1"));
+        order.iter().for_each(|&index| shuffled.align(&alignment(index, false)));
+        prop_assert_eq!(shuffled.solved().frames, plain.solved().frames);
+        prop_assert_eq!(shuffled.verdicts(), plain.verdicts());
+    }
+
+    #[test]
+    fn a_chain_of_robots_is_recovered(
+        steps in prop::collection::vec((-9.0..9.0, -9.0..9.0, -3.1..3.1), 1..20),
+        reference in 0usize..20,
+    ) {
+        let mut places = vec![Pose2::identity()];
+        for (x, y, yaw) in steps {
+            places.push(places[places.len() - 1] * pose(x, y, yaw));
+        }
+        let name = |robot: usize| format!("robot{robot:02}");
+        let reference = reference.min(places.len() - 1);
+        let mut run = Run::new(Some(&name(reference)));
+        for robot in 1..places.len() {
+            run.align(&accepted(&name(robot - 1), &name(robot), places[robot - 1].inverse() * places[robot]));
+        }
+        for (robot, place) in places.iter().enumerate() {
+            let solved = run.pose_of(&name(robot)).unwrap();
+            prop_assert!(is_near(&solved, &(places[reference].inverse() * place), 1e-7));
+        }
+    }
+}

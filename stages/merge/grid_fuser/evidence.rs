@@ -1,0 +1,250 @@
+//! Cell values as log-odds, their sum, and how far they contradict each other.
+//!
+//! A cell's value v stands for the probability v / 100, cut to a lower and an upper bound; its log-odds are
+//! `ln(p / (1 - p))`. Log-odds of several maps add. Unknown cells say nothing. The sum, cut to the log-odds of the two
+//! bounds, becomes a probability again and that a value, where the bounds themselves stand for 0 and 100. A cell that
+//! one map alone knows keeps its value.
+//!
+//! What the maps say for a cell being occupied and what they say for its being free are added apart, so that it shows
+//! where they contradict each other: the sum alone does not tell two maps that are sure of the opposite from two that
+//! know nothing for sure.
+//!
+//! The log-odds are whole numbers of a small unit, so that the sums do not depend on the order of the maps.
+
+use crate::shared::geometry::UNKNOWN;
+
+/// Steps of the whole-number log-odds for one unit of the natural logarithm.
+const STEPS: f64 = 256.0;
+/// The log-odds of one map are within this. No probability below 1 - 1e-15 comes near it.
+const MOST_STEPS: f64 = 16_384.0;
+
+/// The tables that turn values into log-odds and back.
+#[derive(Clone, Debug)]
+pub struct EvidenceTable {
+    /// What a map's cell says, by its value as an unsigned byte.
+    of_value: Box<[Evidence; 256]>,
+    /// The value for every sum from the lowest to the highest.
+    values: Vec<i8>,
+    /// The log-odds of the two bounds, in steps: the most that one map can say for a cell being free, below 0, and for its
+    /// being occupied.
+    lowest: i32,
+    highest: i32,
+}
+
+impl EvidenceTable {
+    /// Tables for probabilities cut to `[min_probability, max_probability]`, which must hold one half.
+    pub fn new(min_probability: f64, max_probability: f64) -> Self {
+        let steps = |probability: f64| {
+            let cut = probability.max(min_probability).min(max_probability);
+            (STEPS * (cut / (1.0 - cut)).ln()).round().clamp(-MOST_STEPS, MOST_STEPS) as i32
+        };
+        let (lowest, highest) = (steps(0.0), steps(1.0));
+        let value = |sum: i32| match sum {
+            _ if sum <= lowest => 0,
+            _ if sum >= highest => 100,
+            _ => (100.0 / (1.0 + (-f64::from(sum) / STEPS).exp())).round() as i8,
+        };
+        let of_value = |byte: usize| match u32::try_from(byte) {
+            Ok(value @ 0..=100) => Evidence::of_one_map(value, steps(f64::from(value) / 100.0)),
+            _ => Evidence::NONE,
+        };
+        Self {
+            of_value: Box::new(std::array::from_fn(of_value)),
+            values: (lowest..=highest.max(lowest)).map(value).collect(),
+            lowest,
+            highest,
+        }
+    }
+
+    /// Adds what a map says of a cell. Values that are none, such as -1, say nothing.
+    pub fn add(&self, cell: &mut Evidence, value: i8) {
+        *cell = cell.plus(self.of_value[usize::from(value.cast_unsigned())]);
+    }
+
+    /// The value that the evidence amounts to.
+    pub fn value(&self, cell: Evidence) -> i8 {
+        match cell.maps {
+            0 => UNKNOWN,
+            1 => cell.values as i8,
+            _ => {
+                let sum = i64::from(cell.occupied) - i64::from(cell.free);
+                let place = (sum - i64::from(self.lowest)).clamp(0, self.values.len() as i64 - 1);
+                self.values[place as usize]
+            }
+        }
+    }
+
+    /// How far the maps contradict each other: unknown where fewer than two know the cell, 0 where all that say
+    /// something say the same, and up to 100.
+    ///
+    /// The log-odds for occupied and those for free are taken as shares of the most that one map can say for each (its
+    /// bound), no more than 1. The smaller share counts, in percent. So 100 is where maps that are as sure as one can be
+    /// stand on both sides, and what hardly says anything hardly contradicts anything.
+    pub fn conflict(&self, cell: Evidence) -> i8 {
+        match cell {
+            Evidence { maps: 0 | 1, .. } => UNKNOWN,
+            Evidence { occupied: 0, .. } | Evidence { free: 0, .. } => 0,
+            Evidence { occupied, free, .. } => {
+                percent(occupied, self.highest.unsigned_abs()).min(percent(free, self.lowest.unsigned_abs()))
+            }
+        }
+    }
+}
+
+/// A sum as a share of the most that one map can say, no more than 1, in percent.
+fn percent(sum: u32, most: u32) -> i8 {
+    let most = most.max(1);
+    ((100 * sum.min(most) + most / 2) / most) as i8
+}
+
+/// What the maps say of one cell so far. All are sums over the maps, so that no order matters, and nothing is asked when
+/// a map is added; those of 200,000 maps fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Evidence {
+    /// Log-odds for the cell being occupied, in steps.
+    occupied: u32,
+    /// Log-odds for its being free.
+    free: u32,
+    /// How many maps know it.
+    maps: u32,
+    /// Their values: where one map knows it, its value.
+    values: u32,
+}
+
+impl Evidence {
+    /// No map knows the cell.
+    pub const NONE: Self = Self { occupied: 0, free: 0, maps: 0, values: 0 };
+
+    /// One map knows it: its value, and that in log-odds, above 0 for occupied and below for free.
+    fn of_one_map(value: u32, log_odds: i32) -> Self {
+        let occupied = log_odds.max(0).unsigned_abs();
+        Self { occupied, free: log_odds.min(0).unsigned_abs(), maps: 1, values: value }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            occupied: self.occupied.wrapping_add(other.occupied),
+            free: self.free.wrapping_add(other.free),
+            maps: self.maps.wrapping_add(other.maps),
+            values: self.values.wrapping_add(other.values),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::{is_free, is_occupied};
+    use proptest::prelude::*;
+
+    fn table() -> EvidenceTable {
+        EvidenceTable::new(0.1192, 0.971)
+    }
+
+    fn fuse(values: &[i8]) -> i8 {
+        let table = table();
+        let mut cell = Evidence::NONE;
+        values.iter().for_each(|&value| table.add(&mut cell, value));
+        table.value(cell)
+    }
+
+    fn conflict(values: &[i8]) -> i8 {
+        let table = table();
+        let mut cell = Evidence::NONE;
+        values.iter().for_each(|&value| table.add(&mut cell, value));
+        table.conflict(cell)
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_of_the_maps_does_not_matter(mut values in prop::collection::vec(-1i8..=100, 0..9)) {
+            let fused = (fuse(&values), conflict(&values));
+            values.sort_unstable();
+            prop_assert_eq!((fuse(&values), conflict(&values)), fused);
+            values.reverse();
+            prop_assert_eq!((fuse(&values), conflict(&values)), fused);
+        }
+
+        #[test]
+        fn what_two_maps_say_is_in_conflict_if_it_lies_on_both_sides_of_one_half(one in 0i8..=100, other in 0i8..=100) {
+            let is_within = (0..=100).contains(&conflict(&[one, other]));
+            prop_assert!(is_within);
+            let is_split = (one < 50 && other > 50) || (one > 50 && other < 50);
+            prop_assert!(is_split || conflict(&[one, other]) == 0);
+            prop_assert!(!((one < 48 && other > 52) || (one > 52 && other < 48)) || conflict(&[one, other]) > 0);
+        }
+
+        #[test]
+        fn another_map_takes_no_conflict_away(values in prop::collection::vec(0i8..=100, 2..6), more in -1i8..=100) {
+            let all = [values.clone(), vec![more]].concat();
+            prop_assert!(conflict(&all) >= conflict(&values));
+        }
+
+        #[test]
+        fn fewer_than_two_maps_are_in_no_conflict(value in 0i8..=100) {
+            prop_assert_eq!(conflict(&[]), -1);
+            prop_assert_eq!(conflict(&[value, -1]), -1);
+        }
+
+        #[test]
+        fn unknown_says_nothing(value in -128i8..=127) {
+            let known = if (0..=100).contains(&value) { value } else { -1 };
+            prop_assert_eq!(fuse(&[value]), known);
+            prop_assert_eq!(fuse(&[-1, value, -1, 101, -128]), known);
+        }
+
+        #[test]
+        fn a_map_fused_with_itself_keeps_its_classes(value in 0i8..=100) {
+            let fused = fuse(&[value, value]);
+            prop_assert!(!is_occupied(value) || is_occupied(fused));
+            prop_assert!(!is_free(value) || is_free(fused));
+        }
+    }
+
+    #[test]
+    fn evidence_adds() {
+        assert_eq!(fuse(&[70, 70]), 84);
+        assert_eq!(fuse(&[30, 30]), 16);
+        assert_eq!(fuse(&[50, 80]), 80);
+        assert_eq!(fuse(&[70, 30]), 50);
+        assert_eq!(fuse(&[100, 100]), 100);
+        assert_eq!(fuse(&[0, 0, 0]), 0);
+    }
+
+    #[test]
+    fn one_wall_outweighs_one_free_cell_but_not_two() {
+        assert!(is_occupied(fuse(&[100, 0])));
+        assert!(!is_occupied(fuse(&[100, 0, 0])));
+        assert!(is_free(fuse(&[100, 0, 0, 0])));
+    }
+
+    #[test]
+    fn a_conflict_is_as_strong_as_the_weaker_side() {
+        assert_eq!(conflict(&[100, 0]), 100);
+        assert_eq!(conflict(&[100, 100]), 0);
+        assert_eq!(conflict(&[50, 100]), 0);
+        // ln(0.7 / 0.3) of ln(0.971 / 0.029), though 0 could say more.
+        assert_eq!(conflict(&[70, 0]), 24);
+        assert_eq!(conflict(&[70, 70, 0]), 48);
+        // ln(0.7 / 0.3) of ln(0.8808 / 0.1192).
+        assert_eq!(conflict(&[30, 100]), 42);
+    }
+
+    #[test]
+    fn any_number_of_maps_can_be_added() {
+        assert_eq!(fuse(&[100; 5000]), 100);
+        assert_eq!(fuse(&[0; 5000]), 0);
+        assert_eq!(conflict(&[[0; 5000], [100; 5000]].concat()), 100);
+    }
+
+    #[test]
+    fn bounds_that_are_no_probabilities_do_no_harm() {
+        for (low, high) in [(f64::NAN, 0.9), (0.0, 1.0), (0.9, 0.1), (-1.0, 2.0)] {
+            let table = EvidenceTable::new(low, high);
+            let mut cell = Evidence::NONE;
+            (0..=100).for_each(|value| table.add(&mut cell, value));
+            let _ = table.value(cell);
+            assert!((0..=100).contains(&table.conflict(cell)));
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! How large the fused grid is, and where its cells lie.
+
+use super::{KnownArea, PlacedGrid};
+use crate::shared::geometry::{GridGeometry, Point2, most_cells_over, pose};
+
+/// A rectangle along the world's axes, in cells of the fused grid, counted from the anchor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extent {
+    low: Point2,
+    high: Point2,
+}
+
+/// The lattice that the fused grid's cells lie on, and its limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Lattice {
+    /// A corner of a cell, metres in the world: that of the reference robot's map, so that its cells fall on cells of
+    /// the fused map.
+    pub anchor: Point2,
+    /// Metres a cell.
+    pub resolution: f64,
+    /// The longest side that a grid may have, metres.
+    pub max_extent: f64,
+    /// The most cells that a grid may have.
+    pub max_cells: u64,
+}
+
+/// Where the fused cells lie, and which maps take part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// The fused grid in the world: along its axes, cropped to what is known. `None` if nothing is.
+    pub geometry: Option<GridGeometry>,
+    /// For every map, whether it is part of it.
+    pub takes_part: Vec<Result<(), LeftOut>>,
+}
+
+/// Why a map is no part of the fused grid.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LeftOut {
+    /// Its pose is no finite number.
+    #[error("where it lies is no finite number")]
+    NotFinite,
+    /// The grid would be longer than a side may be.
+    #[error("it lies so far away that the fused map would be longer than `max_extent`, {0} m; {DOUBT}")]
+    TooLong(f64),
+    /// The grid would have more cells than it may have.
+    #[error("the fused map would have more cells than `max_cells`, {0}; {DOUBT}")]
+    TooManyCells(u64),
+    /// The grid would be all but unknown.
+    #[error("it lies so far away that next to nothing of the fused map would be known; {DOUBT}")]
+    Unknown,
+}
+
+/// What puts a map far away, other than a wrong merge.
+const DOUBT: &str = "does the origin of each map fit the poses of its robot?";
+
+/// Lays out the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left out.
+pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
+    let mut layout = Layout { geometry: None, takes_part: Vec::with_capacity(maps.len()) };
+    let (mut whole, mut known): (Option<Extent>, f64) = (None, 0.0);
+    for (map, area) in maps {
+        let fits = extent(map, area, lattice).and_then(|extent| {
+            let Some(extent) = extent else { return Ok(()) };
+            let cells = area.cell_count() as f64 * (map.grid.geometry.resolution / lattice.resolution).powi(2);
+            let joined = whole.map_or(extent, |whole| whole.joined(&extent));
+            layout.geometry = Some(lattice.geometry(&joined, known + cells)?);
+            (whole, known) = (Some(joined), known + cells);
+            Ok(())
+        });
+        layout.takes_part.push(fits);
+    }
+    layout
+}
+
+/// The rectangle that holds what is known of a map, if anything is.
+fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, LeftOut> {
+    let mut extent: Option<Extent> = None;
+    for corner in area.corners() {
+        let in_cells = Point2::from((map.in_world(&corner) - lattice.anchor) / lattice.resolution);
+        if !in_cells.coords.iter().all(|value| value.is_finite()) {
+            return Err(LeftOut::NotFinite);
+        }
+        let corner = Extent { low: in_cells, high: in_cells };
+        extent = Some(extent.map_or(corner, |extent| extent.joined(&corner)));
+    }
+    Ok(extent)
+}
+
+impl Extent {
+    fn joined(&self, other: &Self) -> Self {
+        Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
+    }
+}
+
+impl Lattice {
+    /// The grid of the cells whose centres lie within the extent, about `known` of which are known.
+    fn geometry(&self, extent: &Extent, known: f64) -> Result<GridGeometry, LeftOut> {
+        let (left, width) = self.cells(extent.low.x, extent.high.x)?;
+        let (bottom, height) = self.cells(extent.low.y, extent.high.y)?;
+        let cells = width as f64 * height as f64;
+        if cells > self.max_cells as f64 {
+            return Err(LeftOut::TooManyCells(self.max_cells));
+        }
+        if cells > most_cells_over(known) {
+            return Err(LeftOut::Unknown);
+        }
+        let corner = self.anchor + nalgebra::Vector2::new(left, bottom) * self.resolution;
+        let origin = pose(corner.x, corner.y, 0.0);
+        Ok(GridGeometry { width, height, resolution: self.resolution, origin })
+    }
+
+    /// The first cell and the number of cells on one axis.
+    fn cells(&self, low: f64, high: f64) -> Result<(f64, usize), LeftOut> {
+        // The extent's ends lie on the borders of cells, mostly; centres are half a cell away from rounding errors.
+        let (mut first, mut behind) = ((low - 0.5).ceil(), (high - 0.5).floor() + 1.0);
+        if behind <= first {
+            (first, behind) = (low.floor(), low.floor() + 1.0);
+        }
+        let count = behind - first;
+        let fits = count * self.resolution <= self.max_extent && count < f64::from(u32::MAX);
+        if fits { Ok((first, count as usize)) } else { Err(LeftOut::TooLong(self.max_extent)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::{Cell, Grid, Pose2};
+    use proptest::prelude::*;
+
+    const LATTICE: Lattice =
+        Lattice { anchor: Point2::new(-1.3, 2.7), resolution: 0.05, max_extent: 100.0, max_cells: 1_000_000 };
+
+    fn geometry(width: usize, height: usize) -> GridGeometry {
+        GridGeometry { width, height, resolution: 0.05, origin: pose(-1.3, 2.7, 0.0) }
+    }
+
+    fn grid(cells: &[i8]) -> Grid<'_> {
+        Grid::new(geometry(6, cells.len() / 6), cells).unwrap()
+    }
+
+    fn lay_out_at(grid: Grid<'_>, poses: &[Pose2]) -> Layout {
+        let area = KnownArea::of(&grid);
+        let maps: Vec<_> =
+            poses.iter().map(|&transform_world_map| (PlacedGrid::rigid(grid, transform_world_map), &area)).collect();
+        lay_out(&maps, &LATTICE)
+    }
+
+    #[rustfmt::skip]
+    const CELLS: [i8; 24] = [
+        -1, -1, -1, -1, -1, -1,
+        -1, -1,  0, 50, -1, -1,
+        -1,  0, -1, -1, -1, -1,
+        -1, -1, -1, -1, -1, -1,
+    ];
+
+    #[test]
+    fn the_grid_is_cropped_and_lies_on_the_reference_cells() {
+        let layout = lay_out_at(grid(&CELLS), &[Pose2::identity()]);
+        let laid = layout.geometry.unwrap();
+        assert_eq!((laid.width, laid.height), (3, 2));
+        let (mine, theirs) =
+            (laid.centre(Cell { column: 0, row: 0 }), geometry(6, 4).centre(Cell { column: 1, row: 1 }));
+        assert!((mine - theirs).norm() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_known_gives_no_grid() {
+        assert_eq!(lay_out_at(grid(&[-1; 24]), &[Pose2::identity()]).geometry, None);
+        assert_eq!(lay_out(&[], &LATTICE).geometry, None);
+    }
+
+    #[test]
+    fn absurd_poses_are_left_out() {
+        let absurd =
+            [pose(f64::NAN, 0.0, 0.0), pose(f64::INFINITY, 0.0, 0.0), pose(3e3, 0.0, 0.0), pose(1e300, 0.0, 0.0)];
+        for bad in absurd {
+            let layout = lay_out_at(grid(&CELLS), &[Pose2::identity(), bad, pose(1.0, 0.0, 0.3)]);
+            assert_eq!(layout.takes_part.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true], "{bad:?}");
+            assert!(layout.geometry.unwrap().width < 40);
+        }
+        let many_cells = lay_out_at(grid(&CELLS), &[Pose2::identity(), pose(60.0, 60.0, 0.0)]);
+        let too_many = Err(LeftOut::TooManyCells(1_000_000));
+        assert_eq!(many_cells.takes_part, [Ok(()), too_many], "1200 x 1200 cells are more than a million");
+    }
+
+    #[test]
+    fn the_grid_goes_with_what_is_known_and_not_with_how_far_apart_it_lies() {
+        let lattice = Lattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
+        let known = vec![0; 6 * 4];
+        let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
+        let at = |x: f64, y: f64| (PlacedGrid::rigid(grid, pose(x, y, 0.0)), &area);
+        let layout = lay_out(&[at(0.0, 0.0), at(300.0, 300.0), at(150.0, 150.0)], &lattice);
+        assert_eq!(layout.takes_part, [Ok(()), Err(LeftOut::Unknown), Ok(())]);
+        assert!(layout.geometry.unwrap().cell_count() < 10_000_000);
+    }
+
+    proptest! {
+        #[test]
+        fn every_known_cell_lies_on_the_grid(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
+            let transform_world_map = pose(x, y, yaw);
+            let laid = lay_out_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
+            for cell in [Cell { column: 2, row: 1 }, Cell { column: 3, row: 1 }, Cell { column: 1, row: 2 }] {
+                let centre = transform_world_map * geometry(6, 4).centre(cell);
+                prop_assert!(laid.cell(&centre).is_some());
+            }
+        }
+    }
+}

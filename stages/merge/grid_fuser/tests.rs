@@ -1,0 +1,275 @@
+//! The stage from outside.
+
+use super::kind;
+use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
+use gridweave_runtime::ros::{
+    DeformationNode, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
+    UnmergedRobot, encode,
+};
+use gridweave_runtime::stage::{Context, LoneStage, OutputEnd, OutputSink, StageError};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+const TIME: LogTime = LogTime(7_000_000_001);
+
+/// Width, height and cells.
+type Fused = (u32, u32, Vec<i8>);
+
+struct Run(LoneStage);
+
+impl Run {
+    fn new(parameters: &str) -> Self {
+        Self(LoneStage::new(&kind(), parameters).unwrap())
+    }
+
+    /// Gives a map and takes the fused maps that it caused.
+    fn map(&mut self, robot: &str, x: f64, cells: &[i8]) -> Vec<Fused> {
+        self.0.give_bytes("map", robot, TIME, map(x, cells)).unwrap();
+        self.fused()
+    }
+
+    /// The same of frames.
+    fn frames(&mut self, placed: &[(&str, f64)]) -> Vec<Fused> {
+        self.0.give::<RobotFrames>("frames", "", TIME, &frames(placed)).unwrap();
+        self.fused()
+    }
+
+    /// The same of a bend, which displaces the map of a robot by `dx` metres about x = 0 and by nothing from x = 8 on.
+    fn bend(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
+        let node = |x: f64, dx: f64| [0.0, 8.0].map(|y| DeformationNode { x, y, dx, ..Default::default() });
+        let nodes = [node(0.0, dx), node(8.0, 0.0), node(16.0, 0.0)].concat();
+        let bend = MapDeformation { robot: robot.into(), spacing: 8.0, nodes, ..Default::default() };
+        self.0.give::<MapDeformation>("deformation", robot, TIME, &bend).unwrap();
+        self.fused()
+    }
+
+    fn finish(&mut self) -> Vec<Fused> {
+        self.0.finish(LogTime(9)).unwrap();
+        self.fused()
+    }
+
+    /// What was sent on `conflicts` and `agreement`.
+    fn conflicts(&mut self) -> (Vec<Vec<i8>>, Vec<MapAgreement>) {
+        let read = |message: &Message| {
+            assert_eq!(message.header().topic.as_str(), "/map_conflicts");
+            message.decode::<OccupancyGrid<'_>>().unwrap().cells().to_vec()
+        };
+        let conflicts = self.0.take_messages("conflicts").iter().map(read).collect();
+        (conflicts, self.0.take("agreement").unwrap())
+    }
+
+    fn fused(&mut self) -> Vec<Fused> {
+        let read = |message: &Message| {
+            let grid: OccupancyGrid<'_> = message.decode().unwrap();
+            assert_eq!((message.header().topic.as_str(), grid.header.frame_id.as_str()), ("/map", "world"));
+            (grid.info.width, grid.info.height, grid.cells().to_vec())
+        };
+        self.0.take_messages("map").iter().map(read).collect()
+    }
+}
+
+/// A row of cells of one metre, its corner at x.
+fn map(x: f64, cells: &[i8]) -> Vec<u8> {
+    let origin = Pose::from(crate::shared::geometry::pose(x, 0.0, 0.0));
+    let info = MapMetaData { resolution: 1.0, width: cells.len() as u32, height: 1, origin, ..Default::default() };
+    let data: Vec<u8> = cells.iter().map(|cell| *cell as u8).collect();
+    encode(&OccupancyGrid { info, data: &data, ..Default::default() }).unwrap()
+}
+
+fn frames(placed: &[(&str, f64)]) -> RobotFrames {
+    let frame = |&(robot, x): &(&str, f64)| RobotFrame { robot: robot.into(), x, ..Default::default() };
+    let unmerged = vec![UnmergedRobot { robot: "robot9".into(), reason: "no alignment".into() }];
+    let frames = placed.iter().map(frame).collect();
+    RobotFrames { reference: "robot1".into(), frames, unmerged, ..Default::default() }
+}
+
+#[test]
+fn a_bent_map_is_drawn_as_it_is_bent_in_both_ways_to_carry_cells() {
+    for warp in ["inverse", "forward"] {
+        let mut run = Run::new(&format!("warp = \"{warp}\""));
+        run.map("robot1", 0.0, &[100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
+        let straight = run.frames(&[("robot1", 0.0)]);
+        assert_eq!(straight[0].2, [100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
+        assert!(run.bend("robot1", 2.4).is_empty(), "it waits for its frames");
+        // The left end goes to the right by two cells and the rest follows: the wall beyond the bend stays.
+        let bent = run.frames(&[("robot1", 0.0)]);
+        assert_eq!(bent[0].2.iter().filter(|cell| **cell == 100).count(), 2, "{bent:?}");
+        assert_eq!((bent[0].0, bent[0].2[0], bent[0].2[7]), (9, 100, 100), "{warp}: {bent:?}");
+        assert!(run.bend("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
+    }
+}
+
+#[test]
+fn a_bend_that_no_frames_follow_is_drawn_at_the_end_and_one_that_is_none_is_left_out() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[100, 0, 0]);
+    run.frames(&[("robot1", 0.0)]);
+    run.bend("robot1", f64::NAN);
+    assert_eq!((run.0.warnings().len(), run.finish().len()), (1, 0));
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[100, 0, 0]);
+    run.frames(&[("robot1", 0.0)]);
+    run.bend("robot1", 1.0);
+    assert_eq!(run.finish().len(), 1);
+}
+
+#[test]
+fn maps_are_fused_once_their_robots_are_placed() {
+    let mut run = Run::new("");
+    assert!(run.map("robot1", 0.0, &[0, 100, -1]).is_empty(), "nothing is placed");
+    assert_eq!(run.frames(&[("robot1", 0.0)]), [(2, 1, vec![0, 100])]);
+    assert!(run.map("robot2", 0.0, &[50, 60]).is_empty(), "robot2 is not placed");
+    let fused = run.frames(&[("robot1", 0.0), ("robot2", 3.0)]);
+    assert_eq!(fused, [(5, 1, vec![0, 100, -1, 50, 60])]);
+    assert_eq!(run.map("robot2", 0.0, &[70]), [(4, 1, vec![0, 100, -1, 70])]);
+    assert!(run.finish().is_empty(), "the last state is out");
+}
+
+#[test]
+fn frames_that_hardly_change_wait_for_the_end() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[0]);
+    run.map("robot2", 0.0, &[100]);
+    assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).len(), 1);
+    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).is_empty());
+    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.01)]).is_empty());
+    assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", 1.03)]).len(), 1);
+    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.04)]).is_empty());
+    assert_eq!(run.finish().len(), 1);
+}
+
+#[test]
+fn a_robot_that_is_no_longer_placed_leaves_the_map() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[0]);
+    run.map("robot2", 0.0, &[100]);
+    run.frames(&[("robot1", 0.0), ("robot2", 1.0)]);
+    assert_eq!(run.frames(&[("robot1", 0.0)]), [(1, 1, vec![0])]);
+}
+
+#[test]
+fn a_frame_without_a_map_changes_nothing_until_the_map_comes() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[0]);
+    run.frames(&[("robot1", 0.0)]);
+    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).is_empty());
+    assert_eq!(run.map("robot2", 0.0, &[100]), [(2, 1, vec![0, 100])]);
+}
+
+#[test]
+fn absurd_frames_and_broken_maps_are_warned_of_and_left_out() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[0]);
+    run.map("robot2", 0.0, &[100]);
+    for x in [f64::NAN, f64::INFINITY, -5e4, 1e308] {
+        assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", x)]), [(1, 1, vec![0])]);
+    }
+    assert_eq!(run.0.warnings().values().sum::<u64>(), 4);
+    assert!(run.map("robot1", f64::NAN, &[0]).is_empty());
+    run.0.give_bytes("map", "robot1", TIME, vec![1, 2, 3]).unwrap();
+    run.0.give_bytes("frames", "", TIME, vec![0, 1]).unwrap();
+    assert!(run.fused().is_empty());
+    assert_eq!(run.0.warnings().values().sum::<u64>(), 7);
+}
+
+#[test]
+fn both_warps_give_the_same_where_nothing_is_turned() {
+    for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
+        let mut run = Run::new(parameters);
+        run.map("robot1", -0.5, &[0, 70, -1, 20]);
+        run.map("robot2", 0.0, &[100, -1, 30]);
+        let fused = run.frames(&[("robot1", 0.0), ("robot2", 0.5)]);
+        assert_eq!(fused, [(4, 1, vec![0, 100, -1, 0])], "{parameters}");
+    }
+}
+
+#[test]
+fn conflicts_lie_on_the_cells_of_the_fused_map_and_their_area_is_sent() {
+    for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
+        let mut run = Run::new(parameters);
+        run.map("robot1", 0.0, &[0, 100, 100, -1, 0]);
+        run.map("robot2", 0.0, &[0, 0, 100, 0, 30]);
+        let agreement = |known_to_one, known_to_several, in_conflict| MapAgreement {
+            header: Header::new(TIME, "world"),
+            known_to_one,
+            known_to_several,
+            in_conflict,
+        };
+        run.frames(&[("robot1", 0.0)]);
+        assert_eq!(run.conflicts(), (vec![vec![-1; 5]], vec![agreement(4.0, 0.0, 0.0)]));
+        run.frames(&[("robot1", 0.0), ("robot2", 1.0)]);
+        let expected = (vec![vec![-1, 100, 100, -1, 0, -1]], vec![agreement(3.0, 3.0, 2.0)]);
+        assert_eq!(run.conflicts(), expected, "{parameters}");
+    }
+}
+
+#[derive(Clone, Default)]
+struct List(Rc<RefCell<Vec<Vec<u8>>>>);
+
+impl OutputSink for List {
+    fn send(&mut self, _: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
+        self.0.borrow_mut().push(bytes.to_vec());
+        Ok(())
+    }
+
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
+        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
+        self.send(header, &bytes)
+    }
+}
+
+#[test]
+fn an_output_is_the_same_if_nothing_else_is_read() {
+    let sent = |is_read: [bool; 3]| {
+        let lists = [0; 3].map(|_| List::default());
+        let ends = lists.iter().zip(is_read).map(|(list, is_read)| OutputEnd {
+            sink: is_read.then(|| Box::new(list.clone()) as Box<dyn OutputSink>),
+            ..Default::default()
+        });
+        let mut node = kind().make(toml::Table::new(), &Context::default(), ends.collect()).unwrap();
+        let bytes = encode(&frames(&[("", 0.0)])).unwrap();
+        for (port, bytes) in [(0, map(0.0, &[0, 100])), (2, bytes)] {
+            node.receive(port, &Message::from_vec(MessageHeader::default(), bytes)).unwrap();
+        }
+        lists.map(|list| list.0.take())
+    };
+    let all = sent([true; 3]);
+    assert!(all.iter().all(|messages| messages.len() == 1));
+    for (port, messages) in all.iter().enumerate() {
+        assert_eq!(&sent(std::array::from_fn(|other| other == port))[port], messages);
+    }
+}
+
+#[test]
+fn nothing_is_said_of_a_map_that_is_not_made() {
+    let mut run = Run::new("");
+    run.map("robot1", 0.0, &[-1]);
+    run.frames(&[("robot1", 0.0)]);
+    assert_eq!(run.conflicts(), (Vec::new(), Vec::new()));
+}
+
+#[test]
+fn the_resolution_can_be_given() {
+    let mut run = Run::new("resolution = 0.5");
+    run.map("robot1", 0.0, &[0, 100]);
+    let fused = run.frames(&[("robot1", 0.0)]);
+    assert_eq!(fused, [(4, 2, vec![0, 0, 100, 100, 0, 0, 100, 100])]);
+}
+
+#[test]
+fn empty_maps_give_no_map() {
+    let mut run = Run::new("");
+    assert!(run.finish().is_empty());
+    run.map("robot1", 0.0, &[-1, -1]);
+    run.map("robot2", 0.0, &[]);
+    assert!(run.frames(&[("robot1", 0.0), ("robot2", 0.5)]).is_empty());
+    assert!(run.0.warnings().is_empty());
+}
+
+#[test]
+fn parameters_out_of_range_are_reported() {
+    let bad = "resolution = 0.0\nmax_probability = 1.0\nmin_probability = 0.0\nmin_move = -1.0\nmin_turn = nan\n\
+               max_extent = inf\nmax_cells = 0";
+    assert_eq!(kind().check_parameters(&toml::from_str(bad).unwrap()).unwrap().len(), 7);
+    assert!(kind().check_parameters(&toml::Table::new()).unwrap().is_empty());
+}

@@ -1,0 +1,72 @@
+//! Lays maps on each other by their Hough spectra: Carpin, "Fast and accurate map merging for multi-robot systems", Autonomous
+//! Robots 25 (2008).
+//!
+//! The spectrum of a map says how much its walls run along each direction, wherever they are; so the cross-correlation of two
+//! spectra gives the rotation without the translation, up to half a turn. The translation then comes one axis at a time from
+//! the cross-correlation of the maps' projections. No search goes over all places, which makes it the quickest way to lay
+//! maps on each other without a guess.
+//!
+//! - [`WallCells`]: the occupied cells of a map.
+//! - [`HoughSpectrum`]: `HS(theta)`, and [`rotations`]: the peaks of the circular cross-correlation of two of them.
+//! - [`Projection`]: the X and the Y spectrum, and [`shifts`]: the peaks of the cross-correlation of two of them.
+//! - [`align_spectra`]: all of it. Each place gets its acceptance index.
+//!
+//! Not in the paper: peaks are interpolated between steps; the projections are taken along the main direction of map a's walls;
+//! and every place has a covariance, from the half widths of the three peaks that it stands on. It says how sharp these are,
+//! and nothing of whether the place is the right one.
+//!
+//! There is no verification but the acceptance index: the method merges wrongly where maps agree at a wrong place, as in
+//! buildings whose rooms are alike, and where two robots share little, their projections are mostly of what they do not
+//! share. Where walls run along many directions or along none, the spectra are flat, and the rotation is a guess.
+
+mod align;
+mod parameters;
+mod peak;
+mod rotation;
+mod spectrum;
+#[cfg(test)]
+mod tests;
+mod translation;
+mod wall_cells;
+
+pub use align::align_spectra;
+pub use parameters::HoughSpectrumParameters;
+pub use rotation::{Rotation, correlate_spectra, rotations};
+pub use spectrum::HoughSpectrum;
+pub use translation::{Projection, Shift, project, shifts};
+pub use wall_cells::WallCells;
+
+use crate::published::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
+use crate::registration::search::{NamedMap, SearchRefusal};
+use gridweave_runtime::stage::StageKind;
+
+/// The stage kind `hough_spectrum_aligner`.
+pub fn kind() -> StageKind {
+    StageKind::stage(
+        "hough_spectrum_aligner",
+        "Lays the maps of each pair of robots on each other by their Hough spectra, after Carpin (2008): the cross-correlation of \
+         the spectra gives the rotation, that of the projections on two axes the translation. The place with the best acceptance \
+         index omega is taken if that is high enough; nothing else is checked, so that maps which agree at a wrong place are \
+         merged wrongly.",
+        |parameters: HoughSpectrumParameters, _| Ok(PairAligner::new(parameters)),
+    )
+    .input("map", "The robots' maps.", PairAligner::receive_map)
+    .finish(PairAligner::finish)
+    .build()
+}
+
+impl Method for HoughSpectrumParameters {
+    const NAME: &'static str = "hough_spectrum";
+
+    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<Hypothesis>, SearchRefusal> {
+        align_spectra(a, b, self)
+    }
+
+    fn criterion(&self) -> Criterion {
+        Criterion { min_omega: self.min_omega, min_overlap: self.min_overlap }
+    }
+
+    fn max_hypotheses(&self) -> usize {
+        self.max_hypotheses
+    }
+}

@@ -1,0 +1,187 @@
+//! The stage from outside: messages in, messages out.
+
+use crate::shared::geometry::{Pose2, pose};
+use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::shared::test_world::stage_bench::StageBench;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Header, IcpErrors, MapMetaData, OccupancyGrid};
+
+fn first_guess(transform_a_b: &Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        header: Header::new(LogTime(0), "robot1/map"),
+        a: "robot1".into(),
+        b: "robot2".into(),
+        covariance: [0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.001],
+        score: 0.9,
+        source: "tags".into(),
+        method: "tags".into(),
+        accepted: true,
+        reason: "three tags".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(transform_a_b);
+    alignment
+}
+
+/// West, east, and more of the east.
+fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 18.0, 12.2), drawing(12.0, 6.0, -2.1));
+    let more_of_b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b, more_of_b)
+}
+
+#[test]
+fn a_first_guess_is_refined_once_both_maps_are_there() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = StageBench::new(&super::kind(), "");
+    assert_eq!(bench.give(&first_guess(&(truth * pose(0.1, -0.1, 0.02)))), []);
+    assert_eq!(bench.give_map("robot1", &a), []);
+    let sent = bench.give_map("robot2", &b);
+    let [refined] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(refined.accepted, "{}", refined.reason);
+    assert_eq!(refined.method, "tags+icp");
+    assert_eq!(refined.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert_eq!((refined.score, refined.provisional), (0.9, false), "these are the first guess's");
+    assert!(refined.reason.starts_with("three tags; walls lie within "), "{}", refined.reason);
+    let off = truth.inverse() * refined.transform_a_b();
+    assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
+    assert_eq!(bench.finish(), []);
+    assert_eq!(bench.counted("registrations"), 1);
+}
+
+#[test]
+fn the_error_of_each_iteration_is_told_and_falls() {
+    let (a, b, _) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    bench.give(&first_guess(&(a.transform_to(&b) * pose(0.3, -0.3, 0.03))));
+    let told: Vec<IcpErrors> = bench.stage.take("errors").unwrap();
+    let [IcpErrors { a, b, rank: 0, accepted: true, errors, .. }] = told.as_slice() else { panic!("{told:?}") };
+    assert_eq!((a.as_str(), b.as_str()), ("robot1", "robot2"));
+    let (first, last) = (errors[0], errors[errors.len() - 1]);
+    assert!(errors.len() > 3 && last < 0.5 * first && last < 0.03, "{errors:?}");
+}
+
+#[test]
+fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
+    let (a, b, more_of_b) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    assert_eq!(bench.give(&first_guess(&truth)).len(), 1);
+    assert_eq!(bench.give(&first_guess(&truth)), []);
+    assert_eq!(bench.give(&first_guess(&(truth * pose(0.01, 0.01, 0.001)))), []);
+    assert_eq!(bench.counted("registrations"), 1);
+    assert_eq!(bench.give_map("robot2", &more_of_b).len(), 1);
+    assert_eq!(bench.counted("registrations"), 2);
+    bench.give(&first_guess(&(truth * pose(0.2, 0.0, 0.0))));
+    assert_eq!(bench.counted("registrations"), 3);
+}
+
+#[test]
+fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    bench.give(&first_guess(&truth));
+    let other = Alignment { method: "few tags".into(), ..first_guess(&truth) };
+    let sent = bench.give(&other);
+    assert_eq!(sent.len(), 1);
+    assert_eq!(sent[0].method, "few tags+icp");
+    assert_eq!(bench.counted("registrations"), 1);
+}
+
+#[test]
+fn a_refused_first_guess_passes_through_unchanged() {
+    let mut bench = StageBench::new(&super::kind(), "");
+    let refused = Alignment { accepted: false, reason: "two tags only".into(), ..first_guess(&Pose2::identity()) };
+    assert_eq!(bench.give(&refused), std::slice::from_ref(&refused));
+    assert_eq!(bench.give(&refused), []);
+    assert_eq!(bench.finish(), []);
+}
+
+#[test]
+fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&first_guess(&(truth * pose(60.0, 1.5, 0.5))));
+    assert_eq!(sent.len(), 1);
+    assert!(!sent[0].accepted && sent[0].reason.contains("no walls that lie near each other"), "{sent:?}");
+    assert!(bench.give(&first_guess(&truth))[0].accepted);
+}
+
+#[test]
+fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
+    let (a, ..) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give(&first_guess(&Pose2::identity()));
+    let sent = bench.finish();
+    assert_eq!(sent.len(), 1);
+    assert!(!sent[0].accepted);
+    assert!(sent[0].reason.contains("robot2"), "{}", sent[0].reason);
+}
+
+#[test]
+fn what_is_no_map_or_no_transform_is_warned_of() {
+    let (a, b, _) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    let info = MapMetaData { resolution: f32::NAN, width: 2, height: 2, ..Default::default() };
+    bench.give_grid("robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    let info = MapMetaData { resolution: 0.05, width: 2, height: 3, ..Default::default() };
+    bench.give_grid("robot1", &OccupancyGrid { info, data: &[0; 4], ..Default::default() });
+    bench.stage.give_bytes("map", "robot1", LogTime(9), vec![0, 1, 0, 0]).unwrap();
+    bench.give(&Alignment { x: f64::NAN, ..first_guess(&Pose2::identity()) });
+    assert_eq!(bench.stage.warnings().values().sum::<u64>(), 4, "{:?}", bench.stage.warnings());
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&first_guess(&a.transform_to(&b)));
+    assert!(sent[0].accepted, "the last good map stays");
+}
+
+#[test]
+fn ranked_guesses_are_refined_and_sent_together() {
+    let (a, b, more_of_b) = maps();
+    let truth = a.transform_to(&b);
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let ranked =
+        |rank: u32, place: &Pose2| Alignment { rank, hypotheses: 2, source: "maps".into(), ..first_guess(place) };
+    assert_eq!(bench.give(&ranked(0, &truth)), []);
+    let sent = bench.give(&ranked(1, &(truth * pose(2.0, 1.5, 0.5))));
+    assert_eq!(sent.iter().map(|one| (one.rank, one.hypotheses)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);
+    assert_eq!(bench.give_map("robot2", &more_of_b).len(), 2, "both, though one may have stayed as it was");
+    assert_eq!(bench.give(&ranked(1, &truth)), [], "the first is missing");
+    assert_eq!(bench.stage.warnings().len(), 1);
+}
+
+#[test]
+fn where_a_search_leaves_the_place_open_registration_does_not_fix_it() {
+    let (a, b, _) = maps();
+    let truth = a.transform_to(&b);
+    let found = |along: f64, method: &str| {
+        let mut bench = StageBench::new(&super::kind(), "");
+        bench.give_map("robot1", &a);
+        bench.give_map("robot2", &b);
+        let mut covariance = [0.0; 9];
+        (covariance[0], covariance[4], covariance[8]) = (along * along, 0.01, 1e-4);
+        let (source, method) = ("maps".into(), method.into());
+        let guess = Alignment { hypotheses: 1, source, method, covariance, ..first_guess(&truth) };
+        bench.give(&guess).remove(0)
+    };
+    let open = found(4.0, "maps");
+    assert!(!open.accepted && open.reason.contains("bare corridor"), "{}", open.reason);
+    assert!(found(0.05, "maps").accepted);
+    assert!(found(4.0, "hough_spectrum").accepted, "there it tells how rough the guess is");
+}

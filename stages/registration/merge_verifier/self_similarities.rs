@@ -1,0 +1,81 @@
+//! What is kept of where the maps of robots look like themselves, so that not every map is searched for it.
+
+use crate::registration::comparison::MapView;
+use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
+use crate::registration::place_window::PlaceWindow;
+use crate::shared::geometry::is_known;
+use crate::shared::robot_pair::RobotPair;
+use std::collections::BTreeMap;
+
+/// What was found in a map holds for others of the robot until as large a share of its known area is new, or is gone.
+const LITTLE_CHANGE: f64 = 0.2;
+
+/// What was found in maps of robots, by robot.
+#[derive(Debug, Default)]
+pub(super) struct SelfSimilarities(BTreeMap<String, Searched>);
+
+#[derive(Debug)]
+struct Searched {
+    /// The number of the map among those of its robot.
+    number: u64,
+    /// How many of its cells are known.
+    known_cells: usize,
+    found: SelfSimilarity,
+}
+
+impl SelfSimilarities {
+    /// The likeliest alias of a place that was accepted by the walls of two maps, which are searched if that is due. Each map comes with
+    /// its number among those of its robot.
+    pub(super) fn alias(
+        &mut self,
+        verdict: &Verdict,
+        pair: &RobotPair,
+        (a, b): ((u64, &MapView<'_>), (u64, &MapView<'_>)),
+        window: Option<&PlaceWindow>,
+        parameters: &JudgementParameters,
+    ) -> Option<Alias> {
+        self.search(&pair.a, a, parameters);
+        self.search(&pair.b, b, parameters);
+        let (of_a, of_b) = (self.0.get(&pair.a)?, self.0.get(&pair.b)?);
+        Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters)
+    }
+
+    /// Searches a map of a robot if nothing that is known of others of it holds.
+    fn search(&mut self, robot: &str, (number, map): (u64, &MapView<'_>), parameters: &JudgementParameters) {
+        let known_cells = map.grid.cells.iter().filter(|value| is_known(**value)).count();
+        let holds = |searched: &Searched| {
+            searched.known_cells.abs_diff(known_cells) as f64 <= LITTLE_CHANGE * searched.known_cells as f64
+        };
+        if !self.0.get(robot).is_some_and(holds) {
+            let found = SelfSimilarity::new(map, parameters);
+            self.0.insert(robot.to_owned(), Searched { number, known_cells, found });
+        }
+    }
+
+    /// Forgets what was found in a map that was not the last of its robot, of which `last` gives the number. The robots whose it was.
+    pub(super) fn forget_former(&mut self, last: impl Fn(&str) -> Option<u64>) -> Vec<String> {
+        self.0.extract_if(.., |robot, searched| last(robot) != Some(searched.number)).map(|(robot, _)| robot).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
+
+    #[test]
+    fn a_map_is_searched_again_once_much_of_it_is_new_and_at_the_end() {
+        let up_to = |x: f64| FloorPlan::hall().draw(seen(-0.2, -0.2, x, 12.2), drawing(3.0, 2.0, 0.4));
+        let parameters = JudgementParameters::default();
+        let mut kept = SelfSimilarities::default();
+        for (number, map, searched) in
+            [(0, up_to(10.0), 0), (1, up_to(11.0), 0), (2, up_to(14.0), 2), (3, up_to(15.0), 2)]
+        {
+            kept.search("robot1", (number, &map.view()), &parameters);
+            assert_eq!(kept.0["robot1"].number, searched, "map {number}");
+        }
+        assert_eq!(kept.forget_former(|_| Some(2)), Vec::<String>::new());
+        assert_eq!(kept.forget_former(|robot| (robot == "robot1").then_some(3)), ["robot1"]);
+        assert!(kept.0.is_empty());
+    }
+}

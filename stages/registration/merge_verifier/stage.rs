@@ -1,0 +1,267 @@
+//! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
+
+use super::knowledge::{Knowledge, by_initial_poses};
+use super::place_searches::PlaceSearches;
+use super::self_similarities::SelfSimilarities;
+use crate::registration::Hypothesis;
+use crate::registration::comparison::{Agreement, Deformed, MapView};
+use crate::registration::hypotheses::{HypothesisGatherer, Origin};
+use crate::registration::judgement::{JudgementParameters, Verdict, judge};
+use crate::shared::geometry::row_by_row;
+use crate::shared::robot_maps::{RobotMap, RobotMaps};
+use crate::shared::robot_pair::RobotPair;
+use crate::shared::walls::{NORMAL_RADIUS, WallsOnDemand};
+use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
+use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
+use nalgebra::Matrix3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the stage sends.
+pub(super) struct Judgements {
+    alignment: Out<Alignment>,
+    evidence: Out<Evidence>,
+}
+
+impl Outputs for Judgements {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        Self {
+            alignment: ports.output(
+                "alignment",
+                "One alignment for each pair of robots, accepted or refused; its score is the probability that it is right.",
+            ),
+            evidence: ports.side_output(
+                "evidence",
+                "What the maps say of the place that was judged for each pair of robots, and of the best of other places.",
+            ),
+        }
+    }
+}
+
+/// Judges the alignments of pairs of robots.
+pub(super) struct MergeVerifier {
+    /// The stage's name, as the user may set its parameters.
+    name: String,
+    parameters: JudgementParameters,
+    knowledge: Knowledge,
+    maps: RobotMaps<WallsOnDemand>,
+    gatherer: HypothesisGatherer,
+    hypotheses: BTreeMap<Origin, Vec<Alignment>>,
+    /// Where else the maps fit, of pairs for which nobody else has looked.
+    place_searches: PlaceSearches,
+    /// Where maps that were accepted by their walls alone look like themselves.
+    self_similarities: SelfSimilarities,
+    sent: BTreeMap<RobotPair, Alignment>,
+    /// What was sent last of what the maps say, without headers.
+    evidence: BTreeMap<RobotPair, Evidence>,
+}
+
+impl MergeVerifier {
+    pub(super) fn new(parameters: JudgementParameters, context: &Context) -> Self {
+        Self {
+            name: context.stage.clone(),
+            knowledge: Knowledge::new(&parameters, context),
+            parameters,
+            maps: RobotMaps::default(),
+            gatherer: HypothesisGatherer::default(),
+            hypotheses: BTreeMap::new(),
+            place_searches: PlaceSearches::default(),
+            self_similarities: SelfSimilarities::default(),
+            sent: BTreeMap::new(),
+            evidence: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn receive_map(
+        &mut self,
+        map: Received<'_, OccupancyGrid<'_>>,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
+        if !self.maps.keep(&map, output, |_| WallsOnDemand::new()) {
+            return Ok(());
+        }
+        let pairs: BTreeSet<RobotPair> = self.pairs().filter(|pair| pair.concerns(map.robot())).cloned().collect();
+        pairs.iter().try_for_each(|pair| self.update(pair, output))
+    }
+
+    pub(super) fn receive_alignment(
+        &mut self,
+        alignment: Received<'_, Alignment>,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
+        match self.gatherer.add(alignment.into_content()) {
+            Ok(None) => Ok(()),
+            Ok(Some((origin, hypotheses))) => {
+                let pair = origin.pair.clone();
+                self.hypotheses.insert(origin, hypotheses);
+                self.update(&pair, output)
+            }
+            Err(missing) => {
+                output.warn(missing.to_string());
+                Ok(())
+            }
+        }
+    }
+
+    /// What was accepted is judged once more if the maps have changed since they were searched for places that look alike. And a pair
+    /// that waits for a map to the end is refused, so that it does not go missing.
+    pub(super) fn finish(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
+        let changed = self.self_similarities.forget_former(|robot| self.maps.get(robot).map(|map| map.number));
+        let is_concerned = |pair: &&RobotPair| changed.iter().any(|robot| pair.concerns(robot));
+        let concerned: BTreeSet<RobotPair> = self.pairs().filter(is_concerned).cloned().collect();
+        concerned.iter().try_for_each(|pair| self.update(pair, output))?;
+        let pairs: BTreeSet<RobotPair> = self.pairs().cloned().collect();
+        for pair in pairs {
+            let Some(missing) = self.maps.missing(&pair) else { continue };
+            let proposed = proposed(&self.hypotheses, &pair);
+            if proposed.iter().all(|alignment| !alignment.accepted) {
+                continue;
+            }
+            let reason = format!("{missing}, so the alignment cannot be verified");
+            let alignment = Alignment { reason, ..refused(&proposed) };
+            self.send(&pair, alignment, output)?;
+        }
+        self.knowledge.unused().for_each(|unused| output.warn(unused));
+        Ok(())
+    }
+
+    /// The pairs that anything was proposed for, once for each source.
+    fn pairs(&self) -> impl Iterator<Item = &RobotPair> {
+        self.hypotheses.keys().map(|origin| &origin.pair)
+    }
+
+    /// Judges a pair, and sends the outcome and what it went by if they are not what was sent last.
+    fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
+        let known = self.knowledge.of(pair, self.maps.iter().count());
+        let proposed = proposed(&self.hypotheses, pair);
+        let maps = self.maps.pair(pair);
+        if let Some(alignment) = maps.and_then(|(a, _)| by_initial_poses(pair, &known, &a.frame_id)) {
+            return self.send(pair, alignment, output);
+        }
+        if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
+            return Ok(());
+        }
+        let verdict = maps.and_then(|(a, b)| {
+            let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
+            let (view_a, view_b) = (view(a), view(b));
+            let mut verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+            if PlaceSearches::is_due(&hypotheses, &verdict) {
+                let grids = ((a.number, a.grid()), (b.number, b.grid()));
+                hypotheses.extend_from_slice(self.place_searches.of(pair, grids, &known));
+                verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+            }
+            if !verdict.rests_on_maps_alone() {
+                return Some(verdict);
+            }
+            let maps = ((a.number, &view_a), (b.number, &view_b));
+            let alias = self.self_similarities.alias(&verdict, pair, maps, known.window.as_ref(), &self.parameters);
+            Some(verdict.against(alias.as_ref(), &self.parameters))
+        });
+        let judged_of: Vec<&Alignment> = proposed.iter().copied().filter(|one| Hypothesis::of(one).is_some()).collect();
+        let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
+        let (evidence, alignment) = (
+            evidence(verdict, pair, proposed.len()),
+            judged(
+                verdict,
+                &judged_of,
+                &proposed,
+                verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b),
+            ),
+        );
+        if self.evidence.get(pair) != Some(&evidence) {
+            let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
+            output.evidence.send("", &Evidence { header, ..evidence.clone() })?;
+            self.evidence.insert(pair.clone(), evidence);
+        }
+        self.send(pair, alignment, output)
+    }
+
+    fn send(
+        &mut self,
+        pair: &RobotPair,
+        mut alignment: Alignment,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
+        alignment.header = Header::new(output.log_time(), alignment.header.frame_id);
+        if let Some(sent) = self.sent.get_mut(pair) {
+            sent.header = alignment.header.clone();
+            if *sent == alignment {
+                return Ok(());
+            }
+        }
+        output.alignment.send("", &alignment)?;
+        self.sent.insert(pair.clone(), alignment);
+        Ok(())
+    }
+}
+
+/// Everything of all that was proposed that is for a pair, by source and rank.
+fn proposed<'a>(hypotheses: &'a BTreeMap<Origin, Vec<Alignment>>, pair: &RobotPair) -> Vec<&'a Alignment> {
+    let of_pair = hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
+    of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
+}
+
+fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
+    MapView::rigid(map.grid(), map.walls(NORMAL_RADIUS))
+}
+
+/// What a judgement on a pair goes by, of so many hypotheses, without a header.
+fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
+    let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
+    let elsewhere = verdict.rival.as_ref().map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
+    Evidence {
+        header: Header::default(),
+        a: pair.a.clone(),
+        b: pair.b.clone(),
+        hypotheses: hypotheses as u32,
+        overlap,
+        wall_on_wall: inlier_length,
+        wall_on_free: conflict_length,
+        evidence_elsewhere: (elsewhere / evidence.max(1.0)).min(2.0),
+    }
+}
+
+/// The outcome for a pair of which a place was proposed: `judged_of` are the alignments that were judged, in the order of the hypotheses.
+fn judged(verdict: &Verdict, judged_of: &[&Alignment], proposed: &[&Alignment], reason: String) -> Alignment {
+    let accepted = verdict.refusal.is_none();
+    let source = &verdict.candidate.hypothesis.source;
+    let mut alignment = judged_of.get(verdict.candidate.number).map_or_else(Alignment::default, |one| (*one).clone());
+    if let Some(Deformed { transform_a_b, .. }) = &verdict.candidate.deformed {
+        alignment.set_transform_a_b(transform_a_b);
+    }
+    if let Some(covariance) = &verdict.candidate.left_by_deformation {
+        alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
+    }
+    Alignment {
+        accepted,
+        provisional: false,
+        rank: 0,
+        hypotheses: 0,
+        score: verdict.probability,
+        reason: if accepted { reason } else { with_other_sources(reason, source, proposed) },
+        ..alignment
+    }
+}
+
+/// The outcome for a pair of which none was.
+fn refused(proposed: &[&Alignment]) -> Alignment {
+    let Some(first) = proposed.first() else { return Alignment::default() };
+    let reason = with_other_sources(first.reason.clone(), &first.source, proposed);
+    Alignment { accepted: false, provisional: false, rank: 0, hypotheses: 0, reason, ..(*first).clone() }
+}
+
+/// A refusal, with what the other sources have against the pair: whoever reads it wants to know why nothing helped.
+fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> String {
+    let others = proposed.iter().filter(|alignment| alignment.source != source && alignment.rank == 0);
+    let others: Vec<String> =
+        others.map(|other| format!("by the {}: {}", other.source, one_line(&other.reason))).collect();
+    if others.is_empty() {
+        return reason;
+    }
+    // Behind the empty line stands what only those read who ask for it.
+    let gap = if reason.contains("\n\n") { "\n" } else { "\n\n" };
+    format!("{reason}{gap}{}", others.join("\n"))
+}
+
+fn one_line(reason: &str) -> String {
+    reason.split('\n').filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
+}

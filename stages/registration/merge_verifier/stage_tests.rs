@@ -1,0 +1,207 @@
+//! The stage from outside: messages in, messages out.
+
+use crate::shared::geometry::{Pose2, pose};
+use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::shared::test_world::stage_bench::StageBench;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, Evidence, Header};
+use gridweave_runtime::stage::{Context, InitialPose, InitialPoses};
+
+/// West and east.
+fn maps() -> (DrawnMap, DrawnMap) {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    (a, b)
+}
+
+fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
+    let mut alignment = Alignment {
+        header: Header::new(LogTime(0), "robot1/map"),
+        a: "robot1".into(),
+        b: "robot2".into(),
+        covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
+        score: 0.3,
+        source: source.into(),
+        method: source.into(),
+        accepted: true,
+        reason: "somebody says so".into(),
+        ..Default::default()
+    };
+    alignment.set_transform_a_b(transform_a_b);
+    alignment
+}
+
+#[test]
+fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    let truth = a.transform_to(&b);
+    assert_eq!(bench.give(&Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
+    assert_eq!(bench.give_map("robot1", &a), []);
+    let sent = bench.give_map("robot2", &b);
+    let [judged] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(judged.accepted && !judged.provisional, "{}", judged.reason);
+    assert_eq!(judged.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert!(judged.score > 0.9 && judged.transform_a_b() == proposed("tags", &truth).transform_a_b());
+    assert_eq!(bench.give_map("robot2", &b), [], "nothing has changed");
+    let other = FloorPlan::another_office().draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let sent = bench.give_map("robot2", &other);
+    assert!(!sent[0].accepted && sent[0].reason.contains("the maps do not confirm it"), "{}", sent[0].reason);
+    assert_eq!(bench.finish(), []);
+}
+
+#[test]
+fn what_a_judgement_went_by_is_sent_when_it_changes() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give(&proposed("tags", &a.transform_to(&b)));
+    bench.give_map("robot1", &a);
+    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has been judged");
+    bench.give_map("robot2", &b);
+    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
+    let [first] = sent.as_slice() else { panic!("{sent:?}") };
+    assert_eq!((first.a.as_str(), first.b.as_str(), first.hypotheses), ("robot1", "robot2", 1));
+    assert_eq!(first.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
+    assert!(first.overlap > 80.0 && first.wall_on_wall > 10.0 * first.wall_on_free, "{first:?}");
+    bench.give_map("robot2", &b);
+    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has changed");
+    bench.give(&proposed("maps", &(pose(1.5, 0.0, 0.0) * a.transform_to(&b))));
+    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
+    assert_eq!((sent.len(), sent[0].hypotheses, sent[0].overlap), (1, 2, first.overlap));
+    assert!(sent[0].evidence_elsewhere > 0.0 || first.evidence_elsewhere == 0.0, "{sent:?}");
+}
+
+#[test]
+fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_last() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let truth = a.transform_to(&b);
+    let ranked =
+        |rank: u32, place: &Pose2| Alignment { provisional: true, rank, hypotheses: 2, ..proposed("maps", place) };
+    let wrong = pose(1.5, 0.0, 0.0) * truth;
+    assert_eq!(bench.give(&ranked(0, &wrong)), []);
+    let sent = bench.give(&ranked(1, &truth));
+    assert!(sent[0].accepted && (sent[0].rank, sent[0].hypotheses) == (0, 0), "{sent:?}");
+    assert_eq!(sent[0].transform_a_b(), ranked(1, &truth).transform_a_b());
+    let sent = bench.give(&Alignment { hypotheses: 1, ..ranked(0, &wrong) });
+    assert!(!sent[0].accepted, "{}", sent[0].reason);
+    let sent = bench.give(&proposed("tags", &truth));
+    assert!(sent[0].accepted && sent[0].method == "tags", "{sent:?}");
+}
+
+/// What another crate's aligner, which knows no doubt, sends of a place.
+fn by_a_plug_in(transform_a_b: &Pose2) -> Alignment {
+    Alignment { score: 1.0, hypotheses: 1, method: "tags".into(), ..proposed("a plug-in", transform_a_b) }
+}
+
+#[test]
+fn a_plug_in_that_proposes_nonsense_is_not_believed_however_sure_it_is() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let truth = a.transform_to(&b);
+    for wrong in [pose(1.5, 0.0, 0.0), pose(0.0, -3.0, 0.3), pose(100.0, 0.0, 0.0), pose(0.0, 0.0, 3.1)] {
+        let sent = bench.give(&by_a_plug_in(&(wrong * truth)));
+        assert!(!sent[0].accepted && sent[0].score < 0.5, "{wrong}: {sent:?}");
+    }
+}
+
+#[test]
+fn a_plug_in_is_believed_where_a_search_of_the_maps_finds_the_same_place_alone() {
+    let (a, b) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));
+    assert!(sent[0].accepted && sent[0].source == "a plug-in", "{sent:?}");
+    // A hall fits half a turn on, too, and only a search shows that.
+    let draw = |at| FloorPlan::hall().draw(seen(-0.2, -0.2, 20.2, 12.2), at);
+    let (a, b) = (draw(drawing(3.0, 2.0, 0.4)), draw(drawing(12.0, 6.0, -2.1)));
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));
+    assert!(!sent[0].accepted && sent[0].score < 0.9, "{sent:?}");
+}
+
+#[test]
+fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
+    let mut bench = StageBench::new(&super::kind(), "");
+    let nothing = |source: &str, reason: &str| Alignment {
+        accepted: false,
+        has_transform: false,
+        reason: reason.into(),
+        ..proposed(source, &Pose2::identity())
+    };
+    assert_eq!(bench.give(&nothing("maps", "no walls"))[0].reason, "no walls");
+    let sent = bench.give(&nothing("tags", "no tags"));
+    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls\n\nby the tags: no tags"));
+    assert_eq!(bench.give(&nothing("tags", "no tags")), []);
+    assert_eq!(bench.finish(), []);
+}
+
+#[test]
+fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
+    let (a, _) = maps();
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give_map("robot1", &a);
+    bench.give(&proposed("tags", &Pose2::identity()));
+    let sent = bench.finish();
+    assert!(!sent[0].accepted && sent[0].reason.contains("no usable map of robot2"), "{}", sent[0].reason);
+}
+
+#[test]
+fn a_hypothesis_out_of_order_is_warned_of() {
+    let mut bench = StageBench::new(&super::kind(), "");
+    bench.give(&Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
+    assert_eq!(bench.stage.warnings().len(), 1, "{:?}", bench.stage.warnings());
+}
+
+/// Two robots of which it is known where they are.
+fn knowing(parameters: &str) -> StageBench {
+    let robot2 = InitialPose { x: 5.0, y: 1.0, yaw: 0.5, ..InitialPose::default() };
+    let initial_poses = InitialPoses::from([("robot1".into(), InitialPose::ORIGIN), ("robot2".into(), robot2)]);
+    StageBench::with_context(&super::kind(), parameters, &Context { initial_poses, ..Context::default() })
+}
+
+#[test]
+fn an_initial_pose_is_taken_as_it_is_when_that_is_asked_for() {
+    let (a, b) = maps();
+    let mut bench = knowing("hypotheses = { robot2 = 0 }");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let nothing = Alignment { accepted: false, has_transform: false, ..proposed("maps", &Pose2::identity()) };
+    let sent = bench.give(&nothing);
+    let [laid] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(laid.accepted && laid.source == "initial poses", "{laid:?}");
+    assert_eq!((laid.x, laid.y, laid.yaw), (5.0, 1.0, 0.5));
+    assert!((laid.covariance[0] - 1.0).abs() < 1e-9 && (laid.covariance[8] - 0.04).abs() < 1e-9, "{laid:?}");
+    assert_eq!(laid.header.frame_id, "robot1/map");
+
+    let mut bench = StageBench::new(&super::kind(), "hypotheses = { robot2 = 0 }");
+    bench.give_map("robot1", &a);
+    bench.give_map("robot2", &b);
+    let sent = bench.give(&nothing);
+    assert!(!sent[0].accepted && sent[0].reason.contains("--initial robot2=X,Y,YAW"), "{sent:?}");
+}
+
+#[test]
+fn a_choice_that_concerns_no_pair_is_warned_of() {
+    let (a, b) = maps();
+    let warnings = |parameters: &str| {
+        let mut bench = knowing(parameters);
+        bench.give_map("robot1", &a);
+        bench.give_map("robot2", &b);
+        bench.give(&proposed("maps", &a.transform_to(&b)));
+        bench.finish();
+        bench.stage.warnings().len()
+    };
+    assert_eq!(warnings("hypotheses = { robot2 = 1 }"), 0);
+    assert_eq!(warnings("hypotheses = { \"robot2/robot1\" = 1 }"), 0);
+    assert_eq!(warnings("hypotheses = { robot3 = 1 }"), 1);
+    assert_eq!(warnings("hypotheses = { \"robot2/robot2\" = 1 }"), 1);
+}

@@ -1,0 +1,253 @@
+//! Occupancy grids: where their cells lie, and what they say.
+
+use super::{Point2, Pose2};
+use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
+use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, Time};
+
+/// As many cells are looked at together.
+const BLOCK: usize = 64;
+
+/// A cell's place in a grid: column (along x) and row (along y).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Cell {
+    /// Along the grid's x axis, from 0.
+    pub column: usize,
+    /// Along the grid's y axis, from 0.
+    pub row: usize,
+}
+
+/// Where the cells of a grid lie in its map frame.
+///
+/// Cell (column, row) has its centre at `origin * ((column + 0.5) * resolution, (row + 0.5) * resolution)`. The origin
+/// is a pose with yaw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridGeometry {
+    /// Cells along x.
+    pub width: usize,
+    /// Cells along y.
+    pub height: usize,
+    /// Metres a cell.
+    pub resolution: f64,
+    /// `T_map_grid`: the pose of the outer corner of cell (0, 0) in the map frame.
+    pub origin: Pose2,
+}
+
+impl GridGeometry {
+    /// The centre of a cell in the map frame.
+    pub fn centre(&self, cell: Cell) -> Point2 {
+        let x = (cell.column as f64 + 0.5) * self.resolution;
+        let y = (cell.row as f64 + 0.5) * self.resolution;
+        self.origin * Point2::new(x, y)
+    }
+
+    /// The cell that holds a point of the map frame, if it lies on the grid.
+    pub fn cell(&self, point: &Point2) -> Option<Cell> {
+        let local = self.origin.inverse_transform_point(point) / self.resolution;
+        if !(local.x >= 0.0 && local.y >= 0.0) {
+            return None;
+        }
+        let cell = Cell { column: local.x as usize, row: local.y as usize };
+        (cell.column < self.width && cell.row < self.height).then_some(cell)
+    }
+
+    /// The place of a cell in the row-by-row list of cells.
+    pub fn index(&self, cell: Cell) -> usize {
+        cell.row * self.width + cell.column
+    }
+
+    /// The number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// What a message says of a grid that was made at a time. The sides must be less than 2^32.
+    pub fn meta_data(&self, map_load_time: Time) -> MapMetaData {
+        MapMetaData {
+            map_load_time,
+            resolution: self.resolution as f32,
+            width: self.width as u32,
+            height: self.height as u32,
+            origin: self.origin.into(),
+        }
+    }
+
+    /// All of a grid's message but its cells. The sides must be less than 2^32.
+    pub fn prefix(&self, header: Header) -> GridPrefix {
+        GridPrefix { info: self.meta_data(header.stamp), header }
+    }
+}
+
+/// The most cells of a grid that is laid over several, of which `known` cells are known in all: memory goes with what is
+/// known, and not with how far apart a message says that it lies. The first are 200 x 200 m in cells of 0.05 m; beyond, maps
+/// that hang together know more than a sixty-fourth of the rectangle round them.
+pub fn most_cells_over(known: f64) -> f64 {
+    (16 << 20) as f64 + 64.0 * known
+}
+
+/// Why a message cannot be used as a grid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// The number of cells is not width x height.
+    #[error("it has {actual} cells, but its size calls for {width} x {height}")]
+    CellCount {
+        /// Cells there are.
+        actual: usize,
+        /// Cells along x, as said.
+        width: usize,
+        /// Cells along y, as said.
+        height: usize,
+    },
+    /// The resolution is not a positive number.
+    #[error("its resolution is {0} m a cell, which is no positive number")]
+    Resolution(f32),
+    /// The origin is not a pose.
+    #[error("its origin holds a value that is no finite number")]
+    Origin,
+}
+
+/// An occupancy grid, its cells borrowed.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid<'a> {
+    /// Where the cells lie.
+    pub geometry: GridGeometry,
+    /// Row by row: -1 unknown, 0 free to 100 occupied.
+    pub cells: &'a [i8],
+}
+
+impl<'a> Grid<'a> {
+    /// A grid of `cells`, of which there must be width x height. One without cells is 0 x 0, whatever its sides are said to
+    /// be: what is made of a grid takes memory by its sides.
+    pub fn new(mut geometry: GridGeometry, cells: &'a [i8]) -> Result<Self, GridError> {
+        let GridGeometry { width, height, resolution, origin } = geometry;
+        if width.checked_mul(height) != Some(cells.len()) {
+            return Err(GridError::CellCount { actual: cells.len(), width, height });
+        }
+        if cells.is_empty() {
+            (geometry.width, geometry.height) = (0, 0);
+        }
+        if !(resolution.is_finite() && resolution > 0.0) {
+            return Err(GridError::Resolution(resolution as f32));
+        }
+        if !(origin.translation.vector.iter().all(|v| v.is_finite()) && origin.rotation.angle().is_finite()) {
+            return Err(GridError::Origin);
+        }
+        Ok(Self { geometry, cells })
+    }
+
+    /// The grid of a message.
+    pub fn from_message(message: &OccupancyGrid<'a>) -> Result<Self, GridError> {
+        Self::new(GridGeometry::from(&message.info), message.cells())
+    }
+
+    /// The value of a cell; unknown outside of the grid.
+    pub fn value(&self, cell: Cell) -> i8 {
+        match cell.column < self.geometry.width && cell.row < self.geometry.height {
+            true => self.cells[self.geometry.index(cell)],
+            false => UNKNOWN,
+        }
+    }
+
+    /// The value of the cell that a point falls in; unknown outside of the grid.
+    pub fn value_at(&self, point: &Point2) -> i8 {
+        self.geometry.cell(point).map_or(UNKNOWN, |cell| self.value(cell))
+    }
+
+    /// The cells that hold an obstacle, row by row.
+    pub fn occupied(&self) -> impl Iterator<Item = Cell> + 'a {
+        // Most of a map is free or unknown. Whole blocks of it are passed over by their greatest value.
+        let may_hold_one = |block: &[i8]| is_occupied(block.iter().fold(UNKNOWN, |most, v| most.max(*v)).min(100));
+        let rows = self.cells.chunks(self.geometry.width.max(1)).enumerate();
+        rows.flat_map(move |(row, cells)| {
+            let blocks = cells.chunks(BLOCK).enumerate().filter(move |(_, block)| may_hold_one(block));
+            blocks.flat_map(move |(number, block)| {
+                let cells = block.iter().enumerate().filter(|(_, value)| is_occupied(**value));
+                cells.map(move |(place, _)| Cell { column: number * BLOCK + place, row })
+            })
+        })
+    }
+}
+
+impl From<&MapMetaData> for GridGeometry {
+    fn from(info: &MapMetaData) -> Self {
+        Self {
+            width: info.width as usize,
+            height: info.height as usize,
+            // 0.05 as f32 is 0.05000000074505806; the decimal that was meant keeps maps from drifting by a cell
+            // over their width.
+            resolution: shortest_decimal(info.resolution),
+            origin: info.origin.planar(),
+        }
+    }
+}
+
+/// The double with the shortest decimal that rounds to the given single.
+fn shortest_decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or_else(|_| f64::from(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::pose;
+    use proptest::prelude::*;
+
+    fn geometry(x: f64, y: f64, yaw: f64) -> GridGeometry {
+        GridGeometry { width: 30, height: 20, resolution: 0.05, origin: pose(x, y, yaw) }
+    }
+
+    proptest! {
+        #[test]
+        fn the_centre_of_a_cell_lies_in_that_cell(
+            x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0, column in 0usize..30, row in 0usize..20,
+        ) {
+            let geometry = geometry(x, y, yaw);
+            let cell = Cell { column, row };
+            prop_assert_eq!(geometry.cell(&geometry.centre(cell)), Some(cell));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_occupied_cells_are_those_that_a_look_at_every_cell_finds(
+            width in 0usize..200, height in 0usize..5, values in prop::collection::vec(prop::num::i8::ANY, 1000),
+        ) {
+            // Most cells are free, so that there are blocks to pass over.
+            let cells: Vec<i8> =
+                values.iter().enumerate().map(|(i, v)| if i % 7 == 0 { *v } else { 0 }).take(width * height).collect();
+            let geometry = GridGeometry { width, height, ..geometry(0.0, 0.0, 0.0) };
+            let grid = Grid::new(geometry, &cells).unwrap();
+            let all = (0..cells.len()).filter(|&index| is_occupied(cells[index]));
+            let expected: Vec<Cell> = all.map(|index| Cell { column: index % width, row: index / width }).collect();
+            prop_assert_eq!(grid.occupied().collect::<Vec<_>>(), expected);
+        }
+    }
+
+    #[test]
+    fn points_off_the_grid_have_no_cell() {
+        let geometry = geometry(0.0, 0.0, 0.0);
+        for (x, y) in [(-0.01, 0.5), (0.5, -0.01), (1.5, 0.5), (0.5, 1.0), (f64::NAN, 0.5), (f64::INFINITY, 0.5)] {
+            assert_eq!(geometry.cell(&Point2::new(x, y)), None, "({x}, {y})");
+        }
+    }
+
+    #[test]
+    fn a_grid_that_cannot_be_is_refused() {
+        let good = geometry(0.0, 0.0, 0.0);
+        assert!(Grid::new(good, &[0; 600]).is_ok());
+        assert!(matches!(Grid::new(good, &[0; 599]), Err(GridError::CellCount { actual: 599, .. })));
+        for resolution in [0.0, -0.05, f64::NAN, f64::INFINITY] {
+            let geometry = GridGeometry { resolution, ..good };
+            assert!(matches!(Grid::new(geometry, &[0; 600]), Err(GridError::Resolution(_))));
+        }
+        let long = GridGeometry { width: 0, height: u32::MAX as usize, ..good };
+        assert_eq!(Grid::new(long, &[]).unwrap().geometry, GridGeometry { width: 0, height: 0, ..good });
+        let geometry = GridGeometry { origin: pose(f64::NAN, 0.0, 0.0), ..good };
+        assert_eq!(Grid::new(geometry, &[0; 600]).unwrap_err(), GridError::Origin);
+    }
+
+    #[test]
+    fn the_resolution_is_the_decimal_that_was_meant() {
+        let info = MapMetaData { resolution: 0.05, ..Default::default() };
+        assert_eq!(GridGeometry::from(&info).resolution, 0.05);
+    }
+}

@@ -1,0 +1,110 @@
+//! Occupancy in log-odds (Saeedi et al., "Group mapping", equation 7), and its entropy.
+//!
+//! A cell's value v stands for the probability v / 100, cut to a lower and an upper bound, so that no cell is ever beyond
+//! doubt; its log-odds are `ln(p / (1 - p))`. An unknown cell has log-odds of 0, which is a probability of one half.
+
+use crate::shared::geometry::{UNKNOWN, is_known};
+
+/// Steps of the table from log-odds to values for one unit of the natural logarithm.
+const STEPS: f32 = 256.0;
+
+/// The tables that turn values into log-odds and back.
+#[derive(Clone, Debug)]
+pub struct LogOdds {
+    /// By value as an unsigned byte.
+    of_value: Box<[f32; 256]>,
+    /// The value for every step from the lowest log-odds to the highest.
+    values: Vec<i8>,
+    lowest: f32,
+}
+
+impl LogOdds {
+    /// Tables for probabilities cut to `[min_probability, max_probability]`, which must hold one half and neither 0 nor 1.
+    pub fn new(min_probability: f64, max_probability: f64) -> Self {
+        let cut = |probability: f64| log_odds(probability.max(min_probability).min(max_probability)) as f32;
+        let (lowest, highest) = (cut(0.0), cut(1.0));
+        let of_value = |byte: usize| {
+            let value = byte as u8 as i8;
+            if is_known(value) { cut(f64::from(value) / 100.0) } else { 0.0 }
+        };
+        let steps = (STEPS * (highest - lowest)).clamp(0.0, 1e5).ceil() as usize;
+        let value = |step: usize| {
+            let sum = lowest + step as f32 / STEPS;
+            // The bounds themselves stand for 0 and 100.
+            match step {
+                0 => 0,
+                _ if step == steps => 100,
+                _ => (100.0 * probability(f64::from(sum))).round() as i8,
+            }
+        };
+        Self { of_value: Box::new(std::array::from_fn(of_value)), values: (0..=steps).map(value).collect(), lowest }
+    }
+
+    /// The log-odds of a cell's value: 0 if it is unknown.
+    pub fn of(&self, value: i8) -> f32 {
+        self.of_value[usize::from(value.cast_unsigned())]
+    }
+
+    /// The value that log-odds amount to, 0 to 100; [`UNKNOWN`] for what is no number.
+    pub fn value(&self, log_odds: f32) -> i8 {
+        if log_odds.is_nan() {
+            return UNKNOWN;
+        }
+        let step = ((log_odds - self.lowest) * STEPS).round().max(0.0) as usize;
+        self.values[step.min(self.values.len() - 1)]
+    }
+}
+
+/// `ln(p / (1 - p))`: equation 7.
+pub fn log_odds(probability: f64) -> f64 {
+    (probability / (1.0 - probability)).ln()
+}
+
+/// The probability of log-odds: the inverse of equation 7.
+pub fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
+
+/// The entropy of a cell that is occupied with the probability of these log-odds, in bits: 1 where nothing is known.
+pub fn entropy(log_odds: f64) -> f64 {
+    let of = |probability: f64| if probability > 0.0 { -probability * probability.log2() } else { 0.0 };
+    of(probability(log_odds)) + of(probability(-log_odds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_come_back_from_log_odds_within_the_bounds() {
+        let table = LogOdds::new(0.1192, 0.971);
+        for value in 12..=96 {
+            assert_eq!(table.value(table.of(value)), value);
+        }
+        assert_eq!([0, 5, 98, 100].map(|value| table.value(table.of(value))), [0, 0, 100, 100]);
+        assert_eq!([-1, -128, 101].map(|value| table.of(value)), [0.0; 3]);
+        assert!((f64::from(table.of(100)) - log_odds(0.971)).abs() < 1e-6);
+        assert!((f64::from(table.of(0)) - log_odds(0.1192)).abs() < 1e-6);
+        let beyond = [-1e9, 1e9, f32::INFINITY, f32::NEG_INFINITY, f32::NAN].map(|sum| table.value(sum));
+        assert_eq!(beyond, [0, 100, 100, 0, UNKNOWN]);
+    }
+
+    #[test]
+    fn entropy_falls_with_the_size_of_the_log_odds() {
+        assert!((entropy(0.0) - 1.0).abs() < 1e-12);
+        for step in 0..100 {
+            let (near, far) = (0.1 * f64::from(step), 0.1 * f64::from(step + 1));
+            assert!(entropy(near) > entropy(far) && (entropy(near) - entropy(-near)).abs() < 1e-12);
+        }
+        assert_eq!((entropy(1e9), entropy(-1e9)), (0.0, 0.0));
+        assert!((probability(log_odds(0.3)) - 0.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn bounds_that_are_no_probabilities_do_no_harm() {
+        for (low, high) in [(f64::NAN, 0.9), (0.0, 1.0), (0.9, 0.1), (-1.0, 2.0)] {
+            let table = LogOdds::new(low, high);
+            (0..=100).for_each(|value| assert!((-1..=100).contains(&table.value(table.of(value)))));
+        }
+    }
+}

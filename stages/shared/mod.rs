@@ -1,0 +1,12 @@
+//! What several rooms share: poses, grids and their walls, deformations, and the last map of each robot.
+
+pub mod deformation;
+pub mod geometry;
+pub mod log_odds;
+pub mod placement;
+pub mod robot_maps;
+pub mod robot_pair;
+pub mod scan_grid;
+#[cfg(test)]
+pub(crate) mod test_world;
+pub mod walls;

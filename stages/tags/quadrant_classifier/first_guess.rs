@@ -1,0 +1,320 @@
+//! How two maps lie to each other, from their directions and their common tags: sections 4.1.3 and 4.2.
+
+use super::direction::Direction;
+use super::parameters::{QuadrantClassifierParameters, RotationFrom};
+use super::rotation_by_directions::{MissingDirection, rotation_by_directions};
+use super::tag_rotation::{TagPair, TagRotation, tag_rotation};
+use super::translation::{residual, translate};
+use crate::shared::geometry::{Pose2, turn_difference, wrap_angle};
+use gridweave_runtime::ros::CommonTag;
+use nalgebra::Matrix3;
+use std::f64::consts::TAU;
+
+/// A first guess of an alignment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstGuess {
+    /// `T_a_b`.
+    pub transform_a_b: Pose2,
+    /// Covariance of (x, y, yaw), metres and radians.
+    pub covariance: Matrix3<f64>,
+    /// The least common precision of the tags, 0 to 1.
+    pub score: f64,
+    /// `tags+directions`, `tags`, `few tags+directions`, or `one tag+directions`.
+    pub method: &'static str,
+    /// What the guess rests on.
+    pub reason: String,
+}
+
+/// Why common tags give no alignment.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GuessError {
+    /// There are too few tags, or they lie in one place.
+    #[error(
+        "{0} common tags do not tell the rotation: it takes two or more in different places, and three for the paper's \
+         triplet"
+    )]
+    NoRotation(usize),
+    /// The rotation is known too badly.
+    #[error("the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only")]
+    WeakRotation {
+        /// Tags there are.
+        count: usize,
+        /// Standard deviation of the rotation, degrees.
+        degrees: f64,
+    },
+    /// The tags do not suffice by themselves, and there are no directions to confirm them.
+    #[error("the directions of both maps must confirm {count} common tags, but {missing}")]
+    NoDirections {
+        /// Tags there are.
+        count: usize,
+        /// What is missing.
+        missing: MissingDirection,
+    },
+    /// The tags do not suffice by themselves, and too many rotations would be confirmed.
+    #[error(
+        "the directions of both maps must confirm {count} common tags, but together they tell the rotation to {limit:.1} \
+         degrees only, and {most:.1} are allowed"
+    )]
+    VagueDirections {
+        /// Tags there are.
+        count: usize,
+        /// By how much the two rotations could differ, degrees.
+        limit: f64,
+        /// What is allowed, degrees.
+        most: f64,
+    },
+    /// The tags do not suffice by themselves, and the directions say otherwise.
+    #[error(
+        "the directions of both maps must confirm {count} common tags, but tell a rotation {off:.1} degrees off theirs, and \
+         {limit:.1} are allowed"
+    )]
+    Unconfirmed {
+        /// Tags there are.
+        count: usize,
+        /// By how much the two rotations differ, degrees.
+        off: f64,
+        /// What is allowed, degrees.
+        limit: f64,
+    },
+    /// The tags do not fit each other.
+    #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
+    Residual {
+        /// Tags there are.
+        count: usize,
+        /// Root mean square of the distances, metres.
+        residual: f64,
+    },
+}
+
+/// How map b lies to map a: rotation from the directions of the two maps and the quarter turn that the tags tell, or
+/// from the tags alone; then the translation from the tags.
+///
+/// The tags are sorted by falling common precision. Directions that are missing, not valid, or that contradict the tags
+/// are left out, and the reason says so.
+pub fn first_guess(
+    tags: &[CommonTag],
+    direction_a: Option<&Direction>,
+    direction_b: Option<&Direction>,
+    parameters: &QuadrantClassifierParameters,
+) -> Result<FirstGuess, GuessError> {
+    let pairs = tag_pairs(tags, parameters);
+    let count = pairs.len();
+    let by_tags = rotation_of_tags(tags, parameters)?;
+    let (rotation, method, rotation_reason) = match by_directions(&by_tags, direction_a, direction_b, parameters) {
+        Ok(rotation) if parameters.rotation == RotationFrom::Both => {
+            let reason = "rotation from the tags and both maps' directions".to_owned();
+            (mean_rotation(&by_tags, &rotation), "tags+directions", reason)
+        }
+        Ok(rotation) => (rotation, "tags+directions", "rotation from the directions of both maps".to_owned()),
+        Err(reason) => (by_tags, "tags", reason),
+    };
+    let transform = translate(&pairs, &rotation, parameters.translation).ok_or(GuessError::NoRotation(count))?;
+    let residual = residual(&pairs, &transform.transform_a_b);
+    if residual.is_nan() || residual > parameters.max_residual {
+        return Err(GuessError::Residual { count, residual });
+    }
+    let precisions = tags.iter().map(CommonTag::common_precision).filter(|precision| precision.is_finite());
+    Ok(FirstGuess {
+        transform_a_b: transform.transform_a_b,
+        covariance: transform.covariance,
+        score: precisions.fold(1.0, f64::min).max(0.0),
+        method,
+        reason: format!("{count} common tags; {rotation_reason}"),
+    })
+}
+
+/// The rotation that the tags tell, if they tell the quarter turn.
+pub(super) fn rotation_of_tags(
+    tags: &[CommonTag],
+    parameters: &QuadrantClassifierParameters,
+) -> Result<TagRotation, GuessError> {
+    let pairs = tag_pairs(tags, parameters);
+    let count = pairs.len();
+    let by_tags = tag_rotation(&pairs, parameters.tag_rotation).ok_or(GuessError::NoRotation(count))?;
+    match by_tags.deviation > parameters.max_tag_rotation_deviation {
+        true => Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() }),
+        false => Ok(by_tags),
+    }
+}
+
+pub(super) fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
+    tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect()
+}
+
+/// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
+fn by_directions(
+    by_tags: &TagRotation,
+    a: Option<&Direction>,
+    b: Option<&Direction>,
+    parameters: &QuadrantClassifierParameters,
+) -> Result<TagRotation, String> {
+    if parameters.rotation == RotationFrom::Tags {
+        return Err("rotation from the tags".into());
+    }
+    match rotation_by_directions(by_tags, a, b, parameters) {
+        Ok(found) if found.agrees() => Ok(found.rotation),
+        Ok(_) => Err("rotation from the tags, which the directions of the maps contradict".into()),
+        Err(missing) => Err(format!("rotation from the tags, for {missing}")),
+    }
+}
+
+/// The mean of two rotations, weighted with the inverse of their variances.
+fn mean_rotation(a: &TagRotation, b: &TagRotation) -> TagRotation {
+    let (variance_a, variance_b) = (a.deviation * a.deviation, b.deviation * b.deviation);
+    let share_b = variance_a / (variance_a + variance_b);
+    let angle = wrap_angle(a.angle + share_b * turn_difference(b.angle, a.angle, TAU));
+    TagRotation { angle, deviation: share_b.sqrt() * b.deviation }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::{Point2, pose};
+    use crate::tags::quadrant_classifier::{TagRotationFrom, TranslationFrom};
+    use proptest::prelude::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn tags(transform_a_b: &Pose2) -> Vec<CommonTag> {
+        let tag = |(x, y, certainty): (f64, f64, f64)| {
+            let a = transform_a_b * Point2::new(x, y);
+            let covariance = [0.0004, 0.0, 0.0, 0.0004];
+            CommonTag {
+                tag_id: format!("tag at {x}"),
+                a: [a.x, a.y],
+                b: [x, y],
+                covariance_a: covariance,
+                covariance_b: covariance,
+                certainty_a: certainty,
+                certainty_b: 0.95,
+            }
+        };
+        [(2.0, 1.0, 0.91), (9.0, 5.0, 0.82), (4.0, 8.0, 0.76)].map(tag).to_vec()
+    }
+
+    fn direction(angle: f64) -> Direction {
+        Direction { angle, deviation: 0.002, groups: [angle, angle + FRAC_PI_2], agreement: 0.9, valid: true }
+    }
+
+    proptest! {
+        #[test]
+        fn any_transform_is_recovered_in_every_mode(
+            x in -50.0..50.0, y in -50.0..50.0, yaw in -4.0..4.0, direction_b in -1.0..1.0, turns in 0..4i32,
+        ) {
+            let truth = pose(x, y, yaw);
+            let a = direction(direction_b + yaw + f64::from(turns) * FRAC_PI_2);
+            for rotation in [RotationFrom::Directions, RotationFrom::Tags, RotationFrom::Both] {
+                for tag_rotation in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
+                    for translation in [TranslationFrom::AllTags, TranslationFrom::BestTag, TranslationFrom::Triplet] {
+                        let parameters =
+                            QuadrantClassifierParameters { rotation, tag_rotation, translation, ..Default::default() };
+                        let guess = first_guess(&tags(&truth), Some(&a), Some(&direction(direction_b)), &parameters);
+                        let error = guess.unwrap().transform_a_b * truth.inverse();
+                        prop_assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-8);
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn whatever_comes_in_only_numbers_come_out(
+            values in prop::collection::vec(prop::array::uniform10(prop::num::f64::ANY), 0..6),
+        ) {
+            let tags: Vec<CommonTag> = values
+                .iter()
+                .map(|v| CommonTag {
+                    tag_id: String::new(),
+                    a: [v[0], v[1]],
+                    b: [v[2], v[3]],
+                    covariance_a: [v[4], v[5], v[5], v[6]],
+                    covariance_b: [v[7], v[8], v[8], v[9]],
+                    certainty_a: v[0],
+                    certainty_b: v[9],
+                })
+                .collect();
+            let parameters = QuadrantClassifierParameters { max_residual: 1e12, ..Default::default() };
+            if let Ok(guess) = first_guess(&tags, Some(&direction(0.1)), Some(&direction(0.2)), &parameters) {
+                prop_assert!(guess.covariance.iter().all(|value| value.is_finite()));
+                prop_assert!(guess.transform_a_b.translation.vector.iter().all(|value| value.is_finite()));
+                prop_assert!((0.0..=1.0).contains(&guess.score));
+            }
+        }
+    }
+
+    fn guess(tags: &[CommonTag], a: Option<&Direction>, b: Option<&Direction>) -> Result<FirstGuess, GuessError> {
+        first_guess(tags, a, b, &QuadrantClassifierParameters::default())
+    }
+
+    #[test]
+    fn good_directions_make_the_rotation_better_than_noisy_tags() {
+        let mut tags = tags(&pose(3.0, 4.0, 2.0));
+        tags[2].a[0] += 0.06;
+        let found = guess(&tags, Some(&direction(2.0 - FRAC_PI_2)), Some(&direction(0.0))).unwrap();
+        assert_eq!(found.method, "tags+directions");
+        assert!((found.transform_a_b.rotation.angle() - 2.0).abs() < 1e-9);
+        assert_eq!(found.score, 0.76);
+    }
+
+    #[test]
+    fn the_rotation_from_both_lies_between_and_is_known_better_than_from_either() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let rotation = |rotation: RotationFrom| {
+            let parameters = QuadrantClassifierParameters { rotation, ..Default::default() };
+            let a = Direction { deviation: 0.005, ..direction(2.01) };
+            let guess = first_guess(&tags, Some(&a), Some(&direction(0.0)), &parameters).unwrap();
+            (guess.transform_a_b.rotation.angle(), guess.covariance[(2, 2)])
+        };
+        let [directions, tags, both] = [RotationFrom::Directions, RotationFrom::Tags, RotationFrom::Both].map(rotation);
+        assert!(both.0 > tags.0 && both.0 < directions.0);
+        assert!(both.1 < tags.1.min(directions.1));
+    }
+
+    #[test]
+    fn near_the_border_of_two_quadrants_the_directions_are_left_out() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let vague = Direction { deviation: 0.5, ..direction(2.0 - 0.7) };
+        assert_eq!(guess(&tags, Some(&vague), Some(&direction(0.0))).unwrap().method, "tags");
+        let (contradiction_angle, max_contradiction) = (0.8, 0.8);
+        let paper = QuadrantClassifierParameters {
+            contradiction_angle,
+            max_contradiction,
+            max_residual: 9.0,
+            ..Default::default()
+        };
+        for offset in [0.7, 0.785, -0.785] {
+            let a = direction(2.0 - offset);
+            let found = first_guess(&tags, Some(&a), Some(&direction(0.0)), &paper).unwrap();
+            assert_eq!(found.method, "tags+directions");
+            assert!((found.transform_a_b.rotation.angle() - (2.0 - offset)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn directions_that_are_missing_or_bad_leave_the_rotation_to_the_tags() {
+        let tags = tags(&pose(3.0, 4.0, 2.0));
+        let good = direction(0.0);
+        let invalid = Direction { valid: false, ..direction(0.4) };
+        let contradicting = direction(0.2);
+        for a in [None, Some(&invalid), Some(&contradicting)] {
+            let found = guess(&tags, a, Some(&good)).unwrap();
+            assert_eq!(found.method, "tags");
+            assert!(found.reason.contains("from the tags"), "{}", found.reason);
+            assert!((found.transform_a_b.rotation.angle() - 2.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn tags_that_do_not_tell_the_quarter_turn_or_do_not_fit_are_refused() {
+        let all = tags(&pose(3.0, 4.0, 2.0));
+        assert_eq!(guess(&[], None, None), Err(GuessError::NoRotation(0)));
+        assert_eq!(guess(&all[..1], None, None), Err(GuessError::NoRotation(1)));
+        let mut near = all.clone();
+        for (index, tag) in near.iter_mut().enumerate() {
+            tag.a = [0.05 * index as f64, 0.0];
+            tag.b = tag.a;
+        }
+        assert!(matches!(guess(&near, None, None), Err(GuessError::WeakRotation { count: 3, .. })));
+        let mut wrong = all;
+        wrong[1].a[0] += 5.0;
+        assert!(matches!(guess(&wrong, None, None), Err(GuessError::Residual { count: 3, .. })));
+    }
+}

@@ -1,0 +1,60 @@
+//! Which of the four quarter turns aligns two maps (equation 7 of Tsardoulias et al.).
+
+use std::f64::consts::FRAC_PI_2;
+
+/// The number of quarter turns, 0 to 3, to be added to the difference of two maps' directions, `d_theta`, so that it
+/// comes nearest to the rotation that the tags tell, `theta_hat`; both radians.
+///
+/// Equation 7 prints it from `theta_hat` alone, which holds only while `d_theta` is below 45 degrees. For a `d_theta` of
+/// 0 this is its table, but for the printed borders of 215 and 305 degrees, which stand for 225 and 315: a quadrant is
+/// 90 degrees wide.
+pub fn quadrant(theta_hat: f64, d_theta: f64) -> u8 {
+    ((theta_hat - d_theta) / FRAC_PI_2).round().rem_euclid(4.0) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::turn_difference;
+    use proptest::prelude::*;
+    use std::f64::consts::TAU;
+
+    /// Equation 7, with quadrants of 90 degrees.
+    fn equation_7(theta_hat_degrees: f64) -> u8 {
+        match (theta_hat_degrees + 45.0).rem_euclid(360.0) - 45.0 {
+            v if v < 45.0 => 0,
+            v if v < 135.0 => 1,
+            v if v < 225.0 => 2,
+            _ => 3,
+        }
+    }
+
+    #[test]
+    fn without_a_difference_of_directions_it_is_the_table_of_equation_7() {
+        for border in [-45.0, 45.0, 135.0, 225.0, 315.0] {
+            for offset in [-44.9, -1.0, -1e-6, 1e-6, 1.0, 44.9] {
+                let theta_hat: f64 = border + offset;
+                assert_eq!(quadrant(theta_hat.to_radians(), 0.0), equation_7(theta_hat), "{theta_hat}");
+                assert_eq!(quadrant((theta_hat - 360.0).to_radians(), 0.0), equation_7(theta_hat), "{theta_hat}");
+            }
+        }
+        for (theta_hat, kappa) in
+            [(0.0, 0), (90.0, 1), (180.0, 2), (-180.0, 2), (270.0, 3), (-90.0, 3), (210.0, 2), (304.0, 3)]
+        {
+            assert_eq!(quadrant(f64::to_radians(theta_hat), 0.0), kappa, "{theta_hat}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_rotation_is_recovered_for_any_directions(
+            rotation in -TAU..TAU, direction_b in -TAU..TAU, turns_a in 0..4i32, turns_b in 0..4i32, noise in -0.7..0.7,
+        ) {
+            // Directions are known up to quarter turns, and the tags' rotation is off by up to 40 degrees.
+            let direction_a = direction_b + rotation + f64::from(turns_a) * FRAC_PI_2;
+            let d_theta = direction_a - (direction_b + f64::from(turns_b) * FRAC_PI_2);
+            let found = d_theta + f64::from(quadrant(rotation + noise, d_theta)) * FRAC_PI_2;
+            prop_assert!(turn_difference(found, rotation, TAU).abs() < 1e-9);
+        }
+    }
+}

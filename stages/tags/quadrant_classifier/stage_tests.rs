@@ -1,0 +1,166 @@
+//! The stage from outside: messages in, messages out.
+
+use super::kind;
+use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, MapDirection, Segment, Segments};
+use gridweave_runtime::stage::{Context, InputWire, LoneStage};
+use std::f64::consts::TAU;
+
+struct Run(LoneStage);
+
+impl Run {
+    fn new(parameters: &str) -> Self {
+        Self(LoneStage::new(&kind(), parameters).unwrap())
+    }
+
+    /// Gives the stage walls, and gives the alignments that it sends.
+    fn segments(&mut self, segments: &Segments) -> Vec<Alignment> {
+        self.0.give::<Segments>("segments", "", LogTime(7), segments).unwrap();
+        self.0.take("alignment").unwrap()
+    }
+
+    /// Gives the stage common tags, and gives the alignments that it sends.
+    fn common(&mut self, common: &CommonTags) -> Vec<Alignment> {
+        self.0.give::<CommonTags>("common", "", LogTime(7), common).unwrap();
+        self.0.take("alignment").unwrap()
+    }
+}
+
+/// A room whose walls stand at `angle`.
+fn segments(robot: &str, angle: f64) -> Segments {
+    let wall = |(x1, y1, x2, y2): (f64, f64, f64, f64)| {
+        let turn = pose(0.0, 0.0, angle);
+        let (a, b) = (turn * Point2::new(x1, y1), turn * Point2::new(x2, y2));
+        Segment { x1: a.x, y1: a.y, x2: b.x, y2: b.y, reliability: 1.0, inliers: 50 }
+    };
+    let room = [(0.0, 0.0, 8.0, 0.0), (8.0, 0.0, 8.0, 5.0), (8.0, 5.0, 0.0, 5.0), (0.0, 5.0, 0.0, 0.0)];
+    let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
+    Segments { header, robot: robot.into(), segments: room.map(wall).to_vec() }
+}
+
+fn common(transform_a_b: &Pose2) -> CommonTags {
+    let tag = |(x, y): (f64, f64)| {
+        let a = transform_a_b * Point2::new(x, y);
+        let covariance = [0.001, 0.0, 0.0, 0.001];
+        CommonTag {
+            a: [a.x, a.y],
+            b: [x, y],
+            covariance_a: covariance,
+            covariance_b: covariance,
+            certainty_a: 0.95,
+            certainty_b: 0.9,
+            ..Default::default()
+        }
+    };
+    let tags = [(1.0, 0.0), (8.0, 2.0), (3.0, 5.0)].map(tag).to_vec();
+    let (robot_a, robot_b) = ("robot1".into(), "robot2".into());
+    CommonTags { robot_a, robot_b, tags, accepted: true, ..Default::default() }
+}
+
+#[test]
+fn maps_and_common_tags_give_an_alignment_which_every_new_map_sends_again() {
+    let mut run = Run::new("");
+    let truth = pose(4.0, -2.0, 2.5);
+    assert!(run.segments(&segments("robot1", 2.5)).is_empty());
+    let direction = run.0.take::<MapDirection>("direction").unwrap().remove(0);
+    assert!(direction.valid && turn_difference(direction.direction, 2.5, TAU / 4.0).abs() < 1e-9);
+
+    let first = run.common(&common(&truth));
+    assert_eq!(first.len(), 1);
+    assert_eq!(first[0].method, "tags");
+    assert!(run.common(&common(&truth)).is_empty(), "nothing has changed");
+
+    let second = run.segments(&segments("robot2", 0.0));
+    assert_eq!(second.len(), 1);
+    assert_eq!((second[0].method.as_str(), second[0].accepted), ("tags+directions", true));
+    assert_eq!((second[0].a.as_str(), second[0].b.as_str()), ("robot1", "robot2"));
+    assert_eq!(second[0].header.frame_id, "robot1/map");
+    assert_eq!(second[0].score, 0.9);
+    let error = second[0].transform_a_b() * truth.inverse();
+    assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-9);
+    assert!(second[0].covariance.iter().all(|value| value.is_finite()) && second[0].has_transform);
+
+    assert_eq!(run.segments(&segments("robot2", 0.0)), second, "the refiner works on the map");
+    assert!(run.segments(&segments("robot3", 0.0)).is_empty(), "it is in no pair");
+    assert_eq!(run.common(&common(&pose(4.0, -1.9, 2.5))).len(), 1);
+    let directions = run.0.take::<MapDirection>("direction").unwrap();
+    assert!(directions.iter().any(|direction| direction.robot == "robot2" && direction.valid));
+}
+
+#[test]
+fn refused_tags_are_passed_on_with_their_reason() {
+    let mut run = Run::new("");
+    let refused = CommonTags { accepted: false, reason: "two tags only".into(), ..common(&pose(0.0, 0.0, 0.0)) };
+    let sent = run.common(&refused);
+    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "two tags only"));
+    assert!(run.common(&refused).is_empty());
+    let together = CommonTags { tags: vec![refused.tags[0].clone(); 3], accepted: true, ..refused };
+    let sent = run.common(&together);
+    assert!(!sent[0].accepted && sent[0].reason.contains("do not tell the rotation"), "{}", sent[0].reason);
+}
+
+#[test]
+fn walls_may_be_left_unwired_where_the_tags_alone_tell_the_rotation() {
+    let common = InputWire { port: "common", ..Default::default() };
+    let context = Context { inputs: vec![common], ..Default::default() };
+    let make = |parameters: &str| LoneStage::with_context(&kind(), parameters, &context).err();
+    assert!(make("rotation = \"tags\"").is_none());
+    for rotation in ["directions", "both"] {
+        let error = make(&format!("rotation = \"{rotation}\"")).unwrap().to_string();
+        assert!(error.contains("`segments` is not wired"), "{error}");
+    }
+}
+
+#[test]
+fn two_tags_wait_for_both_maps_and_stay_provisional() {
+    let mut run = Run::new("");
+    let truth = pose(4.0, -2.0, 2.5);
+    let all = common(&truth);
+    let two = CommonTags { tags: all.tags[..2].to_vec(), provisional: true, ..all.clone() };
+    run.segments(&segments("robot1", 2.5));
+    let sent = run.common(&two);
+    assert!(!sent[0].accepted && sent[0].reason.contains("a map has not come yet"), "{}", sent[0].reason);
+    let sent = run.segments(&segments("robot2", 0.0));
+    assert_eq!((sent[0].accepted, sent[0].provisional), (true, true));
+    assert_eq!(sent[0].method, "few tags+directions");
+    assert!(sent[0].reason.starts_with("2 common tags only"), "{}", sent[0].reason);
+    let error = sent[0].transform_a_b() * truth.inverse();
+    assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-9);
+    let sent = run.common(&all);
+    assert_eq!((sent[0].accepted, sent[0].provisional), (true, false), "the third tag suffices");
+    let sent = run.segments(&segments("robot2", 0.3));
+    assert!(sent[0].accepted, "directions that contradict three tags are left out");
+    let sent = run.common(&two);
+    assert!(!sent[0].accepted && sent[0].reason.contains("must confirm"), "{}", sent[0].reason);
+}
+
+#[test]
+fn a_single_tag_proposes_every_quarter_turn_if_it_may() {
+    let truth = pose(4.0, -2.0, 2.5);
+    let all = common(&truth);
+    let one = CommonTags { tags: all.tags[..1].to_vec(), accepted: false, reason: "one tag".into(), ..all };
+    let mut run = Run::new("");
+    run.segments(&segments("robot1", 2.5));
+    run.segments(&segments("robot2", 0.0));
+    assert_eq!(run.common(&one)[0].reason, "one tag", "it is not asked for");
+    let mut run = Run::new("single_tag = true");
+    run.segments(&segments("robot1", 2.5));
+    run.segments(&segments("robot2", 0.0));
+    let sent = run.common(&one);
+    let ranks: Vec<(u32, u32, bool, bool)> =
+        sent.iter().map(|one| (one.rank, one.hypotheses, one.accepted, one.provisional)).collect();
+    assert_eq!(ranks, [(0, 4, true, true), (1, 4, true, true), (2, 4, true, true), (3, 4, true, true)]);
+    assert!(sent.iter().all(|one| one.method == "one tag+directions" && one.source == "tags"));
+    assert!(run.common(&one).is_empty(), "nothing has changed");
+    let vague = CommonTags { tags: vec![CommonTag { certainty_a: 0.8, ..one.tags[0].clone() }], ..one.clone() };
+    assert!(!run.common(&vague)[0].accepted);
+}
+
+#[test]
+fn a_robot_paired_with_itself_is_left_out_with_a_warning() {
+    let mut run = Run::new("");
+    let own = CommonTags { robot_b: "robot1".into(), ..common(&pose(0.0, 0.0, 0.0)) };
+    assert!(run.common(&own).is_empty());
+    assert_eq!(run.0.warnings().len(), 1);
+}

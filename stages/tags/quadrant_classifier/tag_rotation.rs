@@ -1,0 +1,142 @@
+//! The rotation between two maps that their common tags tell.
+
+use super::parameters::TagRotationFrom;
+use crate::shared::geometry::{Point2, PointPair, fit_rigid, wrap_angle};
+use gridweave_runtime::ros::CommonTag;
+use nalgebra::Matrix2;
+
+/// A tag in both maps, its values checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TagPair {
+    /// Position in map a, metres.
+    pub(super) a: Point2,
+    /// Position in map b, metres.
+    pub(super) b: Point2,
+    /// Covariance in map a, square metres.
+    pub(super) covariance_a: Matrix2<f64>,
+    /// Covariance in map b, square metres.
+    pub(super) covariance_b: Matrix2<f64>,
+}
+
+/// The largest coordinate that is believed, metres; it keeps squares finite.
+const MAX_COORDINATE: f64 = 1e7;
+/// The largest variance that is believed, square metres.
+const MAX_VARIANCE: f64 = 1e4;
+
+impl TagPair {
+    /// The pair of a common tag. `None` if its position is no position. `deviation`, metres, is added to what the
+    /// estimates claim; a covariance that is none is left out.
+    pub(super) fn new(tag: &CommonTag, deviation: f64) -> Option<Self> {
+        let usable = tag.a.iter().chain(&tag.b).all(|value| value.abs() <= MAX_COORDINATE);
+        let floor = Matrix2::identity() * deviation * deviation;
+        let covariance = |values: &[f64; 4]| floor + believable(values).unwrap_or_else(Matrix2::zeros);
+        usable.then(|| Self {
+            a: Point2::from(tag.a),
+            b: Point2::from(tag.b),
+            covariance_a: covariance(&tag.covariance_a),
+            covariance_b: covariance(&tag.covariance_b),
+        })
+    }
+
+    /// The variance along one axis of the distance between the two positions, square metres, whatever the rotation.
+    fn variance(&self) -> f64 {
+        (self.covariance_a.trace() + self.covariance_b.trace()) / 2.0
+    }
+}
+
+/// A symmetric, positive semi-definite covariance of a believable size.
+fn believable(values: &[f64; 4]) -> Option<Matrix2<f64>> {
+    let [xx, xy, yx, yy] = *values;
+    let xy = (xy + yx) / 2.0;
+    let good = (0.0..=MAX_VARIANCE).contains(&xx) && (0.0..=MAX_VARIANCE).contains(&yy) && xy * xy <= xx * yy;
+    good.then(|| Matrix2::new(xx, xy, xy, yy))
+}
+
+/// A rotation and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TagRotation {
+    /// Rotation of `T_a_b`, radians.
+    pub(super) angle: f64,
+    /// Its standard deviation, radians.
+    pub(super) deviation: f64,
+}
+
+/// The rotation that takes the tags' places in map b to their places in map a. `None` if there are too few tags, or
+/// they lie in one place.
+pub(super) fn tag_rotation(tags: &[TagPair], from: TagRotationFrom) -> Option<TagRotation> {
+    let rotation = match from {
+        TagRotationFrom::LeastSquares => least_squares(tags),
+        TagRotationFrom::Triplet => triplet(tags),
+    }?;
+    (rotation.angle.is_finite() && rotation.deviation.is_finite()).then_some(rotation)
+}
+
+/// The rotation that makes the weighted sum of squared distances least.
+fn least_squares(tags: &[TagPair]) -> Option<TagRotation> {
+    let pair = |tag: &TagPair| PointPair { a: tag.a, b: tag.b, weight: 1.0 / tag.variance() };
+    let fit = fit_rigid(&tags.iter().map(pair).collect::<Vec<_>>())?;
+    Some(TagRotation { angle: fit.transform_a_b.rotation.angle(), deviation: fit.yaw_stddev() })
+}
+
+/// `theta_hat` of equations 5 and 6: the direction from the middle of tags 1 and 2 to tag 3, in map a less in map b.
+fn triplet(tags: &[TagPair]) -> Option<TagRotation> {
+    let [first, second, third, ..] = tags else { return None };
+    let arm = |place: fn(&TagPair) -> Point2| place(third) - nalgebra::center(&place(first), &place(second));
+    let (a, b) = (arm(|tag| tag.a), arm(|tag| tag.b));
+    let length = a.norm().min(b.norm());
+    let variance = third.variance() + (first.variance() + second.variance()) / 4.0;
+    (length > 1e-9).then(|| TagRotation {
+        angle: wrap_angle(a.y.atan2(a.x) - b.y.atan2(b.x)),
+        deviation: variance.sqrt() / length,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::{pose, turn_difference};
+    use proptest::prelude::*;
+    use std::f64::consts::TAU;
+
+    fn pair(a: Point2, b: Point2) -> TagPair {
+        let covariance = Matrix2::identity() * 0.0025;
+        TagPair { a, b, covariance_a: covariance, covariance_b: covariance }
+    }
+
+    proptest! {
+        #[test]
+        fn the_rotation_of_exact_tags_is_recovered(x in -50.0..50.0, y in -50.0..50.0, yaw in -4.0..4.0) {
+            let transform_a_b = pose(x, y, yaw);
+            let places = [[1.0, 2.0], [5.0, -3.0], [-2.0, 6.0]].map(Point2::from);
+            let tags = places.map(|b| pair(transform_a_b * b, b));
+            for from in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
+                let rotation = tag_rotation(&tags, from).unwrap();
+                prop_assert!(turn_difference(rotation.angle, yaw, TAU).abs() < 1e-9);
+                prop_assert!(rotation.deviation > 0.005 && rotation.deviation < 0.05);
+            }
+        }
+    }
+
+    #[test]
+    fn tags_in_one_place_or_too_few_tell_no_rotation() {
+        let place = pair(Point2::new(1.0, 2.0), Point2::new(3.0, 4.0));
+        for from in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
+            for count in 0..5 {
+                assert_eq!(tag_rotation(&vec![place; count], from), None);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_position_is_left_out_and_what_is_no_covariance_is_replaced() {
+        let good = CommonTag { covariance_a: [0.01, 0.0, 0.0, 0.01], ..Default::default() };
+        assert!(TagPair::new(&CommonTag { a: [f64::NAN, 0.0], ..good.clone() }, 0.03).is_none());
+        assert!(TagPair::new(&CommonTag { b: [0.0, 1e300], ..good.clone() }, 0.03).is_none());
+        assert!((TagPair::new(&good, 0.03).unwrap().covariance_a[(0, 0)] - 0.0109).abs() < 1e-12);
+        for covariance_a in [[f64::NAN; 4], [-1.0, 0.0, 0.0, 1.0], [0.1, 5.0, 5.0, 0.1], [f64::INFINITY, 0.0, 0.0, 1.0]]
+        {
+            let pair = TagPair::new(&CommonTag { covariance_a, ..good.clone() }, 0.03).unwrap();
+            assert!((pair.covariance_a[(0, 0)] - 0.0009).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Readings of one place, joined.
+
+use super::{Position, Ring, largest_variance};
+use crate::shared::geometry::Point2;
+use nalgebra::{Matrix2, Vector2};
+
+/// Two readings of one place belong together when they differ by less than this many standard deviations.
+const SAME_RANGE: f64 = 4.0;
+
+/// One range reading with the place it was taken at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Where the robot was.
+    pub position: Position,
+    /// Distance to the tag, metres.
+    pub range: f64,
+    /// Standard deviation of the distance, metres.
+    pub stddev: f64,
+}
+
+/// The readings of one tag, those of one place joined to their mean.
+///
+/// The noise of readings averages out, the error of the pose does not: readings of one place share it. So a robot
+/// that waits does not make a tag certain. A reading that contradicts the others of its place makes a group of its own, which
+/// keeps an outlier from spoiling a mean.
+#[derive(Clone, Debug, Default)]
+pub struct ReadingGroups {
+    groups: Vec<Group>,
+    /// Where the groups of the place that the robot is at begin.
+    here: usize,
+    readings: u32,
+}
+
+/// Weighted sums over readings. Positions are taken from the first one, so that sums lose nothing far from the origin.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    anchor: Point2,
+    weight: f64,
+    offset: Vector2<f64>,
+    range: f64,
+    pose_covariance: Matrix2<f64>,
+}
+
+impl ReadingGroups {
+    /// Adds the next reading. The robot is at another place than before when it is `min_travel` metres or more away
+    /// from where the last place began.
+    pub fn add(&mut self, reading: &Reading, min_travel: f64) {
+        self.readings = self.readings.saturating_add(1);
+        let place = self.groups.get(self.here).map(|group| group.anchor);
+        if !place.is_some_and(|anchor| (reading.position.place - anchor).norm() < min_travel) {
+            self.here = self.groups.len();
+        }
+        let anchor = self.groups.get(self.here).map_or(reading.position.place, |group| group.anchor);
+        let weight = 1.0 / (reading.stddev * reading.stddev);
+        let offset = reading.position.place - anchor;
+        let gate = SAME_RANGE * reading.stddev + offset.norm();
+        let here = &mut self.groups[self.here..];
+        match here.iter_mut().find(|group| (group.range / group.weight - reading.range).abs() < gate) {
+            Some(group) => {
+                group.weight += weight;
+                group.offset += offset * weight;
+                group.range += reading.range * weight;
+                group.pose_covariance += reading.position.covariance * weight;
+            }
+            None => {
+                self.groups.push(Group {
+                    anchor,
+                    weight,
+                    offset: offset * weight,
+                    range: reading.range * weight,
+                    pose_covariance: reading.position.covariance * weight,
+                });
+            }
+        }
+    }
+
+    /// The number of readings.
+    pub fn readings(&self) -> u32 {
+        self.readings
+    }
+
+    /// One ring a group: variance of the mean range, and that of the pose.
+    ///
+    /// An error of the pose changes a distance by its part along the line to the tag. Where on the ring the tag is, and so
+    /// along which line, is what is asked for; and the mirror image lies along another. So the pose counts with its largest
+    /// variance, whatever the direction: that never claims too much, and at most twice the mean over all directions.
+    /// `pose_stddev`, metres, is the least that it counts with.
+    pub fn rings(&self, pose_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
+        self.groups.iter().map(move |group| Ring {
+            centre: group.anchor + group.offset / group.weight,
+            radius: group.range / group.weight,
+            variance: group.variance(pose_stddev),
+        })
+    }
+
+    /// The error that the poses may have in common, which moves the tag and which no number of places averages out:
+    /// their mean covariance, weighed by what each ring says, square metres. Zeros if it is not known.
+    ///
+    /// How much the errors of the poses have in common is not told. If it is all, the error of the tag is theirs; and
+    /// whatever it is, a mean of errors varies by no more than the mean of their variances.
+    pub fn shared_covariance(&self, pose_stddev: f64) -> Matrix2<f64> {
+        let mut sum = Matrix2::zeros();
+        let mut weights = 0.0;
+        for group in &self.groups {
+            let weight = 1.0 / group.variance(pose_stddev);
+            sum += group.pose_covariance * (weight / group.weight);
+            weights += weight;
+        }
+        if weights > 0.0 { sum / weights } else { sum }
+    }
+}
+
+impl Group {
+    /// Variance of the distance between the place and the tag, square metres.
+    fn variance(&self, pose_stddev: f64) -> f64 {
+        let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
+        1.0 / self.weight + pose_variance.max(pose_stddev * pose_stddev)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading(x: f64, range: f64) -> Reading {
+        Reading { position: Position::new(Point2::new(x, 5.0)), range, stddev: 0.05 }
+    }
+
+    fn rings(readings: &[Reading], min_travel: f64, pose_stddev: f64) -> Vec<Ring> {
+        let mut groups = ReadingGroups::default();
+        readings.iter().for_each(|reading| groups.add(reading, min_travel));
+        groups.rings(pose_stddev).collect()
+    }
+
+    #[test]
+    fn readings_of_a_robot_that_stands_still_never_say_more_than_its_pose() {
+        let many = rings(&vec![reading(1.0, 2.0); 10_000], 0.05, 0.02);
+        assert_eq!(many.len(), 1);
+        assert!((many[0].variance.sqrt() - 0.02).abs() < 1e-4);
+        assert!((many[0].radius - 2.0).abs() < 1e-9);
+        assert!((many[0].centre - Point2::new(1.0, 5.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_place_ends_when_the_robot_has_gone_on() {
+        let drive: Vec<_> = (0..10).map(|step| reading(0.03 * f64::from(step), 2.0)).collect();
+        assert_eq!(rings(&drive, 0.05, 0.0).len(), 5, "two readings a place");
+        assert_eq!(rings(&drive, 0.0, 0.0).len(), 10, "every reading by itself");
+    }
+
+    #[test]
+    fn an_outlier_does_not_spoil_the_mean_of_its_place() {
+        for order in [[2.0, 2.04, 0.7, 1.96], [0.7, 2.0, 2.04, 1.96]] {
+            let found = rings(&order.map(|range| reading(0.0, range)), 0.05, 0.0);
+            let radii: Vec<_> = found.iter().map(|ring| ring.radius).collect();
+            assert_eq!(radii.len(), 2, "{radii:?}");
+            assert!(radii.iter().any(|radius| (radius - 2.0).abs() < 1e-9), "{radii:?}");
+        }
+    }
+
+    #[test]
+    fn a_mean_is_weighted_by_the_readings_precision() {
+        let mut coarse = reading(0.0, 2.1);
+        coarse.stddev = 0.1;
+        let found = rings(&[reading(0.0, 2.0), coarse], 0.05, 0.0);
+        assert!((found[0].radius - 2.02).abs() < 1e-9);
+        assert!((found[0].variance - 1.0 / 500.0).abs() < 1e-9);
+    }
+}

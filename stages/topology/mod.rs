@@ -1,0 +1,12 @@
+//! Topological maps: the skeleton of the free space, the graph of its places, and hypotheses from matching two graphs.
+
+pub mod skeleton;
+pub mod topology_extractor;
+pub mod topology_matcher;
+
+use gridweave_runtime::stage::StageKind;
+
+/// The stage kinds of this room.
+pub fn kinds() -> Vec<StageKind> {
+    vec![topology_extractor::kind(), topology_matcher::kind()]
+}

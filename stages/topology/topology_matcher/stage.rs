@@ -1,0 +1,144 @@
+//! The stage: keeps each robot's last topological map, and lays those of each pair on each other.
+
+use super::icp_svd::IcpSvd;
+use super::judge::{Judgement, judge};
+use super::parameters::{MatchingMethod, TopologyMatcherParameters};
+use super::place::Place;
+use super::{Topology, exhaustive, icp_svd};
+use crate::shared::geometry::row_by_row;
+use crate::shared::robot_pair::RobotPair;
+use gridweave_runtime::ros::{Alignment, Header, TopologicalMap};
+use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
+use std::collections::BTreeMap;
+
+/// What the stage sends.
+pub(super) struct Matches {
+    alignment: Out<Alignment>,
+    hypotheses: Out<Alignment>,
+}
+
+impl Outputs for Matches {
+    fn declare(ports: &mut OutputPorts) -> Self {
+        let alignment = "How the maps of each pair of robots lie to each other, and whether that is used. The score is the share of \
+                         the paths of the map with fewer that coincide with paths of the other.";
+        let hypotheses = "The best places of each pair, ranked and marked as provisional, for icp_refiner and merge_verifier; \
+                          the same score.";
+        Self { alignment: ports.output("alignment", alignment), hypotheses: ports.output("hypotheses", hypotheses) }
+    }
+}
+
+/// A robot's last topological map.
+struct Kept {
+    frame_id: String,
+    topology: Topology,
+}
+
+/// Lays topological maps of robots on each other.
+pub(super) struct TopologyMatcher {
+    parameters: TopologyMatcherParameters,
+    maps: BTreeMap<String, Kept>,
+}
+
+impl TopologyMatcher {
+    pub(super) fn new(parameters: TopologyMatcherParameters) -> Self {
+        Self { parameters, maps: BTreeMap::new() }
+    }
+
+    pub(super) fn receive_topology(
+        &mut self,
+        map: Received<'_, TopologicalMap>,
+        output: &Output<Matches>,
+    ) -> Result<(), StageError> {
+        let robot = if map.robot().is_empty() { map.robot.as_str() } else { map.robot() };
+        let topology = match Topology::from_message(&map) {
+            Ok(topology) => topology,
+            Err(problem) => {
+                output.warn(format!("a topological map of {robot} was left out: {problem}"));
+                return Ok(());
+            }
+        };
+        let kept = Kept { frame_id: map.header.frame_id.clone(), topology };
+        let before = self.maps.insert(robot.to_owned(), kept);
+        let is_same =
+            before.is_some_and(|before| self.maps.get(robot).is_some_and(|now| now.topology == before.topology));
+        if is_same {
+            return Ok(());
+        }
+        let pairs = self.maps.keys().filter(|other| *other != robot).map(|other| RobotPair::by_name(robot, other));
+        pairs.collect::<Vec<_>>().iter().try_for_each(|pair| self.match_pair(pair, output))
+    }
+
+    fn match_pair(&self, pair: &RobotPair, output: &Output<Matches>) -> Result<(), StageError> {
+        let Some((map_a, map_b)) = self.maps.get(&pair.a).zip(self.maps.get(&pair.b)) else { return Ok(()) };
+        let (a, b) = (&map_a.topology, &map_b.topology);
+        let method = match self.parameters.method {
+            MatchingMethod::Exhaustive => "topology+exhaustive",
+            MatchingMethod::IcpSvd => "topology+icp_svd",
+        };
+        let of_pair = Alignment {
+            header: Header::new(output.log_time(), map_a.frame_id.clone()),
+            a: pair.a.clone(),
+            b: pair.b.clone(),
+            source: "topology".into(),
+            method: method.into(),
+            ..Alignment::default()
+        };
+        let most = self.parameters.max_nodes;
+        if a.nodes.len().max(b.nodes.len()) > most {
+            let reason = format!(
+                "the topological maps have {} and {} nodes, and at most {most} are matched (max_nodes)",
+                a.nodes.len(),
+                b.nodes.len()
+            );
+            return output.alignment.send("", &Alignment { reason, ..of_pair });
+        }
+        let (places, work) = self.places(a, b, output);
+        let Judgement { accepted, score, reason } = judge(a, b, &places, &self.parameters);
+        let verdict = Alignment { score, accepted, reason: format!("{reason}\n\n{work}"), ..of_pair.clone() };
+        output.alignment.send("", &placed(verdict, places.first()))?;
+        for (rank, place) in (0..).zip(&places) {
+            let hypothesis = Alignment {
+                score: score * place.similarity as f64 / places[0].similarity.max(1) as f64,
+                accepted: true,
+                provisional: true,
+                rank,
+                hypotheses: places.len() as u32,
+                reason: format!("{} paths coincide, their ends {:.2} m apart", place.similarity, place.rms),
+                ..of_pair.clone()
+            };
+            output.hypotheses.send("", &placed(hypothesis, Some(place)))?;
+        }
+        Ok(())
+    }
+
+    /// The best places of a pair, and what was done to find them.
+    fn places(&self, a: &Topology, b: &Topology, output: &Output<Matches>) -> (Vec<Place>, String) {
+        match self.parameters.method {
+            MatchingMethod::Exhaustive => {
+                let found = exhaustive(a, b, &self.parameters);
+                output.count("trials", found.trials);
+                let work = format!("{} trials: {} nodes on {} nodes", found.trials, b.nodes.len(), a.nodes.len());
+                (found.places, work)
+            }
+            MatchingMethod::IcpSvd => {
+                let (runs, places) = icp_svd(a, b, &self.parameters);
+                output.count("iterations", runs.iter().map(|run| run.errors.len() as u64).sum());
+                (places, runs.iter().enumerate().map(told).collect::<Vec<_>>().join("\n"))
+            }
+        }
+    }
+}
+
+fn placed(alignment: Alignment, place: Option<&Place>) -> Alignment {
+    let Some(place) = place else { return alignment };
+    let mut alignment = Alignment { covariance: row_by_row(&place.covariance), ..alignment };
+    alignment.set_transform_a_b(&place.transform_a_b);
+    alignment
+}
+
+/// A run with its error by iteration.
+fn told((number, run): (usize, &IcpSvd)) -> String {
+    let errors: Vec<String> = run.errors.iter().map(|error| format!("{error:.3}")).collect();
+    let end = if run.converged { "converged after" } else { "not converged after" };
+    format!("start {number}: {end} {} iterations; error by iteration, m²: {}", errors.len(), errors.join(" "))
+}

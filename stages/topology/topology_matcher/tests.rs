@@ -1,0 +1,240 @@
+//! Topological maps that are drawn by hand, and random ones.
+
+use super::*;
+use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Alignment, TopologicalMap, TopologicalNode, TopologicalPath};
+use gridweave_runtime::stage::{LoneStage, Parameters};
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+
+/// Seven nodes: a long corridor with four arms that look the same after half a turn, and a loose one.
+fn seven() -> Topology {
+    let nodes = [(0.0, 0.0), (6.0, 0.0), (0.0, 3.0), (6.0, -3.0), (-4.0, 0.0), (10.0, 0.0), (-4.0, -7.0)];
+    let paths = [[0, 1], [0, 2], [1, 3], [0, 4], [1, 5], [4, 6]];
+    Topology { nodes: nodes.map(|(x, y)| Point2::new(x, y)).into(), paths: paths.into() }
+}
+
+/// Four nodes of those, seen from a frame that is turned: nodes 2, 0, 1 and 3.
+fn four(transform_seven_four: &Pose2) -> Topology {
+    let inverse = transform_seven_four.inverse();
+    let nodes = [2, 0, 1, 3].map(|node| inverse * seven().nodes[node]);
+    Topology { nodes: nodes.into(), paths: vec![[0, 1], [1, 2], [2, 3]] }
+}
+
+fn degrees(place: &Place) -> f64 {
+    turn_difference(place.transform_a_b.rotation.angle(), 0.0, TAU).to_degrees().rem_euclid(360.0)
+}
+
+#[test]
+fn four_and_seven_nodes_take_5068_trials_and_both_symmetric_answers_are_found() {
+    let truth = pose(2.0, -1.0, 136f64.to_radians());
+    let found = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default());
+    assert_eq!(found.trials, 5068);
+    let best: Vec<&Place> = found.places.iter().filter(|place| place.similarity == 3).collect();
+    assert_eq!(best.len(), 2, "{:?}", found.places);
+    let mut turns = [degrees(best[0]), degrees(best[1])];
+    turns.sort_by(f64::total_cmp);
+    assert!((turns[0] - 136.0).abs() < 1e-6 && (turns[1] - 316.0).abs() < 1e-6, "{turns:?}");
+    assert!(best.iter().any(|place| (place.transform_a_b.inverse() * truth).translation.vector.norm() < 1e-9));
+    let judgement = judge(&seven(), &four(&truth), &found.places, &TopologyMatcherParameters::default());
+    assert!(!judgement.accepted, "{}", judgement.reason);
+}
+
+#[test]
+fn a_place_is_left_at_its_turn_and_node_if_that_is_asked_for() {
+    let truth = pose(2.0, -1.0, 136.7f64.to_radians());
+    let parameters = TopologyMatcherParameters { refine: false, ..Default::default() };
+    let found = exhaustive(&seven(), &four(&truth), &parameters);
+    let turn = degrees(&found.places[0]);
+    assert!((turn / 2.0 - (turn / 2.0).round()).abs() < 1e-9, "{turn}");
+    let exact = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default());
+    assert!(exact.places[..2].iter().any(|place| (degrees(place) - 136.7).abs() < 1e-6));
+}
+
+#[test]
+fn icp_ends_at_the_place_that_is_near_its_start() {
+    let truth = pose(2.0, -1.0, 0.5);
+    let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
+    let run = icp_svd_from(&seven(), &b, pose(0.0, 0.0, 0.0), &TopologyMatcherParameters::default());
+    assert!(run.converged);
+    assert!((run.transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6, "{run:?}");
+    assert!(run.errors.windows(2).all(|errors| errors[1] <= errors[0] + 1e-9), "{:?}", run.errors);
+    assert_eq!(run.errors.len(), 5, "{:?}", run.errors);
+}
+
+#[test]
+fn one_start_is_misled_by_half_a_turn_and_several_are_not() {
+    let truth = pose(3.0, 1.0, 2.4);
+    let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
+    let error = |starts: usize| {
+        let (runs, places) = icp_svd(&seven(), &b, &TopologyMatcherParameters { starts, ..Default::default() });
+        assert_eq!(runs.len(), starts);
+        places.first().map_or(f64::MAX, |place| (place.transform_a_b.inverse() * truth).rotation.angle().abs())
+    };
+    assert!(error(1) > 0.5);
+    assert!(error(12) < 1e-6);
+}
+
+#[test]
+fn a_run_is_broken_off_at_the_limit() {
+    let parameters = TopologyMatcherParameters { max_iterations: 2, tau: 0.0, ..Default::default() };
+    let run = icp_svd_from(&seven(), &four(&pose(0.0, 0.0, 1.0)), Pose2::identity(), &parameters);
+    assert_eq!((run.errors.len(), run.converged), (2, false));
+}
+
+/// Maps with 7 nodes in a hall of 30 m, and a path from each to the next.
+fn random_map() -> impl Strategy<Value = Topology> {
+    let paths: Vec<[usize; 2]> = (0..6).map(|node| [node, node + 1]).collect();
+    prop::collection::vec((-15.0..15.0, -15.0..15.0), 7).prop_map(move |nodes| Topology {
+        nodes: nodes.into_iter().map(|(x, y)| Point2::new(x, y)).collect(),
+        paths: paths.clone(),
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    #[test]
+    fn a_trial_counts_the_paths_that_equation_2_counts(a in random_map(), b in random_map()) {
+        let parameters = TopologyMatcherParameters { refine: false, tolerance: 1.5, ..Default::default() };
+        let found = exhaustive(&a, &b, &parameters);
+        let by_trials = |turn: usize| {
+            let rotation = nalgebra::UnitComplex::new(turn as f64 * parameters.turn_step);
+            let (a, b, parameters) = (&a, &b, &parameters);
+            let places = a.nodes.iter().flat_map(move |node_a| b.nodes.iter().map(move |node_b| {
+                let translation = node_a.coords - rotation * node_b.coords;
+                coinciding(a, b, &Pose2::from_parts(translation.into(), rotation), parameters.tolerance).len()
+            }));
+            places.max().unwrap_or(0)
+        };
+        let most = (0..181).map(by_trials).max().unwrap_or(0);
+        prop_assert_eq!(found.places.first().map_or(0, |place| place.similarity), most);
+    }
+
+    #[test]
+    fn exchanged_maps_lie_at_the_inverse(a in random_map(), x in -9.0..9.0, y in -9.0..9.0, yaw in -3.0..3.0) {
+        let truth = pose(x, y, yaw);
+        let b = Topology { nodes: a.nodes.iter().map(|node| truth.inverse() * node).collect(), ..a.clone() };
+        let parameters = TopologyMatcherParameters::default();
+        let (forth, back) = (exhaustive(&a, &b, &parameters), exhaustive(&b, &a, &parameters));
+        let identity = forth.places[0].transform_a_b * back.places[0].transform_a_b;
+        prop_assert!(identity.translation.vector.norm() < 1e-6 && identity.rotation.angle().abs() < 1e-6);
+        prop_assert!((forth.places[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
+    }
+}
+
+#[test]
+fn the_covariance_is_that_of_nodes_that_err() {
+    use nalgebra::{Matrix3, Vector3};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+    let noise = Normal::new(0.0, 0.1).unwrap();
+    let parameters = TopologyMatcherParameters { node_stddev: 0.1, ..Default::default() };
+    let mut erring = |of: &Topology| Topology {
+        nodes: of.nodes.iter().map(|p| p + nalgebra::Vector2::from_fn(|_, _| noise.sample(&mut random))).collect(),
+        ..of.clone()
+    };
+    let (mut seen, mut said, runs) = (Matrix3::zeros(), Matrix3::zeros(), 1500);
+    for _ in 0..runs {
+        let (a, b) = (erring(&seven()), erring(&seven()));
+        let place = Place::at(&a, &b, Pose2::identity(), &parameters).unwrap();
+        let off = place.transform_a_b;
+        let error = Vector3::new(off.translation.x, off.translation.y, off.rotation.angle());
+        seen += error * error.transpose() / f64::from(runs);
+        said += place.covariance / f64::from(runs);
+    }
+    for index in 0..3 {
+        let ratio = said[(index, index)] / seen[(index, index)];
+        assert!((0.8..1.6).contains(&ratio), "{index}: {ratio}");
+    }
+}
+
+fn message(robot: &str, topology: &Topology) -> TopologicalMap {
+    let node = |point: &Point2| TopologicalNode { x: point.x, y: point.y, kind: "end".into(), probability: 1.0 };
+    let path = |ends: &[usize; 2]| TopologicalPath { start: ends[0] as u32, end: ends[1] as u32, ..Default::default() };
+    TopologicalMap {
+        robot: robot.into(),
+        nodes: topology.nodes.iter().map(node).collect(),
+        paths: topology.paths.iter().map(path).collect(),
+        ..Default::default()
+    }
+}
+
+/// What the stage sends for maps that come one after the other.
+fn sent(parameters: &str, maps: &[(&str, TopologicalMap)]) -> (Vec<Alignment>, Vec<Alignment>, usize) {
+    let mut stage = LoneStage::new(&kind(), parameters).unwrap();
+    for (robot, map) in maps {
+        stage.give::<TopologicalMap>("topology", robot, LogTime(1), map).unwrap();
+    }
+    (stage.take("alignment").unwrap(), stage.take("hypotheses").unwrap(), stage.warnings().len())
+}
+
+#[test]
+fn maps_that_fit_at_one_place_are_accepted() {
+    let truth = pose(2.0, -1.0, 1.0);
+    let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
+    for (method, name) in [("exhaustive", "topology+exhaustive"), ("icp_svd", "topology+icp_svd")] {
+        let maps = [("robot2", message("robot2", &b)), ("robot1", message("robot1", &seven()))];
+        // After half a turn the same maps fit but for one path.
+        let parameters = format!("method = \"{method}\"\nmax_runner_up = 0.9");
+        let (alignments, hypotheses, _) = sent(&parameters, &maps);
+        let [alignment] = &alignments[..] else { panic!("{alignments:?}") };
+        assert_eq!((alignment.a.as_str(), alignment.b.as_str()), ("robot1", "robot2"));
+        assert!(alignment.accepted && alignment.score > 0.9, "{}", alignment.reason);
+        assert_eq!(alignment.method, name);
+        assert!((alignment.transform_a_b().inverse() * truth).translation.vector.norm() < 1e-6);
+        assert!(alignment.covariance[0] > 0.0 && alignment.covariance[8] > 0.0);
+        assert!(
+            hypotheses
+                .iter()
+                .all(|hypothesis| hypothesis.provisional && hypothesis.hypotheses as usize == hypotheses.len())
+        );
+    }
+}
+
+#[test]
+fn a_refusal_says_what_is_missing() {
+    let b = message("robot2", &four(&pose(0.0, 0.0, 1.0)));
+    let (alignments, hypotheses, _) = sent("", &[("robot1", message("robot1", &seven())), ("robot2", b.clone())]);
+    assert!(!alignments[0].accepted && alignments[0].reason.contains("min_paths"), "{}", alignments[0].reason);
+    assert!(hypotheses.len() >= 2);
+    let (alignments, _, _) = sent("min_paths = 3", &[("robot1", message("robot1", &seven())), ("robot2", b)]);
+    assert!(!alignments[0].accepted && alignments[0].reason.contains("max_runner_up"), "{}", alignments[0].reason);
+    let empty = message("robot2", &Topology::default());
+    let (alignments, hypotheses, _) = sent("", &[("robot1", message("robot1", &seven())), ("robot2", empty)]);
+    assert!(!alignments[0].accepted && !alignments[0].has_transform && hypotheses.is_empty());
+    let large = message("robot2", &Topology { nodes: vec![Point2::origin(); 401], paths: Vec::new() });
+    let (alignments, _, _) = sent("", &[("robot1", message("robot1", &seven())), ("robot2", large)]);
+    assert!(alignments[0].reason.contains("max_nodes"));
+}
+
+#[test]
+fn icp_tells_its_error_by_iteration() {
+    let maps = [("robot1", message("robot1", &seven())), ("robot2", message("robot2", &seven()))];
+    let (alignments, ..) = sent("method = \"icp_svd\"\nstarts = 2", &maps);
+    assert!(
+        alignments[0].reason.contains("start 0: converged after 2 iterations; error by iteration, m²: 0.000 0.000")
+    );
+    assert!(alignments[0].reason.contains("start 1: "));
+}
+
+#[test]
+fn wrong_maps_are_left_out_and_the_same_map_is_matched_once() {
+    let mut no_number = message("robot2", &seven());
+    no_number.nodes[1].x = f64::NAN;
+    let mut no_node = message("robot2", &seven());
+    no_node.paths[2].end = 7;
+    let same = message("robot2", &seven());
+    let one = ("robot1", message("robot1", &seven()));
+    let (alignments, _, warnings) =
+        sent("", &[one, ("robot2", no_number), ("robot2", no_node), ("robot2", same.clone()), ("robot2", same)]);
+    assert_eq!((alignments.len(), warnings), (1, 2));
+}
+
+#[test]
+fn the_defaults_are_in_range_and_nonsense_is_not() {
+    assert!(TopologyMatcherParameters::default().check().is_empty());
+    let wrong = TopologyMatcherParameters { tau: f64::NAN, starts: 0, min_share: 2.0, ..Default::default() };
+    assert_eq!(wrong.check().len(), 3);
+}
