@@ -125,6 +125,14 @@ impl LiveRouter {
         self.router.send(route, stamp, data, output)
     }
 
+    /// Sends the maps whose updates have not been sent. The output's log time is theirs.
+    ///
+    /// # Errors
+    /// The link has failed.
+    pub fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.router.send_updated_maps(output)
+    }
+
     fn role(&self, channel: &LiveChannel) -> Role {
         self.router.roles().classify(&channel.original).role
     }

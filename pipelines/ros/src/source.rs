@@ -53,6 +53,9 @@ pub struct SourceParameters {
     /// reads `scans`. If it publishes a map later than that, its scans are taken no longer.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub wait_for_map: f64,
+    /// The longest time that updates of a map are gathered before the map is sent with them, seconds.
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub update_period: f64,
 }
 
 impl Default for SourceParameters {
@@ -67,6 +70,7 @@ impl Default for SourceParameters {
             definitions: Vec::new(),
             keep_last: 100,
             wait_for_map: 10.0,
+            update_period: 1.0,
         }
     }
 }
@@ -108,6 +112,9 @@ pub struct RosSource {
     /// Publishers of scans of robots that may yet publish a map, and since when they are known.
     waiting_scans: Vec<(Instant, Entity)>,
     wait_for_map: Duration,
+    update_period: Duration,
+    /// When the maps with updates were sent last.
+    updates_sent: Instant,
     /// Those of the topics that are heard.
     subscribers: BTreeMap<Topic, Subscriber>,
     /// What was told already.
@@ -133,7 +140,7 @@ impl RosSource {
     /// It cannot be joined.
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
         let node = Node::start(parameters.connection(), &context.stage)?;
-        let wait_for_map = Duration::try_from_secs_f64(parameters.wait_for_map).unwrap_or_default();
+        let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
         node.watch(move |entity, is_there| events.push(Event::Entity(entity, is_there), 0))?;
@@ -145,7 +152,9 @@ impl RosSource {
             keep_last: parameters.keep_last,
             topics: BTreeMap::new(),
             waiting_scans: Vec::new(),
-            wait_for_map,
+            wait_for_map: duration(parameters.wait_for_map),
+            update_period: duration(parameters.update_period),
+            updates_sent: Instant::now(),
             subscribers: BTreeMap::new(),
             told: BTreeSet::new(),
             waiting_since: Some(Instant::now()),
@@ -384,10 +393,18 @@ impl Source for RosSource {
                 }
             }
         }
+        if self.updates_sent.elapsed() >= self.update_period {
+            self.updates_sent = Instant::now();
+            self.router.send_updated_maps(output)?;
+        }
         let dropped = self.inbox.take_dropped();
         if dropped > 0 {
             output.count("messages that were dropped because the pipeline does not keep up", dropped);
         }
         Ok(true)
+    }
+
+    fn finish(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.router.send_updated_maps(output)
     }
 }

@@ -3,12 +3,12 @@
 use super::links::Links;
 use super::runner::Runner;
 use super::statistics::run_statistics;
-use super::work::Work;
+use super::work_timer::WorkTimer;
 use super::{Failure, StageReport};
 use crate::link::{
     Control, InputQueue, LinkError, LinkReceiver, Order, Outputs, SenderRole, Sleeper, latest, lower_bound,
 };
-use crate::link::{StageBoard, StageNumber, StageState, WireNumber, monotonic_nanoseconds};
+use crate::link::{StageCounters, StageCounter, StageState, WireCounter, monotonic_nanoseconds};
 use crate::message::{LogTime, MessageFlags};
 use crate::stage::Context;
 use iceoryx2::service::Service;
@@ -48,8 +48,8 @@ pub(super) struct StageThread<'a, S: Service> {
     receivers: Vec<LinkReceiver<S>>,
     outputs: Rc<RefCell<Outputs<S>>>,
     sleeper: Rc<Sleeper>,
-    board: StageBoard,
-    work: Work,
+    counters: StageCounters,
+    work: WorkTimer,
     order: Order,
     /// After so many samples the stage looks at its links, and tells its readers how far it is.
     look_interval: usize,
@@ -69,7 +69,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         match Self::connect(links, stage, control, events) {
             Ok(thread) => thread.run(stop_reason),
             Err(failure) => {
-                links.board.stage(stage).clear();
+                links.counters.stage(stage).clear();
                 tell(events, Event::Ended { stage, result: Err(failure) });
             }
         }
@@ -82,26 +82,26 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         control: Arc<Control>,
         events: &'a Sender<Event>,
     ) -> Result<Self, Failure> {
-        let (pipeline, board) = (links.pipeline, links.board.stage(stage));
+        let (pipeline, counters) = (links.pipeline, links.counters.stage(stage));
         let spec = &pipeline.stages[stage];
-        board.set(StageNumber::Started, monotonic_nanoseconds());
-        board.set(StageNumber::Process, u64::from(std::process::id()));
-        board.set_state(StageState::Starting);
-        let sleeper = Rc::new(Sleeper::new(board.clone(), control));
+        counters.set(StageCounter::Started, monotonic_nanoseconds());
+        counters.set(StageCounter::Process, u64::from(std::process::id()));
+        counters.set_state(StageState::Starting);
+        let sleeper = Rc::new(Sleeper::new(counters.clone(), control));
         let node = links.node::<S>()?;
         let receivers = links.receivers(&node, stage)?;
-        let role = if spec.kind.is_external() { SenderRole::FedOwner } else { SenderRole::Owner };
+        let role = if spec.kind.is_external() { SenderRole::PassiveOwner } else { SenderRole::Owner };
         let (ports, senders): (Vec<usize>, Vec<_>) = links.senders(&node, stage, role)?.into_iter().unzip();
         let outputs = Outputs::new(senders, Rc::clone(&sleeper));
         let sink = |port: usize| Some(Outputs::sink(&outputs, ports.binary_search(&port).ok()?));
-        let mut work = Work::new(board.clone(), Rc::clone(&sleeper));
+        let mut work = WorkTimer::new(counters.clone(), Rc::clone(&sleeper));
         work.begin();
-        let statistics = Some(run_statistics(pipeline, links.board));
+        let statistics = Some(run_statistics(pipeline, links.counters));
         let context = Context { statistics, links: links.to_look_on(), ..pipeline.context(stage) };
         let runner = Runner::new(pipeline, stage, &context, sink)?;
         work.note();
         work.end();
-        board.set_state(StageState::Running);
+        counters.set_state(StageState::Running);
         let order = Order::from(pipeline.mode);
         let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
         let look_interval = match order {
@@ -109,7 +109,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             // The next may be one that has just come.
             Order::Arrival => 1,
         };
-        Ok(Self { runner, queues, receivers, outputs, sleeper, board, work, order, look_interval, stage, events })
+        Ok(Self { runner, queues, receivers, outputs, sleeper, counters, work, order, look_interval, stage, events })
     }
 
     /// Runs the stage to its end and tells the run how it went.
@@ -123,7 +123,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         match result {
             Ok(()) => tell(events, Event::Ended { stage, result: self.close() }),
             Err(failure) => {
-                self.board.clear();
+                self.counters.clear();
                 // Told before the links go, so that the peers' complaints about lost links come after the cause.
                 let own_reason = failure.to_string();
                 tell(events, Event::Ended { stage, result: Err(failure) });
@@ -138,16 +138,16 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let is_external = self.runner.is_external();
         let mut report = self.runner.into_report(self.sleeper.waited())?;
         drop(self.queues);
-        let dropped = (0..self.board.wires()).map(|wire| self.board.get_wire(wire, WireNumber::Dropped));
+        let dropped = (0..self.counters.wires()).map(|wire| self.counters.get_wire(wire, WireCounter::Dropped));
         report.dropped = dropped.sum();
-        report.restarts = self.board.get(StageNumber::Restarts);
+        report.restarts = self.counters.get(StageCounter::Restarts);
         if is_external || report.restarts > 0 {
             // With what the processes before this one have done.
-            report.messages_in = self.board.get(StageNumber::MessagesIn);
-            report.messages_out = self.board.all_sent();
-            report.busy = Duration::from_nanos(self.board.get(StageNumber::Busy));
+            report.messages_in = self.counters.get(StageCounter::MessagesIn);
+            report.messages_out = self.counters.all_sent();
+            report.busy = Duration::from_nanos(self.counters.get(StageCounter::Busy));
         }
-        self.board.set_state(StageState::Ended);
+        self.counters.set_state(StageState::Ended);
         Ok(report)
     }
 
@@ -176,6 +176,10 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             if count % REPORT_INTERVAL == 0 {
                 self.report_progress()?;
             }
+        }
+        if sleeper.control().is_draining() {
+            let reached = self.outputs.borrow().reached();
+            self.runner.finish(reached)?;
         }
         self.work.end();
         let reached = self.outputs.borrow().reached();
@@ -238,9 +242,9 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             self.runner.take(wire, message)?;
             let time = self.work.note();
             if is_data {
-                self.board.add(StageNumber::MessagesIn, 1);
+                self.counters.add(StageCounter::MessagesIn, 1);
                 if self.order == Order::Arrival {
-                    self.board.add_latency(time.saturating_sub(self.queues[wire].sent_at()));
+                    self.counters.add_latency(time.saturating_sub(self.queues[wire].sent_at()));
                 }
             }
             handled += usize::from(self.receivers[wire].taken());
@@ -260,7 +264,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     /// Sees whether the run is being stopped, or somebody has come who is to be sent what he has missed.
     fn look(&self) -> Result<(), LinkError> {
         self.sleeper.check()?;
-        self.outputs.borrow_mut().answer_greetings()
+        self.outputs.borrow_mut().answer_history_requests()
     }
 
     /// Sleeps until there is something to receive or to send.
@@ -268,7 +272,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let watermark = lower_bound(&self.queues);
         self.sleeper.wait(|| {
             let mut outputs = self.outputs.borrow_mut();
-            if outputs.is_greeted()
+            if outputs.has_history_requests()
                 || outputs.is_asked()
                 || watermark.is_some_and(|watermark| outputs.can_flush(watermark))
             {
@@ -288,11 +292,11 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         })
     }
 
-    /// Shows on the board how far the stage is.
+    /// Shows on the counters how far the stage is.
     fn show(&self) {
-        self.board.set(StageNumber::Warnings, self.runner.warnings());
+        self.counters.set(StageCounter::Warnings, self.runner.warnings());
         for (wire, queue) in self.queues.iter().enumerate() {
-            self.board.set_wire(wire, WireNumber::Waiting, queue.len() as u64);
+            self.counters.set_wire(wire, WireCounter::Waiting, queue.len() as u64);
         }
     }
 

@@ -63,6 +63,14 @@ pub trait Source: 'static {
     /// In a live run it is called before each [`next`](Self::next), and does not count as work.
     fn wait(&mut self, _longest: Duration) {}
 
+    /// Sends what the source still holds. Called once, when a live run is asked to end.
+    ///
+    /// # Errors
+    /// A link has failed.
+    fn finish(&mut self, _output: &Output<Self::Outputs>) -> Result<(), StageError> {
+        Ok(())
+    }
+
     /// How much of its work is done, 0 to 1, if it can tell.
     fn progress(&self) -> Option<f64> {
         None
@@ -305,6 +313,10 @@ impl<S: Source> RunningSource for Running<S> {
 
     fn wait(&mut self, longest: Duration) {
         self.source.wait(longest);
+    }
+
+    fn finish(&mut self) -> Result<(), StageError> {
+        self.source.finish(&self.output)
     }
 
     fn progress(&self) -> Option<f64> {

@@ -32,6 +32,7 @@ pub(super) trait RunningStage {
 pub(super) trait RunningSource {
     fn next(&mut self) -> Result<bool, StageError>;
     fn wait(&mut self, longest: Duration);
+    fn finish(&mut self) -> Result<(), StageError>;
     fn progress(&self) -> Option<f64>;
     fn abort(&mut self, reason: &str);
 }
@@ -86,11 +87,12 @@ impl Node {
         }
     }
 
-    /// Tells a stage that all its inputs have ended.
+    /// Ends a stage whose inputs have all ended, or a source that is asked to end.
     pub fn finish(&mut self) -> Result<(), StageError> {
         match &mut self.role {
             Role::Stage(stage) => stage.finish(),
-            Role::Source(_) | Role::External => Ok(()),
+            Role::Source(source) => source.finish(),
+            Role::External => Ok(()),
         }
     }
 

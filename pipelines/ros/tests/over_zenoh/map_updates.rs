@@ -1,6 +1,6 @@
 //! What programs have of a map whose changes the sink publishes, over a router on this machine.
 
-use crate::stages::{give, sink};
+use crate::stages::{give, sent, sink, source_with, wait_until_heard};
 use crate::wire::{Hearer, Robot, Router, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
@@ -171,4 +171,41 @@ fn without_updates_every_map_is_whole() {
         wait_until_seen(&merge, &mut viewer);
     }
     assert_eq!(viewer.heard[1], 0);
+}
+
+/// A robot that publishes a map of 40 x 30 cells and one update of one cell, and the source that takes them.
+fn updated_by_one_cell(router: &Router, parameters: &str) -> (LoneStage, Robot) {
+    let mut source = source_with(router, parameters);
+    let robot = Robot::start(router, "slam");
+    let mut maps = robot.publish(&topic("/robot1/map", OccupancyGrid::NAME), Qos::latched(1));
+    let mut updates = robot.publish(&topic("/robot1/map_updates", OccupancyGridUpdate::NAME), Qos::reliable(5));
+    wait_until_heard(&mut source, &maps);
+    wait_until_heard(&mut source, &updates);
+    let header = Header { frame_id: "map".into(), ..Default::default() };
+    let info = MapMetaData { width: WIDTH as u32, height: 30, resolution: 0.05, ..Default::default() };
+    maps.send(&encode(&OccupancyGrid { header: header.clone(), info, data: &[0; CELLS] }).unwrap());
+    let first = sent(&mut source, "map", 1).remove(0);
+    assert_eq!(first.decode::<OccupancyGrid<'_>>().unwrap().data, [0; CELLS]);
+    updates.send(&encode(&OccupancyGridUpdate { header, x: 3, y: 0, width: 1, height: 1, data: &[100] }).unwrap());
+    (source, robot)
+}
+
+#[test]
+fn a_map_with_an_update_is_sent_although_no_other_update_follows() {
+    let router = Router::start();
+    let (mut source, _robot) = updated_by_one_cell(&router, "update_period = 0.05");
+    let updated = sent(&mut source, "map", 1).remove(0);
+    assert_eq!(updated.decode::<OccupancyGrid<'_>>().unwrap().data[..5], [0, 0, 0, 100, 0]);
+}
+
+#[test]
+fn a_run_that_is_asked_to_end_sends_the_map_with_its_last_update() {
+    let router = Router::start();
+    let (mut source, _robot) = updated_by_one_cell(&router, "update_period = 3600.0");
+    let updates = sent(&mut source, "other", 1);
+    assert_eq!(updates[0].decode::<OccupancyGridUpdate<'_>>().unwrap().data, [100]);
+    assert!(source.take_messages("map").is_empty(), "updates are gathered");
+    source.finish(Default::default()).unwrap();
+    let updated = source.take_messages("map").remove(0);
+    assert_eq!(updated.decode::<OccupancyGrid<'_>>().unwrap().data[3], 100);
 }

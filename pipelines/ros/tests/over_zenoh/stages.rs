@@ -18,7 +18,11 @@ pub(crate) fn map(robot: &str, occupied: u8) -> Vec<u8> {
 }
 
 fn source(router: &Router) -> LoneStage {
-    LoneStage::new(&gridweave_ros::source::kind(), &router.parameters()).unwrap()
+    source_with(router, "")
+}
+
+pub(crate) fn source_with(router: &Router, parameters: &str) -> LoneStage {
+    LoneStage::new(&gridweave_ros::source::kind(), &format!("{}\n{parameters}", router.parameters())).unwrap()
 }
 
 /// Lets a source go on until it has sent so many messages on an output, and gives them.
