@@ -1,8 +1,8 @@
 //! The ends of links, as the pipeline of a run has them.
 
 use super::runner::readers;
-use crate::link::Board;
-use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortBoard, ReaderEnd, RunNames, SenderRole};
+use crate::link::SharedCounters;
+use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortCounters, ReaderEnd, RunNames, SenderRole};
 use crate::pipeline::Pipeline;
 use crate::stage::RunLinks;
 use iceoryx2::node::Node;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(super) struct Links<'a> {
     pub(super) pipeline: &'a Pipeline,
     names: &'a RunNames,
-    pub(super) board: &'a Arc<Board>,
+    pub(super) counters: &'a Arc<SharedCounters>,
     /// For each output port of each stage, those that read it: stages and their wires.
     readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
     /// For stages that show elsewhere what passes, if others than the ends of links can see that.
@@ -22,8 +22,8 @@ pub(super) struct Links<'a> {
 }
 
 impl<'a> Links<'a> {
-    pub(super) fn new(pipeline: &'a Pipeline, names: &'a RunNames, board: &'a Arc<Board>) -> Self {
-        Self { pipeline, names, board, readers: readers(pipeline), to_look_on: None }
+    pub(super) fn new(pipeline: &'a Pipeline, names: &'a RunNames, counters: &'a Arc<SharedCounters>) -> Self {
+        Self { pipeline, names, counters, readers: readers(pipeline), to_look_on: None }
     }
 
     /// The same of a run whose links others can look on at.
@@ -50,7 +50,7 @@ impl<'a> Links<'a> {
         let inputs = self.pipeline.stages[stage].inputs.iter().enumerate();
         let receiver = |(wire, input): (usize, &crate::pipeline::Wire)| {
             let (from, port) = (input.from_stage, input.from_port);
-            let owner = PortBoard { board: self.board.stage(from), port };
+            let owner = PortCounters { counters: self.counters.stage(from), port };
             LinkReceiver::new(node, self.names, &self.shape(from, port), self.reader_end(stage, wire), owner)
         };
         inputs.map(receiver).collect()
@@ -66,9 +66,9 @@ impl<'a> Links<'a> {
         let ports = (0..self.pipeline.stages[stage].kind.outputs.len()).filter(|&port| self.is_read(stage, port));
         let sender = |port: usize| {
             let readers = self.readers[&(stage, port)].iter().map(|&(stage, wire)| self.reader_end(stage, wire));
-            let (shape, board) = (self.shape(stage, port), PortBoard { board: self.board.stage(stage), port });
+            let (shape, counters) = (self.shape(stage, port), PortCounters { counters: self.counters.stage(stage), port });
             let gather = self.pipeline.batch;
-            let sender = LinkSender::new(node, self.names, &shape, readers.collect(), board, role, gather)?;
+            let sender = LinkSender::new(node, self.names, &shape, readers.collect(), counters, role, gather)?;
             Ok((port, sender))
         };
         ports.map(sender).collect()
@@ -80,7 +80,7 @@ impl<'a> Links<'a> {
     }
 
     fn reader_end(&self, stage: usize, wire: usize) -> ReaderEnd {
-        ReaderEnd { board: self.board.stage(stage), wire, depth: self.pipeline.stages[stage].depth }
+        ReaderEnd { counters: self.counters.stage(stage), wire, depth: self.pipeline.stages[stage].depth }
     }
 
     fn shape(&self, stage: usize, port: usize) -> LinkShape<'_> {
@@ -98,7 +98,7 @@ impl<'a> Links<'a> {
     }
 }
 
-/// What each stage has on the board of the run: (wires, output ports).
-pub(super) fn board_shape(pipeline: &Pipeline) -> Vec<(usize, usize)> {
+/// What each stage has on the counters of the run: (wires, output ports).
+pub(super) fn counters_shape(pipeline: &Pipeline) -> Vec<(usize, usize)> {
     pipeline.stages.iter().map(|stage| (stage.inputs.len(), stage.kind.outputs.len())).collect()
 }

@@ -3,7 +3,7 @@
 //! Every engine gives each stage the same inputs in the same order, so every engine gives the same result.
 
 mod error;
-mod feed;
+mod external_sender;
 mod links;
 pub mod processes;
 mod report;
@@ -18,10 +18,10 @@ mod statistics;
 mod threads;
 mod user_folder;
 mod watch;
-mod work;
+mod work_timer;
 
 pub use error::{Failure, RunError};
-pub use feed::{Feed, FeedStopper};
+pub use external_sender::{ExternalSender, SenderStopper};
 pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};

@@ -4,11 +4,11 @@
 //! iceoryx2's files, what the processes of the run must know, and a file that they keep locked ([`run_lock`](super::run_lock)).
 //! A folder that nobody has locked is left over, and so is all that bears its prefix in `/dev/shm`.
 
-use super::links::board_shape;
+use super::links::counters_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
-use super::run_prefix::{board_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
+use super::run_prefix::{counters_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
-use crate::link::{Board, RunNames};
+use crate::link::{SharedCounters, RunNames};
 use crate::pipeline::Pipeline;
 use std::fs::{self, DirBuilder, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
@@ -109,15 +109,15 @@ impl RunFolder {
         file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed("write", &path))
     }
 
-    /// Makes the board of the run.
-    pub(super) fn create_board(&self, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
-        let path = board_path(&self.prefix);
-        Board::create(&path, &board_shape(pipeline)).map_err(failed("make the board of the run", &path))
+    /// Makes the counters of the run.
+    pub(super) fn create_counters(&self, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
+        let path = counters_path(&self.prefix);
+        SharedCounters::create(&path, &counters_shape(pipeline)).map_err(failed("make the counters of the run", &path))
     }
 
-    /// The board of the run.
-    pub(super) fn board(&self, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
-        open_board(&self.prefix, pipeline)
+    /// The counters of the run.
+    pub(super) fn counters(&self, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
+        open_counters(&self.prefix, pipeline)
     }
 
     /// Removes all that the run has left. Only for the last process of a run.
@@ -126,10 +126,10 @@ impl RunFolder {
     }
 }
 
-/// The board of the run with the given prefix.
-pub(super) fn open_board(prefix: &str, pipeline: &Pipeline) -> Result<Arc<Board>, RunFolderError> {
-    let path = board_path(prefix);
-    Board::open(&path, &board_shape(pipeline)).map_err(failed("open the board of the run", &path))
+/// The counters of the run with the given prefix.
+pub(super) fn open_counters(prefix: &str, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
+    let path = counters_path(prefix);
+    SharedCounters::open(&path, &counters_shape(pipeline)).map_err(failed("open the counters of the run", &path))
 }
 
 /// A run of processes that is going on.
@@ -278,7 +278,7 @@ mod tests {
         let user = user_folder();
         let alive = RunFolder::create_in(user.path()).unwrap();
         let dead = RunFolder::create_in(user.path()).unwrap();
-        let (dead_path, file) = (dead.path.clone(), board_path(&dead.prefix));
+        let (dead_path, file) = (dead.path.clone(), counters_path(&dead.prefix));
         fs::write(&file, [1; 5000]).unwrap();
         drop(dead);
         let joined = RunFolder::join(&alive.path).unwrap();
@@ -329,7 +329,7 @@ mod tests {
         use iceoryx2::service::ipc;
         let folder = RunFolder::create().unwrap();
         folder.write_pipeline("").unwrap();
-        Board::create(&board_path(&folder.prefix), &[(0, 1)]).unwrap();
+        SharedCounters::create(&counters_path(&folder.prefix), &[(0, 1)]).unwrap();
         let node = folder.names().node::<ipc::Service>().unwrap();
         let files = shared_memory(&folder.prefix);
         assert!(files.len() > 1, "{files:?}");

@@ -4,7 +4,7 @@
 //! that what belongs to others is never taken for that of a run.
 
 use super::user_folder::is_own;
-use crate::link::SHARED_MEMORY;
+use crate::link::SHARED_MEMORY_FOLDER;
 use rustix::rand::{GetRandomFlags, getrandom};
 use std::fs;
 use std::io;
@@ -38,9 +38,9 @@ pub(super) fn is_prefix(name: &str) -> bool {
     })
 }
 
-/// The board lies in shared memory, and goes with the rest of the run that lies there.
-pub(super) fn board_path(prefix: &str) -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("{prefix}board"))
+/// The counters lies in shared memory, and goes with the rest of the run that lies there.
+pub(super) fn counters_path(prefix: &str) -> PathBuf {
+    Path::new(SHARED_MEMORY_FOLDER).join(format!("{prefix}counters"))
 }
 
 /// The files of this user in shared memory that bear a run's prefix.
@@ -48,7 +48,7 @@ pub(super) fn shared_memory(prefix: &str) -> Vec<PathBuf> {
     if !is_prefix(prefix) {
         return Vec::new();
     }
-    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else { return Vec::new() };
+    let Ok(entries) = fs::read_dir(SHARED_MEMORY_FOLDER) else { return Vec::new() };
     let files = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix));
     let is_own_file = |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && is_own(&file));
     files.map(|entry| entry.path()).filter(is_own_file).collect()

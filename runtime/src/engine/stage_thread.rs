@@ -199,7 +199,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     /// A source whose messages come from outside keeps the last of them for readers that come late.
     fn drive_external(&mut self) -> Result<(), Failure> {
         loop {
-            self.outputs.borrow_mut().take_in()?;
+            self.outputs.borrow_mut().ingest()?;
             self.look()?;
             if self.sleeper.control().is_draining() {
                 let reached = self.outputs.borrow().reached();
@@ -224,10 +224,10 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             }
             self.flush()?;
             for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
-                receiver.relieve(queue);
+                receiver.extend_credit(queue);
             }
             self.show();
-            self.receivers.iter_mut().for_each(LinkReceiver::ring_for_room);
+            self.receivers.iter_mut().for_each(LinkReceiver::ring_for_credit);
             self.sleep()?;
         }
     }
@@ -247,7 +247,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                     self.counters.add_latency(time.saturating_sub(self.queues[wire].sent_at()));
                 }
             }
-            handled += usize::from(self.receivers[wire].taken());
+            handled += usize::from(self.receivers[wire].record_taken());
             if handled >= self.look_interval {
                 handled = 0;
                 // A stage whose input never dries up would not see a stop otherwise.
@@ -273,18 +273,18 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         self.sleeper.wait(|| {
             let mut outputs = self.outputs.borrow_mut();
             if outputs.has_history_requests()
-                || outputs.is_asked()
+                || outputs.has_ingest_requests()
                 || watermark.is_some_and(|watermark| outputs.can_flush(watermark))
             {
                 return Ok(true);
             }
             for link in outputs.links() {
-                if link.has_news()? {
+                if link.has_pending()? {
                     return Ok(true);
                 }
             }
             for (receiver, queue) in self.receivers.iter().zip(&self.queues) {
-                if receiver.has_news(queue)? {
+                if receiver.has_pending(queue)? {
                     return Ok(true);
                 }
             }

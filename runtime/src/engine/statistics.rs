@@ -1,31 +1,31 @@
-//! What the stages of a run have done so far, by its board.
+//! What the stages of a run have done so far, by its counters.
 
-use crate::link::{Board, StageBoard, StageNumber, WireNumber};
+use crate::link::{SharedCounters, StageCounters, StageCounter, WireCounter};
 use crate::pipeline::Pipeline;
 use crate::stage::{RunStatistics, StageStatistics};
 use std::sync::Arc;
 
 /// What each stage of a pipeline has done, by what it shows of itself; in their order.
-pub fn stage_statistics(pipeline: &Pipeline, boards: &[StageBoard]) -> Vec<StageStatistics> {
-    pipeline.stages.iter().zip(boards).map(|(stage, board)| of_stage(&stage.name, board)).collect()
+pub fn stage_statistics(pipeline: &Pipeline, counters: &[StageCounters]) -> Vec<StageStatistics> {
+    pipeline.stages.iter().zip(counters).map(|(stage, counters)| of_stage(&stage.name, counters)).collect()
 }
 
-/// The same of a run that has this board, for its stages.
-pub(super) fn run_statistics(pipeline: &Pipeline, board: &Arc<Board>) -> RunStatistics {
-    let named = |(index, stage): (usize, &crate::pipeline::StageSpec)| (stage.name.clone(), board.stage(index));
-    let stages: Vec<(String, StageBoard)> = pipeline.stages.iter().enumerate().map(named).collect();
-    RunStatistics::new(move || stages.iter().map(|(name, board)| of_stage(name, board)).collect())
+/// The same of a run that has this counters, for its stages.
+pub(super) fn run_statistics(pipeline: &Pipeline, counters: &Arc<SharedCounters>) -> RunStatistics {
+    let named = |(index, stage): (usize, &crate::pipeline::StageSpec)| (stage.name.clone(), counters.stage(index));
+    let stages: Vec<(String, StageCounters)> = pipeline.stages.iter().enumerate().map(named).collect();
+    RunStatistics::new(move || stages.iter().map(|(name, counters)| of_stage(name, counters)).collect())
 }
 
-fn of_stage(name: &str, board: &StageBoard) -> StageStatistics {
+fn of_stage(name: &str, counters: &StageCounters) -> StageStatistics {
     StageStatistics {
         name: name.to_owned(),
-        state: board.state().word(),
-        messages_in: board.get(StageNumber::MessagesIn),
-        messages_out: (0..board.ports()).map(|port| board.sent(port)).sum(),
-        busy_ms: board.get(StageNumber::Busy) as f64 * 1e-6,
-        dropped: (0..board.wires()).map(|wire| board.get_wire(wire, WireNumber::Dropped)).sum(),
-        restarts: board.get(StageNumber::Restarts),
-        warnings: board.get(StageNumber::Warnings),
+        state: counters.state().name(),
+        messages_in: counters.get(StageCounter::MessagesIn),
+        messages_out: (0..counters.ports()).map(|port| counters.sent(port)).sum(),
+        busy_ms: counters.get(StageCounter::Busy) as f64 * 1e-6,
+        dropped: (0..counters.wires()).map(|wire| counters.get_wire(wire, WireCounter::Dropped)).sum(),
+        restarts: counters.get(StageCounter::Restarts),
+        warnings: counters.get(StageCounter::Warnings),
     }
 }

@@ -1,9 +1,9 @@
 //! The engine `threads`: a thread a stage, with links over shared memory.
 
-use super::links::{Links, board_shape};
+use super::links::{Links, counters_shape};
 use super::stage_thread::{Event, StageThread, tell};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::{Board, StageState};
+use crate::link::{SharedCounters, StageState};
 use crate::link::{Control, LinkError, RunNames};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;
@@ -21,9 +21,9 @@ pub(super) fn run<S: Service + 'static>(
     names: &RunNames,
     observer: &dyn Observer,
 ) -> Result<RunReport, RunError> {
-    let board = Board::new(&board_shape(pipeline));
-    (0..pipeline.stages.len()).for_each(|stage| board.stage(stage).set_state(StageState::Starting));
-    let links = Links::new(pipeline, names, &board);
+    let counters = SharedCounters::new(&counters_shape(pipeline));
+    (0..pipeline.stages.len()).for_each(|stage| counters.stage(stage).set_state(StageState::Starting));
+    let links = Links::new(pipeline, names, &counters);
     let (control, stop_reason) = (Arc::new(Control::default()), OnceLock::new());
     let (sender, receiver) = channel();
     thread::scope(|scope| {
@@ -39,7 +39,7 @@ pub(super) fn run<S: Service + 'static>(
         drop(sender);
         let stop = |error: &RunError| {
             stop_reason.get_or_init(|| error.to_string());
-            control.stop(&board);
+            control.stop(&counters);
         };
         supervise(pipeline, &receiver, &stop, observer)
     })

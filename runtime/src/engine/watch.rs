@@ -1,10 +1,10 @@
 //! Looking on at a run that is going on.
 
 use super::links::Links;
-use super::run_folder::{RunningRun, open_board};
+use super::run_folder::{RunningRun, open_counters};
 use super::statistics::run_statistics;
 use super::{Failure, RunError};
-use crate::link::{Board, Observer, RunNames, SampleHeader, StageBoard};
+use crate::link::{SharedCounters, Observer, RunNames, SampleHeader, StageCounters};
 use crate::message::{Message, MessageFlags};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::RunStatistics;
@@ -31,7 +31,7 @@ pub struct WatchedLink {
     /// How many came, each counted once.
     taken: u64,
     /// The stage that owns the link, and which of its ports that is.
-    board: StageBoard,
+    counters: StageCounters,
     port: usize,
     /// What that had counted when this began to look on: messages, and programs that have sent.
     sent_before: u64,
@@ -95,11 +95,11 @@ impl WatchedLink {
 
     /// How many messages it was too slow for.
     pub fn missed(&self) -> u64 {
-        if self.board.senders(self.port) == self.senders_before {
+        if self.counters.senders(self.port) == self.senders_before {
             return self.missed;
         }
         // Of a program that came and went meanwhile nothing may have been seen, but the owner of the link has counted it.
-        let passed = self.board.sent(self.port).saturating_sub(self.sent_before);
+        let passed = self.counters.sent(self.port).saturating_sub(self.sent_before);
         self.missed.max(passed.saturating_sub(self.taken))
     }
 }
@@ -110,7 +110,7 @@ struct Opening<'a> {
     stage: usize,
     port: usize,
     names: RunNames,
-    board: Arc<Board>,
+    counters: Arc<SharedCounters>,
     node: Node<Service>,
 }
 
@@ -118,16 +118,16 @@ impl<'a> Opening<'a> {
     fn new(run: &RunningRun, pipeline: &'a Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
-        let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
+        let counters = open_counters(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
         let names = run.names();
-        let links = Links::new(pipeline, &names, &board);
+        let links = Links::new(pipeline, &names, &counters);
         if !links.is_read(stage, port) {
             let name = spec.kind.outputs[port].name;
             let text = format!("has an output `{name}` that nothing reads, and so it is no link");
             return Err(of_stage(Failure::Outside(text)));
         }
         let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
-        Ok(Self { pipeline, stage, port, names, board, node })
+        Ok(Self { pipeline, stage, port, names, counters, node })
     }
 
     fn output(&self) -> &'static str {
@@ -145,18 +145,18 @@ impl<'a> Opening<'a> {
     }
 
     fn begin(self, observer: Observer<Service>) -> WatchedLink {
-        let board = self.board.stage(self.stage);
+        let counters = self.counters.stage(self.stage);
         if self.pipeline.mode == Mode::Live {
-            board.greet();
+            counters.request_history();
         }
         WatchedLink {
             observer,
             next: BTreeMap::new(),
             missed: 0,
             taken: 0,
-            sent_before: board.sent(self.port),
-            senders_before: board.senders(self.port),
-            board,
+            sent_before: counters.sent(self.port),
+            senders_before: counters.senders(self.port),
+            counters,
             port: self.port,
             _node: self.node,
         }
@@ -165,12 +165,12 @@ impl<'a> Opening<'a> {
 
 /// Tells what the stages of a run have done so far.
 pub fn watch_statistics(run: &RunningRun, pipeline: &Pipeline) -> Result<RunStatistics, RunError> {
-    let board = open_board(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
-    Ok(run_statistics(pipeline, &board))
+    let counters = open_counters(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
+    Ok(run_statistics(pipeline, &counters))
 }
 
 /// What each stage of a run shows of itself, in the order of the pipeline.
-pub fn watch_stages(run: &RunningRun, pipeline: &Pipeline) -> Result<Vec<StageBoard>, RunError> {
-    let board = open_board(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
-    Ok((0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect())
+pub fn watch_stages(run: &RunningRun, pipeline: &Pipeline) -> Result<Vec<StageCounters>, RunError> {
+    let counters = open_counters(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
+    Ok((0..pipeline.stages.len()).map(|stage| counters.stage(stage)).collect())
 }

@@ -1,4 +1,4 @@
-//! Links between stages of one thread: a message goes straight into its readers' queues.
+//! Links between stages of one thread: a message is pushed directly to the queues of its readers.
 
 use super::{InputQueue, Sequence};
 use crate::message::{LogTime, Message, MessageHeader, Write, write_vec};
@@ -6,10 +6,10 @@ use crate::stage::{OutputSink, StageError};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// An input queue that a sender of the same thread fills.
+/// An input queue that a sender of the same thread pushes to.
 pub type SharedQueue = Rc<RefCell<InputQueue>>;
 
-/// One output and the queues of all its readers.
+/// An output and the queues of all its readers.
 #[derive(Clone, Debug, Default)]
 pub struct DirectLink {
     readers: Vec<(SharedQueue, usize)>,
@@ -17,7 +17,7 @@ pub struct DirectLink {
 }
 
 impl DirectLink {
-    /// Adds a reader: its queue, and which of its wires this is.
+    /// Adds a reader: its queue, and the index of the wire within the reading stage.
     pub fn add_reader(&mut self, queue: SharedQueue, wire: usize) {
         self.readers.push((queue, wire));
     }
@@ -27,14 +27,14 @@ impl DirectLink {
         !self.readers.is_empty()
     }
 
-    /// Tells the readers that nothing before `watermark` will follow.
+    /// Sends the readers a watermark: no message before it will follow.
     pub fn raise(&self, watermark: LogTime) {
         if self.sequence.borrow_mut().raise(watermark) {
             self.readers.iter().for_each(|(queue, _)| queue.borrow_mut().raise(watermark));
         }
     }
 
-    /// Tells the readers that nothing will follow, and that the stream has come to the given log time.
+    /// Ends the stream for all readers, at the given log time.
     pub fn end(&self, time: LogTime) {
         self.readers.iter().for_each(|(queue, _)| queue.borrow_mut().end(time));
     }

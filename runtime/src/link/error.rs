@@ -1,18 +1,18 @@
-//! How a link over shared memory fails.
+//! Errors of a link over shared memory.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A link over shared memory could not be made or used.
+/// An error while a link over shared memory was created or used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum LinkError {
-    /// iceoryx2 refused something.
+    /// An operation of iceoryx2 failed.
     #[error("cannot {doing}: iceoryx2 says {cause}; {}", HELP)]
     Shared {
         /// What was being done.
         doing: String,
-        /// What iceoryx2 says.
+        /// The error of iceoryx2.
         cause: String,
     },
     /// A sample does not follow the protocol.
@@ -23,52 +23,52 @@ pub enum LinkError {
         /// What is wrong with it.
         problem: String,
     },
-    /// A reader has not taken a sample although it had given credit for it.
-    #[error("a sample of {link} reached {reached} of {readers} readers; a reader must have gone away")]
+    /// A sample did not reach a reader that had granted credit for it.
+    #[error("a sample of {link} reached {reached} of {readers} readers; a reader must have disconnected")]
     Lost {
         /// The link.
         link: String,
-        /// Readers that got it.
+        /// The readers that received it.
         reached: usize,
-        /// Readers there are.
+        /// The readers of the link.
         readers: usize,
     },
-    /// There is no memory for what is to be sent.
+    /// There is not enough memory for a message.
     #[error(
-        "cannot send {bytes} bytes on {link}: there is no memory for it; a smaller `depth` or `--engine single` \
-         lets fewer messages wait at a time"
+        "cannot send {bytes} bytes on {link}: there is not enough memory; use a smaller `depth` or `--engine single`, \
+         so that fewer messages wait at a time"
     )]
     Memory {
         /// The link.
         link: String,
-        /// Its size.
+        /// The size of the message.
         bytes: usize,
     },
-    /// There is no room in the shared memory of the machine.
+    /// The shared memory of the machine is full.
     #[error(
-        "cannot {doing}: there is no room left in /dev/shm; make room there, or use `--engine threads`, which needs none"
+        "cannot {doing}: there is no space left in /dev/shm; free some, or use `--engine threads`, which does not need it"
     )]
     Full {
         /// What was being done.
         doing: String,
     },
-    /// As many programs as can send on a link, or look on at it, do so already.
-    #[error("cannot {doing} {link}: {most} programs do so already, and no more can; end one of them")]
+    /// The link has the maximum number of external senders, or of observers.
+    #[error("cannot {doing} {link}: {most} programs, the maximum, do so already; stop one of them")]
     Crowded {
         /// What was being done.
         doing: String,
         /// The link.
         link: String,
-        /// How many can.
+        /// The maximum.
         most: usize,
     },
-    /// The run is being stopped because something else has failed.
+    /// The run is being stopped, because something else has failed.
     #[error("the run is being stopped")]
     Stopped,
 }
 
-/// What mends most failures of shared memory.
-const HELP: &str = "check that /dev/shm has room and can be written";
+/// What fixes most errors of shared memory.
+const HELP: &str = "check that /dev/shm has free space and is writable";
 
 impl From<LinkError> for crate::stage::StageError {
     fn from(error: LinkError) -> Self {

@@ -1,37 +1,37 @@
-//! How long things took: counts by time, of a size that does not grow.
+//! Histograms of durations, of constant size.
 
 /// The number of buckets.
 pub(super) const BUCKETS: usize = 96;
-/// So many buckets double the time.
+/// The number of buckets per doubling of the duration.
 const PER_OCTAVE: f64 = 4.0;
-/// The times of the first bucket are below this, nanoseconds.
+/// The upper limit of the first bucket, nanoseconds.
 const FIRST: f64 = 1_000.0;
 
-/// Counts of times, four buckets to a doubling, from a microsecond to some ten seconds.
+/// Counts of durations: four buckets per doubling, from a microsecond to about ten seconds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histogram {
     counts: [u64; BUCKETS],
 }
 
 impl Histogram {
-    /// The bucket of a time.
+    /// The bucket of a duration.
     pub fn bucket(nanoseconds: u64) -> usize {
         let octaves = (nanoseconds.max(1) as f64 / FIRST).log2();
         ((octaves * PER_OCTAVE).floor().max(-1.0) as i64 + 1).clamp(0, BUCKETS as i64 - 1) as usize
     }
 
-    /// Counts by bucket.
+    /// A histogram with the given counts by bucket.
     pub fn from_counts(counts: [u64; BUCKETS]) -> Self {
         Self { counts }
     }
 
-    /// How many times were counted.
+    /// The number of counted durations.
     pub fn count(&self) -> u64 {
         self.counts.iter().sum()
     }
 
-    /// The time that this share (0 to 1) of all does not exceed, seconds: the end of the bucket in which it lies. None if
-    /// there are no times.
+    /// The quantile of the durations at `share` (0 to 1), seconds, rounded up to the limit of its bucket. None if the
+    /// histogram is empty.
     pub fn quantile(&self, share: f64) -> Option<f64> {
         let rank = ((self.count() as f64 * share).ceil() as u64).max(1);
         let mut before = 0;
@@ -42,7 +42,7 @@ impl Histogram {
         Some(FIRST * 1e-9 * (bucket as f64 / PER_OCTAVE).exp2())
     }
 
-    /// What was counted since an earlier state of the same histogram.
+    /// The difference to an earlier state of the same histogram.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self { counts: std::array::from_fn(|bucket| self.counts[bucket].saturating_sub(earlier.counts[bucket])) }
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn any_time_has_a_bucket() {
+    fn every_duration_has_a_bucket() {
         assert_eq!((Histogram::bucket(0), Histogram::bucket(999)), (0, 0));
         assert_eq!(Histogram::bucket(1_000), 1);
         assert_eq!(Histogram::bucket(u64::MAX), BUCKETS - 1);

@@ -1,9 +1,9 @@
-//! What has come in on one wire and is not handled yet.
+//! The pending messages of one wire.
 
 use crate::message::{LogTime, Message, MessageFlags};
 use std::collections::VecDeque;
 
-/// The messages of one wire that wait for their turn, and what is known of those to come.
+/// The pending messages of one wire, and a lower bound for the log times of those that follow.
 #[derive(Debug, Default)]
 pub struct InputQueue {
     messages: VecDeque<Message>,
@@ -13,7 +13,7 @@ pub struct InputQueue {
 }
 
 impl InputQueue {
-    /// Takes what has come in: a message to be handled, a watermark, or the end of the stream.
+    /// Adds what was received: a message to be handled, a watermark, or the end of the stream.
     pub fn push(&mut self, message: Message) {
         let header = message.header();
         let flags = header.flags;
@@ -25,34 +25,34 @@ impl InputQueue {
         }
     }
 
-    /// Notes that nothing before `watermark` will follow.
+    /// Raises the watermark: no message before it will follow.
     pub fn raise(&mut self, watermark: LogTime) {
         self.bound = self.bound.max(watermark);
     }
 
-    /// Notes that nothing will follow, and that the stream had come to this log time.
+    /// Ends the stream at the given log time.
     pub fn end(&mut self, time: LogTime) {
         self.raise(time);
         self.ended = true;
     }
 
-    /// Notes when the messages that wait were sent, nanoseconds on the monotonic clock. Those of a live link wait one at a
+    /// Sets when the pending messages were sent, nanoseconds on the monotonic clock. A live link has one pending sample at a
     /// time.
-    pub(crate) fn note_sent_at(&mut self, sent_at: u64) {
+    pub(crate) fn set_sent_at(&mut self, sent_at: u64) {
         self.sent_at = sent_at;
     }
 
-    /// When the messages that wait were sent.
+    /// When the pending messages were sent, nanoseconds on the monotonic clock.
     pub(crate) fn sent_at(&self) -> u64 {
         self.sent_at
     }
 
-    /// The log time to which the stream has come: no message that is still to come lies before it.
+    /// The watermark of the stream: no message before this log time will follow.
     pub fn bound(&self) -> LogTime {
         self.bound
     }
 
-    /// Takes over all that has come in on `other`.
+    /// Moves everything from `other` to the end of this queue.
     pub fn append(&mut self, other: &mut InputQueue) {
         self.messages.append(&mut other.messages);
         self.bound = self.bound.max(other.bound);
@@ -64,32 +64,32 @@ impl InputQueue {
         self.messages.front()
     }
 
-    /// Takes the next message out.
+    /// Removes the next message.
     pub fn pop(&mut self) -> Option<Message> {
         self.messages.pop_front()
     }
 
-    /// The number of messages that wait.
+    /// The number of pending messages.
     pub fn len(&self) -> usize {
         self.messages.len()
     }
 
-    /// Whether no message waits.
+    /// Whether no message is pending.
     pub fn is_empty(&self) -> bool {
         self.messages.is_empty()
     }
 
-    /// Whether none will come.
+    /// Whether the stream has ended. Messages may still be pending.
     pub(crate) fn has_ended(&self) -> bool {
         self.ended
     }
 
-    /// Whether no message waits and none will come.
+    /// Whether the stream has ended and no message is pending.
     pub fn is_done(&self) -> bool {
         self.ended && self.messages.is_empty()
     }
 
-    /// The earliest log time that the next message can have; `None` if none will come.
+    /// The earliest log time that the next message can have; `None` if none will follow.
     pub fn earliest(&self) -> Option<LogTime> {
         match self.head() {
             Some(message) => Some(message.header().log_time),
@@ -98,8 +98,8 @@ impl InputQueue {
         }
     }
 
-    /// Whether all messages that wait have the same log time.
-    pub fn is_one_moment(&self) -> bool {
+    /// Whether all pending messages have the same log time.
+    pub fn has_single_log_time(&self) -> bool {
         let time = |message: &Message| message.header().log_time;
         self.messages.front().map(time) == self.messages.back().map(time)
     }

@@ -1,7 +1,7 @@
-//! The end of a link of one that looks on.
+//! The observing end of a link.
 
-use super::heard::Heard;
 use super::repeats::{Repeat, Repeats};
+use super::sample_tracker::SampleTracker;
 use super::service::{MAX_OBSERVERS, OBSERVER_BUFFER};
 use super::{LinkError, RunNames, SampleHeader, unpack};
 use crate::message::{Message, MessageFlags, Storage};
@@ -13,28 +13,28 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Looks on at a link, of a replay or a live one, and changes nothing: where it is too slow, it misses messages.
+/// An observer of a link of a replay or a live run. It never affects the run: if it is too slow, it misses messages.
 pub struct Observer<S: Service> {
     subscriber: Subscriber<S, [u8], SampleHeader>,
-    heard: BTreeMap<u64, Heard>,
+    trackers: BTreeMap<u64, SampleTracker>,
     name: String,
 }
 
 impl<S: Service + 'static> Observer<S> {
-    /// Looks on at the link `STAGE.PORT` of a run; none if the link is not there, or not yet.
+    /// Observes the link `STAGE.PORT` of a run; none if the link does not exist (yet).
     ///
     /// # Errors
-    /// Too many look on.
+    /// The link has the maximum number of observers, or iceoryx2 fails.
     pub fn new(node: &Node<S>, names: &RunNames, stage: &str, port: &str) -> Result<Option<Self>, LinkError> {
         let name = format!("{stage}.{port}");
-        let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("look on at {name}"))(cause);
+        let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("observe {name}"))(cause);
         let service = node
             .service_builder(&names.link(stage, port)?)
             .publish_subscribe::<[u8]>()
             .user_header::<SampleHeader>()
             .open();
         let service = match service {
-            // It may be in the making.
+            // It may be under construction.
             Err(E::DoesNotExist | E::ServiceInCorruptedState | E::HangsInCreation | E::IsMarkedForDestruction) => {
                 return Ok(None);
             }
@@ -43,21 +43,21 @@ impl<S: Service + 'static> Observer<S> {
         let buffer = OBSERVER_BUFFER.min(service_buffer(&service));
         let subscriber = service.subscriber_builder().buffer_size(buffer).create().map_err(|e| match e {
             SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
-                LinkError::Crowded { doing: "look on at".into(), link: name.clone(), most: MAX_OBSERVERS }
+                LinkError::Crowded { doing: "observe".into(), link: name.clone(), most: MAX_OBSERVERS }
             }
             other => failed(&other),
         })?;
-        Ok(Some(Self { subscriber, heard: BTreeMap::new(), name }))
+        Ok(Some(Self { subscriber, trackers: BTreeMap::new(), name }))
     }
 
-    /// Takes the messages that have passed since the last call, each once, with the header of the sample that it came in. Marks
-    /// of the protocol are left out.
+    /// Takes the messages since the last call, without duplicates, each with the header of its sample. Watermarks and ends are
+    /// omitted.
     pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("receive from {}", self.name))(cause);
         let mut repeats = Repeats::default();
         while let Some(sample) = self.subscriber.receive().map_err(|e| failed(&e))? {
             let header = *sample.user_header();
-            // A copy, as one that looks on must not hold what the run's senders need.
+            // A copy: an observer must not borrow samples that the senders of the run need.
             let bytes: Rc<dyn Storage> = Rc::new(sample.payload().to_vec());
             drop(sample);
             if header.message.flags.contains(MessageFlags::REPEATED) {
@@ -65,23 +65,27 @@ impl<S: Service + 'static> Observer<S> {
                 continue;
             }
             for repeat in repeats.before(&header) {
-                unpack_new(&mut self.heard, repeat, &self.name, &mut take)?;
+                unpack_new(&mut self.trackers, repeat, &self.name, &mut take)?;
             }
-            unpack_new(&mut self.heard, (header, bytes), &self.name, &mut take)?;
+            unpack_new(&mut self.trackers, (header, bytes), &self.name, &mut take)?;
         }
-        repeats.all().into_iter().try_for_each(|repeat| unpack_new(&mut self.heard, repeat, &self.name, &mut take))
+        repeats
+            .take_all()
+            .into_iter()
+            .try_for_each(|repeat| unpack_new(&mut self.trackers, repeat, &self.name, &mut take))
     }
 }
 
-/// Takes the messages of a sample, unless it has come before.
+/// Takes the messages of a sample, unless it is a duplicate.
 fn unpack_new(
-    heard: &mut BTreeMap<u64, Heard>,
+    trackers: &mut BTreeMap<u64, SampleTracker>,
     (header, bytes): Repeat,
     link: &str,
     take: &mut impl FnMut(&SampleHeader, Message),
 ) -> Result<(), LinkError> {
     let is_repeated = header.message.flags.contains(MessageFlags::REPEATED);
-    if !heard.entry(header.origin).or_insert_with(|| Heard::new(false)).note(header.number, is_repeated).0 {
+    if !trackers.entry(header.origin).or_insert_with(|| SampleTracker::new(false)).record(header.number, is_repeated).0
+    {
         return Ok(());
     }
     unpack(&header, bytes, link, |message| {

@@ -1,19 +1,19 @@
-//! The order in which a stage gets its inputs.
+//! The order in which a stage takes its inputs.
 //!
-//! In a replay it is by log time, then by wire, then as sent. It depends on the messages only, so every engine comes to the
-//! same order. In a live run it is that in which messages were sent.
+//! In a replay messages are ordered by log time, then by wire, then as sent. The order depends on the messages only, so it is
+//! the same on every engine. In a live run messages are ordered by the time at which they were sent.
 
 use super::InputQueue;
 use crate::message::LogTime;
 use crate::pipeline::Mode;
 
-/// What decides which message of a stage is the next.
+/// The criterion for the next message of a stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// The least log time, once nothing before it can follow.
+    /// The least log time, once no earlier message can follow.
     #[default]
     LogTime,
-    /// When it was sent, of what is there.
+    /// The earliest sending time among the pending messages.
     Arrival,
 }
 
@@ -27,7 +27,7 @@ impl From<Mode> for Order {
 }
 
 impl Order {
-    /// The wire whose head is the next message of the stage, if that can be told yet.
+    /// The wire whose head is the next message of the stage, if that is decided.
     pub fn next(self, queues: &[InputQueue]) -> Option<usize> {
         match self {
             Self::LogTime => next_input(queues),
@@ -42,9 +42,9 @@ fn next_sent(queues: &[InputQueue]) -> Option<usize> {
     waiting.min_by_key(|(wire, queue)| (queue.sent_at(), *wire)).map(|(wire, _)| wire)
 }
 
-/// The wire whose head is the next message of the stage, if that can be told yet.
+/// The wire whose head is the next message of the stage in a replay, if that is decided.
 ///
-/// It is the least by (log time, wire), and it is taken only when no other wire can still bring something before it.
+/// It is the least by (log time, wire), and only once no other wire can deliver an earlier message.
 pub fn next_input(queues: &[InputQueue]) -> Option<usize> {
     let mut least: Option<(LogTime, usize, bool)> = None;
     for (wire, queue) in queues.iter().enumerate() {
@@ -53,8 +53,8 @@ pub fn next_input(queues: &[InputQueue]) -> Option<usize> {
             least = Some((time, wire, !queue.is_empty()));
         }
     }
-    // The least wire may be one that is empty: then something may still come on it, at this time and before the rest.
-    least.and_then(|(_, wire, is_there)| is_there.then_some(wire))
+    // If the least wire is empty, a message that precedes all others may still arrive on it.
+    least.and_then(|(_, wire, has_message)| has_message.then_some(wire))
 }
 
 /// The earliest log time that any later input can have; `None` if all inputs have ended.
@@ -62,7 +62,7 @@ pub fn lower_bound(queues: &[InputQueue]) -> Option<LogTime> {
     queues.iter().filter_map(InputQueue::earliest).min()
 }
 
-/// The log time to which all inputs together have come. Once they have ended, it is the same on every engine.
+/// The latest log time that any input has reached. Once all have ended, it is the same on every engine.
 pub fn latest(queues: &[InputQueue]) -> LogTime {
     queues.iter().map(InputQueue::bound).max().unwrap_or_default()
 }
@@ -84,13 +84,13 @@ mod tests {
     }
 
     #[test]
-    fn the_earliest_message_comes_first_and_the_lower_wire_at_equal_times() {
+    fn the_earliest_message_is_next_and_the_lower_wire_at_equal_times() {
         assert_eq!(next_input(&[queue(&[5]), queue(&[4])]), Some(1));
         assert_eq!(next_input(&[queue(&[4]), queue(&[4])]), Some(0));
     }
 
     #[test]
-    fn a_silent_wire_holds_back_what_it_could_come_before() {
+    fn a_silent_wire_holds_back_later_messages() {
         assert_eq!(next_input(&[queue(&[5]), queue(&[])]), None);
         let mut silent = queue(&[]);
         silent.raise(LogTime(5));
@@ -104,10 +104,10 @@ mod tests {
     }
 
     #[test]
-    fn of_live_wires_the_head_that_was_sent_first_comes_first() {
+    fn in_a_live_run_the_head_that_was_sent_first_is_next() {
         let sent = |time: u64, sent_at: u64| {
             let mut queue = queue(&[time]);
-            queue.note_sent_at(sent_at);
+            queue.set_sent_at(sent_at);
             queue
         };
         assert_eq!(Order::Arrival.next(&[queue(&[]), sent(1, 8), sent(2, 7)]), Some(2));
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ended_wire_holds_back_nothing() {
+    fn an_ended_wire_holds_nothing_back() {
         let mut ended = queue(&[]);
         ended.end(LogTime(1));
         assert_eq!(next_input(&[ended, queue(&[5])]), Some(1));

@@ -1,14 +1,13 @@
-//! The protocol on a model of memory (loom) that tries every order of events, and every value that a load may give.
+//! The protocol on a model of memory (loom) that tries every order of events, and every value that a load may return.
 
-use super::protocol::{NOTHING_HEARD, Window, Word, ring, sleep};
+use super::protocol::{NOTHING_RECEIVED, Window, Word, ring, sleep};
 use loom::sync::atomic::{AtomicU64, Ordering, fence};
 use loom::sync::{Arc, Condvar, Mutex};
 use loom::thread;
 use std::convert::Infallible;
 use std::time::Duration;
 
-/// A word, and what the system does for those who sleep on it. Nobody wakes by himself here, so that a wake-up that is lost
-/// leaves nobody to go on, which loom tells.
+/// A word with a model of the kernel's futex. There are no timeouts here, so a lost wake-up is a deadlock, which loom reports.
 struct ModelWord {
     value: AtomicU64,
     asleep: Mutex<()>,
@@ -44,7 +43,7 @@ impl Word for ModelWord {
 
     fn sleep(&self, value: u64, _: Duration) {
         let asleep = self.asleep.lock().unwrap();
-        // The system reads the latest value, as an operation that changes it does.
+        // The kernel reads the latest value, as a read-modify-write does.
         if self.value.fetch_or(0, Ordering::Relaxed) == value {
             drop(self.woken.wait(asleep).unwrap());
         }
@@ -56,27 +55,26 @@ impl Word for ModelWord {
     }
 }
 
-/// Runs a model in every order of events in which the threads take turns so often at most beside those that they must:
-/// what goes wrong at all goes wrong in few.
+/// Runs a model in every order of events with at most two preemptions: most concurrency bugs show with few.
 fn model(run: impl Fn() + Sync + Send + 'static) {
     let mut builder = loom::model::Builder::new();
     builder.preemption_bound = Some(2);
     builder.check(run);
 }
 
-/// Sleeps at a bell until something is so.
-fn wait(bell: &ModelWord, is_ready: impl Fn() -> bool) {
+/// Sleeps on a doorbell until `is_ready`.
+fn wait(doorbell: &ModelWord, is_ready: impl Fn() -> bool) {
     let mut ready = is_ready();
     while !ready {
-        let look = || {
+        let check = || {
             ready = is_ready();
             Ok::<_, Infallible>(ready)
         };
-        sleep(bell, Duration::MAX, look).unwrap();
+        sleep(doorbell, Duration::MAX, check).unwrap();
     }
 }
 
-/// A sender and a reader: their bells, what was sent, and the reader's window.
+/// A sender and a reader: their doorbells, the number of sent samples, and the reader's window.
 struct Link {
     sender: ModelWord,
     reader: ModelWord,
@@ -96,24 +94,24 @@ impl Link {
     }
 }
 
-/// The sender of these models.
+/// The origin of the sender in these models.
 const SENDER: u64 = 7;
 
-/// One that sends `samples`, each when there is room for it.
+/// Sends `samples` samples, each once there is credit for it.
 fn send(link: &Link, samples: u64, depth: u64) {
     for number in 0..samples {
         wait(&link.sender, || match link.window().limit_of(SENDER) {
-            Some(NOTHING_HEARD) => number < depth,
+            Some(NOTHING_RECEIVED) => number < depth,
             limit => limit.is_some_and(|limit| number < limit),
         });
-        // What iceoryx2 delivers is written before and read after, with no order that the protocol may build on.
+        // The protocol must not rely on any memory ordering of iceoryx2's delivery.
         link.sent.store(number + 1, Ordering::Relaxed);
         ring([&link.reader].into_iter());
     }
 }
 
 #[test]
-fn no_wake_up_is_lost_and_no_reader_gets_more_than_it_has_room_for() {
+fn no_wake_up_is_lost_and_no_reader_gets_more_samples_than_its_credit() {
     const SAMPLES: u64 = 2;
     const DEPTH: u64 = 1;
     model(|| {
@@ -122,7 +120,7 @@ fn no_wake_up_is_lost_and_no_reader_gets_more_than_it_has_room_for() {
             let link = Arc::clone(&link);
             move || send(&link, SAMPLES, DEPTH)
         });
-        link.window().give(SENDER, NOTHING_HEARD);
+        link.window().assign(SENDER, NOTHING_RECEIVED);
         ring([&link.sender].into_iter());
         for taken in 0..SAMPLES {
             wait(&link.reader, || link.sent.load(Ordering::Relaxed) > taken);
@@ -135,32 +133,32 @@ fn no_wake_up_is_lost_and_no_reader_gets_more_than_it_has_room_for() {
 }
 
 #[test]
-fn all_who_sleep_at_one_bell_are_woken() {
+fn all_that_sleep_on_one_doorbell_are_woken() {
     model(|| {
-        let bell = Arc::new((ModelWord::new(), AtomicU64::new(0)));
+        let doorbell = Arc::new((ModelWord::new(), AtomicU64::new(0)));
         let sleepers = [1, 2].map(|last| {
-            let bell = Arc::clone(&bell);
-            thread::spawn(move || wait(&bell.0, || bell.1.load(Ordering::Relaxed) >= last))
+            let doorbell = Arc::clone(&doorbell);
+            thread::spawn(move || wait(&doorbell.0, || doorbell.1.load(Ordering::Relaxed) >= last))
         });
         for value in [1, 2] {
-            bell.1.store(value, Ordering::Relaxed);
-            ring([&bell.0].into_iter());
+            doorbell.1.store(value, Ordering::Relaxed);
+            ring([&doorbell.0].into_iter());
         }
         sleepers.into_iter().for_each(|sleeper| sleeper.join().unwrap());
     });
 }
 
 #[test]
-fn a_sender_never_takes_the_window_of_another_for_its_own() {
+fn a_sender_never_uses_the_window_of_another() {
     const OTHER: u64 = 8;
     model(|| {
         let link = Link::new();
-        link.window().give(OTHER, 100);
+        link.window().assign(OTHER, 100);
         let reader = thread::spawn({
             let link = Arc::clone(&link);
             move || {
-                link.window().give(SENDER, 1);
-                link.window().give(OTHER, 200);
+                link.window().assign(SENDER, 1);
+                link.window().assign(OTHER, 200);
                 link.window().set_limit(300);
             }
         });

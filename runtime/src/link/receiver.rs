@@ -1,13 +1,13 @@
 //! The reading end of a link.
 
-use super::board::MAX_SENDERS;
+use super::borrowed_samples::BorrowedSamples;
+use super::counters::MAX_SENDERS;
 use super::heap::HeapLink;
-use super::heard::Heard;
-use super::held::HeldSamples;
-use super::protocol::NOTHING_HEARD;
+use super::protocol::NOTHING_RECEIVED;
 use super::repeats::Repeats;
-use super::service::{LinkShape, PortBoard, origin};
-use super::stage_board::{StageBoard, StageNumber, StageState, WireNumber};
+use super::sample_tracker::SampleTracker;
+use super::service::{LinkShape, PortCounters, origin};
+use super::stage_counters::{StageCounter, StageCounters, StageState, WireCounter};
 use super::{InputQueue, LinkError, Order, RunNames, SampleHeader, unpack};
 use crate::message::{LogTime, MessageFlags, Storage};
 use iceoryx2::node::Node;
@@ -21,76 +21,76 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::collections::{BTreeMap, VecDeque};
 use std::rc::Rc;
 
-/// One wire of a stage, as the reader and its senders know it.
+/// A wire of a stage, as both the reader and its senders refer to it.
 #[derive(Clone)]
 pub struct ReaderEnd {
-    /// Where the stage notes how far it is.
-    pub board: StageBoard,
-    /// Which of its wires this is.
+    /// The counters of the reading stage.
+    pub counters: StageCounters,
+    /// The index of the wire within the stage.
     pub wire: usize,
-    /// How many samples of a sender it lets wait.
+    /// The credit per sender, samples.
     pub depth: usize,
 }
 
-/// A sender, as its reader knows it. What one had sent that has gone may still wait.
+/// The reader's state for one sender. It outlives the sender, whose last samples may still be pending.
 struct Known {
-    heard: Heard,
-    /// The slot of its window, while it is there.
+    tracker: SampleTracker,
+    /// The slot of its window while it is connected.
     slot: Option<usize>,
-    /// There is room for its samples before this one.
+    /// The number of its first sample for which there is no credit.
     limit: u64,
 }
 
-/// A sample that is not handled to its end.
+/// A sample of which messages may still be pending.
 struct Waiting {
     origin: u64,
     number: u64,
     is_repeated: bool,
-    /// How many of its messages wait.
+    /// The number of its pending messages.
     messages: usize,
 }
 
-/// One wire of a stage over a link.
+/// The reading end of a link, for one wire of a stage.
 pub struct LinkReceiver<S: Service> {
     service: PortFactory<S, [u8], SampleHeader>,
     subscriber: Subscriber<S, [u8], SampleHeader>,
     name: String,
     order: Order,
     end: ReaderEnd,
-    owner: PortBoard,
-    /// How many senders had come when it was last looked for them.
+    owner: PortCounters,
+    /// The sender count of the port at the last connect.
     senders: u64,
-    /// The number of its greeting, once it has greeted the owner.
-    greeting: Option<u64>,
-    /// Whether it has counted what was sent before it came.
+    /// The number of its history request, once it was made.
+    history_request: Option<u64>,
+    /// Whether the messages sent while the stage was being restarted have been counted.
     has_counted: bool,
-    /// For each slot of the board the sender that it is given to, 0 for none.
+    /// The sender that each window slot is assigned to, 0 for none.
     slots: [u64; MAX_SENDERS],
     known: BTreeMap<u64, Known>,
     waiting: VecDeque<Waiting>,
-    /// How many samples were handled since the owner was last woken for room.
+    /// The number of samples released since the senders were last woken for credit.
     freed: usize,
-    /// The log time that the owner had come to at the end.
+    /// The log time of the end, once the owner has sent it.
     ended: Option<LogTime>,
-    /// What was sent again by senders of whom nothing has come yet.
+    /// Repeated samples of senders from which nothing else has been received yet.
     repeats: Repeats,
-    held: HeldSamples,
-    most_held: usize,
-    /// Where large payloads travel; none if that is in the samples.
+    borrowed: BorrowedSamples,
+    max_borrowed: usize,
+    /// The heap payloads; none if payloads are part of the samples.
     heap: Option<HeapLink>,
 }
 
 impl<S: Service + 'static> LinkReceiver<S> {
-    /// The reading end of the link that is the output port `owner`.
+    /// Creates the reading end of the link of the output port `owner`.
     ///
     /// # Errors
-    /// iceoryx2 refuses.
+    /// iceoryx2 fails.
     pub fn new(
         node: &Node<S>,
         names: &RunNames,
         shape: &LinkShape<'_>,
         end: ReaderEnd,
-        owner: PortBoard,
+        owner: PortCounters,
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
@@ -102,11 +102,11 @@ impl<S: Service + 'static> LinkReceiver<S> {
             heap: names.heap_link(&name),
             name,
             order: shape.order,
-            most_held: shape.held(end.depth),
+            max_borrowed: shape.max_borrowed(end.depth),
             end,
             owner,
             senders: 0,
-            greeting: None,
+            history_request: None,
             has_counted: false,
             slots: [0; MAX_SENDERS],
             known: BTreeMap::new(),
@@ -114,24 +114,24 @@ impl<S: Service + 'static> LinkReceiver<S> {
             freed: 0,
             ended: None,
             repeats: Repeats::default(),
-            held: HeldSamples::default(),
+            borrowed: BorrowedSamples::default(),
         })
     }
 
-    /// Moves what has come in to `queue`: in a replay all of it, of a live link one sample at a time, as what waits in shared
-    /// memory is what a sender can drop.
+    /// Moves received messages to `queue`: all of them in a replay, one sample at a time on a live link, because a sender can
+    /// drop only what still waits in shared memory.
     pub(crate) fn receive(&mut self, queue: &mut InputQueue) -> Result<(), LinkError> {
         self.connect()?;
         while self.order == Order::LogTime || queue.is_empty() {
             match self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
                 Some(sample) => self.take_sample(sample, queue)?,
                 None if !self.repeats.is_empty() => {
-                    for (header, storage) in self.repeats.all() {
-                        self.take_in(&header, storage, queue)?;
+                    for (header, storage) in self.repeats.take_all() {
+                        self.ingest(&header, storage, queue)?;
                     }
                 }
                 None => {
-                    self.note_end(queue);
+                    self.end_queue(queue);
                     break;
                 }
             }
@@ -139,50 +139,50 @@ impl<S: Service + 'static> LinkReceiver<S> {
         Ok(())
     }
 
-    /// Notes that the stage has taken one message of this wire. `true` if it was the last of its sample.
-    pub(crate) fn taken(&mut self) -> bool {
+    /// Records that the stage has taken a message of this wire. Returns whether it was the last of its sample.
+    pub(crate) fn record_taken(&mut self) -> bool {
         if let Some(first) = self.waiting.front_mut() {
             first.messages = first.messages.saturating_sub(1);
         }
         let is_last = self.waiting.front().is_some_and(|first| first.messages == 0);
-        self.give_back();
+        self.release();
         is_last
     }
 
-    /// Lets more samples in than the depth allows where the stage could not go on otherwise: all that waits here is of
-    /// one log time, so no watermark can tell the stage that it may take it.
-    pub(crate) fn relieve(&mut self, queue: &InputQueue) {
-        if queue.is_empty() || !queue.is_one_moment() {
+    /// Grants credit beyond the depth where the stage would be stuck otherwise: if all pending messages have the same log
+    /// time, no watermark can pass it, and the stage cannot take them.
+    pub(crate) fn extend_credit(&mut self, queue: &InputQueue) {
+        if queue.is_empty() || !queue.has_single_log_time() {
             return;
         }
-        let (board, wire, depth) = (&self.end.board, self.end.wire, self.end.depth as u64);
+        let (counters, wire, depth) = (&self.end.counters, self.end.wire, self.end.depth as u64);
         for known in self.known.values_mut() {
-            if known.heard.next() == Some(known.limit) {
-                known.raise(known.limit + depth, board, wire);
+            if known.tracker.next() == Some(known.limit) {
+                known.raise(known.limit + depth, counters, wire);
                 self.freed += 1;
             }
         }
     }
 
-    /// Wakes the senders for what room there is. Called before the stage sleeps.
-    pub(crate) fn ring_for_room(&mut self) {
+    /// Wakes the senders if there is credit that they were not woken for. Called before the stage sleeps.
+    pub(crate) fn ring_for_credit(&mut self) {
         if std::mem::take(&mut self.freed) > 0 {
-            self.owner.board.ring();
+            self.owner.counters.ring();
         }
     }
 
-    /// Whether there is something to receive, or a sender has come, or nothing will follow any more.
-    pub(crate) fn has_news(&self, queue: &InputQueue) -> Result<bool, LinkError> {
-        if self.senders != self.owner.board.senders(self.owner.port) || !self.repeats.is_empty() {
+    /// Whether there is something to receive, a sender to connect to, or an end of the stream to handle.
+    pub(crate) fn has_pending(&self, queue: &InputQueue) -> Result<bool, LinkError> {
+        if self.senders != self.owner.counters.senders(self.owner.port) || !self.repeats.is_empty() {
             return Ok(true);
         }
         let has_samples = self.subscriber.has_samples().map_err(|e| self.failed("receive from", &e))?;
         Ok(has_samples || self.is_at_end() && !queue.has_ended())
     }
 
-    /// Connects to senders that have come, and forgets those that have gone.
+    /// Connects to senders that have joined, and frees the windows of those that have left.
     fn connect(&mut self) -> Result<(), LinkError> {
-        let senders = self.owner.board.senders(self.owner.port);
+        let senders = self.owner.counters.senders(self.owner.port);
         if senders == self.senders {
             return Ok(());
         }
@@ -195,7 +195,7 @@ impl<S: Service + 'static> LinkReceiver<S> {
         self.subscriber.update_connections().map_err(|e| self.failed("connect to", &e))?;
         for (slot, sender) in self.slots.iter_mut().enumerate() {
             if *sender != 0 && !present.contains(sender) {
-                self.end.board.window(self.end.wire, slot).give(0, 0);
+                self.end.counters.window(self.end.wire, slot).assign(0, 0);
                 if let Some(known) = self.known.get_mut(sender) {
                     known.slot = None;
                 }
@@ -209,20 +209,20 @@ impl<S: Service + 'static> LinkReceiver<S> {
                 let known = self.known(sender);
                 known.slot = Some(slot);
                 let limit = known.limit;
-                self.end.board.window(self.end.wire, slot).give(sender, limit);
+                self.end.counters.window(self.end.wire, slot).assign(sender, limit);
             }
         }
-        if self.greeting.is_none() && !present.is_empty() {
+        if self.history_request.is_none() && !present.is_empty() {
             self.count_lost();
-            self.greeting = Some(self.owner.board.greet());
+            self.history_request = Some(self.owner.counters.request_history());
         }
-        self.owner.board.ring();
+        self.owner.counters.ring();
         Ok(())
     }
 
     fn known(&mut self, sender: u64) -> &mut Known {
-        let is_for_all = self.end.board.get(StageNumber::Restarts) == 0;
-        let new = || Known { heard: Heard::new(is_for_all), slot: None, limit: NOTHING_HEARD };
+        let is_for_all = self.end.counters.get(StageCounter::Restarts) == 0;
+        let new = || Known { tracker: SampleTracker::new(is_for_all), slot: None, limit: NOTHING_RECEIVED };
         self.known.entry(sender).or_insert_with(new)
     }
 
@@ -230,21 +230,21 @@ impl<S: Service + 'static> LinkReceiver<S> {
         let header = *sample.user_header();
         let storage = match &self.heap {
             Some(heap) if header.has_payload() && sample.payload().is_empty() => heap.take(header.message.sequence)?,
-            _ => self.held.hold(sample, self.most_held),
+            _ => self.borrowed.borrow(sample, self.max_borrowed),
         };
         let flags = header.message.flags;
         if !flags.contains(MessageFlags::REPEATED) {
             for (header, storage) in self.repeats.before(&header) {
-                self.take_in(&header, storage, queue)?;
+                self.ingest(&header, storage, queue)?;
             }
-        } else if !flags.contains(MessageFlags::END) && self.known(header.origin).heard.next().is_none() {
+        } else if !flags.contains(MessageFlags::END) && self.known(header.origin).tracker.next().is_none() {
             self.repeats.push((header, storage));
             return Ok(());
         }
-        self.take_in(&header, storage, queue)
+        self.ingest(&header, storage, queue)
     }
 
-    fn take_in(
+    fn ingest(
         &mut self,
         header: &SampleHeader,
         storage: Rc<dyn Storage>,
@@ -254,27 +254,27 @@ impl<S: Service + 'static> LinkReceiver<S> {
         let is_repeated = flags.contains(MessageFlags::REPEATED);
         let depth = self.end.depth as u64;
         let known = self.known(header.origin);
-        let (is_new, missing) = known.heard.note(header.number, is_repeated);
-        if known.limit == NOTHING_HEARD && !is_repeated {
+        let (is_new, missing) = known.tracker.record(header.number, is_repeated);
+        if known.limit == NOTHING_RECEIVED && !is_repeated {
             known.limit = header.number.saturating_add(depth);
         }
         if missing != 0 {
-            let dropped = self.end.board.get_wire(self.end.wire, WireNumber::Dropped);
-            self.end.board.set_wire(self.end.wire, WireNumber::Dropped, dropped.saturating_add_signed(missing));
+            let dropped = self.end.counters.get_wire(self.end.wire, WireCounter::Dropped);
+            self.end.counters.set_wire(self.end.wire, WireCounter::Dropped, dropped.saturating_add_signed(missing));
         }
         let mut messages = 0;
         if flags.contains(MessageFlags::END) {
-            // What others have sent may come after the owner's last word.
-            self.note_end_mark(header);
+            // Messages of other senders may arrive after the owner's end mark.
+            self.record_end_mark(header);
         } else if is_new {
             messages = self.unpack(header, storage, queue)?;
         }
         self.waiting.push_back(Waiting { origin: header.origin, number: header.number, is_repeated, messages });
-        self.give_back();
+        self.release();
         Ok(())
     }
 
-    /// Hands the messages of a sample to the queue. Gives how many of them wait there.
+    /// Pushes the messages of a sample to the queue. Returns how many of them are pending there.
     fn unpack(
         &mut self,
         header: &SampleHeader,
@@ -287,54 +287,55 @@ impl<S: Service + 'static> LinkReceiver<S> {
             taken += u64::from(message.header().flags.contains(MessageFlags::DATA));
             queue.push(message.on_wire(self.end.wire));
         })?;
-        queue.note_sent_at(header.sent_at);
-        self.end.board.add_wire(self.end.wire, WireNumber::Taken, taken);
+        queue.set_sent_at(header.sent_at);
+        self.end.counters.add_wire(self.end.wire, WireCounter::Taken, taken);
         Ok(queue.len() - before)
     }
 
-    /// Moves the windows on over samples that are handled to their end. Wakes the senders when half of the room is free, as
-    /// each time costs them a wake-up.
-    fn give_back(&mut self) {
-        let (board, wire, depth) = (&self.end.board, self.end.wire, self.end.depth as u64);
+    /// Advances the windows past samples without pending messages. Wakes the senders only when half of the credit is free, as
+    /// each wake-up is expensive.
+    fn release(&mut self) {
+        let (counters, wire, depth) = (&self.end.counters, self.end.wire, self.end.depth as u64);
         while let Some(sample) = self.waiting.pop_front_if(|sample| sample.messages == 0) {
             if let Some(known) = self.known.get_mut(&sample.origin).filter(|_| !sample.is_repeated) {
-                known.raise(sample.number.saturating_add(1 + depth), board, wire);
+                known.raise(sample.number.saturating_add(1 + depth), counters, wire);
                 self.freed += 1;
             }
         }
         if 2 * self.freed >= self.end.depth && self.freed > 0 {
-            self.ring_for_room();
+            self.ring_for_credit();
         }
     }
 
-    /// Nothing is there: that may be for good.
-    fn note_end(&mut self, queue: &mut InputQueue) {
+    /// Ends the queue if the stream has ended. Called when there is nothing to receive.
+    fn end_queue(&mut self, queue: &mut InputQueue) {
         if self.is_at_end() && !queue.has_ended() {
             queue.end(self.ended.unwrap_or_default());
             self.count_lost();
         }
     }
 
-    /// The owner has said that it sends no more. Where it has yet to answer this reader, it will say so again.
-    fn note_end_mark(&mut self, header: &SampleHeader) {
-        let is_answered = self.greeting.is_some_and(|greeting| greeting <= header.message.sequence);
+    /// Records the owner's end mark. If the owner has not answered this reader's history request, it will repeat the mark.
+    fn record_end_mark(&mut self, header: &SampleHeader) {
+        let is_answered =
+            self.history_request.is_some_and(|history_request| history_request <= header.message.sequence);
         if self.order == Order::LogTime || is_answered {
             self.ended = Some(header.message.log_time);
         }
     }
 
-    /// Whether the owner has ended the link. A reader that was started again after it does not hear it.
+    /// Whether the owner has ended the link. A reader that was restarted after that sees it only in the shared counters.
     fn is_at_end(&self) -> bool {
-        self.ended.is_some() || self.order == Order::Arrival && self.owner.board.state() == StageState::Ended
+        self.ended.is_some() || self.order == Order::Arrival && self.owner.counters.state() == StageState::Ended
     }
 
-    /// Counts as dropped, once, what was sent while a stage was away that was started again.
+    /// Counts, once, the messages that were sent while the stage was being restarted as dropped.
     fn count_lost(&mut self) {
-        let (board, wire) = (&self.end.board, self.end.wire);
-        if !std::mem::replace(&mut self.has_counted, true) && board.get(StageNumber::Restarts) > 0 {
-            let had = board.get_wire(wire, WireNumber::Taken) + board.get_wire(wire, WireNumber::Dropped);
-            let lost = self.owner.board.sent(self.owner.port).saturating_sub(had);
-            board.add_wire(wire, WireNumber::Dropped, lost);
+        let (counters, wire) = (&self.end.counters, self.end.wire);
+        if !std::mem::replace(&mut self.has_counted, true) && counters.get(StageCounter::Restarts) > 0 {
+            let had = counters.get_wire(wire, WireCounter::Taken) + counters.get_wire(wire, WireCounter::Dropped);
+            let lost = self.owner.counters.sent(self.owner.port).saturating_sub(had);
+            counters.add_wire(wire, WireCounter::Dropped, lost);
         }
     }
 
@@ -344,12 +345,12 @@ impl<S: Service + 'static> LinkReceiver<S> {
 }
 
 impl Known {
-    /// Gives room for the samples before `limit`.
-    fn raise(&mut self, limit: u64, board: &StageBoard, wire: usize) {
-        if self.limit == NOTHING_HEARD || limit > self.limit {
+    /// Grants credit for the samples before `limit`.
+    fn raise(&mut self, limit: u64, counters: &StageCounters, wire: usize) {
+        if self.limit == NOTHING_RECEIVED || limit > self.limit {
             self.limit = limit;
             if let Some(slot) = self.slot {
-                board.window(wire, slot).set_limit(limit);
+                counters.window(wire, slot).set_limit(limit);
             }
         }
     }

@@ -1,19 +1,19 @@
-//! What is sent to a reader again, while what it repeats may still be on its way.
+//! Repeated samples, while earlier samples of the same senders may still be pending.
 
 use super::SampleHeader;
 use crate::message::Storage;
 use std::rc::Rc;
 
-/// A sample that was sent again.
+/// A repeated sample.
 pub(super) type Repeat = (SampleHeader, Rc<dyn Storage>);
 
-/// Samples that the owner of a link sends again and that wait until their reader has had what their senders sent before them:
-/// each sender's samples wait by themselves, so what is repeated may overtake them.
+/// Repeated samples that are held back until the reader has received the earlier samples of their senders. Each sender has a
+/// queue of its own, so the owner's repetition can overtake the original samples.
 #[derive(Default)]
 pub(super) struct Repeats(Vec<Repeat>);
 
 impl Repeats {
-    /// Lets one wait.
+    /// Adds a repeated sample.
     pub(super) fn push(&mut self, repeat: Repeat) {
         self.0.push(repeat);
     }
@@ -22,19 +22,19 @@ impl Repeats {
         self.0.is_empty()
     }
 
-    /// Those that are due before a sample that comes from its sender itself: what is not so will come itself. None is due
-    /// while samples come that were sent before it, other than of its sender.
+    /// Removes and returns the repeated samples that are due before an original one. Those that the same sender is about to
+    /// deliver itself are dropped. None are due before a sample of another sender that was sent earlier than the repetition.
     pub(super) fn before(&mut self, sample: &SampleHeader) -> Vec<Repeat> {
         let is_due = |(repeat, _): &Repeat| repeat.origin == sample.origin || repeat.sent_at < sample.sent_at;
         if !self.0.iter().any(is_due) {
             return Vec::new();
         }
         self.0.retain(|(repeat, _)| repeat.origin != sample.origin || repeat.number < sample.number);
-        self.all()
+        self.take_all()
     }
 
-    /// All of them: nothing else waits.
-    pub(super) fn all(&mut self) -> Vec<Repeat> {
+    /// Removes and returns all of them; for when nothing else is pending.
+    pub(super) fn take_all(&mut self) -> Vec<Repeat> {
         std::mem::take(&mut self.0)
     }
 }
@@ -47,7 +47,7 @@ mod tests {
         SampleHeader { origin, number, sent_at, ..Default::default() }
     }
 
-    /// The numbers of those that are due before a sample, where 1, 4 and 6 of the sender 7 were sent again at 100.
+    /// The numbers that are due before a sample, where 1, 4 and 6 of sender 7 were repeated at time 100.
     fn due(sample: &SampleHeader) -> Vec<u64> {
         let mut repeats = Repeats::default();
         for number in [1, 4, 6] {
@@ -57,11 +57,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_sent_again_comes_after_what_was_sent_before_it_and_not_twice() {
-        assert_eq!(due(&sample(7, 5, 50)), [1, 4], "6 will come itself");
-        assert_eq!(due(&sample(7, 0, 50)), [0; 0], "all will come");
+    fn repeated_samples_come_after_earlier_ones_and_not_twice() {
+        assert_eq!(due(&sample(7, 5, 50)), [1, 4], "6 is still to come");
+        assert_eq!(due(&sample(7, 0, 50)), [0; 0], "all are still to come");
         assert_eq!(due(&sample(7, 9, 200)), [1, 4, 6]);
-        assert_eq!(due(&sample(8, 0, 99)), [0; 0], "of another, which tells nothing");
-        assert_eq!(due(&sample(8, 0, 101)), [1, 4, 6], "a stage that is never done with its input gets them as well");
+        assert_eq!(due(&sample(8, 0, 99)), [0; 0], "another sender's earlier sample decides nothing");
+        assert_eq!(due(&sample(8, 0, 101)), [1, 4, 6], "a stage whose input never pauses gets them too");
     }
 }

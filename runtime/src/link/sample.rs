@@ -1,20 +1,20 @@
-//! How messages lie in a sample.
+//! The layout of messages in a sample.
 
 use super::LinkError;
 use crate::message::{Message, MessageHeader, Storage};
 use iceoryx2::prelude::ZeroCopySend;
 use std::rc::Rc;
 
-/// The version of the link protocol. A reader refuses samples of another one.
+/// The version of the link protocol. A reader rejects samples of another version.
 pub const PROTOCOL_VERSION: u32 = 4;
 
-/// Where each message of a batch begins.
+/// The alignment of each message of a batch, bytes.
 const RECORD_ALIGNMENT: usize = 8;
 
 /// The user header of a sample.
 ///
-/// With `count` 1 the payload is the bytes of `message`. With more, `message` is the header of the first, and the
-/// payload is for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
+/// If `count` is 1, the payload is the bytes of `message`. Otherwise `message` is the header of the first message, and the
+/// payload contains for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[type_name("gridweave_sample_header_3")]
 #[repr(C)]
@@ -25,27 +25,27 @@ pub struct SampleHeader {
     pub count: u32,
     /// When it was sent, nanoseconds on the monotonic clock of the machine; 0 in a replay.
     pub sent_at: u64,
-    /// Who has sent it first, and numbers its samples: several programs may send on a live link.
+    /// The sender that sent it originally: several programs may send on a live link.
     pub origin: u64,
-    /// Counts the samples of that sender, from 0.
+    /// The number of the sample among those of that sender, from 0.
     pub number: u64,
-    /// The header of the only message, or of the first.
+    /// The header of the only or the first message.
     pub message: MessageHeader,
 }
 
 impl SampleHeader {
-    /// That of a sample of one message.
+    /// The header of a sample of one message.
     pub(super) fn single(message: MessageHeader) -> Self {
         Self { version: PROTOCOL_VERSION, count: 1, message, ..Default::default() }
     }
 
-    /// Whether its messages have bytes, or headers of their own.
+    /// Whether the sample has a payload: bytes, or the headers of several messages.
     pub(super) fn has_payload(&self) -> bool {
         self.count > 1 || self.message.length > 0
     }
 }
 
-/// Small messages that are gathered to be sent in one sample.
+/// Small messages that will be sent in one sample.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
     bytes: Vec<u8>,
@@ -68,12 +68,12 @@ impl Batch {
         self.count == 0
     }
 
-    /// How many bytes a sample of it takes.
+    /// The payload size of its sample, bytes.
     pub(crate) fn len(&self) -> usize {
         self.bytes.len()
     }
 
-    /// The header and the payload of a sample that holds it. A single message goes without its header in the payload.
+    /// The header and the payload of its sample. The payload of a single message has no message header.
     pub(crate) fn sample(&self) -> (SampleHeader, &[u8]) {
         let message = self.first.unwrap_or_default();
         let header = SampleHeader { count: self.count, ..SampleHeader::single(message) };
@@ -83,7 +83,7 @@ impl Batch {
         }
     }
 
-    /// Forgets all messages and keeps the memory.
+    /// Removes all messages; the allocated memory is reused.
     pub(crate) fn clear(&mut self) {
         self.bytes.clear();
         self.first = None;
@@ -91,7 +91,7 @@ impl Batch {
     }
 }
 
-/// Takes a sample apart and hands each message to `take`.
+/// Splits a sample into its messages and passes each to `take`.
 pub(crate) fn unpack(
     header: &SampleHeader,
     storage: Rc<dyn Storage>,
@@ -101,22 +101,23 @@ pub(crate) fn unpack(
     let wrong = |problem: String| LinkError::Sample { link: link.to_owned(), problem };
     if header.version != PROTOCOL_VERSION {
         return Err(wrong(format!(
-            "it has protocol version {}, and this program speaks {PROTOCOL_VERSION}",
+            "it has protocol version {}, and this program has version {PROTOCOL_VERSION}",
             header.version
         )));
     }
-    let cut = || wrong("its messages are longer than the sample".to_owned());
+    let truncated = || wrong("its messages are longer than the sample".to_owned());
     if header.count == 1 {
         let length = header.message.length as usize;
-        take(Message::new(header.message, storage, 0..length).ok_or_else(cut)?);
+        take(Message::new(header.message, storage, 0..length).ok_or_else(truncated)?);
         return Ok(());
     }
     let mut start = 0;
     for _ in 0..header.count {
         let body = start + MessageHeader::SIZE;
-        let message = storage.bytes().get(start..body).and_then(MessageHeader::from_bytes).ok_or_else(cut)?;
-        let end = usize::try_from(message.length).ok().and_then(|length| body.checked_add(length)).ok_or_else(cut)?;
-        take(Message::new(message, Rc::clone(&storage), body..end).ok_or_else(cut)?);
+        let message = storage.bytes().get(start..body).and_then(MessageHeader::from_bytes).ok_or_else(truncated)?;
+        let end =
+            usize::try_from(message.length).ok().and_then(|length| body.checked_add(length)).ok_or_else(truncated)?;
+        take(Message::new(message, Rc::clone(&storage), body..end).ok_or_else(truncated)?);
         start = end.next_multiple_of(RECORD_ALIGNMENT);
     }
     Ok(())
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_messages_of_a_batch_come_out_as_they_went_in() {
+    fn unpacking_a_batch_gives_its_messages() {
         for messages in [&[&b"one"[..]][..], &[b"", b"1", b"12345678", b"123456789"]] {
             let batch = batch(messages);
             let (header, payload) = batch.sample();
@@ -161,19 +162,19 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_is_cut_or_lies_about_its_lengths_is_an_error() {
+    fn a_truncated_sample_or_wrong_lengths_are_an_error() {
         let batch = batch(&[b"123456789", b"12"]);
         let (header, payload) = batch.sample();
         for end in 0..payload.len() - 8 {
             assert!(unpacked(&header, &payload[..end]).is_err(), "{end}");
         }
-        let mut lie = payload.to_vec();
-        lie[24..32].fill(0xff);
-        assert!(unpacked(&header, &lie).is_err());
+        let mut wrong_length = payload.to_vec();
+        wrong_length[24..32].fill(0xff);
+        assert!(unpacked(&header, &wrong_length).is_err());
     }
 
     #[test]
-    fn a_sample_of_another_version_is_refused() {
+    fn a_sample_of_another_version_is_rejected() {
         let batch = batch(&[b"1"]);
         let (header, payload) = batch.sample();
         let error = unpacked(&SampleHeader { version: 1, ..header }, payload).unwrap_err().to_string();

@@ -1,15 +1,15 @@
 //! The sending end of a link.
 
-use super::board::monotonic_nanoseconds;
+use super::counters::monotonic_nanoseconds;
 use super::heap::HeapLink;
-use super::kept::Kept;
-use super::protocol::{NOTHING_HEARD, ring};
+use super::history::History;
+use super::protocol::{NOTHING_RECEIVED, ring};
 use super::receiver::ReaderEnd;
-use super::room::Room;
 use super::sample::Batch;
 use super::service::origin;
-use super::service::{FIRST_PLACE, LinkShape, PortBoard};
-use super::stage_board::{StageBoard, StageNumber, StageState};
+use super::service::{INITIAL_CAPACITY, LinkShape, PortCounters};
+use super::shared_memory::SharedMemory;
+use super::stage_counters::{StageCounter, StageCounters, StageState};
 use super::{LinkError, Order, RunNames, SampleHeader, Sequence};
 use crate::message::{LogTime, MessageFlags, MessageHeader, Write, write_all, write_vec};
 use crate::pipeline::Overflow;
@@ -21,39 +21,40 @@ use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use iceoryx2::service::Service;
 use std::mem::MaybeUninit;
 
-/// Messages above this size are sent by themselves, written in place; smaller ones are gathered.
+/// The largest message that is batched, bytes. A larger one is written in place in a sample of its own.
 const LARGEST_BATCHED: usize = 4 * 1024;
-/// A batch is sent when it has reached this size.
+/// The size at which a batch is sent, bytes.
 const FULL_BATCH: usize = 64 * 1024;
 
-/// Who sends on a link.
+/// The role of a sender on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SenderRole {
-    /// The stage that it belongs to.
+    /// The stage that the link belongs to.
     Owner,
-    /// The stage that it belongs to, whose messages come from programs outside of the run.
-    FedOwner,
+    /// The stage that the link belongs to, whose messages are sent by programs outside of the run.
+    PassiveOwner,
     /// A program outside of the run.
-    Guest,
+    External,
 }
 
-/// A reader, and what the sender knows of it.
+/// The sender's state for one reader.
 struct Reader {
     end: ReaderEnd,
-    /// There is room for the samples before this one.
+    /// The number of the first sample for which there is no credit, as last read.
     limit: u64,
-    /// When the stage was started that had heard nothing yet, and the sample that was then the next.
+    /// When the reading stage was started, as last seen while it had not received a sample of this sender.
     started: u64,
+    /// The number of the sample that was next at that moment.
     first: u64,
 }
 
 impl Reader {
-    /// Which samples there is room for, as the board says; none while it is not connected to the sender `origin`, whose next
-    /// sample is `number`.
+    /// The number of the first sample without credit, read from the shared counters, for the sender `origin` whose next sample
+    /// is `number`; none while the reader is not connected to it.
     fn limit(&mut self, origin: u64, number: u64) -> Option<u64> {
-        match self.end.board.limit_of(self.end.wire, origin)? {
-            NOTHING_HEARD => {
-                let started = self.end.board.get(StageNumber::Started);
+        match self.end.counters.limit_of(self.end.wire, origin)? {
+            NOTHING_RECEIVED => {
+                let started = self.end.counters.get(StageCounter::Started);
                 if self.started != started {
                     (self.started, self.first) = (started, number);
                 }
@@ -64,7 +65,7 @@ impl Reader {
     }
 }
 
-/// One sender of a link.
+/// A sending end of a link.
 pub struct LinkSender<S: Service> {
     publisher: Publisher<S, [u8], SampleHeader>,
     name: String,
@@ -72,55 +73,54 @@ pub struct LinkSender<S: Service> {
     overflow: Overflow,
     role: SenderRole,
     readers: Vec<Reader>,
-    /// The port of the owner.
-    port: PortBoard,
-    /// The last messages, if this is the owner of a live link.
-    kept: Option<Kept<S>>,
-    /// Where large payloads travel; none if that is in the samples.
+    /// The output port of the owner.
+    port: PortCounters,
+    /// The history, if this is the owner of a live link.
+    history: Option<History<S>>,
+    /// The heap payloads; none if payloads are part of the samples.
     heap: Option<HeapLink>,
-    /// Where samples take room; none if they do not leave the process.
-    room: Option<Room>,
+    /// The shared memory of the samples; none if they do not leave the process.
+    shared_memory: Option<SharedMemory>,
     origin: u64,
     /// The number of the next sample.
     number: u64,
-    /// The log time to which the stream had come at its end.
+    /// The log time of the end of the stream, once it was sent.
     ended: Option<LogTime>,
     sequence: Sequence,
     batch: Batch,
-    gather: bool,
+    batches: bool,
 }
 
 impl<S: Service + 'static> LinkSender<S> {
-    /// A sender of the link that is an output port. Small messages are gathered if `gather` is set, and sent at once
-    /// otherwise.
+    /// Creates a sender of the link of an output port. In a replay small messages are batched if `batches` is set.
     ///
     /// # Errors
-    /// iceoryx2 refuses, or too many programs send on the link.
+    /// iceoryx2 fails, or the link has the maximum number of senders.
     pub fn new(
         node: &Node<S>,
         names: &RunNames,
         shape: &LinkShape<'_>,
         readers: Vec<ReaderEnd>,
-        port: PortBoard,
+        port: PortCounters,
         role: SenderRole,
-        gather: bool,
+        batches: bool,
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
         let publisher = shape.publisher(&service)?;
         let origin = origin(publisher.id().value());
-        let is_first = port.board.get(StageNumber::Restarts) == 0;
-        let is_keeper = shape.order == Order::Arrival && role != SenderRole::Guest;
-        let mut kept = is_keeper.then(|| Kept::new(service, &name, origin, is_first));
-        if let Some(kept) = kept.as_mut().filter(|_| role == SenderRole::FedOwner) {
-            kept.listen()?;
+        let is_first = port.counters.get(StageCounter::Restarts) == 0;
+        let has_history = shape.order == Order::Arrival && role != SenderRole::External;
+        let mut history = has_history.then(|| History::new(service, &name, origin, is_first));
+        if let Some(history) = history.as_mut().filter(|_| role == SenderRole::PassiveOwner) {
+            history.subscribe()?;
         }
-        port.board.add_sender(port.port);
-        ring(readers.iter().map(|reader| reader.board.bell()));
+        port.counters.add_sender(port.port);
+        ring(readers.iter().map(|reader| reader.counters.doorbell()));
         let reader = |end: ReaderEnd| Reader { end, limit: 0, started: 0, first: 0 };
         Ok(Self {
             heap: names.heap_link(&name),
-            room: names.is_shared().then(Room::default),
+            shared_memory: names.is_shared().then(SharedMemory::default),
             publisher,
             name,
             order: shape.order,
@@ -128,25 +128,25 @@ impl<S: Service + 'static> LinkSender<S> {
             role,
             readers: readers.into_iter().map(reader).collect(),
             port,
-            kept,
+            history,
             origin,
             number: 0,
             ended: None,
             sequence: Sequence::new(shape.order),
             batch: Batch::default(),
-            gather: gather && shape.order == Order::LogTime,
+            batches: batches && shape.order == Order::LogTime,
         })
     }
 
-    /// Whether the next sample can be sent.
-    pub(crate) fn has_room(&mut self) -> bool {
+    /// Whether there is credit for the next sample.
+    pub(crate) fn has_credit(&mut self) -> bool {
         if self.overflow == Overflow::DropOldest {
             return true;
         }
         let (order, origin, number) = (self.order, self.origin, self.number);
         self.readers.iter_mut().all(|reader| {
             if number >= reader.limit {
-                if order == Order::Arrival && !reader.end.board.is_there() {
+                if order == Order::Arrival && !reader.end.counters.is_alive() {
                     return true;
                 }
                 reader.limit = reader.limit(origin, number).unwrap_or_default();
@@ -155,30 +155,30 @@ impl<S: Service + 'static> LinkSender<S> {
         })
     }
 
-    /// Whether every reader that is there is connected to this sender.
+    /// Whether every live reader is connected to this sender.
     pub(crate) fn is_connected(&self) -> bool {
-        let is_connected = |reader: &Reader| reader.end.board.limit_of(reader.end.wire, self.origin).is_some();
+        let is_connected = |reader: &Reader| reader.end.counters.limit_of(reader.end.wire, self.origin).is_some();
         self.readers.iter().all(|reader| self.is_gone(reader) || is_connected(reader))
     }
 
-    /// Whether every reader that is there has taken all that this sender has sent.
+    /// Whether every live reader has taken all samples of this sender.
     pub(crate) fn is_taken(&mut self) -> bool {
         let (origin, number) = (self.origin, self.number);
         self.readers.iter_mut().all(|reader| {
             let all = number + reader.end.depth as u64;
-            !reader.end.board.is_there() || reader.limit(origin, number).is_some_and(|limit| limit >= all)
+            !reader.end.counters.is_alive() || reader.limit(origin, number).is_some_and(|limit| limit >= all)
         })
     }
 
-    /// Whether every reader that is there has taken the end of the stream, and holds nothing any more.
+    /// Whether every live reader has taken the end of the stream and borrows no samples.
     pub(crate) fn is_acknowledged(&self) -> bool {
-        let has_ended = |reader: &Reader| reader.end.board.state() == StageState::Ended;
+        let has_ended = |reader: &Reader| reader.end.counters.state() == StageState::Ended;
         self.readers.iter().all(|reader| self.is_gone(reader) || has_ended(reader))
     }
 
-    /// Whether a reader is not to be waited for: in a replay that is never so.
+    /// Whether a reader is gone and must not be waited for; never in a replay.
     fn is_gone(&self, reader: &Reader) -> bool {
-        self.order == Order::Arrival && !reader.end.board.is_there()
+        self.order == Order::Arrival && !reader.end.counters.is_alive()
     }
 
     /// The log time that the link has reached.
@@ -186,36 +186,36 @@ impl<S: Service + 'static> LinkSender<S> {
         self.sequence.reached()
     }
 
-    /// Numbers a message.
+    /// Assigns a message its sequence number.
     pub(crate) fn stamp(&mut self, header: &mut MessageHeader) -> Result<(), StageError> {
         self.sequence.stamp(header)
     }
 
-    /// Notes that a message was sent, or gathered.
+    /// Counts a message that was sent or batched.
     pub(crate) fn count(&self, header: &MessageHeader) {
-        // What others send on the link is counted by its owner.
+        // The owner counts what others send on the link.
         if self.role == SenderRole::Owner && header.flags.contains(MessageFlags::DATA) {
-            self.port.board.add_sent(self.port.port, 1);
+            self.port.counters.add_sent(self.port.port, 1);
         }
     }
 
-    /// Whether a message of this size is gathered with others.
-    pub(crate) fn is_gathered(&self, length: usize) -> bool {
-        self.gather && length <= LARGEST_BATCHED
+    /// Whether a message of this size is batched.
+    pub(crate) fn is_batched(&self, length: usize) -> bool {
+        self.batches && length <= LARGEST_BATCHED
     }
 
-    /// Gathers a small message. `true` if the batch should be sent.
-    pub(crate) fn gather(&mut self, header: &MessageHeader, bytes: &[u8]) -> bool {
+    /// Adds a small message to the batch. Returns whether the batch should be sent.
+    pub(crate) fn add_to_batch(&mut self, header: &MessageHeader, bytes: &[u8]) -> bool {
         self.batch.push(header, bytes);
         self.batch.len() >= FULL_BATCH
     }
 
-    /// Whether messages were gathered and not sent.
+    /// Whether the batch has messages.
     pub(crate) fn has_batch(&self) -> bool {
         !self.batch.is_empty()
     }
 
-    /// Sends what was gathered. Needs room.
+    /// Sends the batch. Needs credit.
     pub(crate) fn send_batch(&mut self) -> Result<(), LinkError> {
         let mut batch = std::mem::take(&mut self.batch);
         let (header, payload) = batch.sample();
@@ -225,18 +225,18 @@ impl<S: Service + 'static> LinkSender<S> {
         sent
     }
 
-    /// Sends one message by itself, copying its bytes once. Needs room.
+    /// Sends one message in a sample of its own, copying its bytes once. Needs credit.
     pub(crate) fn send_bytes(&mut self, message: MessageHeader, bytes: &[u8]) -> Result<(), LinkError> {
         self.send_payload(SampleHeader::single(message), bytes)
     }
 
-    /// Sends one message that `write` writes in place. Needs room.
+    /// Sends one message that `write` writes in place. Needs credit.
     pub(crate) fn send_in_place(&mut self, message: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
         let length = message.length as usize;
         let header = SampleHeader::single(message);
         if let Some(heap) = self.heap_for(length) {
             let buffer = write_vec(heap.buffer(length)?, length, write)?;
-            heap.leave(message.sequence, buffer, self.readers.len());
+            heap.push(message.sequence, buffer, self.readers.len());
             return Ok(self.send_payload(header, &[])?);
         }
         let mut sample = self.loan(length)?;
@@ -247,7 +247,7 @@ impl<S: Service + 'static> LinkSender<S> {
         Ok(self.send_sample(header, sample)?)
     }
 
-    /// Tells the readers that nothing before `watermark` will follow, if they do not know it. Needs room.
+    /// Sends the readers a watermark if it is later than the last one. Needs credit.
     pub(crate) fn raise(&mut self, watermark: LogTime) -> Result<(), LinkError> {
         match self.sequence.raise(watermark) {
             true => {
@@ -258,30 +258,30 @@ impl<S: Service + 'static> LinkSender<S> {
         }
     }
 
-    /// Whether the readers do not know that nothing before `watermark` will follow. Live ones need not.
+    /// Whether a watermark would be later than the last one. Live links have no watermarks.
     pub(crate) fn can_raise(&self, watermark: LogTime) -> bool {
         self.order == Order::LogTime && watermark > self.reached()
     }
 
-    /// Says that the stream has ended, and that it has come to the given log time, when the owner had answered so many
-    /// greetings. Needs room.
-    pub(crate) fn end(&mut self, time: LogTime, greeted: u64) -> Result<(), LinkError> {
+    /// Sends the end of the stream at the given log time; `answered_requests` is the number of history requests that the owner
+    /// has answered. Needs credit.
+    pub(crate) fn end(&mut self, time: LogTime, answered_requests: u64) -> Result<(), LinkError> {
         self.ended = Some(time);
-        self.send_bytes(end_mark(time, greeted), &[])
+        self.send_bytes(end_mark(time, answered_requests), &[])
     }
 
-    /// Sends the last message of each topic again, if this is the owner of a live link, and that the stream has ended, if it
-    /// has. With this so many greetings are answered.
-    pub(crate) fn repeat(&mut self, greeted: u64) -> Result<(), LinkError> {
-        self.look()?;
-        let Some(kept) = &self.kept else { return Ok(()) };
-        for (header, bytes) in kept.messages() {
-            self.send_again(*header, bytes)?;
+    /// Repeats the history, if this is the owner of a live link, and the end of the stream, if it was sent.
+    /// `answered_requests` includes the history requests that this answers.
+    pub(crate) fn repeat(&mut self, answered_requests: u64) -> Result<(), LinkError> {
+        self.ingest()?;
+        let Some(history) = &self.history else { return Ok(()) };
+        for (header, bytes) in history.messages() {
+            self.send_repeated(*header, bytes)?;
         }
         if let Some(time) = self.ended {
-            let header = SampleHeader::single(end_mark(time, greeted));
-            // The number of the mark itself, which was the last sample.
-            self.send_again(
+            let header = SampleHeader::single(end_mark(time, answered_requests));
+            // The end mark was the last sample.
+            self.send_repeated(
                 SampleHeader { origin: self.origin, number: self.number.saturating_sub(1), ..header },
                 &[],
             )?;
@@ -290,8 +290,8 @@ impl<S: Service + 'static> LinkSender<S> {
         Ok(())
     }
 
-    /// Sends a sample that was sent before, with the number and the origin that it had.
-    fn send_again(&self, mut header: SampleHeader, bytes: &[u8]) -> Result<(), LinkError> {
+    /// Repeats a sample with its original number and origin.
+    fn send_repeated(&self, mut header: SampleHeader, bytes: &[u8]) -> Result<(), LinkError> {
         header.message.flags.0 |= MessageFlags::REPEATED.0;
         header.sent_at = monotonic_nanoseconds();
         let mut sample = self.loan(bytes.len())?.write_from_slice(bytes);
@@ -300,32 +300,32 @@ impl<S: Service + 'static> LinkSender<S> {
         Ok(())
     }
 
-    /// Lets the owner take in what was sent on the link, by whomever, so that it can be repeated, and count it.
-    pub(crate) fn look(&mut self) -> Result<(), LinkError> {
-        let Some(kept) = &mut self.kept else { return Ok(()) };
-        let count = kept.update()?;
+    /// Ingests what was sent on the link by any sender, if this is the owner of a live link: retains and counts it.
+    pub(crate) fn ingest(&mut self) -> Result<(), LinkError> {
+        let Some(history) = &mut self.history else { return Ok(()) };
+        let count = history.ingest()?;
         if count > 0 {
-            self.port.board.add_sent(self.port.port, count);
+            self.port.counters.add_sent(self.port.port, count);
         }
         Ok(())
     }
 
-    /// Whether there is something for the owner to take in.
-    pub(crate) fn has_news(&self) -> Result<bool, LinkError> {
-        self.kept.as_ref().map_or(Ok(false), Kept::has_news)
+    /// Whether there is something for the owner to ingest.
+    pub(crate) fn has_pending(&self) -> Result<bool, LinkError> {
+        self.history.as_ref().map_or(Ok(false), History::has_pending)
     }
 
-    /// Where a payload of this size travels; none if that is in its sample.
+    /// The heap payloads for a payload of this size; none if it is part of its sample.
     fn heap_for(&self, length: usize) -> Option<&HeapLink> {
-        self.heap.as_ref().filter(|_| length > FIRST_PLACE)
+        self.heap.as_ref().filter(|_| length > INITIAL_CAPACITY)
     }
 
-    /// Sends a sample, whose payload may travel on the heap.
+    /// Sends a sample whose payload may be passed on the heap.
     fn send_payload(&mut self, header: SampleHeader, mut payload: &[u8]) -> Result<(), LinkError> {
         if let Some(heap) = self.heap_for(payload.len()) {
             let mut buffer = heap.buffer(payload.len())?;
             buffer.extend_from_slice(payload);
-            heap.leave(header.message.sequence, buffer, self.readers.len());
+            heap.push(header.message.sequence, buffer, self.readers.len());
             payload = &[];
         }
         let sample = self.loan(payload.len())?.write_from_slice(payload);
@@ -334,19 +334,19 @@ impl<S: Service + 'static> LinkSender<S> {
 
     fn loan(&self, length: usize) -> Result<SampleMutUninit<S, [MaybeUninit<u8>], SampleHeader>, LinkError> {
         let doing = || format!("send {length} bytes on {}", self.name);
-        if let Some(room) = &self.room {
-            room.ask(length, doing)?;
+        if let Some(shared_memory) = &self.shared_memory {
+            shared_memory.check_free(length, doing)?;
         }
         let sample = self.publisher.loan_slice_uninit(length).map_err(|e| self.failed(&e))?;
-        if let Some(room) = &self.room {
-            // The headers lie before it, and were written already: where it was free a moment ago, if not taken.
+        if let Some(shared_memory) = &self.shared_memory {
+            // The headers precede the payload, and iceoryx2 has written them already, into space that was checked to be free.
             let start = std::ptr::from_ref(sample.user_header()).addr();
-            room.take(start..sample.payload().as_ptr_range().end.addr(), doing)?;
+            shared_memory.commit(start..sample.payload().as_ptr_range().end.addr(), doing)?;
         }
         Ok(sample)
     }
 
-    /// Sends a sample, and wakes those who wait for it.
+    /// Sends a sample, and wakes those that wait for it.
     fn send_sample(
         &mut self,
         mut header: SampleHeader,
@@ -357,24 +357,24 @@ impl<S: Service + 'static> LinkSender<S> {
             header.sent_at = monotonic_nanoseconds();
         }
         *sample.user_header_mut() = header;
-        if let Some(kept) = &mut self.kept {
-            kept.show(&header, sample.payload())?;
+        if let Some(history) = &mut self.history {
+            history.record(&header, sample.payload())?;
         }
         let reached = sample.send().map_err(|e| self.failed(&e))?;
-        // Those that look on get it as well, if they have room.
+        // Observers are counted too, if their buffers have space.
         if self.order == Order::LogTime && reached < self.readers.len() {
             return Err(LinkError::Lost { link: self.name.clone(), reached, readers: self.readers.len() });
         }
         self.number += 1;
         self.ring();
-        self.look()
+        self.ingest()
     }
 
-    /// Wakes the readers, and the owner if it keeps what others send.
+    /// Wakes the readers, and the owner if this is another sender, so that it ingests the sample.
     fn ring(&self) {
-        let owner = (self.role == SenderRole::Guest).then_some(&self.port.board);
-        let boards = self.readers.iter().map(|reader| &reader.end.board).chain(owner);
-        ring(boards.map(StageBoard::bell));
+        let owner = (self.role == SenderRole::External).then_some(&self.port.counters);
+        let counters = self.readers.iter().map(|reader| &reader.end.counters).chain(owner);
+        ring(counters.map(StageCounters::doorbell));
     }
 
     fn failed(&self, cause: &dyn std::fmt::Debug) -> LinkError {
@@ -382,7 +382,7 @@ impl<S: Service + 'static> LinkSender<S> {
     }
 }
 
-/// The mark of the end of a stream. A live reader whose own greeting is not among the answered ones waits for the next.
-fn end_mark(log_time: LogTime, greeted: u64) -> MessageHeader {
-    MessageHeader { flags: MessageFlags::END, log_time, sequence: greeted, ..Default::default() }
+/// The end mark of a stream. A live reader whose history request is not among the answered ones waits for the next mark.
+fn end_mark(log_time: LogTime, answered_requests: u64) -> MessageHeader {
+    MessageHeader { flags: MessageFlags::END, log_time, sequence: answered_requests, ..Default::default() }
 }

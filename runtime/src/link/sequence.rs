@@ -1,15 +1,15 @@
-//! The numbering of a link's messages, and the rule that log time never goes back in a replay.
+//! The sequence numbers of a link's messages, and the check that log time never decreases in a replay.
 
 use super::Order;
 use crate::message::{LogTime, MessageFlags, MessageHeader};
 use crate::stage::StageError;
 
-/// Numbers the messages of one link and watches their log times.
+/// The sequence numbers of one link and the log time that it has reached.
 #[derive(Debug, Default)]
 pub(crate) struct Sequence {
     order: Order,
     next: u64,
-    /// The latest log time. In a replay the readers know that nothing before it will follow.
+    /// The latest log time of a message or watermark. In a replay no earlier message may follow.
     reached: LogTime,
 }
 
@@ -18,18 +18,21 @@ impl Sequence {
         Self { order, ..Self::default() }
     }
 
-    /// Gives a message its number. An error if it lies before that of the message before it in a replay.
+    /// Assigns a message its sequence number.
+    ///
+    /// # Errors
+    /// In a replay, its log time is before the one that the link has reached.
     pub(crate) fn stamp(&mut self, header: &mut MessageHeader) -> Result<(), StageError> {
         if self.order == Order::Arrival {
-            // Each message has a time of its own, and the next may be earlier.
+            // Live messages carry the times of their sources, in any order.
         } else if header.flags.contains(MessageFlags::DATA) {
             if header.log_time < self.reached {
                 let cause = format!(
-                    "its log time {} lies before {}, which the stream has reached",
+                    "its log time {} is before {}, which the stream has reached",
                     header.log_time, self.reached
                 );
                 return Err(StageError::new(format!("send a message on {}", header.topic), cause)
-                    .with_help("a stage must send by rising log time"));
+                    .with_help("a stage must send its messages in order of log time"));
             }
         } else {
             header.log_time = header.log_time.max(self.reached);
@@ -40,11 +43,11 @@ impl Sequence {
         Ok(())
     }
 
-    /// Notes that the readers are told of a watermark. `false` if it tells them nothing.
+    /// Raises the watermark. Returns whether it is later than the log time that the stream has reached.
     pub(crate) fn raise(&mut self, watermark: LogTime) -> bool {
-        let is_news = watermark > self.reached;
+        let is_later = watermark > self.reached;
         self.reached = self.reached.max(watermark);
-        is_news
+        is_later
     }
 
     /// The log time that the stream has reached: that of the last message or watermark.

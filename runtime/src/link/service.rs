@@ -1,9 +1,9 @@
-//! The service of a link, as all of its ends open it.
+//! The iceoryx2 service of a link, and its sizes.
 
-use super::board::MAX_SENDERS;
-use super::kept::MAX_TOPICS;
-use super::room::Room;
-use super::stage_board::StageBoard;
+use super::counters::MAX_SENDERS;
+use super::history::MAX_TOPICS;
+use super::shared_memory::SharedMemory;
+use super::stage_counters::StageCounters;
 use super::{LinkError, Order, RunNames, SampleHeader};
 use crate::pipeline::Overflow;
 use iceoryx2::node::Node;
@@ -16,73 +16,73 @@ use iceoryx2::service::builder::publish_subscribe::{
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::time::Duration;
 
-/// How many programs may look on at a link.
+/// The maximum number of observers of a link.
 pub(crate) const MAX_OBSERVERS: usize = 4;
-/// How many samples wait for one that looks on.
+/// The buffer of an observer, samples.
 pub(super) const OBSERVER_BUFFER: usize = 64;
-/// How many samples wait for the owner of a live link, which keeps the last of them.
-pub(super) const KEEPER_BUFFER: usize = 128;
-/// How many samples the owner of a live link may hold.
-pub(super) const KEEPER_HELD: usize = 22;
-/// For how large a payload, in bytes, room is set aside for each sample before the first is sent.
-pub(super) const FIRST_PLACE: usize = 4 * 1024;
-/// What a reader of a live link has room for beyond its depth: for what is repeated, with the end, for itself and for
-/// another who came at the same time.
-const REPEAT_ROOM: usize = 2 * (MAX_TOPICS + 1);
-/// Ends that open a link at once may each find it neither there nor theirs to make, where the machine is busy. They try
-/// again, so often at the most.
+/// The buffer of the owner of a live link, which retains the last messages, samples.
+pub(super) const HISTORY_BUFFER: usize = 128;
+/// The maximum number of samples that the owner of a live link borrows.
+pub(super) const HISTORY_BORROWED: usize = 22;
+/// The initial capacity of each sample, bytes of payload.
+pub(super) const INITIAL_CAPACITY: usize = 4 * 1024;
+/// The buffer of a reader of a live link beyond its depth: for the repeated history and end, for itself and for another late
+/// joiner at the same time.
+const REPEAT_BUFFER: usize = 2 * (MAX_TOPICS + 1);
+/// The maximum number of attempts to open a link: on a busy machine, ends that open it concurrently may find it neither
+/// existing nor free to be created.
 const ATTEMPTS: usize = 100;
 const BETWEEN_ATTEMPTS: Duration = Duration::from_millis(10);
-/// Of what may be held, so much is not counted on: for the sample that is being received.
+/// Borrowed samples reserved for the sample that is being received.
 const SPARE: usize = 2;
 
-/// What all ends of a link must agree on.
+/// The properties on which all ends of a link must agree.
 #[derive(Clone, Debug)]
 pub struct LinkShape<'a> {
-    /// The stage that owns it.
+    /// The stage that owns the link.
     pub stage: &'a str,
     /// Its output port.
     pub port: &'a str,
-    /// How many stages read it.
+    /// The number of readers.
     pub readers: usize,
-    /// The largest of their depths.
+    /// The largest depth of the readers.
     pub depth: usize,
-    /// The order in which they take their inputs.
+    /// The order in which the readers take their inputs.
     pub order: Order,
-    /// What becomes of a message for which there is no room.
+    /// What happens to a message for which there is no credit.
     pub overflow: Overflow,
 }
 
-/// An output port on the board.
+/// An output port in the shared counters.
 #[derive(Clone)]
-pub struct PortBoard {
-    /// That of the stage.
-    pub board: StageBoard,
-    /// The port.
+pub struct PortCounters {
+    /// The counters of its stage.
+    pub counters: StageCounters,
+    /// The index of the port within the stage.
     pub port: usize,
 }
 
 impl LinkShape<'_> {
-    /// STAGE.PORT
+    /// The name of the link, `STAGE.PORT`.
     pub fn name(&self) -> String {
         format!("{}.{}", self.stage, self.port)
     }
 
-    /// How many samples of one sender can wait for a reader of the given depth.
+    /// The buffer of a reader of the given depth, samples per sender.
     pub(super) fn buffer(&self, depth: usize) -> usize {
         match (self.order, self.overflow) {
-            // Twice, as a reader may have to let more in to be able to go on.
+            // Twice the depth, as a reader may have to grant more credit so that its stage is not stuck.
             (Order::LogTime, _) => 2 * depth,
-            (Order::Arrival, Overflow::Wait) => depth + REPEAT_ROOM,
+            (Order::Arrival, Overflow::Wait) => depth + REPEAT_BUFFER,
             (Order::Arrival, Overflow::DropOldest) => depth,
         }
     }
 
-    /// How many samples a reader of the given depth may hold; what comes on top of that is copied.
-    pub(super) fn held(&self, depth: usize) -> usize {
+    /// The maximum number of samples that a reader of the given depth borrows; further ones are copied.
+    pub(super) fn max_borrowed(&self, depth: usize) -> usize {
         match self.order {
             Order::LogTime => depth + 64 - SPARE,
-            Order::Arrival => KEEPER_HELD,
+            Order::Arrival => HISTORY_BORROWED,
         }
     }
 
@@ -93,22 +93,22 @@ impl LinkShape<'_> {
     ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {}", self.name()))(cause);
         if names.is_shared() {
-            Room::default().ask(0, || format!("open the link {}", self.name()))?;
+            SharedMemory::default().check_free(0, || format!("open the link {}", self.name()))?;
         }
-        // Nobody sees a link from outside that does not leave the process.
+        // A link that does not leave the process cannot be observed.
         let (observers, mut buffer) = match names.is_shared() {
             true => (MAX_OBSERVERS, self.buffer(self.depth).max(OBSERVER_BUFFER)),
             false => (0, self.buffer(self.depth)),
         };
-        let (senders, keepers) = match self.order {
+        let (senders, histories) = match self.order {
             Order::LogTime => (1, 0),
             Order::Arrival => (MAX_SENDERS, 1),
         };
-        buffer = buffer.max(keepers * KEEPER_BUFFER);
-        let subscribers = self.readers.max(1) + observers + keepers;
+        buffer = buffer.max(histories * HISTORY_BUFFER);
+        let subscribers = self.readers.max(1) + observers + histories;
         let name = names.link(self.stage, self.port)?;
-        // The payload begins where the user header ends, and so is aligned as that is. To ask iceoryx2 for it would set
-        // aside eight bytes for each.
+        // The payload follows the user header, and so has its alignment. Requesting the alignment from iceoryx2 would cost
+        // eight bytes per sample.
         let open = || {
             node.service_builder(&name)
                 .publish_subscribe::<[u8]>()
@@ -116,7 +116,7 @@ impl LinkShape<'_> {
                 .enable_safe_overflow(self.overflow == Overflow::DropOldest)
                 .history_size(0)
                 .subscriber_max_buffer_size(buffer)
-                .subscriber_max_borrowed_samples(self.held(self.depth) + SPARE)
+                .subscriber_max_borrowed_samples(self.max_borrowed(self.depth) + SPARE)
                 .max_publishers(senders)
                 .max_subscribers(subscribers)
                 .max_nodes(subscribers + senders + 1)
@@ -133,15 +133,15 @@ impl LinkShape<'_> {
         open().map_err(|e| failed(&e))
     }
 
-    /// A publisher of the link. It sets memory aside for each sample that can be in use at a time: as much as the largest
-    /// payload takes that was sent, rounded up to a power of two.
+    /// Creates a publisher of the link. It reserves memory for every sample that can be in use at a time: the size of the
+    /// largest payload so far, rounded up to a power of two.
     pub(super) fn publisher<S: Service>(
         &self,
         service: &PortFactory<S, [u8], SampleHeader>,
     ) -> Result<Publisher<S, [u8], SampleHeader>, LinkError> {
         service
             .publisher_builder()
-            .initial_max_slice_len(FIRST_PLACE)
+            .initial_max_slice_len(INITIAL_CAPACITY)
             .max_loaned_samples(1)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
@@ -155,7 +155,7 @@ impl LinkShape<'_> {
     }
 }
 
-/// The number by which readers know a sender, made of iceoryx2's for its publisher; never 0.
+/// The origin of a sender: a number made from the id of its publisher, never 0.
 pub(super) fn origin(publisher: u128) -> u64 {
     ((publisher >> 64) as u64 ^ publisher as u64).max(1)
 }
@@ -168,16 +168,16 @@ mod tests {
 
     const LARGE: usize = 1 << 20;
 
-    /// How many bytes the largest file of the run in shared memory has.
+    /// The size of the largest file of the run in shared memory, bytes.
     fn largest_file(prefix: &str) -> u64 {
         let files = std::fs::read_dir("/dev/shm").unwrap().map(|file| file.unwrap());
         let of_run = files.filter(|file| file.file_name().to_string_lossy().starts_with(prefix));
-        // One of another link may go away meanwhile.
+        // A file of another link may disappear meanwhile.
         of_run.filter_map(|file| file.metadata().ok()).map(|file| file.len()).max().unwrap()
     }
 
     #[test]
-    fn a_byte_that_is_sent_sets_no_more_aside_than_two_for_each_sample_in_use_and_payloads_are_aligned() {
+    fn at_most_twice_the_payload_is_reserved_per_sample_in_use_and_payloads_are_aligned() {
         let folder = RunFolder::create().unwrap();
         let names = folder.names();
         let (readers, depth) = (1, 2);
@@ -186,14 +186,14 @@ mod tests {
         let shape = LinkShape { stage: "a", port: "b", readers, depth, order, overflow };
         let service = shape.open(&node, &names).unwrap();
         let publisher = shape.publisher(&service).unwrap();
-        for length in [1, FIRST_PLACE, FIRST_PLACE + 1, LARGE] {
+        for length in [1, INITIAL_CAPACITY, INITIAL_CAPACITY + 1, LARGE] {
             let sample = publisher.loan_slice(length).unwrap();
             assert!(sample.payload().as_ptr().cast::<u64>().is_aligned(), "{length}");
         }
         let samples = (readers + MAX_OBSERVERS) * (OBSERVER_BUFFER.max(2 * depth) + depth + 64) + 1;
-        let set_aside = largest_file(folder.prefix());
-        assert!(set_aside as usize >= samples * LARGE, "{set_aside}");
-        assert!(set_aside as usize <= samples * (2 * LARGE + 64), "{set_aside}");
+        let reserved = largest_file(folder.prefix());
+        assert!(reserved as usize >= samples * LARGE, "{reserved}");
+        assert!(reserved as usize <= samples * (2 * LARGE + 64), "{reserved}");
         drop((publisher, service, node));
         folder.remove().unwrap();
     }

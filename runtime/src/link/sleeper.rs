@@ -1,19 +1,19 @@
-//! How a stage sleeps, and how it learns that it should not go on.
+//! How a stage sleeps, and how it is stopped or drained.
 
 use super::LinkError;
-use super::board::{Board, monotonic_nanoseconds};
+use super::counters::{SharedCounters, monotonic_nanoseconds};
 use super::protocol;
-use super::stage_board::{StageBoard, StageNumber};
+use super::stage_counters::{StageCounter, StageCounters};
 use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// After this long asleep a stage looks at its links again. Nothing depends on it; it bounds the harm that a process does
-/// which is killed after it has rung a bell and before it has woken who sleeps there.
+/// The longest sleep before a stage checks its links again. Correctness does not depend on it; it limits the delay if a
+/// process is killed between changing a doorbell and waking those that sleep on it.
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
-/// What the stages of one process are told from outside.
+/// Requests to all stages of one process: to stop, or to drain.
 #[derive(Debug, Default)]
 pub struct Control {
     stopped: AtomicBool,
@@ -21,54 +21,57 @@ pub struct Control {
 }
 
 impl Control {
-    /// The run is being stopped.
-    pub fn stop(&self, board: &Board) {
+    /// Requests that all stages stop at once.
+    pub fn stop(&self, counters: &SharedCounters) {
         self.stopped.store(true, Ordering::Release);
-        board.ring_all();
+        counters.ring_all();
     }
 
-    /// A live run is to come to its end: sources send no more.
-    pub fn drain(&self, board: &Board) {
+    /// Requests that a live run ends: sources send no more, and pending messages are handled.
+    pub fn drain(&self, counters: &SharedCounters) {
         self.draining.store(true, Ordering::Release);
-        board.ring_all();
+        counters.ring_all();
     }
 
-    /// Whether a live run is to come to its end.
+    /// Whether the end of a live run was requested.
     pub(crate) fn is_draining(&self) -> bool {
         self.draining.load(Ordering::Acquire)
     }
 }
 
-/// What a stage sleeps on, or a program that sends as that stage.
+/// The means of sleeping of a stage, or of a program that sends as that stage.
 pub struct Sleeper {
-    board: StageBoard,
+    counters: StageCounters,
     control: Arc<Control>,
-    /// How long it has slept in the midst of its work, for want of room.
+    /// The time slept for credit while handling messages.
     waited: Cell<Duration>,
 }
 
 impl Sleeper {
-    /// Sleeps at the bell of a stage.
-    pub fn new(board: StageBoard, control: Arc<Control>) -> Self {
-        Self { board, control, waited: Cell::default() }
+    /// A sleeper on the doorbell of a stage.
+    pub fn new(counters: StageCounters, control: Arc<Control>) -> Self {
+        Self { counters, control, waited: Cell::default() }
     }
 
-    /// What the stage shows of itself.
-    pub(crate) fn board(&self) -> &StageBoard {
-        &self.board
+    /// The counters of the stage.
+    pub(crate) fn counters(&self) -> &StageCounters {
+        &self.counters
     }
 
-    /// What the stage is told from outside.
+    /// The requests to the stages of the process.
     pub(crate) fn control(&self) -> &Control {
         &self.control
     }
 
-    /// How long it has slept in the midst of its work, for want of room.
+    /// The time slept for credit while handling messages.
     pub(crate) fn waited(&self) -> Duration {
         self.waited.get()
     }
 
-    /// An error if the run is being stopped.
+    /// Checks that the run goes on.
+    ///
+    /// # Errors
+    /// The run is being stopped.
     pub(crate) fn check(&self) -> Result<(), LinkError> {
         match self.control.stopped.load(Ordering::Acquire) {
             true => Err(LinkError::Stopped),
@@ -76,12 +79,12 @@ impl Sleeper {
         }
     }
 
-    /// Sleeps until `is_ready`. Whoever changes what that depends on must ring the bell afterwards.
+    /// Sleeps until `is_ready`. Whoever changes a state that this depends on must ring the doorbell afterwards.
     pub(crate) fn wait(&self, is_ready: impl FnMut() -> Result<bool, LinkError>) -> Result<(), LinkError> {
         self.wait_until(None, is_ready).map(|_| ())
     }
 
-    /// Sleeps until `is_ready`, or until the time has come. Gives whether it is ready.
+    /// Sleeps until `is_ready` or until `end`. Returns whether it is ready.
     pub(crate) fn wait_until(
         &self,
         end: Option<Instant>,
@@ -91,14 +94,14 @@ impl Sleeper {
         if is_ready()? {
             return Ok(true);
         }
-        let working_since = self.board.get(StageNumber::WorkingSince);
+        let working_since = self.counters.get(StageCounter::WorkingSince);
         let begin = Instant::now();
         if working_since != 0 {
-            self.board.set(StageNumber::WorkingSince, 0);
+            self.counters.set(StageCounter::WorkingSince, 0);
         }
         let result = self.sleep_until(end, &mut is_ready);
         if working_since != 0 {
-            self.board.set(StageNumber::WorkingSince, monotonic_nanoseconds());
+            self.counters.set(StageCounter::WorkingSince, monotonic_nanoseconds());
             self.waited.set(self.waited.get() + begin.elapsed());
         }
         result
@@ -112,7 +115,7 @@ impl Sleeper {
         let mut ready = false;
         loop {
             let longest = end.map_or(LONGEST_SLEEP, |end| end.saturating_duration_since(Instant::now()));
-            protocol::sleep(self.board.bell(), longest.min(LONGEST_SLEEP), || {
+            protocol::sleep(self.counters.doorbell(), longest.min(LONGEST_SLEEP), || {
                 self.check()?;
                 ready = is_ready()?;
                 Ok::<_, LinkError>(ready)

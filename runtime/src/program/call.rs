@@ -3,7 +3,7 @@
 use super::header::{CALL_VERSION, CallHeader, Said, Told};
 use super::process::{Launch, Lost, Process};
 use crate::engine::RunFolder;
-use crate::link::{LinkError, Room, RunNames};
+use crate::link::{LinkError, SharedMemory, RunNames};
 use crate::message::MessageHeader;
 use crate::stage::StageError;
 use iceoryx2::node::Node;
@@ -31,7 +31,7 @@ pub(super) struct Program {
     process: Process,
     ports: Option<Ports>,
     folder: Option<RunFolder>,
-    room: Room,
+    shared_memory: SharedMemory,
     /// How long a call may take.
     longest: Option<Duration>,
     /// Whether it can still be called.
@@ -66,7 +66,7 @@ fn open(
     way: &str,
     buffer: usize,
 ) -> Result<PortFactory<Service, [u8], CallHeader>, LinkError> {
-    Room::default().ask(0, || "share memory with a program".to_owned())?;
+    SharedMemory::default().check_free(0, || "share memory with a program".to_owned())?;
     node.service_builder(&names.call(way)?)
         .publish_subscribe::<[u8]>()
         .user_header::<CallHeader>()
@@ -95,7 +95,7 @@ impl Program {
         let (ports, folder) = (Some(ports), Some(folder));
         // A little before the engine would end the stage, which could not say where its program hangs.
         let longest = longest.map(|longest| longest - (longest / 4).min(FOR_LAST_WORDS));
-        let mut started = Self { process, ports, folder, room: Room::default(), longest, is_alive: true };
+        let mut started = Self { process, ports, folder, shared_memory: SharedMemory::default(), longest, is_alive: true };
         match started.process.wait(longest) {
             Ok(b'r') => Ok(started),
             Ok(other) => Err(StageError::new(program(), format!("it rings {other}, which says nothing"))),
@@ -125,10 +125,10 @@ impl Program {
     fn tell(&mut self, header: CallHeader, bytes: &[u8]) -> Result<(), LinkError> {
         let Some(ports) = &self.ports else { return Ok(()) };
         let doing = || format!("send {} bytes to a program", bytes.len());
-        self.room.ask(bytes.len(), doing)?;
+        self.shared_memory.check_free(bytes.len(), doing)?;
         let sample = ports.publisher.loan_slice_uninit(bytes.len()).map_err(|error| failed(&doing())(&error))?;
         let start = std::ptr::from_ref(sample.user_header()).addr();
-        self.room.take(start..sample.payload().as_ptr_range().end.addr(), doing)?;
+        self.shared_memory.commit(start..sample.payload().as_ptr_range().end.addr(), doing)?;
         let mut sample = sample.write_from_slice(bytes);
         *sample.user_header_mut() = header;
         sample.send().map_err(|error| failed(&doing())(&error))?;

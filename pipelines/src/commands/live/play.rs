@@ -7,7 +7,7 @@ use crate::terminal::print_line;
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use gridweave_logs::schemas::schema_text;
-use gridweave_runtime::engine::{Feed, FeedStopper};
+use gridweave_runtime::engine::{ExternalSender, SenderStopper};
 use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader, Write};
 use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, PortType, Registry, StageError};
 use std::cell::RefCell;
@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What `gridweave play` is told.
+/// Arguments of `gridweave play`.
 #[derive(Debug, Args)]
 pub(crate) struct PlayArgs {
     /// The logs: MCAP files, and folders of ROS 2 bags. Several are merged by log time.
@@ -65,7 +65,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let player = Player { context: running.pipeline.context(stage), ..player };
     let stop = stop_on_interrupt("no more is sent");
     let stopped = Arc::new(AtomicBool::new(false));
-    let feed = Feed::join(&running.run, &running.pipeline, stage)?;
+    let feed = ExternalSender::join(&running.run, &running.pipeline, stage)?;
     if !feed.wait_for_readers(READY_TIMEOUT) {
         bail!("the stages that read `{}` do not connect", running.pipeline.stages[stage].name);
     }
@@ -112,7 +112,7 @@ fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
 fn watch_while<T>(
     is_over: &(impl Fn() -> bool + Sync),
     stopped: &AtomicBool,
-    feed: &FeedStopper,
+    feed: &SenderStopper,
     work: impl FnOnce() -> T,
 ) -> T {
     let done = AtomicBool::new(false);
@@ -157,7 +157,7 @@ impl Player<'_> {
     }
 
     /// Where the outputs of the source lead: each to that of the same name of the stage that it plays for.
-    fn links(&self, running: &Running, stage: usize, feed: &Feed, pace: &Rc<RefCell<Pace>>) -> Result<Vec<OutputEnd>> {
+    fn links(&self, running: &Running, stage: usize, feed: &ExternalSender, pace: &Rc<RefCell<Pace>>) -> Result<Vec<OutputEnd>> {
         let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
         let spec = &running.pipeline.stages[stage];
         let links = kind.outputs.iter().map(|output| {

@@ -5,12 +5,12 @@ use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::table::Table;
-use crate::terminal::{print, print_line, say, width};
+use crate::terminal::{print, print_line, eprint_line, width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
 use gridweave_runtime::link::Histogram;
-use gridweave_runtime::link::{StageBoard, StageNumber, StageState, WireNumber};
+use gridweave_runtime::link::{StageCounters, StageCounter, StageState, WireCounter};
 use gridweave_runtime::pipeline::{Mode, Pipeline, Wire};
 use gridweave_runtime::ros::StageProgress;
 use gridweave_runtime::stage::Registry;
@@ -20,7 +20,7 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What `gridweave top` is told.
+/// Arguments of `gridweave top`.
 #[derive(Debug, Args)]
 pub(crate) struct TopArgs {
     /// Measure for one interval, print that, and end.
@@ -47,9 +47,9 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let Some(interval) = interval else { return Err(BadUse("--interval must be above 0 s".to_owned()).into()) };
     let running = find_run(&args.run, registry)?;
     let stop = stop_on_interrupt("the display ends");
-    let boards = watch_stages(&running.run, &running.pipeline)?;
+    let counters = watch_stages(&running.run, &running.pipeline)?;
     let mut others = OtherMachines::watch(&running);
-    let look = || boards.iter().map(Snapshot::new).collect::<Vec<_>>();
+    let look = || counters.iter().map(Snapshot::new).collect::<Vec<_>>();
     let is_redrawn = std::io::stdout().is_terminal() && !args.once && !args.json;
     let (mut before, mut since) = (look(), Instant::now());
     loop {
@@ -72,7 +72,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
             ))?,
         };
         if is_over {
-            say("the run has ended");
+            eprint_line("the run has ended");
         }
         if args.once || is_over || !is_read {
             return Ok(Status::Done);
@@ -97,20 +97,20 @@ struct Snapshot {
 }
 
 impl Snapshot {
-    fn new(board: &StageBoard) -> Self {
+    fn new(counters: &StageCounters) -> Self {
         let wire = |wire: usize| {
-            [WireNumber::Taken, WireNumber::Dropped, WireNumber::Waiting].map(|number| board.get_wire(wire, number))
+            [WireCounter::Taken, WireCounter::Dropped, WireCounter::Waiting].map(|number| counters.get_wire(wire, number))
         };
         Self {
-            state: board.state(),
-            process: board.get(StageNumber::Process),
-            messages_in: board.get(StageNumber::MessagesIn),
-            sent: (0..board.ports()).map(|port| board.sent(port)).collect(),
-            busy: board.get(StageNumber::Busy),
-            restarts: board.get(StageNumber::Restarts),
-            warnings: board.get(StageNumber::Warnings),
-            wires: (0..board.wires()).map(wire).collect(),
-            latency: board.latency(),
+            state: counters.state(),
+            process: counters.get(StageCounter::Process),
+            messages_in: counters.get(StageCounter::MessagesIn),
+            sent: (0..counters.ports()).map(|port| counters.sent(port)).collect(),
+            busy: counters.get(StageCounter::Busy),
+            restarts: counters.get(StageCounter::Restarts),
+            warnings: counters.get(StageCounter::Warnings),
+            wires: (0..counters.wires()).map(wire).collect(),
+            latency: counters.latency(),
         }
     }
 }
@@ -152,7 +152,7 @@ fn rates(pipeline: &Pipeline, before: &[Snapshot], now: &[Snapshot], seconds: f6
         let latency = now.latency.since(&before.latency);
         StageRates {
             name: spec.name.clone(),
-            state: now.state.word(),
+            state: now.state.name(),
             messages_in: now.messages_in,
             messages_out: out(now),
             rate_in: rate(before.messages_in, now.messages_in),
@@ -275,7 +275,7 @@ fn of_other_machine(machine: &Machine<'_>, stage: &StageProgress) -> [String; 14
         unknown(),
         format!("{:.1} %", stage.busy * 100.0),
         unknown(),
-        (stage.restarts + u64::from(stage.state != StageState::Absent.word())).to_string(),
+        (stage.restarts + u64::from(stage.state != StageState::Absent.name())).to_string(),
         stage.warnings.to_string(),
     ]
 }

@@ -1,14 +1,14 @@
 //! One process of a run: its stages in threads, and its words with the supervisor.
 
-use super::awake::Awake;
-use super::words::{Said, Told, say};
+use super::suspend_detector::SuspendDetector;
+use super::protocol::{Said, Told, say};
 use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
 use crate::engine::run_links::watch_links;
 use crate::engine::stage_thread::{Event, StageThread, tell};
-use crate::engine::work::working_for;
+use crate::engine::work_timer::working_for;
 use crate::engine::{Failure, RunError};
-use crate::link::Board;
+use crate::link::SharedCounters;
 use crate::link::{Control, LinkError};
 use crate::pipeline::Pipeline;
 use crate::stage::Registry;
@@ -42,9 +42,9 @@ pub fn run_process(
         return Err(format!("the pipeline {} has no process `{process}`", pipeline.name));
     }
     let supervisor = Supervisor { output: &mut io::stdout(), told: Instant::now() };
-    let board = folder.board(&pipeline).map_err(|error| error.to_string())?;
+    let counters = folder.counters(&pipeline).map_err(|error| error.to_string())?;
     let control = Arc::new(Control::default());
-    Process { pipeline: &pipeline, folder: &folder, stages: &stages, board: &board, control }.run(supervisor);
+    Process { pipeline: &pipeline, folder: &folder, stages: &stages, counters: &counters, control }.run(supervisor);
     Ok(())
 }
 
@@ -80,7 +80,7 @@ struct Process<'a> {
     /// The indexes of its stages.
     stages: &'a [usize],
     /// What the stages of the run show of themselves.
-    board: &'a Arc<Board>,
+    counters: &'a Arc<SharedCounters>,
     /// What its stages are told.
     control: Arc<Control>,
 }
@@ -89,7 +89,7 @@ impl Process<'_> {
     fn run(&self, mut supervisor: Supervisor<'_>) {
         let names = self.folder.names();
         let to_look_on = watch_links(&self.folder.as_running(), self.pipeline);
-        let links = Links::new(self.pipeline, &names, self.board).looked_on(to_look_on);
+        let links = Links::new(self.pipeline, &names, self.counters).looked_on(to_look_on);
         let stop_reason = OnceLock::new();
         let (sender, receiver) = channel();
         listen(sender.clone());
@@ -108,7 +108,7 @@ impl Process<'_> {
     fn report(&self, supervisor: &mut Supervisor<'_>, events: &Receiver<Event>, stop_reason: &OnceLock<String>) {
         let mut running = self.stages.len();
         let mut hung = false;
-        let mut awake = Awake::new(Instant::now());
+        let mut awake = SuspendDetector::new(Instant::now());
         while running > 0 {
             let words = match events.recv_timeout(ALIVE_INTERVAL) {
                 Ok(Event::Progress { stage, share, log_time }) => {
@@ -123,12 +123,12 @@ impl Process<'_> {
                     })
                 }
                 Ok(Event::Drain) => {
-                    self.control.drain(self.board);
+                    self.control.drain(self.counters);
                     None
                 }
                 Ok(Event::Stop { reason }) => {
                     stop_reason.get_or_init(|| reason);
-                    self.control.stop(self.board);
+                    self.control.stop(self.counters);
                     None
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
@@ -148,7 +148,7 @@ impl Process<'_> {
     /// The first stage that has worked on one message for longer than the pipeline allows, while the process was awake.
     fn hung(&self, awake_for: Duration) -> Option<Said> {
         let longest = self.pipeline.stall_timeout.filter(|longest| awake_for > *longest)?;
-        let is_hung = |stage: usize| working_for(&self.board.stage(stage)).is_some_and(|time| time > longest);
+        let is_hung = |stage: usize| working_for(&self.counters.stage(stage)).is_some_and(|time| time > longest);
         let stage = self.stages.iter().copied().find(|&stage| is_hung(stage))?;
         let failure = Failure::Hung { seconds: longest.as_secs_f64() };
         Some(Said::Failed { stage: self.name(stage), failure })

@@ -1,6 +1,6 @@
 //! What the supervisor hears of a process, until that is silent.
 
-use super::words::Said;
+use super::protocol::Said;
 use std::io::{BufRead, BufReader};
 use std::process::ChildStdout;
 use std::sync::mpsc::Sender;

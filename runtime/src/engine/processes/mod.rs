@@ -18,7 +18,7 @@
 //! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end, however long
 //! that takes; only when nothing moves any more does the run fail.
 
-mod awake;
+mod suspend_detector;
 mod backoff;
 mod child;
 mod drain;
@@ -26,7 +26,7 @@ mod event;
 mod process;
 mod supervisor;
 mod system;
-mod words;
+mod protocol;
 
 pub use child::run_process;
 pub use system::{describe_exit, memory_of_process};

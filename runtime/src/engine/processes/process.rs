@@ -2,7 +2,7 @@
 
 use super::backoff::Backoff;
 use super::system::memory_of_process;
-use super::words::{Told, say};
+use super::protocol::{Told, say};
 use crate::engine::Failure;
 use crate::pipeline::Pipeline;
 use std::process::{Child, ChildStdin};

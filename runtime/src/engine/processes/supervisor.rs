@@ -1,17 +1,17 @@
 //! The supervisor: starts the processes of a run, hears how they go, stops them, and removes what they leave.
 
 use super::Launch;
-use super::awake::Awake;
+use super::suspend_detector::SuspendDetector;
 use super::backoff::Backoff;
 use super::drain::{Drain, STUCK_AFTER};
 use super::event::{Event, listen};
 use super::process::Process;
 use super::system::describe_exit;
-use super::words::{Said, Told};
+use super::protocol::{Said, Told};
 use crate::engine::run_folder::{RunFolder, clean_after};
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{LinkError, RunNames};
-use crate::link::{StageBoard, StageNumber, StageState, WireNumber};
+use crate::link::{StageCounters, StageCounter, StageState, WireCounter};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
@@ -57,10 +57,10 @@ fn run_in(
     observer: &dyn Observer,
 ) -> Result<RunReport, RunError> {
     let of_run = |error| RunError::of_run(Failure::from(error));
-    let board = folder.create_board(pipeline).map_err(of_run)?;
-    let boards: Vec<StageBoard> = (0..pipeline.stages.len()).map(|stage| board.stage(stage)).collect();
+    let counters = folder.create_counters(pipeline).map_err(of_run)?;
+    let counters: Vec<StageCounters> = (0..pipeline.stages.len()).map(|stage| counters.stage(stage)).collect();
     // Senders wait for the stages that are still to come.
-    boards.iter().for_each(|board| board.set_state(StageState::Starting));
+    counters.iter().for_each(|counters| counters.set_state(StageState::Starting));
     folder.write_pipeline(&pipeline.to_toml()).map_err(of_run)?;
     let (sender, receiver) = channel();
     let mut supervisor = Supervisor {
@@ -68,11 +68,11 @@ fn run_in(
         observer,
         launch,
         folder,
-        boards,
+        counters,
         events: sender,
         processes: Vec::new(),
         draining: None,
-        awake: Awake::new(Instant::now()),
+        awake: SuspendDetector::new(Instant::now()),
         awake_for: Duration::ZERO,
         reports: BTreeMap::new(),
         stopping: None,
@@ -88,12 +88,12 @@ struct Supervisor<'a> {
     observer: &'a dyn Observer,
     launch: &'a Launch,
     folder: &'a RunFolder,
-    boards: Vec<StageBoard>,
+    counters: Vec<StageCounters>,
     events: Sender<Event>,
     processes: Vec<Process>,
     /// Of a live run that comes to its end.
     draining: Option<Drain>,
-    awake: Awake,
+    awake: SuspendDetector,
     /// For how long this process had been awake when it last looked.
     awake_for: Duration,
     reports: BTreeMap<String, StageReport>,
@@ -236,8 +236,8 @@ impl Supervisor<'_> {
         let wait = process.backoff.fail();
         process.start_at = Some(Instant::now() + wait);
         for &stage in &process.stages {
-            self.boards[stage].clear();
-            self.boards[stage].add(StageNumber::Restarts, 1);
+            self.counters[stage].clear();
+            self.counters[stage].add(StageCounter::Restarts, 1);
         }
         remove_dead_nodes(&self.folder.names());
         self.observer.restarting(stage, &failure.to_string(), wait);
@@ -285,7 +285,7 @@ impl Supervisor<'_> {
                     .for_each(|process| process.tell(&Told::Drain));
             }
             Some(drain) => {
-                if drain.is_stuck(&self.boards, self.awake_for, Instant::now()) {
+                if drain.is_stuck(&self.counters, self.awake_for, Instant::now()) {
                     let stages = self.not_ended();
                     self.fail(RunError::of_run(Failure::Stuck { seconds: STUCK_AFTER.as_secs_f64(), stages }));
                 }
@@ -295,12 +295,12 @@ impl Supervisor<'_> {
 
     /// The stages that have not ended, each with how many messages wait in it.
     fn not_ended(&self) -> Vec<String> {
-        let stages = self.pipeline.stages.iter().zip(&self.boards);
-        let running = stages.filter(|(_, board)| board.state() != StageState::Ended);
-        let waiting = |board: &StageBoard| -> u64 {
-            (0..board.wires()).map(|wire| board.get_wire(wire, WireNumber::Waiting)).sum()
+        let stages = self.pipeline.stages.iter().zip(&self.counters);
+        let running = stages.filter(|(_, counters)| counters.state() != StageState::Ended);
+        let waiting = |counters: &StageCounters| -> u64 {
+            (0..counters.wires()).map(|wire| counters.get_wire(wire, WireCounter::Waiting)).sum()
         };
-        running.map(|(stage, board)| format!("`{}` ({} messages wait)", stage.name, waiting(board))).collect()
+        running.map(|(stage, counters)| format!("`{}` ({} messages wait)", stage.name, waiting(counters))).collect()
     }
 
     fn note_words(&mut self, process: usize, words: Said) {

@@ -10,11 +10,11 @@ use super::tap::LOOK_INTERVAL;
 use crate::commands::report::LivePage;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
-use crate::terminal::{print_line, say};
+use crate::terminal::{print_line, eprint_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{stage_statistics, watch_stages};
-use gridweave_runtime::link::StageBoard;
+use gridweave_runtime::link::StageCounters;
 use gridweave_runtime::stage::{Registry, StageStatistics};
 use serde_json::{Map, Value, json};
 use server::PageServer;
@@ -24,7 +24,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use watched::WatchedRun;
 
-/// What `gridweave view` is told.
+/// Arguments of `gridweave view`.
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
     /// The address to serve the page on. Anybody who can reach it can look on: 0.0.0.0:PORT lets other machines in. Port 0 is one
@@ -48,7 +48,7 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
     let page = LivePage::new(running.name());
     let mut server = PageServer::start(args.address, page.empty()?)?;
     let stop = stop_on_interrupt("the view ends");
-    let boards = watch_stages(&running.run, &running.pipeline)?;
+    let counters = watch_stages(&running.run, &running.pipeline)?;
     let mut watched = WatchedRun::open(&running)?;
     print_line(format_args!("open http://{} in a browser; ctrl-c ends the view, not the run", server.address()))?;
     let (mut next, mut is_new) = (Instant::now(), true);
@@ -58,13 +58,13 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
         is_new |= watched.take()?;
         if is_new && (is_last_look || server.is_watched() && Instant::now() >= next) {
             let start = Instant::now();
-            server.show(&page.change(&watched.state, watched.seconds(), &summary(&running, &boards))?);
+            server.show(&page.change(&watched.state, watched.seconds(), &summary(&running, &counters))?);
             is_new = false;
             next = Instant::now() + SHORTEST_INTERVAL.max(REST * start.elapsed());
         }
         if is_last_look {
             server.end(LAST_CALL);
-            say("the run has ended");
+            eprint_line("the run has ended");
             break;
         }
         if stop.load(Ordering::Relaxed) {
@@ -73,13 +73,13 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
         thread::sleep(LOOK_INTERVAL);
     }
     if watched.missed() > 0 {
-        say(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
+        eprint_line(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
     }
     Ok(Status::Done)
 }
 
 /// What the stages have done so far, in the form of the summary of a run.
-fn summary(running: &Running, boards: &[StageBoard]) -> Value {
+fn summary(running: &Running, counters: &[StageCounters]) -> Value {
     let stage = |done: StageStatistics| {
         let mut stage = json!({
             "messages_in": done.messages_in,
@@ -93,6 +93,6 @@ fn summary(running: &Running, boards: &[StageBoard]) -> Value {
         }
         (done.name, stage)
     };
-    let stages: Map<String, Value> = stage_statistics(&running.pipeline, boards).into_iter().map(stage).collect();
+    let stages: Map<String, Value> = stage_statistics(&running.pipeline, counters).into_iter().map(stage).collect();
     json!({ "stages": stages })
 }

@@ -1,13 +1,13 @@
 //! How long a stage works, for those who look on.
 
 use crate::link::Sleeper;
-use crate::link::{StageBoard, StageNumber, monotonic_nanoseconds};
+use crate::link::{StageCounters, StageCounter, monotonic_nanoseconds};
 use std::rc::Rc;
 use std::time::Duration;
 
-/// Notes on the board since when the stage has worked on one message, and how long it has worked in all.
-pub(super) struct Work {
-    board: StageBoard,
+/// Notes on the counters since when the stage has worked on one message, and how long it has worked in all.
+pub(super) struct WorkTimer {
+    counters: StageCounters,
     sleeper: Rc<Sleeper>,
     /// When the work on this message began; 0 while the stage waits.
     since: u64,
@@ -15,9 +15,9 @@ pub(super) struct Work {
     waited: Duration,
 }
 
-impl Work {
-    pub(super) fn new(board: StageBoard, sleeper: Rc<Sleeper>) -> Self {
-        Self { board, sleeper, since: 0, waited: Duration::ZERO }
+impl WorkTimer {
+    pub(super) fn new(counters: StageCounters, sleeper: Rc<Sleeper>) -> Self {
+        Self { counters, sleeper, since: 0, waited: Duration::ZERO }
     }
 
     /// The stage begins to work on a message, or goes on with the next.
@@ -32,7 +32,7 @@ impl Work {
         let time = monotonic_nanoseconds();
         let waited = self.sleeper.waited().saturating_sub(self.waited);
         let worked = time.saturating_sub(self.since).saturating_sub(waited.as_nanos() as u64);
-        self.board.add(StageNumber::Busy, worked);
+        self.counters.add(StageCounter::Busy, worked);
         self.waited += waited;
         self.set_since(time);
         time
@@ -45,13 +45,13 @@ impl Work {
 
     fn set_since(&mut self, since: u64) {
         self.since = since;
-        self.board.set(StageNumber::WorkingSince, since);
+        self.counters.set(StageCounter::WorkingSince, since);
     }
 }
 
 /// For how long a stage has worked on one message; nothing while it waits.
-pub(super) fn working_for(board: &StageBoard) -> Option<Duration> {
-    match board.get(StageNumber::WorkingSince) {
+pub(super) fn working_for(counters: &StageCounters) -> Option<Duration> {
+    match counters.get(StageCounter::WorkingSince) {
         0 => None,
         since => Some(Duration::from_nanos(monotonic_nanoseconds().saturating_sub(since))),
     }
@@ -60,23 +60,23 @@ pub(super) fn working_for(board: &StageBoard) -> Option<Duration> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::Board;
+    use crate::link::SharedCounters;
     use crate::link::Control;
     use std::sync::Arc;
 
     #[test]
     fn only_work_without_a_pause_counts() {
-        let board = Board::new(&[(0, 0)]).stage(0);
-        let sleeper = Rc::new(Sleeper::new(board.clone(), Arc::new(Control::default())));
-        let mut work = Work::new(board.clone(), sleeper);
-        assert_eq!(working_for(&board), None);
+        let counters = SharedCounters::new(&[(0, 0)]).stage(0);
+        let sleeper = Rc::new(Sleeper::new(counters.clone(), Arc::new(Control::default())));
+        let mut work = WorkTimer::new(counters.clone(), sleeper);
+        assert_eq!(working_for(&counters), None);
         let begin = monotonic_nanoseconds();
         work.begin();
-        assert!(working_for(&board).is_some());
+        assert!(working_for(&counters).is_some());
         work.begin();
         let end = work.note();
-        assert!(board.get(StageNumber::Busy) <= end - begin);
+        assert!(counters.get(StageCounter::Busy) <= end - begin);
         work.end();
-        assert_eq!(working_for(&board), None);
+        assert_eq!(working_for(&counters), None);
     }
 }

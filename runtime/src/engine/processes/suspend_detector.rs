@@ -10,13 +10,13 @@ const HALT: Duration = Duration::from_secs(1);
 
 /// Since when this process has been awake.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Awake {
+pub(super) struct SuspendDetector {
     since: Instant,
     looked: Instant,
 }
 
-impl Awake {
-    /// Awake from `now` on.
+impl SuspendDetector {
+    /// SuspendDetector from `now` on.
     pub(super) fn new(now: Instant) -> Self {
         Self { since: now, looked: now }
     }
@@ -39,7 +39,7 @@ mod tests {
     fn a_process_that_was_halted_has_been_awake_since_then_only() {
         let start = Instant::now();
         let at = |milliseconds| start + Duration::from_millis(milliseconds);
-        let mut awake = Awake::new(start);
+        let mut awake = SuspendDetector::new(start);
         for milliseconds in (0..5000).step_by(200) {
             assert_eq!(awake.look(at(milliseconds)), Duration::from_millis(milliseconds));
         }

@@ -1,4 +1,4 @@
-//! Samples that messages borrow from.
+//! Samples whose memory messages borrow.
 
 use super::SampleHeader;
 use crate::message::Storage;
@@ -7,30 +7,30 @@ use iceoryx2::service::Service;
 use std::cell::Cell;
 use std::rc::Rc;
 
-/// Counts the samples that a reader holds.
+/// The number of samples that a reader borrows.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct HeldSamples(Rc<Cell<usize>>);
+pub(crate) struct BorrowedSamples(Rc<Cell<usize>>);
 
-struct Held<S: Service> {
+struct BorrowedSample<S: Service> {
     sample: Sample<S, [u8], SampleHeader>,
-    held: HeldSamples,
+    count: BorrowedSamples,
 }
 
-impl<S: Service> Storage for Held<S> {
+impl<S: Service> Storage for BorrowedSample<S> {
     fn bytes(&self) -> &[u8] {
         self.sample.payload()
     }
 }
 
-impl<S: Service> Drop for Held<S> {
+impl<S: Service> Drop for BorrowedSample<S> {
     fn drop(&mut self) {
-        self.held.0.set(self.held.0.get() - 1);
+        self.count.0.set(self.count.0.get() - 1);
     }
 }
 
-impl HeldSamples {
-    /// The bytes of a sample: the sample itself, or a copy of them if the reader holds `most` already.
-    pub(crate) fn hold<S: Service + 'static>(
+impl BorrowedSamples {
+    /// The bytes of a sample: the sample itself, or a copy if the reader already borrows `most` samples.
+    pub(crate) fn borrow<S: Service + 'static>(
         &self,
         sample: Sample<S, [u8], SampleHeader>,
         most: usize,
@@ -39,6 +39,6 @@ impl HeldSamples {
             return Rc::new(sample.payload().to_vec());
         }
         self.0.set(self.0.get() + 1);
-        Rc::new(Held { sample, held: self.clone() })
+        Rc::new(BorrowedSample { sample, count: self.clone() })
     }
 }

@@ -1,9 +1,9 @@
 //! Sending into a live run from outside of it.
 
 use super::links::Links;
-use super::run_folder::{RunningRun, open_board};
+use super::run_folder::{RunningRun, open_counters};
 use super::{Failure, RunError};
-use crate::link::Board;
+use crate::link::SharedCounters;
 use crate::link::{Control, LinkError, LinkSender, Outputs, SenderRole, Sleeper};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::OutputSink;
@@ -15,30 +15,30 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A program that sends on the outputs of a stage of a live run whose messages come from outside.
-pub struct Feed {
+pub struct ExternalSender {
     ports: Vec<usize>,
     outputs: Rc<RefCell<Outputs<Service>>>,
     sleeper: Rc<Sleeper>,
-    stopper: FeedStopper,
+    stopper: SenderStopper,
     run: RunningRun,
     _node: Node<Service>,
 }
 
-/// Stops a [`Feed`] from another thread.
+/// Stops a [`ExternalSender`] from another thread.
 #[derive(Clone)]
-pub struct FeedStopper {
+pub struct SenderStopper {
     control: Arc<Control>,
-    board: Arc<Board>,
+    counters: Arc<SharedCounters>,
 }
 
-impl FeedStopper {
+impl SenderStopper {
     /// A sender of the feed that waits for room gives up, and so does one that is to wait later.
     pub fn stop(&self) {
-        self.control.stop(&self.board);
+        self.control.stop(&self.counters);
     }
 }
 
-impl Feed {
+impl ExternalSender {
     /// Joins a run of the given pipeline as a sender on the outputs of the stage with the given index.
     ///
     /// # Errors
@@ -50,20 +50,20 @@ impl Feed {
             return Err(RunError::of_stage(&spec.name, Failure::Outside(text)));
         }
         let of_stage = |failure: Failure| RunError::of_stage(&spec.name, failure);
-        let board = open_board(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
+        let counters = open_counters(&run.prefix, pipeline).map_err(|error| of_stage(error.into()))?;
         let (names, control) = (run.names(), Arc::new(Control::default()));
-        let links = Links::new(pipeline, &names, &board);
+        let links = Links::new(pipeline, &names, &counters);
         let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
-        let senders = links.senders(&node, stage, SenderRole::Guest).map_err(|error| of_stage(error.into()))?;
+        let senders = links.senders(&node, stage, SenderRole::External).map_err(|error| of_stage(error.into()))?;
         let (ports, senders) = senders.into_iter().unzip();
-        let sleeper = Rc::new(Sleeper::new(board.stage(stage), Arc::clone(&control)));
+        let sleeper = Rc::new(Sleeper::new(counters.stage(stage), Arc::clone(&control)));
         let outputs = Outputs::new(senders, Rc::clone(&sleeper));
-        let stopper = FeedStopper { control, board };
+        let stopper = SenderStopper { control, counters };
         Ok(Self { ports, outputs, sleeper, stopper, run: run.clone(), _node: node })
     }
 
     /// What stops it from another thread.
-    pub fn stopper(&self) -> FeedStopper {
+    pub fn stopper(&self) -> SenderStopper {
         self.stopper.clone()
     }
 
@@ -82,19 +82,19 @@ impl Feed {
     /// has not been taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers
     /// go on.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
-        let sleeper = Sleeper::new(self.sleeper.board().clone(), Arc::default());
+        let sleeper = Sleeper::new(self.sleeper.counters().clone(), Arc::default());
         self.wait(&sleeper, longest, LinkSender::is_taken)
     }
 
     /// Waits until all links are ready, and the stage has taken in what was sent so far.
     fn wait(&self, sleeper: &Sleeper, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
         // The stage sees a program that sends only while that is there: without its answer a short visit would pass unseen.
-        let (board, asked) = (sleeper.board(), sleeper.board().ask());
+        let (counters, asked) = (sleeper.counters(), sleeper.counters().request_ingest());
         let are_ready = || {
             if !self.run.is_running() {
                 return Err(LinkError::Stopped);
             }
-            Ok(board.has_answered(asked) && self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
+            Ok(counters.has_ingested(asked) && self.outputs.borrow_mut().links().iter_mut().all(&is_ready))
         };
         sleeper.wait_until(Some(Instant::now() + longest), are_ready).unwrap_or(false)
     }
