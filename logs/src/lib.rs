@@ -13,11 +13,11 @@ pub mod names;
 pub mod picture;
 pub mod qos;
 pub mod reader;
+mod robots;
 pub mod schemas;
 pub mod sink;
 pub mod source;
 pub mod summary;
-mod supplement;
 pub mod tf;
 pub mod truth;
 

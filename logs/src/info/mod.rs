@@ -14,7 +14,7 @@ pub use run::RunInfo;
 use crate::names::{self, Input, NameError, NameRules, Names, Renamed};
 use crate::qos;
 use crate::reader::{Damage, LogFile, LogReader};
-use crate::source::{RobotChannels, Role};
+use crate::robots::{RobotChannels, Role};
 use clocks::HeaderPlace;
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::RobotTopics;

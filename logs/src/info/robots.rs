@@ -1,8 +1,8 @@
 //! What a log holds of each robot.
 
 use super::LogInfo;
+use crate::robots::{Classified, InferredPoses, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance};
 use crate::schemas::full_type_name;
-use crate::source::{Classified, InferredPoses, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance};
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};

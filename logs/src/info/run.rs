@@ -1,7 +1,8 @@
 //! What a log says of the run that wrote it.
 
 use crate::reader::LogFile;
-use crate::sink::{INPUTS_RECORD, InputFile, OUTCOME_RECORD, RUN_RECORD};
+use crate::reader::OUTCOME_RECORD;
+use crate::sink::{INPUTS_RECORD, InputFile, RUN_RECORD};
 use serde::Serialize;
 
 /// The run that wrote a log.

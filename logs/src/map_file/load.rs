@@ -43,7 +43,7 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<R
         Thresholds::Literal => (reading, None),
         Thresholds::ByPicture => reading.by_picture(&shades),
     };
-    Ok((GridMap { info, cells: shades.cells(&reading) }, remark))
+    Ok((GridMap { info, cells: shades.cells(|samples, white| reading.pixel(samples, white)) }, remark))
 }
 
 /// The image of the map that the YAML file at `yaml` describes, which may not be there.

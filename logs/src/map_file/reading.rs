@@ -92,18 +92,15 @@ impl Reading {
     }
 
     /// The cell of a pixel: grey or three colours, the last of an even number being its opacity.
-    pub(super) fn pixel<T: Copy + Into<f64>>(&self, pixel: &[T], white: f64) -> i8 {
-        let mut values = [0.0; 4];
-        values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample.into());
-        let count = pixel.len().min(4);
-        match count % 2 {
-            0 if count > 0 => self.cell(&values[..count - 1], Some(values[count - 1]), white),
-            _ => self.cell(&values[..count], None, white),
+    pub(super) fn pixel(&self, samples: &[f64], white: f64) -> i8 {
+        match samples.split_last() {
+            Some((opacity, colours)) if samples.len() % 2 == 0 => self.cell(colours, Some(*opacity), white),
+            _ => self.cell(samples, None, white),
         }
     }
 
     /// The cell of a pixel with the given colours and opacity.
-    pub(super) fn cell(&self, colours: &[f64], opacity: Option<f64>, white: f64) -> i8 {
+    fn cell(&self, colours: &[f64], opacity: Option<f64>, white: f64) -> i8 {
         let mean_of = |sum: f64, count: usize| (sum / (count.max(1) as f64) / white).min(1.0);
         let (sum, count) = (colours.iter().sum::<f64>(), colours.len());
         let grey = mean_of(sum, count);

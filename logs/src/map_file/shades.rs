@@ -1,6 +1,5 @@
 //! The image of a map: from shades to cells, as nav2's map server reads them.
 
-use super::reading::Reading;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use std::io::{self, Cursor};
 
@@ -85,22 +84,23 @@ impl Shades {
         greys
     }
 
-    /// The cells, row by row from the image's last row to its first.
-    pub(super) fn cells(&self, reading: &Reading) -> Vec<i8> {
+    /// The cells, row by row from the image's last row to its first. `cell` makes one of a pixel's samples, each from 0 to
+    /// `white`.
+    pub(super) fn cells(&self, cell: impl Fn(&[f64], f64) -> i8) -> Vec<i8> {
         let white = self.white;
         let channels = usize::from(self.image.color().channel_count());
         match &self.image {
             // Most maps: 256 shades, each of which is read once.
             DynamicImage::ImageLuma8(grey) => {
-                let table: Vec<i8> = (0..=255u8).map(|value| reading.cell(&[f64::from(value)], None, white)).collect();
+                let table: Vec<i8> = (0..=255u8).map(|value| cell(&[f64::from(value)], white)).collect();
                 self.rows_upward(grey.as_raw(), 1, |pixel| table[usize::from(pixel[0])])
             }
             image => match image.as_flat_samples_u8() {
-                Some(flat) => self.rows_upward(flat.samples, channels, |pixel| reading.pixel(pixel, white)),
+                Some(flat) => self.rows_upward(flat.samples, channels, |pixel| of_samples(pixel, white, &cell)),
                 None => {
                     let flat = image.as_flat_samples_u16();
                     let samples = flat.as_ref().map(|flat| flat.samples).unwrap_or_default();
-                    self.rows_upward(samples, channels, |pixel| reading.pixel(pixel, white))
+                    self.rows_upward(samples, channels, |pixel| of_samples(pixel, white, &cell))
                 }
             },
         }
@@ -111,4 +111,10 @@ impl Shades {
         let rows = samples.chunks_exact(row).rev();
         rows.flat_map(|row| row.chunks_exact(channels.max(1))).map(cell).collect()
     }
+}
+
+fn of_samples<T: Copy + Into<f64>>(pixel: &[T], white: f64, cell: impl Fn(&[f64], f64) -> i8) -> i8 {
+    let mut values = [0.0; 4];
+    values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample.into());
+    cell(&values[..pixel.len().min(4)], white)
 }

@@ -1,9 +1,9 @@
 //! Logs that look alike are those of different robots.
 
+use super::file_names::robot_names;
 use super::{Input, NameError};
+use crate::robots::{RobotChannels, Role};
 use crate::schemas::full_type_name;
-use crate::source::map_file::robot_names;
-use crate::source::{RobotChannels, Role};
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange};

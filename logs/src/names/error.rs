@@ -1,7 +1,7 @@
 //! Why logs cannot be named.
 
+use super::file_names::FileNameError;
 use crate::reader::ReadError;
-use crate::source::map_file;
 use gridweave_runtime::pipeline::suggest;
 
 /// Logs cannot be opened and named.
@@ -13,7 +13,7 @@ pub enum NameError {
     Read(#[from] ReadError),
     /// Logs look alike, and so do their names.
     #[error("the logs look alike, and their names do not tell them apart: {0}; or say whose they are: ROBOT=LOG")]
-    Alike(#[from] map_file::NameError),
+    Alike(#[from] FileNameError),
     /// A robot that was asked for is not there.
     #[error("there is nothing of a robot `{robot}` in the logs: {}", listed(.known))]
     NoSuchRobot {

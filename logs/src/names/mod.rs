@@ -12,6 +12,7 @@ mod alike;
 mod channel;
 mod clock;
 mod error;
+mod file_names;
 mod input;
 mod naming;
 mod rename;
@@ -22,12 +23,12 @@ mod tests;
 
 pub(crate) use channel::{NamedChannel, Renamed};
 pub use error::NameError;
+pub use file_names::{FileNameError, robot_names};
 pub use input::Input;
 pub use rename::TopicRename;
 pub use rules::{Convention, NameRules};
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};
-use crate::source::map_file::robot_names;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::borrow::Cow;

@@ -4,7 +4,7 @@ use super::channel::NamedChannel;
 use super::rules::fits;
 use super::{Convention, Input, NameError, NameRules, Names, alike};
 use crate::reader::LogFile;
-use crate::source::{RobotChannels, Role};
+use crate::robots::{RobotChannels, Role};
 use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;

@@ -1,6 +1,6 @@
 //! Axes, marks, margin, scale bar and legend.
 
-use super::grid_lines::grid_lines;
+use super::grid_lines::{grid_lines, length_text};
 use super::legend::{Entry, Legend};
 use super::marks::text_size;
 use super::view::View;
@@ -13,14 +13,9 @@ const INK: Colour = [0, 0, 0];
 const X_AXIS: Colour = [200, 30, 30];
 const Y_AXIS: Colour = [30, 150, 30];
 
-/// A length for lines and gaps that suits the size of the picture, pixels.
-pub(super) fn unit(view: &View) -> f64 {
-    (f64::from(view.width.max(view.height)) / 500.0).max(1.0)
-}
-
 /// The maps with all that is drawn on them and beside them.
 pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<Picture, PictureError> {
-    let unit = unit(view).round();
+    let unit = view.unit().round();
     let (margin, size) = (8.0 * unit, text_size(unit));
     let corner = Vector2::new(margin, margin);
     let lines = scene.grid.map(|metres| grid_lines(view, metres)).transpose()?;
@@ -62,7 +57,7 @@ pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<
 
 /// The axes of the world at its origin, x red and y green; none if it lies far beyond the picture.
 fn axes(view: &View, corner: Vector2<f64>) -> Option<Group> {
-    let unit = unit(view);
+    let unit = view.unit();
     let origin = view.pixel(Point2::origin());
     if !(origin.x.abs() < 1e5 && origin.y.abs() < 1e5) {
         return None;
@@ -87,12 +82,6 @@ fn round_length(limit: f64) -> (f64, u32) {
         ratio if ratio >= 2.0 => (2.0 * power, 4),
         _ => (power, 5),
     }
-}
-
-/// A length for people, as in `2.5 m`.
-pub(super) fn length_text(metres: f64) -> String {
-    // Without the last digits of what is no round number to the machine.
-    format!("{} m", (metres * 1e6).round() / 1e6 + 0.0)
 }
 
 /// A bar of a round length, its parts black and white in turn, and that length beside it.
@@ -141,10 +130,5 @@ mod tests {
         for (length, expected) in lengths.into_iter().zip(expected) {
             assert!((length - expected).abs() < 1e-9 * expected, "{length} instead of {expected}");
         }
-    }
-
-    #[test]
-    fn lengths_are_told_without_needless_digits() {
-        assert_eq!([20.0, 0.1 + 0.2, 0.05, -0.0].map(length_text), ["20 m", "0.3 m", "0.05 m", "0 m"]);
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError
     let mut add = |from: Point2<f64>, to: Point2<f64>, value: f64| {
         marks.push(Mark { shape: Shape::Line { places: vec![from, to], width: 0.5 }, paint: LINE });
         // Where the next line's number still has room.
-        let words = super::decoration::length_text(value);
+        let words = length_text(value);
         marks.push(Mark { shape: Shape::Label { at: from, words }, paint: NUMBER.into() });
     };
     for x in multiples(low.x, high.x).map(|multiple| multiple as f64 * metres) {
@@ -33,9 +33,21 @@ pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError
     for y in multiples(low.y, high.y).map(|multiple| multiple as f64 * metres) {
         add(Point2::new(low.x, y), Point2::new(high.x, y), y);
     }
-    Ok(Marks {
-        name: format!("a line every {}", super::decoration::length_text(metres)),
-        legend: Some(LINE.colour),
-        marks,
-    })
+    Ok(Marks { name: format!("a line every {}", length_text(metres)), legend: Some(LINE.colour), marks })
+}
+
+/// A length for people, as in `2.5 m`.
+pub(super) fn length_text(metres: f64) -> String {
+    // Without the last digits of what is no round number to the machine.
+    format!("{} m", (metres * 1e6).round() / 1e6 + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_written_without_needless_digits() {
+        assert_eq!([20.0, 0.1 + 0.2, 0.05, -0.0].map(length_text), ["20 m", "0.3 m", "0.05 m", "0 m"]);
+    }
 }

@@ -1,6 +1,5 @@
 //! What is drawn on maps, in metres of the world.
 
-use super::decoration::unit;
 use super::view::View;
 use crate::drawing::{Colour, Group, Paint, Path, text};
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
@@ -75,7 +74,7 @@ pub enum Shape {
 impl Marks {
     /// As shapes of a drawing on an image that lies at `corner`.
     pub(super) fn draw(&self, view: &View, corner: Vector2<f64>) -> Group {
-        let canvas = Canvas { view, corner, unit: unit(view) };
+        let canvas = Canvas { view, corner, unit: view.unit() };
         let paths = self.marks.iter().flat_map(|mark| canvas.draw(mark).unwrap_or_default()).collect();
         Group { name: self.name.clone(), is_on_image: true, paths }
     }

@@ -25,6 +25,11 @@ pub(super) struct View {
 }
 
 impl View {
+    /// A length for lines and gaps that suits the size of the picture, pixels.
+    pub(super) fn unit(&self) -> f64 {
+        (f64::from(self.width.max(self.height)) / 500.0).max(1.0)
+    }
+
     /// All points of the outlines of so many maps, of which the finest has cells of `finest` metres. `None` if there are
     /// none, or if they lie too far apart to be measured.
     pub(super) fn of(outlines: impl Iterator<Item = Point2<f64>>, maps: usize, finest: f64) -> Option<Self> {

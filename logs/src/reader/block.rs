@@ -2,8 +2,8 @@
 //! themselves.
 
 use super::bytes::FileBytes;
-use super::chunk::{Chunk, LARGEST};
-use super::damage::ChunkFault;
+use super::chunk::Chunk;
+use super::damage::{ChunkFault, LARGEST};
 use super::definitions::Definitions;
 use super::packed::{ZSTD_MAGIC, unpack_messages};
 use super::record::{MessageRecord, record_at};
@@ -88,7 +88,7 @@ impl Block {
         memory: Memory,
     ) -> Result<LoadedBlock, ChunkFault> {
         let (records, lost) = match (&self.records, storage) {
-            (Records::Rows(rows), Storage::Sqlite(database)) => rows.contents(database)?,
+            (Records::Rows(rows), Storage::Sqlite(database)) => database.contents(rows)?,
             (Records::Ros1(chunk), Storage::Ros1(bag)) => chunk.messages(bag)?,
             (_, Storage::Mcap(file)) => (self.contents(file, memory.records)?, 0),
             _ => return Err(ChunkFault::Records),

@@ -1,16 +1,13 @@
 //! Chunks: many records, compressed together.
 
 use super::bytes::{FileBytes, Window};
-use super::damage::ChunkFault;
+use super::damage::{ChunkFault, LARGEST};
 use super::record::{Fields, HEAD, Record, wanted};
 use mcap::records::op;
 use std::io::Read;
 use std::ops::Range;
 
-/// The most bytes that the contents of a chunk may have: no more than a log of ours can hold in one, and less than
-/// would harm a machine. A few bytes of a file can claim, and even hold, any number.
-pub(crate) const LARGEST: u64 = 1 << 30;
-/// The same for a chunk that is cut and does not say its size, as one does whose recorder was killed. Recorders close a chunk
+/// The most bytes for a chunk that is cut and does not say its size, as one does whose recorder was killed. Recorders close a chunk
 /// after 1 to 16 MB.
 const LARGEST_UNTOLD: u64 = 64 << 20;
 

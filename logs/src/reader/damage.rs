@@ -2,6 +2,10 @@
 
 use serde::Serialize;
 
+/// The most bytes that the contents of a chunk may have: no more than a log of ours can hold in one, and less than
+/// would harm a machine. A few bytes of a file can claim, and even hold, any number.
+pub(crate) const LARGEST: u64 = 1 << 30;
+
 /// Damage to a log that was read as far as it goes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
 #[serde(tag = "damage", rename_all = "snake_case")]
@@ -105,7 +109,7 @@ pub enum ChunkFault {
     #[error("it does not consist of whole records")]
     Records,
     /// It would expand to more than is read.
-    #[error("its contents take {size} bytes, and {} are the most that is read", super::chunk::LARGEST)]
+    #[error("its contents take {size} bytes, and {} are the most that is read", LARGEST)]
     TooMuch {
         /// Bytes that it claims.
         size: u64,

@@ -5,10 +5,9 @@ use super::bytes::{FileBytes, Window};
 use super::chunk::Chunk;
 use super::damage::{ChunkFault, Damage};
 use super::definitions::Definitions;
-use super::outcome;
 use super::record::{Fields, HEAD, MessageRecord, Record};
 use super::summary::{Statistics, SummarySection};
-use crate::supplement::{SupplementKind, read_metadata};
+use super::supplement::{SupplementKind, damage_of, read_metadata};
 use mcap::MAGIC;
 use mcap::records::op;
 use rayon::prelude::*;
@@ -150,7 +149,7 @@ impl Walk {
             }
             op::METADATA => {
                 if let Some((name, metadata)) = read_metadata(record.body) {
-                    self.layout.damage.extend(outcome::damage_of(&name, &metadata));
+                    self.layout.damage.extend(damage_of(&name, &metadata));
                     self.layout.metadata.insert(name, metadata);
                 }
             }

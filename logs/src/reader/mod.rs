@@ -31,7 +31,6 @@ mod guess;
 mod layout;
 mod map;
 mod merge;
-mod outcome;
 mod packed;
 mod paths;
 mod record;
@@ -39,18 +38,19 @@ mod ros1;
 mod sqlite;
 mod storage;
 mod summary;
+mod supplement;
 
 #[cfg(test)]
 mod tests;
 
-pub use crate::supplement::SupplementKind;
 pub use damage::{ChunkFault, Damage};
 pub use error::ReadError;
 pub use file::LogFile;
 pub use merge::{LogMessage, LogReader};
 pub use paths::log_files;
-pub(crate) use record::Fields;
 pub use summary::Statistics;
+pub use supplement::SupplementKind;
+pub(crate) use supplement::{OUTCOME_RECORD, describes_its_file, read_attachment, read_metadata};
 
 use std::path::PathBuf;
 

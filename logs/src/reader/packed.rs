@@ -1,8 +1,9 @@
 //! What is compressed with zstd in the ways of rosbag2: whole files, and messages each by itself.
 
 use super::bytes::FileBytes;
-use super::chunk::{LARGEST, decompress_zstd};
+use super::chunk::decompress_zstd;
 use super::damage::ChunkFault;
+use super::damage::LARGEST;
 use super::definitions::Definitions;
 use super::record::{MessageRecord, push_message, record_at};
 use mcap::records::op;

@@ -1,9 +1,9 @@
 //! Closing a log whose writer was killed.
 
-use super::log_writer::OUTCOME_RECORD;
 use super::rewrite::rewrite;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::file::OutputFile;
+use crate::reader::OUTCOME_RECORD;
 use crate::reader::{Damage, LogFile, LogReader, ReadError};
 use mcap::MAGIC;
 use mcap::records::op;

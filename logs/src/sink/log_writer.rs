@@ -3,6 +3,7 @@
 use super::chunk_file::ChunkFile;
 use super::{Compression, LogWriteError};
 use crate::file::OutputFile;
+use crate::reader::OUTCOME_RECORD;
 use gridweave_runtime::message::Channel;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
@@ -12,9 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// The bytes that a message takes in a chunk beside its own: opcode, length and header.
 const MESSAGE_OVERHEAD: u64 = 31;
-
-/// The name of the metadata record that says how the run ended.
-pub(crate) const OUTCOME_RECORD: &str = "gridweave";
 
 /// How a log is written.
 #[derive(Clone, Copy, Debug)]

@@ -25,7 +25,6 @@ mod stage;
 
 pub use close::{CloseError, close_log};
 pub use error::LogWriteError;
-pub(crate) use log_writer::OUTCOME_RECORD;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
 pub use provenance::InputFile;
 pub(crate) use provenance::{INPUTS_RECORD, RUN_RECORD};

@@ -1,8 +1,8 @@
 //! Writing anew what can be read of logs.
 
-use super::{LogOptions, LogWriteError, LogWriter, OUTCOME_RECORD, Outcome};
+use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::reader::{Damage, LogFile, LogReader, ReadError, SupplementKind, log_files};
-use crate::supplement::{read_attachment, read_metadata};
+use crate::reader::{OUTCOME_RECORD, read_attachment, read_metadata};
 use gridweave_runtime::message::LogTime;
 use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, BTreeSet};

@@ -4,7 +4,7 @@ use super::given_frames::GivenFrames;
 use super::provenance::{INPUTS_RECORD, InputHashes, RUN_RECORD, run_record};
 use super::routing::{ResultTopics, Route, is_tf, result_channel};
 use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
-use crate::supplement::{SupplementKind, read_attachment, read_metadata};
+use crate::reader::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{RosMessage, TFMessage};
 use gridweave_runtime::stage::{Context, InputWire, Output, StageError, match_robot};

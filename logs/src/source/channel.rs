@@ -1,8 +1,8 @@
 //! One channel of the logs, and how its messages are sent.
 
 use super::carry::Latch;
-use super::route::Role;
-use super::tag_reader::TagReader;
+use crate::robots::Role;
+use crate::robots::TagReader;
 use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
 use gridweave_runtime::stage::{Out, StageError};
 

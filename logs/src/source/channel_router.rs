@@ -4,7 +4,7 @@ use super::RobotMessages;
 use super::carry::Latch;
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
-use super::route::{RobotChannels, Role};
+use crate::robots::{RobotChannels, Role};
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage};

@@ -3,14 +3,14 @@
 
 use super::RobotMessages;
 use super::channel::Route;
-use super::inferred_poses::InferredPoses;
-use super::mounts::Untied;
-use super::pose::{NoPose, pose_with_covariance};
-use super::route::{PoseSource, RobotChannels, Role};
-use super::scans::{Scans, read_scan};
-use super::tag_positions::TagPositions;
-use super::tag_reader::Seen;
 use super::updated_maps::{UpdatedMap, UpdatedMaps};
+use crate::robots::InferredPoses;
+use crate::robots::Seen;
+use crate::robots::TagPositions;
+use crate::robots::Untied;
+use crate::robots::{NoPose, pose_with_covariance};
+use crate::robots::{PoseSource, RobotChannels, Role};
+use crate::robots::{Scans, read_scan};
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::ros::{
     Header, OccupancyGrid, OccupancyGridUpdate, PoseStamped, PoseWithCovarianceStamped, TFMessage, TagPosition,

@@ -3,8 +3,8 @@
 use super::RobotMessages;
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
-use super::route::Role;
 use crate::names::{NamedChannel, Renamed};
+use crate::robots::Role;
 use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{OccupancyGrid, TagRange, TopologicalMap, decode};

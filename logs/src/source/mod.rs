@@ -5,29 +5,18 @@ mod carry;
 mod channel;
 mod channel_router;
 mod derived;
-mod inferred_poses;
 mod live_router;
 pub mod map_file;
-mod mounts;
-mod pose;
-mod route;
 mod router;
-mod scans;
 mod stage;
-mod tag_positions;
-mod tag_reader;
 pub mod topology_file;
 mod updated_maps;
 
 #[cfg(test)]
 mod tests;
 
-pub(crate) use inferred_poses::InferredPoses;
 pub use live_router::{LiveMessage, LiveRouter};
-pub(crate) use pose::pose_with_covariance;
-pub(crate) use route::{Classified, PoseSource, RobotChannels, Role};
 pub use stage::McapSource;
-pub(crate) use tag_reader::TagReader;
 
 use crate::map_file::Thresholds;
 use crate::names::{Convention, Input, NameRules};

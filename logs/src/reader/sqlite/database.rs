@@ -1,17 +1,17 @@
 //! One database, opened to be read and never to be written.
 
-use super::rows::survey;
+use super::rows::{Rows, survey};
 use super::tables;
 use super::torn::Pages;
 use crate::reader::bytes::FileBytes;
-use crate::reader::damage::Damage;
+use crate::reader::damage::{ChunkFault, Damage};
 use crate::reader::layout::Layout;
 use rusqlite::{Connection, OpenFlags};
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 /// The most bytes of a header that say how long the database is.
 const HEADER: usize = 100;
@@ -55,19 +55,14 @@ impl Database {
         self.file.is_cut()
     }
 
-    pub(super) fn connection(&self) -> MutexGuard<'_, Connection> {
+    /// The messages of a run of rows as records of MCAP, and how many of them could not be read.
+    ///
+    /// # Errors
+    /// They are too large, or the database cannot be read there.
+    pub(crate) fn contents(&self, rows: &Rows) -> Result<(Vec<u8>, u64), ChunkFault> {
         // A thread that has failed leaves a connection that can be used.
-        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Whether the message of a row is not whole.
-    pub(super) fn is_torn(&self, row: i64) -> bool {
-        self.torn.binary_search(&row).is_ok()
-    }
-
-    /// The number that a topic has as a channel; one that no channel has if the database does not describe it.
-    pub(super) fn channel(&self, topic: i64) -> u16 {
-        self.channels.get(&topic).copied().unwrap_or(0)
+        let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
+        rows.contents(&connection, &self.torn, &self.channels)
     }
 }
 

@@ -1,13 +1,12 @@
 //! The rows of the table of messages: found in runs, and read a run at a time.
 
-use super::database::Database;
 use crate::reader::block::{Block, Records};
-use crate::reader::chunk::LARGEST;
-use crate::reader::damage::{ChunkFault, Damage};
+use crate::reader::damage::{ChunkFault, Damage, LARGEST};
 use crate::reader::layout::Layout;
 use crate::reader::record::push_message;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row, Statement};
+use std::collections::BTreeMap;
 
 /// A run is ended when its messages have so many bytes, or there are so many of them.
 const RUN_BYTES: u64 = 1 << 20;
@@ -143,16 +142,21 @@ impl Runs<'_> {
 
 impl Rows {
     /// The messages of the rows as records of MCAP, and how many of them could not be read.
-    pub(crate) fn contents(&self, database: &Database) -> Result<(Vec<u8>, u64), ChunkFault> {
+    /// The rows `torn`, rising, are not whole; `channels` are the numbers that topics have as channels.
+    pub(super) fn contents(
+        &self,
+        connection: &Connection,
+        torn: &[i64],
+        channels: &BTreeMap<i64, u16>,
+    ) -> Result<(Vec<u8>, u64), ChunkFault> {
         if self.size > LARGEST {
             return Err(ChunkFault::TooMuch { size: self.size });
         }
-        let connection = database.connection();
-        let mut reading = Reading { database, records: Vec::new(), read: 0, last: None };
+        let mut reading = Reading { torn, channels, records: Vec::new(), read: 0, last: None };
         // The size is the word of the database only.
         let _ = reading.records.try_reserve(usize::try_from(self.size.min(2 * RUN_BYTES)).unwrap_or(0));
-        if reading.all(&connection, self).is_err() {
-            reading.one_by_one(&connection, self).map_err(|_| ChunkFault::Records)?;
+        if reading.all(connection, self).is_err() {
+            reading.one_by_one(connection, self).map_err(|_| ChunkFault::Records)?;
         }
         if reading.records.len() as u64 > 2 * LARGEST {
             return Err(ChunkFault::TooLarge);
@@ -162,7 +166,8 @@ impl Rows {
 }
 
 struct Reading<'a> {
-    database: &'a Database,
+    torn: &'a [i64],
+    channels: &'a BTreeMap<i64, u16>,
     records: Vec<u8>,
     /// How many rows were read, and the last of them.
     read: u64,
@@ -200,7 +205,7 @@ impl Reading<'_> {
     fn take(&mut self, row: &Row<'_>) -> rusqlite::Result<()> {
         let number: i64 = row.get(0)?;
         self.last = Some(number);
-        if self.database.is_torn(number) {
+        if self.torn.binary_search(&number).is_ok() {
             return Ok(());
         }
         let (time, topic) = match (row.get_ref(1)?, row.get_ref(2)?) {
@@ -208,7 +213,8 @@ impl Reading<'_> {
             _ => return Ok(()),
         };
         let (ValueRef::Blob(data) | ValueRef::Text(data)) = row.get_ref(3)? else { return Ok(()) };
-        let channel = self.database.channel(topic);
+        // A number that no channel has, where the database does not describe the topic.
+        let channel = self.channels.get(&topic).copied().unwrap_or(0);
         // Numbers count from 1; those that do not fit begin anew.
         push_message(&mut self.records, channel, number as u32, time, time, data);
         self.read += 1;

@@ -1,12 +1,10 @@
 //! `map_file_source`: the maps of nav2's map server, a file for each robot.
 
-mod names;
 mod stage;
 
 #[cfg(test)]
 mod tests;
 
-pub use names::{NameError, robot_names};
 pub use stage::MapFileSource;
 
 use gridweave_runtime::ros::OccupancyGrid;

@@ -1,8 +1,8 @@
 //! The stage `map_file_source`.
 
-use super::names::robot_names;
 use super::{FileMaps, MapFileSourceParameters};
 use crate::map_file::{self, Thresholds};
+use crate::names::robot_names;
 use crate::qos;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};

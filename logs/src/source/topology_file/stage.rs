@@ -1,7 +1,7 @@
 //! The stage `topology_file_source`.
 
 use super::{FileTopologies, TopologyFileSourceParameters, load};
-use crate::source::map_file::robot_names;
+use crate::names::robot_names;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::Header;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};

@@ -170,7 +170,7 @@ fn a_log_says_at_its_beginning_what_writes_it_and_at_its_end_from_what() {
     run.finish();
     let file = crate::reader::LogFile::open(run.file()).unwrap();
     let names: Vec<String> = file.supplements().map(|(_, body)| read_metadata(&body.unwrap()).unwrap().0).collect();
-    assert_eq!(names, [RUN_RECORD, INPUTS_RECORD, crate::sink::OUTCOME_RECORD]);
+    assert_eq!(names, [RUN_RECORD, INPUTS_RECORD, crate::reader::OUTCOME_RECORD]);
     assert_eq!(file.metadata(RUN_RECORD).unwrap()["pipeline"], "[pipeline]");
     assert_eq!(file.metadata(RUN_RECORD).unwrap()["version"], env!("CARGO_PKG_VERSION"));
     let input = &file.metadata(INPUTS_RECORD).unwrap()["1"];

@@ -1,6 +1,6 @@
 //! Poses from all types that hold one.
 
-use super::route::PoseSource;
+use super::channels::PoseSource;
 use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
 use serde::Deserialize;
 use std::borrow::Cow;

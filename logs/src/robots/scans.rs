@@ -11,18 +11,18 @@ use nalgebra::Vector3;
 
 /// Knows how lidars are mounted on their robots.
 #[derive(Debug)]
-pub(super) struct Scans {
+pub(crate) struct Scans {
     mounts: Mounts,
 }
 
 impl Scans {
     /// For robots whose base is called `base`, or as most are.
-    pub(super) fn new(base: Option<&str>) -> Self {
+    pub(crate) fn new(base: Option<&str>) -> Self {
         Self { mounts: Mounts::new(base) }
     }
 
     /// Takes up transforms whose frames lack a prefix.
-    pub(super) fn transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
+    pub(crate) fn transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
         for edge in &message.transforms {
             let parent = frame_of_robot(prefix, &edge.header.frame_id);
             let child = frame_of_robot(prefix, &edge.child_frame_id);
@@ -31,7 +31,7 @@ impl Scans {
     }
 
     /// A scan as the base of its robot sees it: in the plane, with a lidar that hangs upside down turning the other way.
-    pub(super) fn seen_from_base(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, Untied> {
+    pub(crate) fn seen_from_base(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, Untied> {
         let (base, transform_base_lidar) = self.mounts.mount(robot, &scan.header.frame_id)?;
         let ahead = transform_base_lidar * Vector3::x();
         let is_upright = (transform_base_lidar * Vector3::z()).z >= 0.0;
@@ -53,12 +53,12 @@ impl Scans {
 }
 
 /// Whether a type is that of scans.
-pub(super) fn is_scan(type_name: &str) -> bool {
+pub(crate) fn is_scan(type_name: &str) -> bool {
     [LaserScan::NAME, MultiEchoLaserScan::NAME].contains(&type_name)
 }
 
 /// Reads a scan of a channel that [holds some](is_scan). Of several echoes of a beam the nearest counts: it has met something.
-pub(super) fn read_scan(channel: &Channel, data: &[u8]) -> Result<LaserScan, DecodeError> {
+pub(crate) fn read_scan(channel: &Channel, data: &[u8]) -> Result<LaserScan, DecodeError> {
     if full_type_name(&channel.schema_name) == LaserScan::NAME {
         return decode(data);
     }

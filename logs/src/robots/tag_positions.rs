@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 /// Knows how cameras and other such sensors are mounted on their robots, by tf.
 #[derive(Debug)]
-pub(super) struct TagPositions {
+pub(crate) struct TagPositions {
     mounts: Mounts,
     /// The robots whose tags are frames in tf.
     in_tf: BTreeSet<String>,
@@ -17,18 +17,18 @@ pub(super) struct TagPositions {
 
 impl TagPositions {
     /// For robots whose base is called `base`, or as most are; tags of the robots `in_tf` are frames there.
-    pub(super) fn new(base: Option<&str>, in_tf: BTreeSet<String>) -> Self {
+    pub(crate) fn new(base: Option<&str>, in_tf: BTreeSet<String>) -> Self {
         Self { mounts: Mounts::new(base), in_tf }
     }
 
     /// Tags of these robots are frames in tf.
-    pub(super) fn set_robots(&mut self, in_tf: BTreeSet<String>) {
+    pub(crate) fn set_robots(&mut self, in_tf: BTreeSet<String>) {
         self.in_tf = in_tf;
     }
 
     /// Takes up transforms whose frames lack a prefix. Gives the tags that are seen in them: the robot, and where it sees the
     /// tag, or that this cannot be told.
-    pub(super) fn transforms(
+    pub(crate) fn transforms(
         &mut self,
         prefix: &str,
         is_static: bool,
@@ -60,7 +60,7 @@ impl TagPositions {
     }
 
     /// Where a robot sees a tag that is at a point in a frame.
-    pub(super) fn position(
+    pub(crate) fn position(
         &self,
         robot: &str,
         tag_id: &str,
@@ -76,7 +76,7 @@ impl TagPositions {
 
     /// In which direction a robot perceives a tag whose direction a sensor tells: an angle about the z axis of `frame`, radians,
     /// and its standard deviation.
-    pub(super) fn bearing(
+    pub(crate) fn bearing(
         &self,
         robot: &str,
         tag_id: &str,

@@ -1,8 +1,8 @@
 //! What a log holds beside its messages: attachments and metadata records. They pass through a pipeline as messages do, on
 //! channels of their own.
 
-use crate::reader::Fields;
-use crate::sink::OUTCOME_RECORD;
+use super::damage::Damage;
+use super::record::Fields;
 use gridweave_runtime::message::Channel;
 use mcap::records::op;
 use std::borrow::Cow;
@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 
 /// The encoding of the channels that they pass on: each message is the body of a record, as the MCAP specification has it.
 const ENCODING: &str = "mcap_record";
+/// Name of the metadata record in which a run says how it has ended.
+pub(crate) const OUTCOME_RECORD: &str = "gridweave";
 
 /// What a record beside the messages is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +62,12 @@ pub(crate) fn read_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, Str
         metadata.insert(key, value);
     }
     Some((name, metadata))
+}
+
+/// The damage that a metadata record tells of: a run that ended early says so in its log.
+pub(crate) fn damage_of(name: &str, metadata: &BTreeMap<String, String>) -> Option<Damage> {
+    let incomplete = name == OUTCOME_RECORD && metadata.get("complete").is_some_and(|complete| complete == "false");
+    incomplete.then(|| Damage::Incomplete { reason: metadata.get("reason").cloned().unwrap_or_default() })
 }
 
 /// The attachment in the body of a record; none if it is not whole, or does not fit its checksum.

@@ -1,12 +1,10 @@
 //! Poses of robots that have no topic for them: out of tf, or odometry that is in the frame of the map.
 
-use super::route::RobotChannels;
+use super::channels::RobotChannels;
+use super::mounts::BASES;
 use crate::tf::{Ends, TfPoses};
 use gridweave_runtime::ros::{PoseStamped, TFMessage};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// The names that the frame of a robot's base has, behind that of the robot. The first that is tied to the map counts.
-pub(super) const BASES: [&str; 4] = ["/base_link", "/base_footprint", "_base_link", "_base_footprint"];
 
 /// What the frame of a robot's odometry is called, behind the robot's name.
 const ODOMETRY_FRAME: &str = "odom";

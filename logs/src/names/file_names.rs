@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why map files give no names.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NameError {
+pub enum FileNameError {
     /// One file would be two robots' map.
     #[error("{0} is given twice; give every map once")]
     GivenTwice(PathBuf),
@@ -31,7 +31,7 @@ pub enum NameError {
 /// # Errors
 ///
 /// A file is given twice, or two robots would have one name.
-pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
+pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
     check_once(files)?;
     let stems: Vec<String> = files.iter().map(|file| own_name(file)).collect();
     let count = |stem: &String| stems.iter().filter(|other| *other == stem).count();
@@ -43,19 +43,19 @@ pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, NameError> {
     let mut owners: BTreeMap<&str, &PathBuf> = BTreeMap::new();
     for (name, file) in names.iter().zip(files) {
         if let Some(one) = owners.insert(name, file) {
-            return Err(NameError::Alike { name: name.clone(), one: one.clone(), other: file.clone() });
+            return Err(FileNameError::Alike { name: name.clone(), one: one.clone(), other: file.clone() });
         }
     }
     Ok(names)
 }
 
-fn check_once(files: &[PathBuf]) -> Result<(), NameError> {
+fn check_once(files: &[PathBuf]) -> Result<(), FileNameError> {
     // A file that is not there is found out when it is read.
     let mut places: Vec<PathBuf> =
         files.iter().map(|file| file.canonicalize().unwrap_or_else(|_| file.clone())).collect();
     places.sort();
     match places.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(NameError::GivenTwice(pair[0].clone())),
+        Some(pair) => Err(FileNameError::GivenTwice(pair[0].clone())),
         None => Ok(()),
     }
 }
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn names(files: &[&str]) -> Result<Vec<String>, NameError> {
+    fn names(files: &[&str]) -> Result<Vec<String>, FileNameError> {
         robot_names(&files.iter().map(PathBuf::from).collect::<Vec<_>>())
     }
 
@@ -127,7 +127,7 @@ mod tests {
             assert!(files.iter().all(|file| error.contains(file)) && error.contains("rename"), "{error}");
         }
         // A folder is called as another file.
-        assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(NameError::Alike { .. })));
+        assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(FileNameError::Alike { .. })));
     }
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
         let file = folder.path().join("a.yaml");
         std::fs::write(&file, "").unwrap();
         let error = robot_names(&[file.clone(), folder.path().join("./a.yaml")]).unwrap_err();
-        assert!(matches!(error, NameError::GivenTwice(_)), "{error}");
+        assert!(matches!(error, FileNameError::GivenTwice(_)), "{error}");
     }
 
     proptest! {
