@@ -71,11 +71,9 @@ impl ChannelRouter {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        self.send_as_is(index, stamp, data, output)?;
-        match self.routes.get(index) {
-            Some(route) => self.derived.send_map_if_due(route, &self.roles, data, output),
-            None => Ok(()),
-        }
+        let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        pass(route, stamp, data, output)?;
+        self.derived.send(route, &self.roles, data, output)
     }
 
     /// Sends a message as one that means nothing here.
@@ -104,8 +102,8 @@ impl ChannelRouter {
         self.derived.send_updated_maps(output)
     }
 
-    /// Sends a message and what it tells, but for a map that has become due.
-    pub(super) fn send_as_is(
+    /// Sends a message that was [learnt](Self::learn) before.
+    pub(super) fn send_learnt(
         &mut self,
         index: usize,
         stamp: Stamp,
@@ -113,20 +111,8 @@ impl ChannelRouter {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        self.derived.learn_map_frame(route, data);
-        match route.role {
-            Role::Map => route.send(stamp, data, &output.map, output.log_time()),
-            Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
-            Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
-            Role::MapUpdate
-            | Role::Pose(_)
-            | Role::Odometry
-            | Role::TagMessage
-            | Role::Scan
-            | Role::Tf
-            | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
-        }?;
-        self.derived.send(route, data, output)
+        pass(route, stamp, data, output)?;
+        self.derived.send_of_learnt(route, data, output)
     }
 
     /// The route of a channel, which is added if there is none; `None` if its name is too long, and nothing that this program
@@ -213,6 +199,19 @@ impl ChannelRouter {
         }
         if output.pose.is_read() && !self.derived.has_odometry() {
             self.derived.warn_of_missing_poses(output);
+        }
+    }
+}
+
+/// Sends a message as it is, on the port that its role calls for.
+fn pass(route: &mut Route, stamp: Stamp, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
+    let log_time = output.log_time();
+    match route.role {
+        Role::Map => route.send(stamp, data, &output.map, log_time),
+        Role::Tags => route.send(stamp, data, &output.tags, log_time),
+        Role::Topology => route.send(stamp, data, &output.topology, log_time),
+        Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan | Role::Tf | Role::Other => {
+            route.send(stamp, data, &output.other, log_time)
         }
     }
 }

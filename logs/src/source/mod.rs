@@ -10,7 +10,6 @@ pub mod map_file;
 mod router;
 mod stage;
 pub mod topology_file;
-mod updated_maps;
 
 #[cfg(test)]
 mod tests;

@@ -159,7 +159,7 @@ impl Router {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let stamp = Stamp { sequence: carried.sequence, publish_time: carried.publish_time };
-        self.channels.send_as_is(route, stamp, &carried.data, output)
+        self.channels.send_learnt(route, stamp, &carried.data, output)
     }
 
     /// The index of the message's route; `None` if nobody asked for it, if the log does not describe its channel, or if it

@@ -1,0 +1,144 @@
+//! What no message of a log holds as stages take it: poses from transforms and odometry, scans as seen from the robot's base,
+//! readings of tags from messages of other types, and whole maps from updates.
+
+mod maps;
+mod poses;
+mod scans;
+mod tags;
+mod updated_maps;
+
+use super::RobotMessages;
+use super::channel::Route;
+use crate::robots::{PoseSource, RobotChannels, Role};
+use gridweave_runtime::ros::{TFMessage, decode};
+use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use maps::DerivedMaps;
+use poses::DerivedPoses;
+use scans::DerivedScans;
+use tags::DerivedTags;
+
+/// Derives these from messages as they pass.
+pub(super) struct Derived {
+    poses: DerivedPoses,
+    scans: DerivedScans,
+    tags: DerivedTags,
+    maps: DerivedMaps,
+    /// The name of a robot's base in tf, if the pipeline gives it.
+    base_frame: Option<String>,
+}
+
+impl Derived {
+    /// For channels with these roles. Whole maps are made of updates if `updates_maps`.
+    pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels, updates_maps: bool) -> Self {
+        let base_frame = robots.tf.as_ref().map(|tf| tf.base_frame.clone());
+        Self {
+            poses: DerivedPoses::new(robots, roles),
+            scans: DerivedScans::new(base_frame.as_deref(), roles),
+            tags: DerivedTags::new(base_frame.as_deref(), roles),
+            maps: DerivedMaps::new(updates_maps),
+            base_frame,
+        }
+    }
+
+    /// Takes other channels. What is known of frames and maps stays.
+    pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
+        self.poses.set_roles(roles);
+        self.tags.set_roles(roles);
+    }
+
+    /// Learns how cameras and lidars are mounted before it is known whether there are any.
+    pub(super) fn expect_sensors(&mut self) {
+        self.tags.expect_sensors(self.base_frame.as_deref());
+        self.scans.expect_sensors(self.base_frame.as_deref());
+    }
+
+    /// Learns frames, and maps with their updates, from a message before the start.
+    pub(super) fn learn(&mut self, route: &Route, roles: &RobotChannels, data: &[u8], output: &Output<RobotMessages>) {
+        if route.role == Role::Tf
+            && let Ok(transforms) = decode::<TFMessage>(data)
+        {
+            self.poses.learn_transforms(route, &transforms);
+            self.tags.learn_transforms(route, &transforms);
+            self.scans.learn_transforms(route, &transforms);
+        }
+        self.poses.learn_map_frame(route, data);
+        self.maps.update(route, roles, data, output);
+    }
+
+    /// Sends what is derived from a message.
+    pub(super) fn send(
+        &mut self,
+        route: &mut Route,
+        roles: &RobotChannels,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        self.send_of_learnt(route, data, output)?;
+        self.maps.send_if_due(route, roles, data, output)
+    }
+
+    /// Sends what is derived from a message whose map or update was [learnt](Self::learn) before.
+    pub(super) fn send_of_learnt(
+        &mut self,
+        route: &mut Route,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        self.poses.learn_map_frame(route, data);
+        match route.role {
+            Role::Pose(source) => self.poses.send_pose(route, source, data, output),
+            Role::Odometry => {
+                self.poses.send_odometry(route, data, output)?;
+                self.poses.send_pose(route, PoseSource::Odometry, data, output)
+            }
+            Role::Scan => self.scans.send(route, data, output),
+            Role::TagMessage => self.tags.send_readings(route, data, output),
+            Role::Tf => self.send_of_transforms(route, data, output),
+            _ => Ok(()),
+        }
+    }
+
+    /// Sends the maps of which updates have come since they were last sent.
+    pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.maps.send_updated(output)
+    }
+
+    fn send_of_transforms(
+        &mut self,
+        route: &Route,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let (positions, bearings) = (output.positions.is_read(), output.bearings.is_read());
+        if !output.pose.is_read() && !positions && !bearings && !output.scans.is_read() && !output.odometry.is_read() {
+            return Ok(());
+        }
+        let Ok(message) = decode::<TFMessage>(data) else {
+            output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
+            return Ok(());
+        };
+        self.scans.learn_transforms(route, &message);
+        self.poses.send_of_transforms(route, &message, output)?;
+        self.tags.send_of_transforms(route, &message, output)
+    }
+
+    /// Whether poses were made from transforms or odometry.
+    pub(super) fn has_inferred_poses(&self) -> bool {
+        self.poses.has_inferred()
+    }
+
+    /// Whether odometry was sent along which scans can be matched.
+    pub(super) fn has_odometry(&self) -> bool {
+        self.poses.has_odometry()
+    }
+
+    /// Whether readings of tags were made from other messages.
+    pub(super) fn has_made_readings(&self) -> bool {
+        self.tags.has_made_readings()
+    }
+
+    /// Warns of robots whose poses were expected from transforms, and did not come.
+    pub(super) fn warn_of_missing_poses(&self, output: &Output<RobotMessages>) {
+        self.poses.warn_of_missing(output);
+    }
+}

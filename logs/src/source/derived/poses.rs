@@ -1,0 +1,160 @@
+//! Poses and odometry of robots, from messages that hold a pose and from transforms.
+
+use super::super::RobotMessages;
+use super::super::channel::Route;
+use crate::robots::{InferredPoses, NoPose, PoseSource, RobotChannels, Role, pose_with_covariance};
+use crate::tf::{TfPoses, is_static};
+use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, TFMessage, decode};
+use gridweave_runtime::stage::{Output, RobotTopics, StageError};
+use std::collections::BTreeSet;
+
+/// Makes poses with covariance of messages of other types, and of transforms.
+pub(super) struct DerivedPoses {
+    /// Poses from tf, if the pipeline names the frames.
+    tf: Option<TfPoses>,
+    /// Poses of robots that have no topic for them.
+    inferred: InferredPoses,
+    /// Whether poses were made from transforms or odometry.
+    has_inferred: bool,
+    /// The robots with scans and without maps, whose odometry is sent.
+    scanned: BTreeSet<String>,
+    /// Whether odometry was sent along which scans can be matched.
+    has_odometry: bool,
+}
+
+impl DerivedPoses {
+    pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels) -> Self {
+        Self {
+            tf: robots.tf.clone().map(TfPoses::new),
+            inferred: InferredPoses::new(roles),
+            has_inferred: false,
+            scanned: roles.scanned().map(str::to_owned).collect(),
+            has_odometry: false,
+        }
+    }
+
+    /// Takes other channels; frames that are known stay so.
+    pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
+        self.inferred.set_channels(roles);
+        self.scanned = roles.scanned().map(str::to_owned).collect();
+    }
+
+    /// Learns the frame of a map whose robot has no topic for poses.
+    pub(super) fn learn_map_frame(&mut self, route: &Route, data: &[u8]) {
+        if route.role == Role::Map
+            && self.inferred.asks_for_map(&route.robot)
+            && let Ok(map) = decode::<OccupancyGrid<'_>>(data)
+        {
+            self.inferred.set_map_frame(&route.robot, &map.header.frame_id);
+        }
+    }
+
+    /// Learns frames from transforms without sending what follows from them.
+    pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
+        self.poses_of_transforms(route, message);
+        self.odometry_of_transforms(route, message);
+    }
+
+    /// Sends the poses and the odometry that follow from transforms.
+    pub(super) fn send_of_transforms(
+        &mut self,
+        route: &Route,
+        message: &TFMessage,
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let (poses, unusable) = self.poses_of_transforms(route, message);
+        for _ in 0..unusable {
+            output.warn("transforms with values that are not finite, or between a frame and itself");
+        }
+        for (robot, pose) in poses {
+            self.has_inferred = true;
+            output.pose.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
+        }
+        for (robot, pose) in self.odometry_of_transforms(route, message) {
+            self.has_odometry = true;
+            output.odometry.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
+        }
+        Ok(())
+    }
+
+    /// Sends the pose in a message of another type.
+    pub(super) fn send_pose(
+        &mut self,
+        route: &mut Route,
+        source: PoseSource,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        if !output.pose.is_read() {
+            return Ok(());
+        }
+        match pose_with_covariance(source, data) {
+            Ok(pose) if route.role == Role::Odometry => {
+                let Ok(Header { frame_id, .. }) = decode(&pose) else { return Ok(()) };
+                if !self.inferred.takes_odometry(&route.robot, &route.channel.topic, &frame_id) {
+                    return Ok(());
+                }
+                self.has_inferred = true;
+                output.pose.send_bytes(&route.robot, &pose)
+            }
+            Ok(pose) => output.pose.send_bytes(&route.robot, &pose),
+            Err(NoPose) => {
+                route.unreadable += 1;
+                output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
+                Ok(())
+            }
+        }
+    }
+
+    /// Sends odometry along which scans can be matched.
+    pub(super) fn send_odometry(
+        &mut self,
+        route: &Route,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        if !output.odometry.is_read() || !self.scanned.contains(&route.robot) {
+            return Ok(());
+        }
+        match pose_with_covariance(PoseSource::Odometry, data) {
+            Ok(pose) => {
+                self.has_odometry = true;
+                output.odometry.send_bytes(&route.robot, &pose)
+            }
+            // Who asks for the pose warns.
+            Err(NoPose) => Ok(()),
+        }
+    }
+
+    /// Poses from a message of transforms, and how many of these cannot be used.
+    fn poses_of_transforms(&mut self, route: &Route, message: &TFMessage) -> (Vec<(String, PoseStamped)>, usize) {
+        let Route { robot, channel, .. } = route;
+        match &mut self.tf {
+            Some(tf) => tf.update(robot, is_static(&channel.topic), message),
+            None => self.inferred.transforms(robot, is_static(&channel.topic), message),
+        }
+    }
+
+    /// Odometry of robots with scans from a message of transforms.
+    fn odometry_of_transforms(&mut self, route: &Route, message: &TFMessage) -> Vec<(String, PoseStamped)> {
+        self.inferred.odometry(&route.robot, is_static(&route.channel.topic), message)
+    }
+
+    /// Whether poses were made from transforms or odometry.
+    pub(super) fn has_inferred(&self) -> bool {
+        self.has_inferred
+    }
+
+    /// Whether odometry was sent along which scans can be matched.
+    pub(super) fn has_odometry(&self) -> bool {
+        self.has_odometry
+    }
+
+    /// Warns of robots whose poses were expected from transforms, and did not come.
+    pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
+        for robot in self.tf.iter().flat_map(TfPoses::robots_without_pose) {
+            output.warn(format!("tf does not tie the base of {robot} to its map"));
+        }
+        self.inferred.missing().into_values().for_each(|missing| output.warn(missing));
+    }
+}
