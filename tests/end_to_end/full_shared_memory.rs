@@ -1,4 +1,4 @@
-//! When there is no room left in shared memory, a run of processes ends with the stage's name and the cause.
+//! When there is no space left in shared memory, a run of processes ends with the stage's name and the cause.
 use crate::support::{Ended, Running, gridweave_program, outcome, processes, run_folder, start_program};
 use std::fs;
 use tempfile::TempDir;
@@ -75,9 +75,9 @@ fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
 #[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
 fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
     let (_, ended, id) = run_with(FULL, "processes");
-    ended.assert(1, &["cannot make the board of the run", &format!("/dev/shm/gw{id}_"), "No space left"]);
+    ended.assert(1, &["cannot create the shared counters of the run", &format!("/dev/shm/gw{id}_"), "No space left"]);
     let (_, ended, _) = run_with(FULL, "threads-ipc");
-    ended.assert(1, &["there is no room left in /dev/shm"]);
+    ended.assert(1, &["there is no space left in /dev/shm"]);
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn a_run_whose_room_in_shared_memory_another_program_takes_says_so() {
     // The first message has come, so there is room for more by what is known then.
     run.wait_for_lines(1);
     fs::write(folder.path().join("fill"), b"").unwrap();
-    run.wait().assert(1, &["stage `source`", "no room left in /dev/shm"]);
+    run.wait().assert(1, &["stage `source`", "no space left in /dev/shm"]);
     let (reason, messages) = outcome(&folder.path().join("out.mcap"));
     assert!(reason.contains("/dev/shm") && messages > 0, "{messages} {reason}");
 }

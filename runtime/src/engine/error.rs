@@ -1,4 +1,4 @@
-//! How a run fails.
+//! The errors of a run.
 
 use super::RunFolderError;
 use crate::link::LinkError;
@@ -6,22 +6,22 @@ use crate::stage::StageError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A run has failed: which stage, and why.
+/// The error of a failed run: the stage and the cause.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub struct RunError {
     /// The stage that failed first; none if the run as a whole did.
     pub stage: Option<String>,
-    /// Why.
+    /// The cause.
     pub failure: Failure,
 }
 
 impl RunError {
-    /// A stage has failed.
+    /// The error of a failed stage.
     pub fn of_stage(stage: &str, failure: impl Into<Failure>) -> Self {
         Self { stage: Some(stage.to_owned()), failure: failure.into() }
     }
 
-    /// The run as a whole has failed.
+    /// The error of a run that failed as a whole.
     pub fn of_run(failure: impl Into<Failure>) -> Self {
         Self { stage: None, failure: failure.into() }
     }
@@ -42,58 +42,58 @@ impl From<RunFolderError> for Failure {
     }
 }
 
-/// Why a stage, or a run, has failed.
+/// The cause of a failed stage or run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Failure {
-    /// It says so itself.
+    /// The stage returned an error.
     #[error("failed: {0}")]
     Stage(#[from] StageError),
-    /// It panicked: a fault in the program.
-    #[error("panicked: {0}; this is a fault in the program, please report it")]
+    /// The stage panicked, which is a bug.
+    #[error("panicked: {0}; this is a bug in the program, please report it")]
     Panic(String),
-    /// Its links failed.
+    /// A link of the stage failed.
     #[error("lost its links: {0}")]
     Link(#[from] LinkError),
-    /// The user asked for a stop.
+    /// The user interrupted the run.
     #[error("was interrupted")]
     Interrupted,
-    /// The user asked a live run for its end, and it does not come to it.
+    /// The user stopped a live run, but it makes no progress towards its end.
     #[error(
-        "was to end, but nothing has moved in it for {seconds} s, and these stages have not ended: {}",
+        "was asked to end, but has made no progress for {seconds} s, and these stages have not ended: {}",
         stages.join(", ")
     )]
     Stuck {
-        /// For how long nothing has moved.
+        /// The time without progress.
         seconds: f64,
-        /// The stages that have not ended, with how many messages wait in them.
+        /// The stages that have not ended, with the numbers of their pending messages.
         stages: Vec<String>,
     },
-    /// Its process could not be started or watched.
+    /// A process or thread could not be started, or the folder of the run could not be used.
     #[error("cannot run in processes: {0}")]
     Process(String),
-    /// What a program outside of the run wants of it cannot be.
+    /// The request of a program outside of the run is impossible.
     #[error("{0}")]
     Outside(String),
-    /// Its process has ended before the stage was done.
+    /// The process ended before the stage was done.
     #[error("lost its process, which {0}")]
     Ended(String),
-    /// It has worked for so long without a pause.
+    /// The stage exceeded `stall_timeout` on one message.
     #[error("hangs: it has made no progress for {seconds} s; `stall_timeout` in [pipeline] sets how long it may take")]
     Hung {
-        /// For how long.
+        /// The timeout.
         seconds: f64,
     },
-    /// Its process has taken more memory than the pipeline allows.
+    /// The process exceeded the memory limit of the pipeline.
     #[error(
-        "was ended, as its process had taken {} MB of memory; `memory_limit` in [pipeline] allows {} MB",
+        "was killed, as its process used {} MB of memory; `memory_limit` in [pipeline] allows {} MB",
         taken / 1_000_000,
         limit / 1_000_000
     )]
     Memory {
-        /// Bytes that it had taken.
+        /// The memory that it used, bytes.
         taken: u64,
-        /// Bytes that it may take.
+        /// The memory limit, bytes.
         limit: u64,
     },
     /// The process that started it is gone.

@@ -1,4 +1,4 @@
-//! Sending into a live run from outside of it.
+//! Sending messages to a live run from outside.
 
 use super::links::Links;
 use super::run_folder::{RunningRun, open_counters};
@@ -14,7 +14,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A program that sends on the outputs of a stage of a live run whose messages come from outside.
+/// A program outside of a live run that sends on the outputs of an external source of the run.
 pub struct ExternalSender {
     ports: Vec<usize>,
     outputs: Rc<RefCell<Outputs<Service>>>,
@@ -32,7 +32,7 @@ pub struct SenderStopper {
 }
 
 impl SenderStopper {
-    /// A sender of the feed that waits for room gives up, and so does one that is to wait later.
+    /// Makes every wait for credit fail, pending and future.
     pub fn stop(&self) {
         self.control.stop(&self.counters);
     }
@@ -42,7 +42,7 @@ impl ExternalSender {
     /// Joins a run of the given pipeline as a sender on the outputs of the stage with the given index.
     ///
     /// # Errors
-    /// The stage makes its messages itself, the run has gone, or too many send already.
+    /// The stage is no external source, the run has ended, or the link has the maximum number of senders.
     pub fn join(run: &RunningRun, pipeline: &Pipeline, stage: usize) -> Result<Self, RunError> {
         let spec = &pipeline.stages[stage];
         if pipeline.mode != Mode::Live || !spec.kind.is_external() {
@@ -62,7 +62,7 @@ impl ExternalSender {
         Ok(Self { ports, outputs, sleeper, stopper, run: run.clone(), _node: node })
     }
 
-    /// What stops it from another thread.
+    /// A handle that stops it from another thread.
     pub fn stopper(&self) -> SenderStopper {
         self.stopper.clone()
     }
@@ -72,23 +72,23 @@ impl ExternalSender {
         Some(Outputs::sink(&self.outputs, self.ports.binary_search(&port).ok()?))
     }
 
-    /// Waits until every reader and the stage itself, which repeats the last messages to who comes late, are connected, so
-    /// that none misses the first messages. `false` if it takes too long.
+    /// Waits until every reader and the stage itself, which retains the history for late joiners, are connected, so that none
+    /// misses the first messages. Returns `false` after the timeout.
     pub fn wait_for_readers(&self, longest: Duration) -> bool {
         self.wait(&self.sleeper, longest, |sender| sender.is_connected())
     }
 
-    /// Waits until every reader and the stage itself have taken all that was sent. What is sent is lost with its sender where it
-    /// has not been taken. `false` if it takes too long. A feed that was stopped waits as well: it sends no more, but its readers
-    /// go on.
+    /// Waits until every reader and the stage itself have taken all messages; those that were not taken are lost with their
+    /// sender. Returns `false` after the timeout. A stopped sender waits too: it sends no more, but its readers continue.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
         let sleeper = Sleeper::new(self.sleeper.counters().clone(), Arc::default());
         self.wait(&sleeper, longest, LinkSender::is_taken)
     }
 
-    /// Waits until all links are ready, and the stage has taken in what was sent so far.
+    /// Waits until all links are ready, and the stage has ingested what was sent so far.
     fn wait(&self, sleeper: &Sleeper, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
-        // The stage sees a program that sends only while that is there: without its answer a short visit would pass unseen.
+        // The stage sees the messages of this sender only while it exists: without waiting for the stage, those of a short-lived
+        // sender would be missed.
         let (counters, asked) = (sleeper.counters(), sleeper.counters().request_ingest());
         let are_ready = || {
             if !self.run.is_running() {

@@ -1,8 +1,10 @@
-//! The ends of links, as the pipeline of a run has them.
+//! Creation of the ends of all links of a run.
 
 use super::runner::readers;
 use crate::link::SharedCounters;
-use crate::link::{LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortCounters, ReaderEnd, RunNames, SenderRole};
+use crate::link::{
+    LinkError, LinkReceiver, LinkSender, LinkShape, Order, PortCounters, ReaderEnd, RunNames, SenderRole,
+};
 use crate::pipeline::Pipeline;
 use crate::stage::RunLinks;
 use iceoryx2::node::Node;
@@ -10,38 +12,38 @@ use iceoryx2::service::Service;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What the ends of all links of a run are made from: what both ends of a link must agree on.
+/// The links of a run: creates their ends such that both ends of a link agree.
 pub(super) struct Links<'a> {
     pub(super) pipeline: &'a Pipeline,
     names: &'a RunNames,
     pub(super) counters: &'a Arc<SharedCounters>,
-    /// For each output port of each stage, those that read it: stages and their wires.
+    /// The readers of each output port of each stage: stages and their wires.
     readers: BTreeMap<(usize, usize), Vec<(usize, usize)>>,
-    /// For stages that show elsewhere what passes, if others than the ends of links can see that.
-    to_look_on: Option<RunLinks>,
+    /// For stages that forward messages of other links; none if the links cannot be observed.
+    observable: Option<RunLinks>,
 }
 
 impl<'a> Links<'a> {
     pub(super) fn new(pipeline: &'a Pipeline, names: &'a RunNames, counters: &'a Arc<SharedCounters>) -> Self {
-        Self { pipeline, names, counters, readers: readers(pipeline), to_look_on: None }
+        Self { pipeline, names, counters, readers: readers(pipeline), observable: None }
     }
 
-    /// The same of a run whose links others can look on at.
-    pub(super) fn looked_on(self, links: RunLinks) -> Self {
-        Self { to_look_on: Some(links), ..self }
+    /// The same for a run whose links can be observed.
+    pub(super) fn with_observable(self, links: RunLinks) -> Self {
+        Self { observable: Some(links), ..self }
     }
 
-    /// For stages that show elsewhere what passes, if others than the ends of links can see that.
-    pub(super) fn to_look_on(&self) -> Option<RunLinks> {
-        self.to_look_on.clone()
+    /// The observable links, for stages that forward messages of other links.
+    pub(super) fn observable(&self) -> Option<RunLinks> {
+        self.observable.clone()
     }
 
-    /// The iceoryx2 node of one thread of the run.
+    /// Creates the iceoryx2 node of one thread of the run.
     pub(super) fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         self.names.node()
     }
 
-    /// The wires of a stage.
+    /// Creates the reading ends of the wires of a stage.
     pub(super) fn receivers<S: Service + 'static>(
         &self,
         node: &Node<S>,
@@ -56,7 +58,7 @@ impl<'a> Links<'a> {
         inputs.map(receiver).collect()
     }
 
-    /// A sender for each output port of a stage that others read.
+    /// Creates a sender for each output port of a stage that has readers.
     pub(super) fn senders<S: Service + 'static>(
         &self,
         node: &Node<S>,
@@ -66,15 +68,16 @@ impl<'a> Links<'a> {
         let ports = (0..self.pipeline.stages[stage].kind.outputs.len()).filter(|&port| self.is_read(stage, port));
         let sender = |port: usize| {
             let readers = self.readers[&(stage, port)].iter().map(|&(stage, wire)| self.reader_end(stage, wire));
-            let (shape, counters) = (self.shape(stage, port), PortCounters { counters: self.counters.stage(stage), port });
-            let gather = self.pipeline.batch;
-            let sender = LinkSender::new(node, self.names, &shape, readers.collect(), counters, role, gather)?;
+            let (shape, counters) =
+                (self.shape(stage, port), PortCounters { counters: self.counters.stage(stage), port });
+            let batches = self.pipeline.batch;
+            let sender = LinkSender::new(node, self.names, &shape, readers.collect(), counters, role, batches)?;
             Ok((port, sender))
         };
         ports.map(sender).collect()
     }
 
-    /// Whether anything reads an output port.
+    /// Whether an output port has readers.
     pub(super) fn is_read(&self, stage: usize, port: usize) -> bool {
         self.readers.contains_key(&(stage, port))
     }
@@ -98,7 +101,7 @@ impl<'a> Links<'a> {
     }
 }
 
-/// What each stage has on the counters of the run: (wires, output ports).
+/// The sizes of the shared counters of each stage: (wires, output ports).
 pub(super) fn counters_shape(pipeline: &Pipeline) -> Vec<(usize, usize)> {
     pipeline.stages.iter().map(|stage| (stage.inputs.len(), stage.kind.outputs.len())).collect()
 }

@@ -1,6 +1,6 @@
-//! Engines: what runs the stages of a pipeline.
+//! Engines: they run the stages of a pipeline.
 //!
-//! Every engine gives each stage the same inputs in the same order, so every engine gives the same result.
+//! Every engine delivers the same inputs in the same order to each stage, so every engine produces the same result.
 
 mod error;
 mod external_sender;
@@ -37,17 +37,17 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How the stages share the machine.
+/// The engine of a run: how its stages are distributed over threads and processes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineKind {
-    /// All stages in one thread; a message goes straight from one to the next.
+    /// All stages in one thread; a message goes directly from one to the next.
     Single,
-    /// A thread a stage, with links over iceoryx2 within the process.
+    /// One thread per stage, with links over iceoryx2 within the process.
     #[default]
     Threads,
-    /// A thread a stage, with links over the shared memory of the machine, as between processes.
+    /// One thread per stage, with links over the shared memory of the machine, as between processes.
     ThreadsIpc,
-    /// A process a stage. The program itself is started for each of them, with the command `stage`.
+    /// One process per stage. The program starts itself for each of them, with the command `stage`.
     Processes,
 }
 
@@ -78,37 +78,41 @@ impl fmt::Display for EngineKind {
     }
 }
 
-/// What looks on while a pipeline runs. Nothing that it does changes the result, unless it asks for a stop.
+/// An observer of a run. It does not influence the result, unless it requests a stop.
 pub trait Observer: Sync {
-    /// A source has done this share of its work (0 to 1) and stands at this log time. Called now and then.
+    /// Reports the progress of a source: the share of its work that is done (0 to 1) and the log time that it has reached.
+    /// Called from time to time.
     fn progress(&self, _stage: &str, _share: f64, _log_time: LogTime) {}
 
-    /// All processes of a run have been started, whose names begin so.
+    /// Reports that all processes of a run were started, with the name prefix of the run.
     fn started(&self, _prefix: &str) {}
 
-    /// A stage of a live run has failed, and is started again after a while.
+    /// Reports that a stage of a live run has failed, and is restarted after a delay.
     fn restarting(&self, _stage: &str, _failure: &str, _after: Duration) {}
 
-    /// Whether the run should stop, as after an interrupt by the user.
+    /// Whether the run should stop, for example after an interrupt by the user.
     fn should_stop(&self) -> bool {
         false
     }
 }
 
-/// An observer that sees nothing.
+/// An observer that ignores everything.
 impl Observer for () {}
 
-/// Asks a run to stop when it is set, for example by a signal handler.
+/// An observer that requests a stop when the flag is set, for example by a signal handler.
 impl Observer for AtomicBool {
     fn should_stop(&self) -> bool {
         self.load(Ordering::Relaxed)
     }
 }
 
-/// Runs a pipeline to its end: a replay to that of its logs, a live one until the observer asks for a stop.
+/// Runs a pipeline to its end: a replay until its logs end, a live run until the observer requests a stop.
+///
+/// # Errors
+/// A stage or the run as a whole fails, or the observer stops a replay.
 pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> Result<RunReport, RunError> {
     if pipeline.mode == Mode::Live && engine != EngineKind::Processes {
-        let text = format!("it is live, and the engine `{engine}` is for replays: use `processes`");
+        let text = format!("the pipeline is live, and the engine `{engine}` is for replays only: use `processes`");
         return Err(RunError::of_run(Failure::Process(text)));
     }
     match engine {

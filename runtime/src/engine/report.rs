@@ -1,41 +1,41 @@
-//! What a run has done.
+//! The report of a run.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// What a run has done, stage by stage in the order of the pipeline.
+/// The report of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunReport {
-    /// The stages.
+    /// The reports of the stages, in the order of the pipeline.
     pub stages: Vec<StageReport>,
 }
 
-/// What one stage has done.
+/// The report of one stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
-    /// Its name in the pipeline.
+    /// The name of the stage in the pipeline.
     pub name: String,
-    /// Its kind.
+    /// The kind of the stage.
     pub kind: String,
-    /// Messages it was given.
+    /// Messages that it has received.
     pub messages_in: u64,
-    /// Messages it has sent.
+    /// Messages that it has sent.
     pub messages_out: u64,
-    /// Messages that a live pipeline has dropped because the stage had no room for them.
+    /// Messages that a live pipeline has dropped because the stage had not granted credit for them.
     pub dropped: u64,
-    /// How often a live pipeline has started it again after a failure. What else stands here is since the last time.
+    /// How often a live pipeline has restarted it after a failure. Warnings and counts are those since the last restart.
     pub restarts: u64,
-    /// How long it worked, without waiting for others.
+    /// Its working time, without waiting for others.
     pub busy: Duration,
-    /// What was wrong with its input and how often.
+    /// Its warnings, each with the number of times.
     pub warnings: BTreeMap<String, u64>,
-    /// What it has counted of its work, such as searches.
+    /// Its counts of what it has done, such as searches.
     pub counts: BTreeMap<String, u64>,
 }
 
 impl RunReport {
-    /// All warnings of all stages.
+    /// The warnings of all stages: stage, text, and number of times.
     pub fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
         self.stages
             .iter()

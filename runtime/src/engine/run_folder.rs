@@ -1,14 +1,14 @@
-//! The folder of a run whose shared memory other processes can see, and what is left of runs that were killed.
+//! The folder of a run whose shared memory is visible to other processes, and the cleanup after killed runs.
 //!
-//! A run has a folder of its own below that of its user ([`user_folder`]), called by its prefix. The folder holds
-//! iceoryx2's files, what the processes of the run must know, and a file that they keep locked ([`run_lock`](super::run_lock)).
-//! A folder that nobody has locked is left over, and so is all that bears its prefix in `/dev/shm`.
+//! Each run has a folder in that of its user ([`user_folder`]), named by its prefix. It contains iceoryx2's files, the pipeline,
+//! and a file that the processes of the run keep locked ([`run_lock`](super::run_lock)). A folder that nobody has locked is
+//! left over from a killed run, and so are all files with its prefix in `/dev/shm`.
 
 use super::links::counters_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
 use super::run_prefix::{counters_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
-use crate::link::{SharedCounters, RunNames};
+use crate::link::{RunNames, SharedCounters};
 use crate::pipeline::Pipeline;
 use std::fs::{self, DirBuilder, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
@@ -16,10 +16,10 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The pipeline of the run.
+/// The name of the file with the pipeline of the run.
 const PIPELINE: &str = "pipeline.toml";
 
-/// The folder of a run, kept from being taken for left over while this value lives.
+/// The folder of a run, locked while this value lives.
 #[derive(Debug)]
 pub struct RunFolder {
     prefix: String,
@@ -27,7 +27,7 @@ pub struct RunFolder {
     _lock: File,
 }
 
-/// What is wrong with the folder of a run.
+/// An error with the folder of a run.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {doing} {}: {cause}", path.display())]
 pub struct RunFolderError {
@@ -42,10 +42,10 @@ fn failed(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunFold
 }
 
 impl RunFolder {
-    /// Makes a folder for a run. Its prefix is the run's own.
+    /// Creates the folder of a run, with a unique prefix.
     ///
     /// # Errors
-    /// The folder of this user cannot be made or is not to be trusted, or there is no room.
+    /// The folder of this user cannot be created or is not trusted, or there is no space.
     pub fn create() -> Result<Self, RunFolderError> {
         Self::create_in(&user_folder::path())
     }
@@ -55,7 +55,7 @@ impl RunFolder {
         loop {
             let prefix = new_prefix().map_err(failed("name a run in", parent))?;
             let path = parent.join(&prefix);
-            DirBuilder::new().mode(OWN_FOLDER).create(&path).map_err(failed("make the folder", &path))?;
+            DirBuilder::new().mode(OWN_FOLDER).create(&path).map_err(failed("create the folder", &path))?;
             if let Some(lock) = lock_for_run(&path).map_err(failed("lock a file in the folder", &path))? {
                 return Ok(Self { prefix, path, _lock: lock });
             }
@@ -65,7 +65,7 @@ impl RunFolder {
     /// Joins a run that another process has started.
     ///
     /// # Errors
-    /// It is not there, or is being removed.
+    /// It does not exist, or is being removed.
     pub fn join(path: &Path) -> Result<Self, RunFolderError> {
         let lock = File::open(path.join(LOCK)).map_err(failed("open the run's folder", path))?;
         let locked = lock.try_lock_shared().map_err(|error| match error {
@@ -77,27 +77,27 @@ impl RunFolder {
         Ok(Self { prefix, path: path.to_owned(), _lock: lock })
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the run's services and files begin with.
+    /// The prefix of the services and files of the run.
     pub fn prefix(&self) -> &str {
         &self.prefix
     }
 
-    /// Where the pipeline of the run stands.
+    /// The path of the pipeline of the run.
     pub fn pipeline(&self) -> PathBuf {
         self.path.join(PIPELINE)
     }
 
-    /// The names of the run's services.
+    /// The names of the services of the run.
     pub fn names(&self) -> RunNames {
         RunNames::shared(self.prefix.clone(), self.path.to_string_lossy())
     }
 
-    /// The run, as those see it that look on.
+    /// The run, for observers.
     pub(super) fn as_running(&self) -> RunningRun {
         RunningRun { prefix: self.prefix.clone(), folder: self.path.clone() }
     }
@@ -109,33 +109,34 @@ impl RunFolder {
         file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed("write", &path))
     }
 
-    /// Makes the counters of the run.
+    /// Creates the shared counters of the run.
     pub(super) fn create_counters(&self, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
         let path = counters_path(&self.prefix);
-        SharedCounters::create(&path, &counters_shape(pipeline)).map_err(failed("make the counters of the run", &path))
+        SharedCounters::create(&path, &counters_shape(pipeline))
+            .map_err(failed("create the shared counters of the run", &path))
     }
 
-    /// The counters of the run.
+    /// Opens the shared counters of the run.
     pub(super) fn counters(&self, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
         open_counters(&self.prefix, pipeline)
     }
 
-    /// Removes all that the run has left. Only for the last process of a run.
+    /// Removes the folder and all shared memory of the run. Only for the last process of a run.
     pub fn remove(self) -> Result<(), RunFolderError> {
         remove(&self.path, &self.prefix).map_err(failed("remove the folder", &self.path))
     }
 }
 
-/// The counters of the run with the given prefix.
+/// Opens the shared counters of the run with the given prefix.
 pub(super) fn open_counters(prefix: &str, pipeline: &Pipeline) -> Result<Arc<SharedCounters>, RunFolderError> {
     let path = counters_path(prefix);
-    SharedCounters::open(&path, &counters_shape(pipeline)).map_err(failed("open the counters of the run", &path))
+    SharedCounters::open(&path, &counters_shape(pipeline)).map_err(failed("open the shared counters of the run", &path))
 }
 
-/// A run of processes that is going on.
+/// A run on the engine `processes` that is in progress.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunningRun {
-    /// What its services and files begin with.
+    /// The prefix of its services and files.
     pub prefix: String,
     /// Its folder.
     pub folder: PathBuf,
@@ -147,34 +148,34 @@ impl RunningRun {
         RunNames::shared(self.prefix.clone(), self.folder.to_string_lossy())
     }
 
-    /// Where its pipeline stands.
+    /// The path of its pipeline.
     pub fn pipeline(&self) -> PathBuf {
         self.folder.join(PIPELINE)
     }
 
-    /// Removes what a program outside of the run may have left in shared memory that was still there when the run ended.
-    /// Does nothing while the run goes on.
+    /// Removes what a program outside of the run, still connected when the run ended, has left in shared memory. Does nothing
+    /// while the run is in progress.
     pub fn remove_traces(&self) {
-        // What cannot be removed harms nobody but takes memory, until the machine is started again.
+        // What cannot be removed is harmless, except that it takes memory until the machine restarts.
         let _ = match lock_for_removal(&self.folder) {
             Ok(Removal::Dead(_lock)) => remove(&self.folder, &self.prefix),
-            // It was removed, and its prefix is nobody else's.
+            // It was removed, and no other run has its prefix.
             Ok(Removal::Gone) => remove(&self.folder, &self.prefix),
             Ok(Removal::Alive) | Err(_) => Ok(()),
         };
     }
 
-    /// Whether it still goes on.
+    /// Whether it is still in progress.
     pub fn is_running(&self) -> bool {
         let lock = File::open(self.folder.join(LOCK));
         lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 }
 
-/// The runs of this user on the engine `processes` that are going on, by prefix.
+/// The runs of this user on the engine `processes` that are in progress, by prefix.
 ///
 /// # Errors
-/// The folder of this user is not to be trusted, or cannot be read.
+/// The folder of this user is not trusted, or cannot be read.
 pub fn running_runs() -> Result<Vec<RunningRun>, RunFolderError> {
     let run = |(folder, prefix)| {
         let run = RunningRun { prefix, folder };
@@ -183,27 +184,26 @@ pub fn running_runs() -> Result<Vec<RunningRun>, RunFolderError> {
     Ok(run_folders(&user_folder::path())?.into_iter().filter_map(run).collect())
 }
 
-/// What is left of one run of which no process lives.
+/// What a run without living processes has left.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOver {
     /// The run's folder.
     pub folder: PathBuf,
-    /// Files in `/dev/shm`.
+    /// The number of files in `/dev/shm`.
     pub files: usize,
-    /// How much of the memory of the machine they held, bytes.
+    /// The memory that these files took, bytes.
     pub bytes: u64,
 }
 
-/// Removes what runs of this user have left behind that were killed. A run of which a process lives is not touched.
+/// Removes what killed runs of this user have left. A run with a living process is not touched.
 ///
 /// # Errors
-/// The folder of this user is not to be trusted, or something cannot be removed.
+/// The folder of this user is not trusted, or something cannot be removed.
 pub fn clean() -> Result<Vec<LeftOver>, RunFolderError> {
     clean_in(&user_folder::path())
 }
 
-/// Removes what a process of this user that has died has left of the folders that were its own, such as those that it has shared
-/// with its programs.
+/// Removes the folders that a dead process of this user has created, such as those that it shared with its programs.
 pub(super) fn clean_after(process: u32) -> Result<Vec<LeftOver>, RunFolderError> {
     clean_of(&user_folder::path(), |prefix| is_prefix_of(prefix, process))
 }
@@ -225,13 +225,13 @@ fn clean_of(parent: &Path, is_meant: impl Fn(&str) -> bool) -> Result<Vec<LeftOv
     Ok(cleaned)
 }
 
-/// The folders of runs in that of a user and their prefixes, by name. What is called otherwise than a run is passed over.
+/// The folders of runs in that of a user, and their prefixes, by name. Other names are skipped.
 fn run_folders(parent: &Path) -> Result<Vec<(PathBuf, String)>, RunFolderError> {
     match user_folder::check(parent) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
         checked => checked.map_err(failed("use the folder", parent))?,
     }
-    let entries = fs::read_dir(parent).map_err(failed("look into the folder", parent))?;
+    let entries = fs::read_dir(parent).map_err(failed("read the folder", parent))?;
     let folders = entries.flatten().filter_map(|entry| {
         let prefix = entry.file_name().into_string().ok().filter(|name| is_prefix(name))?;
         let metadata = fs::symlink_metadata(entry.path()).ok()?;
@@ -244,21 +244,21 @@ fn run_folders(parent: &Path) -> Result<Vec<(PathBuf, String)>, RunFolderError> 
 
 fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
     for file in shared_memory(prefix) {
-        unless_done_by_another(fs::remove_file(file))?;
+        ignore_concurrent_removal(fs::remove_file(file))?;
     }
-    unless_done_by_another(fs::remove_dir_all(folder))
+    ignore_concurrent_removal(fs::remove_dir_all(folder))
 }
 
-/// Two programs may remove the same at once: what is gone is gone, and a folder that is not empty got the lock of the other,
-/// which removes it.
-fn unless_done_by_another(result: io::Result<()>) -> io::Result<()> {
+/// Ignores the errors of a concurrent removal by another program: a missing file, and a folder that is not empty because the
+/// other program has created its lock, and removes the folder itself.
+fn ignore_concurrent_removal(result: io::Result<()>) -> io::Result<()> {
     match result {
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => Err(error),
         _ => Ok(()),
     }
 }
 
-/// The bytes that a sparse file really takes.
+/// The allocated size of a sparse file, bytes.
 fn allocated(file: &Path) -> Option<u64> {
     Some(fs::metadata(file).ok()?.blocks() * 512)
 }
@@ -268,13 +268,13 @@ mod tests {
     use super::*;
     use std::os::unix::fs::PermissionsExt;
 
-    // Runs of other tests, and what cleans up after them, have other folders.
+    // A folder of its own, separate from the runs of other tests and their cleanup.
     fn user_folder() -> tempfile::TempDir {
         tempfile::Builder::new().permissions(fs::Permissions::from_mode(OWN_FOLDER)).tempdir().unwrap()
     }
 
     #[test]
-    fn a_living_run_is_not_touched_and_a_dead_one_is_removed() {
+    fn only_a_run_without_living_processes_is_removed() {
         let user = user_folder();
         let alive = RunFolder::create_in(user.path()).unwrap();
         let dead = RunFolder::create_in(user.path()).unwrap();
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_named_as_a_run_is_never_touched() {
+    fn a_folder_that_is_not_named_like_a_run_is_never_touched() {
         let user = user_folder();
         fs::create_dir(user.path().join("o")).unwrap();
         assert_eq!(clean_in(user.path()).unwrap(), []);
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_was_never_locked_is_removed_and_a_run_that_comes_too_late_sees_it() {
+    fn a_folder_without_a_lock_is_removed_and_a_run_that_locks_it_too_late_fails() {
         let user = user_folder();
         let folder = user.path().join(new_prefix().unwrap());
         fs::create_dir(&folder).unwrap();
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn many_that_clean_at_once_remove_all_and_none_fails() {
+    fn concurrent_cleaners_remove_everything_without_errors() {
         let user = user_folder();
         for _ in 0..100 {
             drop(RunFolder::create_in(user.path()).unwrap());
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_else_can_read_what_a_run_has_or_write_to_it() {
+    fn other_users_can_neither_read_nor_write_the_files_of_a_run() {
         use iceoryx2::service::ipc;
         let folder = RunFolder::create().unwrap();
         folder.write_pipeline("").unwrap();
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_is_not_there_cannot_be_joined() {
+    fn a_run_that_does_not_exist_cannot_be_joined() {
         let error = RunFolder::join(Path::new("/nonexistent/gw1_0_")).unwrap_err();
         assert!(error.to_string().contains("cannot open the run's folder /nonexistent/gw1_0_"), "{error}");
     }

@@ -1,4 +1,4 @@
-//! The links of a run, for its stages and for programs that stand for one.
+//! The links of a run, for stages that forward their messages and for programs outside of the run.
 
 use super::run_folder::RunningRun;
 use super::runner::readers;
@@ -7,7 +7,7 @@ use crate::message::Message;
 use crate::pipeline::Pipeline;
 use crate::stage::{LinkView, RunLink, RunLinks, StageError};
 
-/// The links of a run of the given pipeline that is going on, for a stage that shows them elsewhere.
+/// The links of a running pipeline, for a stage that forwards their messages.
 pub fn watch_links(run: &RunningRun, pipeline: &Pipeline) -> RunLinks {
     let ports: Vec<(usize, usize)> = readers(pipeline).into_keys().collect();
     let link = |&(stage, port): &(usize, usize)| {
@@ -21,10 +21,10 @@ pub fn watch_links(run: &RunningRun, pipeline: &Pipeline) -> RunLinks {
     let (run, pipeline) = (run.clone(), pipeline.clone());
     RunLinks::new(links, move |link| {
         let Some(&(stage, port)) = ports.get(link) else {
-            return Err(StageError::new("look on at a link", format!("the run has no link {link}")));
+            return Err(StageError::new("observe a link", format!("the run has no link {link}")));
         };
         let opened = WatchedLink::open_now(&run, &pipeline, stage, port);
-        let opened = opened.map_err(|error| StageError::new("look on at a link", error))?;
+        let opened = opened.map_err(|error| StageError::new("observe a link", error))?;
         Ok(opened.map(|link| Box::new(link) as Box<dyn LinkView>))
     })
 }
@@ -32,7 +32,7 @@ pub fn watch_links(run: &RunningRun, pipeline: &Pipeline) -> RunLinks {
 impl LinkView for WatchedLink {
     fn take(&mut self, take: &mut dyn FnMut(Message)) -> Result<(), StageError> {
         let taken = Self::take(self, |_, message| take(message));
-        taken.map_err(|error| StageError::new("look on at a link", error))
+        taken.map_err(|error| StageError::new("observe a link", error))
     }
 
     fn missed(&self) -> u64 {

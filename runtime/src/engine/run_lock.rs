@@ -1,7 +1,7 @@
-//! The file in the folder of a run that every process of the run keeps locked for as long as it lives.
+//! The lock file of a run, which every process of the run keeps locked while it lives.
 //!
-//! The system takes such a lock back when a process dies, in whatever way. So a folder that nobody has locked is left over:
-//! whoever gets the lock for himself may remove it, and nobody else.
+//! The kernel releases the lock when a process dies, whatever the cause. So a folder that nobody has locked is left over from a
+//! killed run; only a program that gets its exclusive lock may remove it.
 
 use super::user_folder::OWN_FILE;
 use std::fs::{self, File, TryLockError};
@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
-/// The file.
+/// The name of the file.
 pub(super) const LOCK: &str = "lock";
 
 fn lock_options() -> fs::OpenOptions {
@@ -18,7 +18,7 @@ fn lock_options() -> fs::OpenOptions {
     options
 }
 
-/// Makes the lock of a folder and locks it for the run; none if a program that cleans up was quicker.
+/// Creates the lock file of a folder and locks it for the run; none if a program that cleans up was faster.
 pub(super) fn lock_for_run(folder: &Path) -> io::Result<Option<File>> {
     let lock = match lock_options().create_new(true).open(folder.join(LOCK)) {
         Err(error) if matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::NotFound) => return Ok(None),
@@ -30,24 +30,23 @@ pub(super) fn lock_for_run(folder: &Path) -> io::Result<Option<File>> {
         Ok(()) => {}
     }
     // It may have been removed before it was locked.
-    let is_there =
-        fs::metadata(folder.join(LOCK)).is_ok_and(|there| there.ino() == lock.metadata().map_or(0, |m| m.ino()));
-    Ok(is_there.then_some(lock))
+    let exists = fs::metadata(folder.join(LOCK)).is_ok_and(|file| file.ino() == lock.metadata().map_or(0, |m| m.ino()));
+    Ok(exists.then_some(lock))
 }
 
-/// What may be done with the folder of a run.
+/// Whether the folder of a run may be removed.
 #[derive(Debug)]
 pub(super) enum Removal {
-    /// A process of it lives.
+    /// No: the run has a living process.
     Alive,
-    /// No process of it lives, and nobody but the owner of this lock removes it.
+    /// Yes: the run has no living process, and only the owner of this lock may remove the folder.
     Dead(File),
-    /// It is not there.
+    /// The folder does not exist.
     Gone,
 }
 
 pub(super) fn lock_for_removal(folder: &Path) -> io::Result<Removal> {
-    // Where there is no lock it is made, so that a run that is just being made sees that it was not quick enough.
+    // A missing lock file is created, so that a run that is being created notices that it was too slow.
     let lock = match lock_options().create(true).truncate(false).open(folder.join(LOCK)) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Removal::Gone),
         lock => lock?,

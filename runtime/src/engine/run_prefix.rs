@@ -1,7 +1,7 @@
-//! The prefix of a run, with which all its names begin: those of its services, its folder and its files in `/dev/shm`.
+//! The prefix of all names of a run: its services, its folder and its files in `/dev/shm`.
 //!
-//! It is random, as machines that share these folders (containers) give the same process numbers, and of one exact form, so
-//! that what belongs to others is never taken for that of a run.
+//! It is random, because machines that share these folders (containers) assign the same process ids. It has one exact format,
+//! so that files of other programs are never mistaken for those of a run.
 
 use super::user_folder::is_own;
 use crate::link::SHARED_MEMORY_FOLDER;
@@ -10,23 +10,23 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Digits of the random number in a prefix.
+/// The digits of the random number in a prefix.
 const RANDOM_DIGITS: usize = 16;
 
-/// A prefix that no other run has: `gw`, the number of the process for those who look at it, and a random number.
+/// A unique prefix: `gw`, the process id (for people who look at it), and a random number.
 pub(super) fn new_prefix() -> io::Result<String> {
     let mut random = [0; RANDOM_DIGITS / 2];
-    // So few bytes come at once, or not at all.
+    // A request of so few bytes is never answered partially.
     getrandom(&mut random, GetRandomFlags::empty())?;
     Ok(format!("gw{}_{:016x}_", std::process::id(), u64::from_le_bytes(random)))
 }
 
-/// Whether a prefix was made by the process of this number, here or on another machine that shares these folders.
+/// Whether a prefix was created by a process with this id, on this machine or on another one that shares these folders.
 pub(super) fn is_prefix_of(prefix: &str, process: u32) -> bool {
     is_prefix(prefix) && prefix.starts_with(&format!("gw{process}_"))
 }
 
-/// Whether a name has exactly the form of a prefix.
+/// Whether a name has the exact format of a prefix.
 pub(super) fn is_prefix(name: &str) -> bool {
     let parts = name.strip_prefix("gw").and_then(|rest| rest.strip_suffix('_')).and_then(|rest| rest.split_once('_'));
     let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
@@ -38,12 +38,12 @@ pub(super) fn is_prefix(name: &str) -> bool {
     })
 }
 
-/// The counters lies in shared memory, and goes with the rest of the run that lies there.
+/// The path of the shared counters. It is in shared memory, and is removed together with the other files of the run there.
 pub(super) fn counters_path(prefix: &str) -> PathBuf {
     Path::new(SHARED_MEMORY_FOLDER).join(format!("{prefix}counters"))
 }
 
-/// The files of this user in shared memory that bear a run's prefix.
+/// The files of this user in shared memory that start with the prefix of a run.
 pub(super) fn shared_memory(prefix: &str) -> Vec<PathBuf> {
     if !is_prefix(prefix) {
         return Vec::new();
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_has_the_exact_form_of_a_prefix_is_one() {
+    fn only_a_name_with_the_exact_format_is_a_prefix() {
         let made = new_prefix().unwrap();
         assert!(is_prefix(&made), "{made}");
         let digits = "0123456789abcdef";
@@ -82,14 +82,14 @@ mod tests {
     }
 
     #[test]
-    fn a_prefix_tells_the_process_that_made_it() {
+    fn a_prefix_contains_the_id_of_its_process() {
         let made = new_prefix().unwrap();
         let own = std::process::id();
         assert!(is_prefix_of(&made, own) && !is_prefix_of(&made, own + 1) && !is_prefix_of(&made, own / 10));
     }
 
     #[test]
-    fn two_runs_of_one_process_number_have_names_of_their_own() {
+    fn two_runs_of_one_process_have_different_prefixes() {
         assert_ne!(new_prefix().unwrap(), new_prefix().unwrap());
     }
 }

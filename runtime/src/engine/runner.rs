@@ -1,7 +1,6 @@
-//! One running stage, whatever its links are.
+//! A running stage, independent of the kind of its links.
 //!
-//! What it does is told by `tracing`: as information when it starts and ends; each message that it works on as a span, with
-//! details for debugging.
+//! It logs through `tracing`: its start and end at the level `info`, and each message as a span at the level `debug`.
 
 use super::{Failure, StageReport};
 use crate::link::{InputQueue, next_input};
@@ -13,19 +12,18 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-/// A stage that runs: its node, and what it has done.
+/// A running stage: its node and its report.
 pub(super) struct Runner {
     node: Node,
-    /// For each wire, the input port it leads to.
+    /// The input port of each wire.
     ports: Vec<usize>,
-    /// For each wire, the output that it comes from: STAGE.PORT.
+    /// The output that each wire comes from: STAGE.PORT.
     origins: Vec<String>,
     report: StageReport,
 }
 
 impl Runner {
-    /// Makes the stage with the given index of a pipeline, each of its output ports leading to what `sink` gives for it.
-    /// `context` is what it is told.
+    /// Creates the stage with the given index of a pipeline. `sink` returns the sink of each of its output ports.
     pub(super) fn new(
         pipeline: &Pipeline,
         stage: usize,
@@ -56,12 +54,12 @@ impl Runner {
         self.node.is_source()
     }
 
-    /// Whether the messages of the stage come from outside of the run.
+    /// Whether the stage is an external source: its messages come from outside of the run.
     pub(super) fn is_external(&self) -> bool {
         self.node.is_external()
     }
 
-    /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
+    /// Lets a source send its next messages. Returns `false` if there are no more, and for a stage that is no source.
     pub(super) fn advance(&mut self) -> Result<bool, Failure> {
         let _span = tracing::debug_span!("advance", stage = self.report.name).entered();
         let start = Instant::now();
@@ -70,7 +68,7 @@ impl Runner {
         more
     }
 
-    /// Lets a source wait for something to send.
+    /// Lets a source wait until there is something to send, for at most `longest`.
     pub(super) fn wait(&mut self, longest: Duration) -> Result<(), Failure> {
         guarded(|| {
             self.node.wait(longest);
@@ -78,28 +76,28 @@ impl Runner {
         })
     }
 
-    /// How often the stage has warned.
+    /// The number of warnings of the stage.
     pub(super) fn warnings(&self) -> u64 {
         self.node.warning_count()
     }
 
-    /// How much of its work a source has done.
+    /// The share of its work that a source has done.
     pub(super) fn progress(&self) -> Result<Option<f64>, Failure> {
         guarded(|| Ok(self.node.progress()))
     }
 
-    /// Hands the next message to the stage, if it can be told which that is. Gives the wire it came on.
+    /// Passes the next message to the stage, if it is decided which one that is. Returns its wire.
     pub(super) fn handle_next(&mut self, queues: &mut [InputQueue]) -> Result<Option<usize>, Failure> {
         let Some(wire) = next_input(queues) else { return Ok(None) };
         let Some(message) = queues[wire].pop() else { return Ok(None) };
         self.take(wire, message).map(|()| Some(wire))
     }
 
-    /// Hands a message to the stage that has come on a wire.
+    /// Passes a message of the given wire to the stage.
     pub(super) fn take(&mut self, wire: usize, message: Message) -> Result<(), Failure> {
         let start = Instant::now();
         let result = self.handle(wire, &message);
-        // The message is dropped within the measured time, as giving its memory back is work of this stage.
+        // The message is dropped within the measured time, as releasing its memory is work of this stage.
         drop(message);
         self.report.busy += start.elapsed();
         result
@@ -122,7 +120,7 @@ impl Runner {
         guarded(|| self.node.receive(self.ports[wire], message))
     }
 
-    /// Tells the stage that all its inputs have ended, having come to the log time `time`.
+    /// Notifies the stage that all its inputs have ended, at the log time `time`.
     pub(super) fn finish(&mut self, time: LogTime) -> Result<(), Failure> {
         self.node.set_log_time(self.node.log_time().max(time));
         let _span = tracing::debug_span!("finish", stage = self.report.name).entered();
@@ -132,13 +130,13 @@ impl Runner {
         result
     }
 
-    /// Tells the stage that the run has failed.
+    /// Notifies the stage that the run has failed.
     pub(super) fn abort(&mut self, reason: &str) {
-        // The run has failed already; a second failure while it is wound up would only hide the first.
+        // The run has failed already; a second failure during the cleanup would only hide the first.
         let _ = catch_unwind(AssertUnwindSafe(|| self.node.abort(reason)));
     }
 
-    /// Drops the stage and gives its report. Of the time it worked, `waited` was spent waiting for others.
+    /// Drops the stage and returns its report. `waited` is the part of its working time that it spent waiting for others.
     pub(super) fn into_report(mut self, waited: Duration) -> Result<StageReport, Failure> {
         self.report.messages_out = self.node.messages_sent().sum();
         self.report.warnings = self.node.warnings();
@@ -155,7 +153,7 @@ impl Runner {
     }
 }
 
-/// Runs code of a stage. A panic becomes a failure.
+/// Runs code of a stage, and turns a panic into a failure.
 fn guarded<T>(work: impl FnOnce() -> Result<T, StageError>) -> Result<T, Failure> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(result) => result.map_err(Failure::Stage),
@@ -168,7 +166,7 @@ fn panic_text(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a text".to_owned())
 }
 
-/// For each output port of each stage: the wires that read it, as (reading stage, wire).
+/// The readers of each output port, as (reading stage, wire) by (stage, port).
 pub(super) fn readers(pipeline: &Pipeline) -> BTreeMap<(usize, usize), Vec<(usize, usize)>> {
     let mut readers: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for (stage, spec) in pipeline.stages.iter().enumerate() {

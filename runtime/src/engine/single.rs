@@ -1,8 +1,8 @@
 //! The engine `single`: all stages in one thread.
 //!
-//! The source that is furthest behind sends a few messages; then each stage, in the order of the pipeline, handles all
-//! that it can and says how far it is. What waits stays small, and nothing is ever stuck, as every stage sees the
-//! watermarks of all before it in the same round.
+//! In each round the source with the earliest log time sends a few messages; then each stage, in the order of the pipeline,
+//! handles all messages that it can and raises its watermark. Queues stay short, and no stage is ever stuck, as each sees the
+//! watermarks of all stages before it in the same round.
 
 use super::runner::{Runner, readers};
 use super::{Failure, Observer, RunError, RunReport};
@@ -13,12 +13,12 @@ use crate::pipeline::Pipeline;
 use crate::stage::OutputSink;
 use std::rc::Rc;
 
-/// How often a source may send before the others get their turn.
-const TURNS: usize = 64;
+/// The number of times that a source advances per round.
+const ADVANCES_PER_ROUND: usize = 64;
 
 struct SingleStage {
     runner: Runner,
-    /// What other stages have sent since this one had its turn.
+    /// The messages received since the last round, by wire.
     inbox: Vec<SharedQueue>,
     queues: Vec<InputQueue>,
     links: Vec<DirectLink>,
@@ -41,14 +41,14 @@ pub(super) fn run(pipeline: &Pipeline, observer: &dyn Observer) -> Result<RunRep
     Ok(report)
 }
 
-/// Makes the stages and ties their queues to their links.
+/// Creates the stages and connects their queues to their links.
 fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
     let inboxes: Vec<Vec<SharedQueue>> =
         pipeline.stages.iter().map(|spec| spec.inputs.iter().map(|_| SharedQueue::default()).collect()).collect();
     let readers = readers(pipeline);
     let mut stages = Vec::with_capacity(inboxes.len());
     for (index, spec) in pipeline.stages.iter().enumerate() {
-        // Clones of a link are one link.
+        // Clones of a link share its state.
         let mut links: Vec<DirectLink> = spec.kind.outputs.iter().map(|_| DirectLink::default()).collect();
         for (port, link) in links.iter_mut().enumerate() {
             for &(reader, wire) in readers.get(&(index, port)).into_iter().flatten() {
@@ -70,7 +70,7 @@ fn connect(pipeline: &Pipeline) -> Result<Vec<SingleStage>, RunError> {
 fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observer) -> Result<(), RunError> {
     let failed = |stage: usize| move |failure: Failure| RunError::of_stage(&pipeline.stages[stage].name, failure);
     while let Some(source) = furthest_behind(stages) {
-        stages[source].let_source_send().map_err(failed(source))?;
+        stages[source].advance_source().map_err(failed(source))?;
         if let Some(share) = stages[source].runner.progress().map_err(failed(source))? {
             observer.progress(&pipeline.stages[source].name, share, stages[source].reached());
         }
@@ -84,7 +84,7 @@ fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observe
     Ok(())
 }
 
-/// Of the sources that are not done, the one whose log time is the least.
+/// The source with the earliest log time among those that are not done.
 fn furthest_behind(stages: &[SingleStage]) -> Option<usize> {
     let sources = stages.iter().enumerate().filter(|(_, stage)| stage.runner.is_source() && !stage.done);
     sources.min_by_key(|(index, stage)| (stage.reached(), *index)).map(|(index, _)| index)
@@ -95,8 +95,8 @@ impl SingleStage {
         self.links.iter().map(DirectLink::reached).max().unwrap_or_default()
     }
 
-    fn let_source_send(&mut self) -> Result<(), Failure> {
-        for _ in 0..TURNS {
+    fn advance_source(&mut self) -> Result<(), Failure> {
+        for _ in 0..ADVANCES_PER_ROUND {
             if !self.runner.advance()? {
                 self.end(self.reached());
                 return Ok(());

@@ -1,4 +1,4 @@
-//! One stage with its links over shared memory: receives, handles, sends, sleeps.
+//! A stage with its links over shared memory: receives, handles, sends, sleeps.
 
 use super::links::Links;
 use super::runner::Runner;
@@ -8,7 +8,7 @@ use super::{Failure, StageReport};
 use crate::link::{
     Control, InputQueue, LinkError, LinkReceiver, Order, Outputs, SenderRole, Sleeper, latest, lower_bound,
 };
-use crate::link::{StageCounters, StageCounter, StageState, WireCounter, monotonic_nanoseconds};
+use crate::link::{StageCounter, StageCounters, StageState, WireCounter, monotonic_nanoseconds};
 use crate::message::{LogTime, MessageFlags};
 use crate::stage::Context;
 use iceoryx2::service::Service;
@@ -18,30 +18,30 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-/// After so many messages a source tells how far it is.
+/// The number of times that a source advances between two reports of its progress.
 const REPORT_INTERVAL: usize = 256;
 
-/// A source of a live run that has nothing to send sees so often whether it is to end, or somebody has come to read.
+/// The interval at which an idle source of a live run checks for a drain and for late joiners.
 const SOURCE_WAIT: Duration = Duration::from_millis(50);
 
-/// What a stage's thread tells the run.
+/// An event of a stage's thread, or a command to it.
 pub(super) enum Event {
-    /// A source has done a share of its work.
+    /// The progress of a source.
     Progress { stage: usize, share: f64, log_time: LogTime },
-    /// A live run is to come to its end.
+    /// The end of a live run was requested.
     Drain,
-    /// The run is to be stopped.
+    /// The stop of the run was requested.
     Stop { reason: String },
-    /// The stage is done, or has failed.
+    /// The stage has finished or failed.
     Ended { stage: usize, result: Result<StageReport, Failure> },
 }
 
-/// Tells the run something. It listens until all stages have ended.
-pub(super) fn tell(events: &Sender<Event>, event: Event) {
+/// Sends an event to the run, which receives events until all stages have ended.
+pub(super) fn send_event(events: &Sender<Event>, event: Event) {
     let _ = events.send(event);
 }
 
-/// One stage in its thread.
+/// A stage in its thread.
 pub(super) struct StageThread<'a, S: Service> {
     runner: Runner,
     queues: Vec<InputQueue>,
@@ -51,14 +51,14 @@ pub(super) struct StageThread<'a, S: Service> {
     counters: StageCounters,
     work: WorkTimer,
     order: Order,
-    /// After so many samples the stage looks at its links, and tells its readers how far it is.
-    look_interval: usize,
+    /// The number of handled samples after which the stage receives, sends watermarks and checks for requests.
+    check_interval: usize,
     stage: usize,
     events: &'a Sender<Event>,
 }
 
 impl<'a, S: Service + 'static> StageThread<'a, S> {
-    /// Makes the stage, runs it to its end, and tells the run how it went.
+    /// Creates the stage, runs it to its end, and sends the result to the run.
     pub(super) fn start(
         links: &Links<'_>,
         stage: usize,
@@ -70,12 +70,12 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             Ok(thread) => thread.run(stop_reason),
             Err(failure) => {
                 links.counters.stage(stage).clear();
-                tell(events, Event::Ended { stage, result: Err(failure) });
+                send_event(events, Event::Ended { stage, result: Err(failure) });
             }
         }
     }
 
-    /// Makes the ends of all links of the stage, and the stage.
+    /// Creates the ends of all links of the stage, and the stage.
     fn connect(
         links: &Links<'_>,
         stage: usize,
@@ -97,22 +97,22 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         let mut work = WorkTimer::new(counters.clone(), Rc::clone(&sleeper));
         work.begin();
         let statistics = Some(run_statistics(pipeline, links.counters));
-        let context = Context { statistics, links: links.to_look_on(), ..pipeline.context(stage) };
+        let context = Context { statistics, links: links.observable(), ..pipeline.context(stage) };
         let runner = Runner::new(pipeline, stage, &context, sink)?;
-        work.note();
+        work.finish_message();
         work.end();
         counters.set_state(StageState::Running);
         let order = Order::from(pipeline.mode);
         let queues = spec.inputs.iter().map(|_| InputQueue::default()).collect();
-        let look_interval = match order {
+        let check_interval = match order {
             Order::LogTime => (spec.depth / 2).max(1),
-            // The next may be one that has just come.
+            // The next message may be one that has just arrived.
             Order::Arrival => 1,
         };
-        Ok(Self { runner, queues, receivers, outputs, sleeper, counters, work, order, look_interval, stage, events })
+        Ok(Self { runner, queues, receivers, outputs, sleeper, counters, work, order, check_interval, stage, events })
     }
 
-    /// Runs the stage to its end and tells the run how it went.
+    /// Runs the stage to its end and sends the result to the run.
     fn run(mut self, stop_reason: &OnceLock<String>) {
         let (events, stage) = (self.events, self.stage);
         let result = match (self.runner.is_source(), self.runner.is_external()) {
@@ -121,20 +121,20 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             _ => self.drive_stage(),
         };
         match result {
-            Ok(()) => tell(events, Event::Ended { stage, result: self.close() }),
+            Ok(()) => send_event(events, Event::Ended { stage, result: self.close() }),
             Err(failure) => {
                 self.counters.clear();
-                // Told before the links go, so that the peers' complaints about lost links come after the cause.
+                // Sent before the links are dropped, so that the errors of peers about lost links follow the cause.
                 let own_reason = failure.to_string();
-                tell(events, Event::Ended { stage, result: Err(failure) });
+                send_event(events, Event::Ended { stage, result: Err(failure) });
                 self.runner.abort(stop_reason.get().unwrap_or(&own_reason));
             }
         }
     }
 
-    /// Drops the stage and all that it holds of its inputs, and so acknowledges their end.
+    /// Drops the stage and all samples that it borrows, and so acknowledges the end of its inputs.
     fn close(self) -> Result<StageReport, Failure> {
-        self.show();
+        self.update_counters();
         let is_external = self.runner.is_external();
         let mut report = self.runner.into_report(self.sleeper.waited())?;
         drop(self.queues);
@@ -142,7 +142,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         report.dropped = dropped.sum();
         report.restarts = self.counters.get(StageCounter::Restarts);
         if is_external || report.restarts > 0 {
-            // With what the processes before this one have done.
+            // The counters include the work of the processes before this one.
             report.messages_in = self.counters.get(StageCounter::MessagesIn);
             report.messages_out = self.counters.all_sent();
             report.busy = Duration::from_nanos(self.counters.get(StageCounter::Busy));
@@ -153,7 +153,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
 
     fn drive_source(&mut self) -> Result<(), Failure> {
         let sleeper = Rc::clone(&self.sleeper);
-        // So that none misses the first messages.
+        // Wait for all readers, so that none misses the first messages.
         let is_connected = || self.outputs.borrow_mut().links().iter().all(|link| link.is_connected());
         sleeper.wait(|| Ok(sleeper.control().is_draining() || is_connected()))?;
         let mut count = 0;
@@ -162,16 +162,16 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 self.work.end();
                 let reached = self.outputs.borrow().reached();
                 self.outputs.borrow_mut().flush(reached)?;
-                self.show();
+                self.update_counters();
                 self.runner.wait(SOURCE_WAIT)?;
             }
             self.work.begin();
             let more = self.runner.advance()?;
-            self.work.note();
+            self.work.finish_message();
             if !more {
                 break;
             }
-            self.look()?;
+            self.check_requests()?;
             count += 1;
             if count % REPORT_INTERVAL == 0 {
                 self.report_progress()?;
@@ -189,18 +189,18 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     fn report_progress(&mut self) -> Result<(), Failure> {
         let reached = self.outputs.borrow().reached();
         self.outputs.borrow_mut().flush(reached)?;
-        self.show();
+        self.update_counters();
         if let Some(share) = self.runner.progress()? {
-            tell(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
+            send_event(self.events, Event::Progress { stage: self.stage, share, log_time: reached });
         }
         Ok(())
     }
 
-    /// A source whose messages come from outside keeps the last of them for readers that come late.
+    /// Runs an external source, which only retains the history of its links for late joiners.
     fn drive_external(&mut self) -> Result<(), Failure> {
         loop {
             self.outputs.borrow_mut().ingest()?;
-            self.look()?;
+            self.check_requests()?;
             if self.sleeper.control().is_draining() {
                 let reached = self.outputs.borrow().reached();
                 return Ok(self.outputs.borrow_mut().end(reached)?);
@@ -211,14 +211,14 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
 
     fn drive_stage(&mut self) -> Result<(), Failure> {
         loop {
-            self.look()?;
+            self.check_requests()?;
             self.receive()?;
             self.handle_all()?;
             if self.queues.iter().all(InputQueue::is_done) {
                 let time = latest(&self.queues);
                 self.work.begin();
                 self.runner.finish(time)?;
-                self.work.note();
+                self.work.finish_message();
                 self.work.end();
                 return Ok(self.outputs.borrow_mut().end(time)?);
             }
@@ -226,13 +226,13 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
                 receiver.extend_credit(queue);
             }
-            self.show();
+            self.update_counters();
             self.receivers.iter_mut().for_each(LinkReceiver::ring_for_credit);
             self.sleep()?;
         }
     }
 
-    /// Handles the messages that are there, as far as it can be told which is the next.
+    /// Handles the pending messages, as far as it is decided which one is next.
     fn handle_all(&mut self) -> Result<(), Failure> {
         let mut handled = 0;
         while let Some(wire) = self.order.next(&self.queues) {
@@ -240,7 +240,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
             let is_data = message.header().flags.contains(MessageFlags::DATA);
             self.work.begin();
             self.runner.take(wire, message)?;
-            let time = self.work.note();
+            let time = self.work.finish_message();
             if is_data {
                 self.counters.add(StageCounter::MessagesIn, 1);
                 if self.order == Order::Arrival {
@@ -248,21 +248,21 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 }
             }
             handled += usize::from(self.receivers[wire].record_taken());
-            if handled >= self.look_interval {
+            if handled >= self.check_interval {
                 handled = 0;
-                // A stage whose input never dries up would not see a stop otherwise.
-                self.look()?;
+                // A stage with a steady input would not notice a stop otherwise.
+                self.check_requests()?;
                 self.receive()?;
                 self.flush()?;
-                self.show();
+                self.update_counters();
             }
         }
         self.work.end();
         Ok(())
     }
 
-    /// Sees whether the run is being stopped, or somebody has come who is to be sent what he has missed.
-    fn look(&self) -> Result<(), LinkError> {
+    /// Checks whether the run is being stopped, and answers requests for the history.
+    fn check_requests(&self) -> Result<(), LinkError> {
         self.sleeper.check()?;
         self.outputs.borrow_mut().answer_history_requests()
     }
@@ -292,8 +292,8 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         })
     }
 
-    /// Shows on the counters how far the stage is.
-    fn show(&self) {
+    /// Publishes the progress of the stage in its counters.
+    fn update_counters(&self) {
         self.counters.set(StageCounter::Warnings, self.runner.warnings());
         for (wire, queue) in self.queues.iter().enumerate() {
             self.counters.set_wire(wire, WireCounter::Waiting, queue.len() as u64);

@@ -1,16 +1,16 @@
-//! What the stages of a run have done so far, by its counters.
+//! The statistics of the stages of a run, from its shared counters.
 
-use crate::link::{SharedCounters, StageCounters, StageCounter, WireCounter};
+use crate::link::{SharedCounters, StageCounter, StageCounters, WireCounter};
 use crate::pipeline::Pipeline;
 use crate::stage::{RunStatistics, StageStatistics};
 use std::sync::Arc;
 
-/// What each stage of a pipeline has done, by what it shows of itself; in their order.
+/// The statistics of each stage, in the order of the pipeline.
 pub fn stage_statistics(pipeline: &Pipeline, counters: &[StageCounters]) -> Vec<StageStatistics> {
     pipeline.stages.iter().zip(counters).map(|(stage, counters)| of_stage(&stage.name, counters)).collect()
 }
 
-/// The same of a run that has this counters, for its stages.
+/// The statistics of a run with these counters, for a stage that shows them.
 pub(super) fn run_statistics(pipeline: &Pipeline, counters: &Arc<SharedCounters>) -> RunStatistics {
     let named = |(index, stage): (usize, &crate::pipeline::StageSpec)| (stage.name.clone(), counters.stage(index));
     let stages: Vec<(String, StageCounters)> = pipeline.stages.iter().enumerate().map(named).collect();

@@ -1,10 +1,10 @@
-//! The engine `threads`: a thread a stage, with links over shared memory.
+//! The engine `threads`: one thread per stage, with links over shared memory.
 
 use super::links::{Links, counters_shape};
-use super::stage_thread::{Event, StageThread, tell};
+use super::stage_thread::{Event, StageThread, send_event};
 use super::{Failure, Observer, RunError, RunReport, StageReport};
-use crate::link::{SharedCounters, StageState};
 use crate::link::{Control, LinkError, RunNames};
+use crate::link::{SharedCounters, StageState};
 use crate::pipeline::Pipeline;
 use iceoryx2::service::Service;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -12,10 +12,10 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Duration;
 
-/// At least so often the run asks its observer whether it should stop.
+/// The maximum time between two checks whether the run should stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Runs a pipeline with services of the given names.
+/// Runs a pipeline, with its services under the given names.
 pub(super) fn run<S: Service + 'static>(
     pipeline: &Pipeline,
     names: &RunNames,
@@ -33,7 +33,7 @@ pub(super) fn run<S: Service + 'static>(
             let (name, events) = (pipeline.stages[stage].name.clone(), sender.clone());
             let work = move || StageThread::<S>::start(links, stage, control, stop_reason, &sender);
             if let Err(error) = thread::Builder::new().name(name).spawn_scoped(scope, work) {
-                tell(&events, Event::Stop { reason: format!("cannot start a thread: {error}") });
+                send_event(&events, Event::Stop { reason: format!("cannot start a thread: {error}") });
             }
         }
         drop(sender);
@@ -69,7 +69,7 @@ fn supervise(
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
-        // After every event, as a fast source tells of its progress without a pause.
+        // After every event: a fast source reports its progress without a pause.
         if first_error.is_none() && observer.should_stop() {
             stop(&mut first_error, RunError::of_run(Failure::Interrupted));
         }

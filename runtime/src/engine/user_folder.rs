@@ -1,8 +1,7 @@
-//! The folder that holds those of all runs of this user.
+//! The folder with the folders of all runs of this user.
 //!
-//! It is `gridweave` in the folder that `XDG_RUNTIME_DIR` names, where there is one of this user, and else
-//! `/tmp/gridweave-UID`. In `/tmp` anybody may make a folder of that name, or a link: only one that belongs to this user
-//! alone is trusted.
+//! It is `gridweave` in the folder `XDG_RUNTIME_DIR` if that belongs to this user, and `/tmp/gridweave-UID` otherwise. In `/tmp`
+//! anybody can create a folder or a link of that name: only a folder that this user alone can write to is trusted.
 
 use rustix::process::geteuid;
 use std::fs::{self, DirBuilder, Metadata, Permissions};
@@ -10,14 +9,14 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Nobody else may look into it, or write there.
+/// The mode of folders: accessible to this user only.
 pub(super) const OWN_FOLDER: u32 = 0o700;
-/// Nobody else may read it, or write to it.
+/// The mode of files: accessible to this user only.
 pub(super) const OWN_FILE: u32 = 0o600;
-/// What another user may not do in a folder that is trusted: write.
+/// The mode bits that make a folder writable for other users, and so not trusted.
 const OTHERS_WRITE: u32 = 0o022;
 
-/// Where the folder is, or would be.
+/// The path of the folder, which may not exist.
 pub(super) fn path() -> PathBuf {
     let user = geteuid().as_raw();
     let is_own = |folder: &PathBuf| {
@@ -29,10 +28,10 @@ pub(super) fn path() -> PathBuf {
     }
 }
 
-/// Makes the folder if it is not there.
+/// Creates the folder if it does not exist.
 ///
 /// # Errors
-/// It cannot be made, or something is in its place that is not to be trusted.
+/// It cannot be created, or what exists is not trusted.
 pub(super) fn make(path: &Path) -> io::Result<()> {
     match DirBuilder::new().mode(OWN_FOLDER).create(path) {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => check(path),
@@ -43,9 +42,9 @@ pub(super) fn make(path: &Path) -> io::Result<()> {
 /// Checks that a folder belongs to this user alone.
 ///
 /// # Errors
-/// It is not there, it is a link or no folder, it belongs to another user, or others may write to it.
+/// It does not exist, it is a link or no folder, it belongs to another user, or other users can write to it.
 pub(super) fn check(path: &Path) -> io::Result<()> {
-    // The link itself, where it is one.
+    // The metadata of a symbolic link itself, not of its target.
     let metadata = fs::symlink_metadata(path)?;
     let refused = |what: &str| {
         let text = format!("{what}; remove it, or set XDG_RUNTIME_DIR to a folder of your own");
@@ -53,9 +52,9 @@ pub(super) fn check(path: &Path) -> io::Result<()> {
     };
     match &metadata {
         metadata if metadata.is_symlink() => refused("it is a symbolic link"),
-        metadata if !metadata.is_dir() => refused("it is no folder"),
+        metadata if !metadata.is_dir() => refused("it is not a folder"),
         metadata if !is_own(metadata) => refused(&format!("it belongs to the user {}", metadata.uid())),
-        metadata if metadata.mode() & OTHERS_WRITE != 0 => refused("other users may write to it"),
+        metadata if metadata.mode() & OTHERS_WRITE != 0 => refused("other users can write to it"),
         metadata if metadata.mode() & 0o777 != OWN_FOLDER => {
             fs::set_permissions(path, Permissions::from_mode(OWN_FOLDER))
         }
@@ -63,7 +62,7 @@ pub(super) fn check(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Whether something belongs to this user.
+/// Whether a file or folder belongs to this user.
 pub(super) fn is_own(metadata: &Metadata) -> bool {
     metadata.uid() == geteuid().as_raw()
 }
@@ -85,7 +84,7 @@ mod tests {
         fs::write(at("file"), "").unwrap();
         fs::create_dir(at("open")).unwrap();
         fs::set_permissions(at("open"), Permissions::from_mode(0o777)).unwrap();
-        for (name, what) in [("link", "symbolic link"), ("file", "no folder"), ("open", "other users may write")] {
+        for (name, what) in [("link", "symbolic link"), ("file", "not a folder"), ("open", "other users can write")] {
             let error = make(&at(name)).unwrap_err().to_string();
             assert!(error.contains(what) && error.contains("XDG_RUNTIME_DIR"), "{error}");
         }

@@ -1,10 +1,10 @@
-//! Looking on at a run that is going on.
+//! Observing a run that is in progress.
 
 use super::links::Links;
 use super::run_folder::{RunningRun, open_counters};
 use super::statistics::run_statistics;
 use super::{Failure, RunError};
-use crate::link::{SharedCounters, Observer, RunNames, SampleHeader, StageCounters};
+use crate::link::{Observer, RunNames, SampleHeader, SharedCounters, StageCounters};
 use crate::message::{Message, MessageFlags};
 use crate::pipeline::{Mode, Pipeline};
 use crate::stage::RunStatistics;
@@ -15,53 +15,54 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// So long the stages of a run may take to make their links.
+/// The time to wait for a stage of a run to create its links.
 const LINK_TIMEOUT: Duration = Duration::from_secs(10);
-/// So often it is looked for a link that is not there yet.
-const LOOK_INTERVAL: Duration = Duration::from_millis(10);
+/// The interval at which a missing link is looked for.
+const RETRY_INTERVAL: Duration = Duration::from_millis(10);
 
-/// A link of a run, as a program sees it that looks on. It changes nothing in the run: where it is too slow, it misses
-/// messages.
+/// A link of a run that is observed by a program outside of the run. The observer never affects the run: if it is too slow, it
+/// misses messages.
 pub struct WatchedLink {
     observer: Observer<Service>,
-    /// For each sender the number of its next message.
+    /// The sequence number of the next message of each sender.
     next: BTreeMap<u64, u64>,
-    /// How many messages were missed between others of their senders.
+    /// The number of messages missing in the sequences of their senders.
     missed: u64,
-    /// How many came, each counted once.
+    /// The number of received messages, without duplicates.
     taken: u64,
-    /// The stage that owns the link, and which of its ports that is.
+    /// The counters of the stage that owns the link.
     counters: StageCounters,
+    /// The index of the output port of that stage.
     port: usize,
-    /// What that had counted when this began to look on: messages, and programs that have sent.
+    /// The messages and senders that had been counted when the observation began.
     sent_before: u64,
     senders_before: u64,
     _node: Node<Service>,
 }
 
 impl WatchedLink {
-    /// Looks on at an output port of a stage of a run of the given pipeline. A live link sends the last message of each
-    /// topic again for it.
+    /// Observes an output port of a stage of a run of the given pipeline. A live link repeats the last message of each topic
+    /// for it.
     ///
     /// # Errors
-    /// Nothing in the run reads the port, the run has gone or does not make the link, or too many look on.
+    /// The port has no readers, the run has ended or does not create the link, or the link has the maximum number of observers.
     pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
         let opening = Opening::new(run, pipeline, stage, port)?;
         let start = Instant::now();
         loop {
             match opening.observer()? {
                 Some(observer) => return Ok(opening.begin(observer)),
-                None if start.elapsed() < LINK_TIMEOUT && run.is_running() => thread::sleep(LOOK_INTERVAL),
+                None if start.elapsed() < LINK_TIMEOUT && run.is_running() => thread::sleep(RETRY_INTERVAL),
                 None => {
                     let (name, seconds) = (opening.output(), LINK_TIMEOUT.as_secs());
                     return Err(opening
-                        .failed(Failure::Outside(format!("has not made its output `{name}` within {seconds} s"))));
+                        .failed(Failure::Outside(format!("has not created its output `{name}` within {seconds} s"))));
                 }
             }
         }
     }
 
-    /// The same without waiting: none if the stage has not made the link yet.
+    /// The same without waiting: none if the stage has not created the link yet.
     ///
     /// # Errors
     /// Those of [`open`](Self::open).
@@ -75,13 +76,13 @@ impl WatchedLink {
         Ok(opening.observer()?.map(|observer| opening.begin(observer)))
     }
 
-    /// Takes the messages that have passed since the last call: each once, with the header of its sample.
+    /// Takes the messages since the last call, without duplicates, each with the header of its sample.
     pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), RunError> {
         let (next, missed, taken) = (&mut self.next, &mut self.missed, &mut self.taken);
         let taken = self.observer.take(|sample, message| {
             let sequence = message.header().sequence;
             let is_repeated = message.header().flags.contains(MessageFlags::REPEATED);
-            // What is repeated does not tell where the stream stands.
+            // A repeated message says nothing about the position of the stream.
             if !is_repeated {
                 let next = next.entry(sample.origin).or_insert(sequence);
                 *missed += sequence.saturating_sub(*next);
@@ -93,18 +94,18 @@ impl WatchedLink {
         taken.map_err(RunError::of_run)
     }
 
-    /// How many messages it was too slow for.
+    /// The number of messages that were missed.
     pub fn missed(&self) -> u64 {
         if self.counters.senders(self.port) == self.senders_before {
             return self.missed;
         }
-        // Of a program that came and went meanwhile nothing may have been seen, but the owner of the link has counted it.
+        // All messages of an external sender may have been missed, but the owner of the link has counted them.
         let passed = self.counters.sent(self.port).saturating_sub(self.sent_before);
         self.missed.max(passed.saturating_sub(self.taken))
     }
 }
 
-/// A link that may not be there yet.
+/// A link to observe, which may not exist yet.
 struct Opening<'a> {
     pipeline: &'a Pipeline,
     stage: usize,
@@ -123,7 +124,7 @@ impl<'a> Opening<'a> {
         let links = Links::new(pipeline, &names, &counters);
         if !links.is_read(stage, port) {
             let name = spec.kind.outputs[port].name;
-            let text = format!("has an output `{name}` that nothing reads, and so it is no link");
+            let text = format!("has no link for its output `{name}`, as nothing reads it");
             return Err(of_stage(Failure::Outside(text)));
         }
         let node = links.node::<Service>().map_err(|error| of_stage(error.into()))?;
@@ -163,13 +164,19 @@ impl<'a> Opening<'a> {
     }
 }
 
-/// Tells what the stages of a run have done so far.
+/// The statistics of the stages of a run.
+///
+/// # Errors
+/// The run has ended.
 pub fn watch_statistics(run: &RunningRun, pipeline: &Pipeline) -> Result<RunStatistics, RunError> {
     let counters = open_counters(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
     Ok(run_statistics(pipeline, &counters))
 }
 
-/// What each stage of a run shows of itself, in the order of the pipeline.
+/// The counters of each stage of a run, in the order of the pipeline.
+///
+/// # Errors
+/// The run has ended.
 pub fn watch_stages(run: &RunningRun, pipeline: &Pipeline) -> Result<Vec<StageCounters>, RunError> {
     let counters = open_counters(&run.prefix, pipeline).map_err(|error| RunError::of_run(Failure::from(error)))?;
     Ok((0..pipeline.stages.len()).map(|stage| counters.stage(stage)).collect())

@@ -1,17 +1,18 @@
-//! How long a stage works, for those who look on.
+//! The working time of a stage, for statistics and the detection of hanging stages.
 
 use crate::link::Sleeper;
-use crate::link::{StageCounters, StageCounter, monotonic_nanoseconds};
+use crate::link::{StageCounter, StageCounters, monotonic_nanoseconds};
 use std::rc::Rc;
 use std::time::Duration;
 
-/// Notes on the counters since when the stage has worked on one message, and how long it has worked in all.
+/// Measures the working time of a stage, and publishes it in the shared counters: the start of the work on the current message,
+/// and the total.
 pub(super) struct WorkTimer {
     counters: StageCounters,
     sleeper: Rc<Sleeper>,
-    /// When the work on this message began; 0 while the stage waits.
+    /// When the work on the current message began, nanoseconds on the monotonic clock; 0 while the stage waits.
     since: u64,
-    /// How long the stage had waited for room when it began.
+    /// The time that the stage had waited for credit before that.
     waited: Duration,
 }
 
@@ -20,15 +21,15 @@ impl WorkTimer {
         Self { counters, sleeper, since: 0, waited: Duration::ZERO }
     }
 
-    /// The stage begins to work on a message, or goes on with the next.
+    /// Starts the timer, if it is not running.
     pub(super) fn begin(&mut self) {
         if self.since == 0 {
             self.set_since(monotonic_nanoseconds());
         }
     }
 
-    /// The stage has done one message. Gives the time.
-    pub(super) fn note(&mut self) -> u64 {
+    /// Adds the working time since the last message, and restarts the timer. Returns the monotonic time, nanoseconds.
+    pub(super) fn finish_message(&mut self) -> u64 {
         let time = monotonic_nanoseconds();
         let waited = self.sleeper.waited().saturating_sub(self.waited);
         let worked = time.saturating_sub(self.since).saturating_sub(waited.as_nanos() as u64);
@@ -38,7 +39,7 @@ impl WorkTimer {
         time
     }
 
-    /// The stage waits for others.
+    /// Stops the timer: the stage waits for others.
     pub(super) fn end(&mut self) {
         self.set_since(0);
     }
@@ -49,7 +50,7 @@ impl WorkTimer {
     }
 }
 
-/// For how long a stage has worked on one message; nothing while it waits.
+/// The time that a stage has worked on its current message; none while it waits.
 pub(super) fn working_for(counters: &StageCounters) -> Option<Duration> {
     match counters.get(StageCounter::WorkingSince) {
         0 => None,
@@ -60,12 +61,12 @@ pub(super) fn working_for(counters: &StageCounters) -> Option<Duration> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::SharedCounters;
     use crate::link::Control;
+    use crate::link::SharedCounters;
     use std::sync::Arc;
 
     #[test]
-    fn only_work_without_a_pause_counts() {
+    fn waiting_does_not_count_as_work() {
         let counters = SharedCounters::new(&[(0, 0)]).stage(0);
         let sleeper = Rc::new(Sleeper::new(counters.clone(), Arc::new(Control::default())));
         let mut work = WorkTimer::new(counters.clone(), sleeper);
@@ -74,7 +75,7 @@ mod tests {
         work.begin();
         assert!(working_for(&counters).is_some());
         work.begin();
-        let end = work.note();
+        let end = work.finish_message();
         assert!(counters.get(StageCounter::Busy) <= end - begin);
         work.end();
         assert_eq!(working_for(&counters), None);

@@ -1,15 +1,15 @@
-//! How long a process that fails waits before it is started again.
+//! The delay before a failed process is restarted.
 
 use std::time::{Duration, Instant};
 
-/// The first wait.
+/// The first delay.
 const FIRST: Duration = Duration::from_millis(500);
-/// The longest wait.
+/// The maximum delay.
 const LONGEST: Duration = Duration::from_secs(30);
-/// A process that has run for so long without a failure begins with the first wait again.
+/// The time without a failure after which the delay is reset to the first one.
 const HEALTHY: Duration = Duration::from_secs(60);
 
-/// Waits that double with each failure in a row.
+/// Exponential backoff: the delay doubles with each consecutive failure.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Backoff {
     next: Duration,
@@ -21,12 +21,12 @@ impl Backoff {
         Self { next: FIRST, started: Instant::now() }
     }
 
-    /// The process has been started.
+    /// Records that the process was started.
     pub(super) fn start(&mut self) {
         self.started = Instant::now();
     }
 
-    /// The process has failed: how long to wait.
+    /// Records that the process has failed, and returns the delay before the restart.
     pub(super) fn fail(&mut self) -> Duration {
         self.wait_after(self.started.elapsed())
     }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waits_double_up_to_the_longest_and_begin_anew_after_a_healthy_time() {
+    fn delays_double_up_to_the_maximum_and_are_reset_after_a_healthy_time() {
         let mut backoff = Backoff::new();
         let short = Duration::from_secs(1);
         let waits: Vec<f64> = (0..8).map(|_| backoff.wait_after(short).as_secs_f64()).collect();

@@ -1,11 +1,11 @@
-//! One process of a run: its stages in threads, and its words with the supervisor.
+//! A process of a run: its stages in threads, and its reports to the supervisor.
 
+use super::protocol::{ProcessReport, SupervisorCommand, write_line};
 use super::suspend_detector::SuspendDetector;
-use super::protocol::{Said, Told, say};
 use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
 use crate::engine::run_links::watch_links;
-use crate::engine::stage_thread::{Event, StageThread, tell};
+use crate::engine::stage_thread::{Event, StageThread, send_event};
 use crate::engine::work_timer::working_for;
 use crate::engine::{Failure, RunError};
 use crate::link::SharedCounters;
@@ -20,14 +20,14 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A process says at least so often that it is alive.
+/// The maximum time between two reports of a process.
 pub(super) const ALIVE_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Runs the process called `process` of the run in `folder`, with the words of the supervisor on standard input and
-/// those for it on standard output. `load` gives the pipeline that stands in a file.
+/// Runs the process called `process` of the run in `folder`, with commands of the supervisor on standard input and reports to
+/// it on standard output. `load` reads a pipeline from a file.
 ///
 /// # Errors
-/// The run is not there, or it has no such process. How the stages go is told to the supervisor.
+/// The run does not exist, or it has no such process. Failures of stages are reported to the supervisor instead.
 pub fn run_process(
     folder: &Path,
     process: &str,
@@ -36,41 +36,41 @@ pub fn run_process(
 ) -> Result<(), String> {
     let folder = RunFolder::join(folder).map_err(|error| error.to_string())?;
     let pipeline = load(&folder.pipeline(), registry)?;
-    offer_to_the_system();
+    raise_oom_score();
     let stages = pipeline.stages_of(process);
     if stages.is_empty() {
         return Err(format!("the pipeline {} has no process `{process}`", pipeline.name));
     }
-    let supervisor = Supervisor { output: &mut io::stdout(), told: Instant::now() };
+    let supervisor = Supervisor { output: &mut io::stdout(), last_report: Instant::now() };
     let counters = folder.counters(&pipeline).map_err(|error| error.to_string())?;
     let control = Arc::new(Control::default());
     Process { pipeline: &pipeline, folder: &folder, stages: &stages, counters: &counters, control }.run(supervisor);
     Ok(())
 }
 
-/// The way to the supervisor: standard output, locked for a line at a time, as stages may print. That it is gone is seen at
-/// standard input, so a failure to write is no news.
+/// The connection to the supervisor: standard output, locked for a line at a time, as stages may print. A failure to write is
+/// ignored, as the end of the supervisor is noticed at standard input.
 struct Supervisor<'a> {
     output: &'a mut dyn Write,
-    told: Instant,
+    last_report: Instant,
 }
 
 impl Supervisor<'_> {
-    fn tell(&mut self, words: &Said) {
-        self.told = Instant::now();
-        let _ = say(&mut *self.output, words);
+    fn send(&mut self, report: &ProcessReport) {
+        self.last_report = Instant::now();
+        let _ = write_line(&mut *self.output, report);
     }
 
-    fn tell_alive(&mut self) {
-        if self.told.elapsed() >= ALIVE_INTERVAL {
-            self.tell(&Said::Alive);
+    fn send_alive(&mut self) {
+        if self.last_report.elapsed() >= ALIVE_INTERVAL {
+            self.send(&ProcessReport::Alive);
         }
     }
 }
 
-/// When memory runs out, the system is to end a stage, which is seen and told, rather than the supervisor or a program
-/// that has nothing to do with the run. Where it does not take the offer, nothing else changes.
-fn offer_to_the_system() {
+/// Raises the score of this process for the kernel's out-of-memory killer. When memory runs out, it then kills a stage, which
+/// is detected and reported, rather than the supervisor or an unrelated program. Failing to do so is harmless.
+fn raise_oom_score() {
     let _ = std::fs::write("/proc/self/oom_score_adj", "500");
 }
 
@@ -79,20 +79,20 @@ struct Process<'a> {
     folder: &'a RunFolder,
     /// The indexes of its stages.
     stages: &'a [usize],
-    /// What the stages of the run show of themselves.
+    /// The shared counters of the run.
     counters: &'a Arc<SharedCounters>,
-    /// What its stages are told.
+    /// The requests to its stages.
     control: Arc<Control>,
 }
 
 impl Process<'_> {
     fn run(&self, mut supervisor: Supervisor<'_>) {
         let names = self.folder.names();
-        let to_look_on = watch_links(&self.folder.as_running(), self.pipeline);
-        let links = Links::new(self.pipeline, &names, self.counters).looked_on(to_look_on);
+        let observable = watch_links(&self.folder.as_running(), self.pipeline);
+        let links = Links::new(self.pipeline, &names, self.counters).with_observable(observable);
         let stop_reason = OnceLock::new();
         let (sender, receiver) = channel();
-        listen(sender.clone());
+        read_commands(sender.clone());
         thread::scope(|scope| {
             for &stage in self.stages {
                 let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
@@ -104,22 +104,22 @@ impl Process<'_> {
         });
     }
 
-    /// Tells the supervisor how the stages go until all have ended.
+    /// Reports the events of the stages to the supervisor until all have ended.
     fn report(&self, supervisor: &mut Supervisor<'_>, events: &Receiver<Event>, stop_reason: &OnceLock<String>) {
         let mut running = self.stages.len();
         let mut hung = false;
-        let mut awake = SuspendDetector::new(Instant::now());
+        let mut suspend_detector = SuspendDetector::new(Instant::now());
         while running > 0 {
-            let words = match events.recv_timeout(ALIVE_INTERVAL) {
+            let report = match events.recv_timeout(ALIVE_INTERVAL) {
                 Ok(Event::Progress { stage, share, log_time }) => {
-                    Some(Said::Progress { stage: self.name(stage), share, log_time })
+                    Some(ProcessReport::Progress { stage: self.name(stage), share, log_time })
                 }
                 Ok(Event::Ended { stage, result }) => {
                     running -= 1;
                     Some(match result {
-                        Ok(report) => Said::Done { report },
-                        Err(Failure::Link(LinkError::Stopped)) => Said::Stopped { stage: self.name(stage) },
-                        Err(failure) => Said::Failed { stage: self.name(stage), failure },
+                        Ok(report) => ProcessReport::Done { report },
+                        Err(Failure::Link(LinkError::Stopped)) => ProcessReport::Stopped { stage: self.name(stage) },
+                        Err(failure) => ProcessReport::Failed { stage: self.name(stage), failure },
                     })
                 }
                 Ok(Event::Drain) => {
@@ -133,25 +133,26 @@ impl Process<'_> {
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
             };
-            let awake_for = awake.look(Instant::now());
-            if !hung && let Some(words) = self.hung(awake_for) {
+            let awake_for = suspend_detector.check(Instant::now());
+            if !hung && let Some(report) = self.hung(awake_for) {
                 hung = true;
-                supervisor.tell(&words);
+                supervisor.send(&report);
             }
-            match words {
-                Some(words) => supervisor.tell(&words),
-                None => supervisor.tell_alive(),
+            match report {
+                Some(report) => supervisor.send(&report),
+                None => supervisor.send_alive(),
             }
         }
     }
 
-    /// The first stage that has worked on one message for longer than the pipeline allows, while the process was awake.
-    fn hung(&self, awake_for: Duration) -> Option<Said> {
+    /// The report for the first stage that has worked on one message for longer than `stall_timeout`, while the process was not
+    /// suspended.
+    fn hung(&self, awake_for: Duration) -> Option<ProcessReport> {
         let longest = self.pipeline.stall_timeout.filter(|longest| awake_for > *longest)?;
         let is_hung = |stage: usize| working_for(&self.counters.stage(stage)).is_some_and(|time| time > longest);
         let stage = self.stages.iter().copied().find(|&stage| is_hung(stage))?;
         let failure = Failure::Hung { seconds: longest.as_secs_f64() };
-        Some(Said::Failed { stage: self.name(stage), failure })
+        Some(ProcessReport::Failed { stage: self.name(stage), failure })
     }
 
     fn name(&self, stage: usize) -> String {
@@ -159,18 +160,18 @@ impl Process<'_> {
     }
 }
 
-/// Listens to the supervisor in a thread of its own. When the supervisor is gone, that is a reason to stop.
-fn listen(events: Sender<Event>) {
+/// Reads the commands of the supervisor in a separate thread. The end of the supervisor is a reason to stop.
+fn read_commands(events: Sender<Event>) {
     thread::spawn(move || {
         for line in io::stdin().lock().lines() {
             let Ok(line) = line else { break };
             let event = match serde_json::from_str(&line) {
-                Ok(Told::Stop { reason }) => Event::Stop { reason },
-                Ok(Told::Drain) => Event::Drain,
-                Err(error) => Event::Stop { reason: format!("the supervisor says what cannot be understood: {error}") },
+                Ok(SupervisorCommand::Stop { reason }) => Event::Stop { reason },
+                Ok(SupervisorCommand::Drain) => Event::Drain,
+                Err(error) => Event::Stop { reason: format!("cannot read a command of the supervisor: {error}") },
             };
-            tell(&events, event);
+            send_event(&events, event);
         }
-        tell(&events, Event::Stop { reason: RunError::of_run(Failure::Orphaned).to_string() });
+        send_event(&events, Event::Stop { reason: RunError::of_run(Failure::Orphaned).to_string() });
     });
 }

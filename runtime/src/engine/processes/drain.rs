@@ -1,39 +1,41 @@
-//! The end of a live run: it goes on for as long as what is on its way is handled.
+//! The end of a live run: it continues while pending messages are being handled.
 
 use crate::engine::work_timer::working_for;
-use crate::link::{StageCounters, StageCounter, StageState};
+use crate::link::{StageCounter, StageCounters, StageState};
 use std::time::{Duration, Instant};
 
-/// Nothing moves in the run for this long: it will not come to its end by itself.
+/// The time without progress after which the run counts as stuck.
 pub(super) const STUCK_AFTER: Duration = Duration::from_secs(30);
 
-/// A live run that comes to its end.
+/// The progress of a live run that is ending.
 #[derive(Debug)]
 pub(super) struct Drain {
-    /// Messages that were taken and sent, restarts, and stages that have ended, when it last moved.
+    /// The sum of received and sent messages, restarts, and ended stages at the last progress.
     counted: u64,
-    moved: Instant,
+    progressed: Instant,
 }
 
 impl Drain {
-    /// The sources are told at `now` to send no more.
+    /// A drain for a run whose sources were stopped at `now`.
     pub(super) fn new(now: Instant) -> Self {
-        Self { counted: 0, moved: now }
+        Self { counted: 0, progressed: now }
     }
 
-    /// Looks at the stages. Gives whether nothing has moved for too long, of which the supervisor was awake for
-    /// `awake_for`. A stage that works moves, even if it has no message done: how long it may take is for the pipeline to
-    /// say.
+    /// Checks the stages. Returns whether there was no progress for too long, during which the supervisor was not suspended
+    /// (`awake_for`). A stage that works on a message counts as progress: `stall_timeout` limits how long that may take.
     pub(super) fn is_stuck(&mut self, counters: &[StageCounters], awake_for: Duration, now: Instant) -> bool {
         let count = |counters: &StageCounters| {
             let has_ended = u64::from(counters.state() == StageState::Ended);
-            counters.get(StageCounter::MessagesIn) + counters.get(StageCounter::Restarts) + counters.all_sent() + has_ended
+            counters.get(StageCounter::MessagesIn)
+                + counters.get(StageCounter::Restarts)
+                + counters.all_sent()
+                + has_ended
         };
         let counted = counters.iter().map(count).sum();
         if counted != self.counted || counters.iter().any(|counters| working_for(counters).is_some()) {
-            (self.counted, self.moved) = (counted, now);
+            (self.counted, self.progressed) = (counted, now);
         }
-        now.saturating_duration_since(self.moved).min(awake_for) > STUCK_AFTER
+        now.saturating_duration_since(self.progressed).min(awake_for) > STUCK_AFTER
     }
 }
 
@@ -43,7 +45,7 @@ mod tests {
     use crate::link::SharedCounters;
 
     #[test]
-    fn a_run_is_stuck_when_no_stage_works_takes_sends_or_ends() {
+    fn a_run_is_stuck_when_no_stage_works_receives_sends_or_ends() {
         let counters = SharedCounters::new(&[(1, 1), (0, 0)]);
         let counters = [counters.stage(0), counters.stage(1)];
         let start = Instant::now();
@@ -68,6 +70,9 @@ mod tests {
         counters[0].set(StageCounter::WorkingSince, 0);
         assert!(!after_20_s(&|| ()));
         assert!(after_20_s(&|| ()));
-        assert!(!drain.is_stuck(&counters, Duration::from_secs(1), start + Duration::from_secs(900)), "it was halted");
+        assert!(
+            !drain.is_stuck(&counters, Duration::from_secs(1), start + Duration::from_secs(900)),
+            "the supervisor was suspended"
+        );
     }
 }

@@ -1,35 +1,35 @@
-//! What the supervisor hears of a process, until that is silent.
+//! The output of a process, as events for the supervisor.
 
-use super::protocol::Said;
+use super::protocol::ProcessReport;
 use std::io::{BufRead, BufReader};
 use std::process::ChildStdout;
 use std::sync::mpsc::Sender;
 
-/// What happens to a process.
+/// An event of a process.
 pub(super) enum Event {
-    Said {
+    Report {
         process: usize,
-        words: Said,
+        report: ProcessReport,
     },
-    /// It printed something that is no word for the supervisor.
+    /// It printed a line that is no report.
     Printed {
         line: String,
     },
-    /// Its output has ended: it has died, or is about to.
-    Silent {
+    /// Its standard output was closed: it has ended, or is about to.
+    Closed {
         process: usize,
     },
 }
 
-/// Hears what a process says until it is silent.
-pub(super) fn listen(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
+/// Reads the reports of a process until its standard output is closed.
+pub(super) fn read_reports(process: usize, stdout: ChildStdout, events: &Sender<Event>) {
     for line in BufReader::new(stdout).lines() {
         let Ok(line) = line else { break };
         let event = match serde_json::from_str(&line) {
-            Ok(words) => Event::Said { process, words },
+            Ok(report) => Event::Report { process, report },
             Err(_) => Event::Printed { line },
         };
         let _ = events.send(event);
     }
-    let _ = events.send(Event::Silent { process });
+    let _ = events.send(Event::Closed { process });
 }

@@ -1,32 +1,31 @@
-//! The engine `processes`: every stage a process of its own, with links over the shared memory of the machine.
+//! The engine `processes`: one process per stage, with links over the shared memory of the machine.
 //!
 //! The **supervisor** ([`run`]) writes the pipeline to the run's folder, starts the processes, and waits for all of them.
-//! Stages that the pipeline file gives the same `process` share one. Each process ([`run_process`]) makes its stages and
-//! their links as the engine `threads` does, and tells the supervisor how they go.
+//! Stages with the same `process` in the pipeline file share one. Each process ([`run_process`]) creates its stages and
+//! their links like the engine `threads`, and reports to the supervisor.
 //!
-//! They speak in lines of JSON (`words.rs`): the supervisor on the process's standard input, the process on its standard
-//! output. So each learns of the other's death, in whatever way it died, from the end of the pipe:
+//! They exchange lines of JSON (`protocol.rs`): commands on the standard input of the process, reports on its standard output.
+//! The closed pipe shows each of them that the other has died, whatever the cause:
 //!
-//! - A process that ends before its stages are done has failed. The supervisor then tells all others to stop and why,
-//!   and kills those that have not ended after a while.
-//! - When the supervisor is gone, the processes stop by themselves.
+//! - A process that ends before its stages are done has failed. The supervisor then stops all others with the cause, and kills
+//!   those that do not end within a timeout.
+//! - When the supervisor is gone, the processes stop.
 //!
-//! In both cases a sink closes its output and says in it why it is not complete.
+//! In both cases a sink closes its output and records in it why it is not complete.
 //!
-//! A live run goes on without a process that has failed if its stages say `restart = "on_failure"`: the supervisor removes
-//! what the process has left in shared memory and starts it again after a while. A live run ends when the observer asks
-//! for a stop: the supervisor tells the sources to send no more, and what is on its way is handled to its end, however long
-//! that takes; only when nothing moves any more does the run fail.
+//! A live run continues without a failed process if its stages have `restart = "on_failure"`: the supervisor removes what the
+//! process has left in shared memory and restarts it after a delay. A live run ends when the observer requests a stop: the
+//! sources send no more, and pending messages are handled, however long that takes. The run fails only if there is no progress.
 
-mod suspend_detector;
 mod backoff;
 mod child;
 mod drain;
 mod event;
 mod process;
-mod supervisor;
-mod system;
 mod protocol;
+mod supervisor;
+mod suspend_detector;
+mod system;
 
 pub use child::run_process;
 pub use system::{describe_exit, memory_of_process};
@@ -35,24 +34,24 @@ use super::{Observer, RunError, RunReport};
 use crate::pipeline::Pipeline;
 use std::path::PathBuf;
 
-/// How a process of a run is started: PROGRAM ARGUMENTS FOLDER PROCESS. It must call [`run_process`] with the folder, the
-/// name, and the stage kinds of the program that started it.
+/// The command line of a process of a run: PROGRAM ARGUMENTS FOLDER PROCESS. The program must call [`run_process`] with the
+/// folder, the name, and the stage kinds of the program that started it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Launch {
     /// The program.
     pub program: PathBuf,
-    /// What stands before the folder and the name.
+    /// The arguments before the folder and the name.
     pub arguments: Vec<String>,
 }
 
 impl Launch {
-    /// This program itself, with the command `stage`.
+    /// The current program with the command `stage`.
     pub fn this_program() -> std::io::Result<Self> {
         Ok(Self { program: std::env::current_exe()?, arguments: vec!["stage".to_owned()] })
     }
 }
 
-/// Runs a pipeline to its end, its stages as processes.
+/// Runs a pipeline to its end, with its stages in processes.
 pub fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
     supervisor::run(pipeline, launch, observer)
 }

@@ -1,60 +1,60 @@
-//! What a supervisor and its processes say to each other: one JSON object a line.
+//! The protocol between a supervisor and its processes: one JSON object per line.
 
 use crate::engine::{Failure, StageReport};
 use crate::message::LogTime;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 
-/// What a process says.
+/// A report of a process to the supervisor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "said", rename_all = "snake_case")]
-pub(super) enum Said {
-    /// It is alive. Said at least every [`ALIVE_INTERVAL`](super::child::ALIVE_INTERVAL).
+pub(super) enum ProcessReport {
+    /// The process is alive. Sent at least every [`ALIVE_INTERVAL`](super::child::ALIVE_INTERVAL).
     Alive,
-    /// A source has done a share of its work.
+    /// The progress of a source.
     Progress {
-        /// Which stage.
+        /// The name of the stage.
         stage: String,
-        /// 0 to 1.
+        /// The share of its work that is done, 0 to 1.
         share: f64,
-        /// Where it stands.
+        /// The log time that it has reached.
         log_time: LogTime,
     },
-    /// A stage is done.
+    /// A stage has finished.
     Done {
-        /// What it has done; it bears the stage's name.
+        /// Its report, which includes the name of the stage.
         report: StageReport,
     },
     /// A stage has failed.
     Failed {
-        /// Which stage.
+        /// The name of the stage.
         stage: String,
-        /// Why.
+        /// The cause.
         failure: Failure,
     },
     /// A stage has ended because the run is being stopped.
     Stopped {
-        /// Which stage.
+        /// The name of the stage.
         stage: String,
     },
 }
 
-/// What a supervisor says.
+/// A command of the supervisor to a process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "told", rename_all = "snake_case")]
-pub(super) enum Told {
-    /// Come to the end of a live run: sources send no more, and what is on its way is handled.
+pub(super) enum SupervisorCommand {
+    /// End a live run: sources send no more, and pending messages are handled.
     Drain,
-    /// The run has failed: stop, and leave what was made in a state that can be used.
+    /// The run has failed: stop, and leave the outputs in a usable state.
     Stop {
-        /// Why.
+        /// The cause.
         reason: String,
     },
 }
 
-/// Writes one line.
-pub(super) fn say(mut to: impl Write, words: &impl Serialize) -> io::Result<()> {
-    let mut line = serde_json::to_vec(words)?;
+/// Writes a report or a command as one line.
+pub(super) fn write_line(mut to: impl Write, content: &impl Serialize) -> io::Result<()> {
+    let mut line = serde_json::to_vec(content)?;
     line.push(b'\n');
     to.write_all(&line)?;
     to.flush()
@@ -66,22 +66,22 @@ mod tests {
     use crate::stage::StageError;
 
     #[test]
-    fn whatever_is_said_is_understood() {
+    fn every_report_is_read_back_from_one_line() {
         let report =
             StageReport { name: "lines".into(), counts: [("searches".to_owned(), 3)].into(), ..Default::default() };
         let all = [
-            Said::Alive,
-            Said::Progress { stage: "log".into(), share: 0.1, log_time: LogTime(u64::MAX) },
-            Said::Done { report },
-            Said::Failed { stage: "a".into(), failure: StageError::new("b\n", "c").with_help("d").into() },
-            Said::Failed { stage: "a".into(), failure: Failure::Hung { seconds: 1.5 } },
-            Said::Stopped { stage: "a".into() },
+            ProcessReport::Alive,
+            ProcessReport::Progress { stage: "log".into(), share: 0.1, log_time: LogTime(u64::MAX) },
+            ProcessReport::Done { report },
+            ProcessReport::Failed { stage: "a".into(), failure: StageError::new("b\n", "c").with_help("d").into() },
+            ProcessReport::Failed { stage: "a".into(), failure: Failure::Hung { seconds: 1.5 } },
+            ProcessReport::Stopped { stage: "a".into() },
         ];
-        for words in all {
+        for report in all {
             let mut line = Vec::new();
-            say(&mut line, &words).unwrap();
+            write_line(&mut line, &report).unwrap();
             assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
-            assert_eq!(serde_json::from_slice::<Said>(&line).unwrap(), words);
+            assert_eq!(serde_json::from_slice::<ProcessReport>(&line).unwrap(), report);
         }
     }
 }

@@ -1,17 +1,17 @@
-//! The supervisor: starts the processes of a run, hears how they go, stops them, and removes what they leave.
+//! The supervisor: starts, watches and stops the processes of a run, and cleans up after them.
 
 use super::Launch;
-use super::suspend_detector::SuspendDetector;
 use super::backoff::Backoff;
 use super::drain::{Drain, STUCK_AFTER};
-use super::event::{Event, listen};
+use super::event::{Event, read_reports};
 use super::process::Process;
+use super::protocol::{ProcessReport, SupervisorCommand};
+use super::suspend_detector::SuspendDetector;
 use super::system::describe_exit;
-use super::protocol::{Said, Told};
 use crate::engine::run_folder::{RunFolder, clean_after};
 use crate::engine::{Failure, Observer, RunError, RunReport, StageReport};
 use crate::link::{LinkError, RunNames};
-use crate::link::{StageCounters, StageCounter, StageState, WireCounter};
+use crate::link::{StageCounter, StageCounters, StageState, WireCounter};
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
@@ -24,22 +24,22 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tracing::{Level, event_enabled};
 
-/// The variable of the environment that says what is told.
+/// The environment variable with the log filter.
 const LOG_FILTER: &str = "RUST_LOG";
-/// At least so often the observer is asked whether the run should stop.
+/// The maximum time between two checks whether the run should stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
-/// So long may a process take to close its outputs before it is killed.
+/// The time that a process has to close its outputs before it is killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(10);
-/// A process that dies takes the links of others with it, and their complaints may come before the news of its death.
-/// So long the supervisor waits for a better reason.
+/// The time to wait for the cause of a lost link: a process that dies breaks the links of others, whose errors may be reported
+/// before its death is noticed.
 const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// A run that has failed.
+/// A failed run that is being stopped.
 struct Stopping {
     error: RunError,
     since: Instant,
-    /// Whether the processes were told.
-    told: bool,
+    /// Whether the command to stop was sent.
+    was_sent: bool,
 }
 
 pub(super) fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
@@ -59,7 +59,7 @@ fn run_in(
     let of_run = |error| RunError::of_run(Failure::from(error));
     let counters = folder.create_counters(pipeline).map_err(of_run)?;
     let counters: Vec<StageCounters> = (0..pipeline.stages.len()).map(|stage| counters.stage(stage)).collect();
-    // Senders wait for the stages that are still to come.
+    // Senders wait for stages that are starting.
     counters.iter().for_each(|counters| counters.set_state(StageState::Starting));
     folder.write_pipeline(&pipeline.to_toml()).map_err(of_run)?;
     let (sender, receiver) = channel();
@@ -72,7 +72,7 @@ fn run_in(
         events: sender,
         processes: Vec::new(),
         draining: None,
-        awake: SuspendDetector::new(Instant::now()),
+        suspend_detector: SuspendDetector::new(Instant::now()),
         awake_for: Duration::ZERO,
         reports: BTreeMap::new(),
         stopping: None,
@@ -91,10 +91,10 @@ struct Supervisor<'a> {
     counters: Vec<StageCounters>,
     events: Sender<Event>,
     processes: Vec<Process>,
-    /// Of a live run that comes to its end.
+    /// The drain of a live run, once its end was requested.
     draining: Option<Drain>,
-    awake: SuspendDetector,
-    /// For how long this process had been awake when it last looked.
+    suspend_detector: SuspendDetector,
+    /// For how long this process has been running without suspension, at the last check.
     awake_for: Duration,
     reports: BTreeMap<String, StageReport>,
     stopping: Option<Stopping>,
@@ -118,7 +118,7 @@ impl Supervisor<'_> {
                 child,
                 stdin,
                 running: stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect(),
-                heard: Instant::now(),
+                last_report: Instant::now(),
                 ended: false,
                 restarts: self.pipeline.mode == Mode::Live && stages.iter().all(is_restarted),
                 backoff: Backoff::new(),
@@ -131,11 +131,11 @@ impl Supervisor<'_> {
         self.observer.started(self.folder.prefix());
     }
 
-    /// Starts the process called `name`, whose number is `process`, and listens to it.
+    /// Starts the process called `name`, with the index `process`, and reads its reports.
     fn start(&mut self, name: &str, process: usize) -> Result<(Child, Option<ChildStdin>), Failure> {
         let mut command = Command::new(&self.launch.program);
-        // What this process tells beyond warnings, others are to tell as well.
-        if let Some(level) = told_beyond_warnings().filter(|_| env::var_os(LOG_FILTER).is_none()) {
+        // The other processes log at the level of this one.
+        if let Some(level) = verbose_log_level().filter(|_| env::var_os(LOG_FILTER).is_none()) {
             command.env(LOG_FILTER, level);
         }
         let mut child = command
@@ -144,13 +144,13 @@ impl Supervisor<'_> {
             .arg(name)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            // An interrupt from the terminal is the supervisor's: it tells the others.
+            // An interrupt from the terminal is for the supervisor, which stops the others.
             .process_group(0)
             .spawn()
             .map_err(|error| Failure::Process(format!("cannot start {}: {error}", self.launch.program.display())))?;
         if let Some(stdout) = child.stdout.take() {
             let events = self.events.clone();
-            self.readers.push(thread::spawn(move || listen(process, stdout, &events)));
+            self.readers.push(thread::spawn(move || read_reports(process, stdout, &events)));
         }
         let stdin = child.stdin.take();
         Ok((child, stdin))
@@ -163,15 +163,15 @@ impl Supervisor<'_> {
                 Ok(event) => self.note(event),
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
             }
-            self.awake_for = self.awake.look(Instant::now());
+            self.awake_for = self.suspend_detector.check(Instant::now());
             if self.stopping.is_none() && self.observer.should_stop() {
                 match self.pipeline.mode {
                     Mode::Replay => self.fail(RunError::of_run(Failure::Interrupted)),
                     Mode::Live => self.drain(),
                 }
             }
-            self.look_at_processes();
-            self.start_again();
+            self.check_processes();
+            self.restart_due();
             self.stop();
         }
     }
@@ -180,18 +180,18 @@ impl Supervisor<'_> {
         match event {
             // A closed standard error is no reason to end the run.
             Event::Printed { line } => drop(writeln!(io::stderr(), "{line}")),
-            Event::Said { process, words } => {
-                self.processes[process].heard = Instant::now();
-                self.note_words(process, words);
+            Event::Report { process, report } => {
+                self.processes[process].last_report = Instant::now();
+                self.note_report(process, report);
             }
-            Event::Silent { process } => self.note_end(process),
+            Event::Closed { process } => self.note_end(process),
         }
     }
 
-    /// A process has ended, or is about to.
-    fn note_end(&mut self, place: usize) {
-        let process = &mut self.processes[place];
-        // Nobody closes standard output and goes on; if one did, it would be killed by the stop.
+    /// Handles the end of a process.
+    fn note_end(&mut self, index: usize) {
+        let process = &mut self.processes[index];
+        // A process that closes standard output is about to end; if it went on, it would be killed by the stop.
         let status = process.child.wait();
         process.ended = true;
         let lost = || {
@@ -204,24 +204,24 @@ impl Supervisor<'_> {
             Some((stage.clone(), Failure::Ended(how + &together)))
         };
         let Some((stage, failure)) = process.failure.take().or_else(lost) else { return };
-        // What cannot be removed waits for `clean`.
-        let _ = clean_after(self.processes[place].child.id());
-        match self.is_restarted(place) {
-            true => self.start_later(place, &stage, &failure),
+        // What cannot be removed is left to `clean`.
+        let _ = clean_after(self.processes[index].child.id());
+        match self.is_restarted(index) {
+            true => self.schedule_restart(index, &stage, &failure),
             false => self.fail(RunError::of_stage(&stage, failure)),
         }
     }
 
-    /// Whether a process that fails is started again.
-    fn is_restarted(&self, place: usize) -> bool {
-        self.processes[place].restarts && self.stopping.is_none() && self.draining.is_none()
+    /// Whether a process is restarted if it fails.
+    fn is_restarted(&self, index: usize) -> bool {
+        self.processes[index].restarts && self.stopping.is_none() && self.draining.is_none()
     }
 
-    /// A process of which a stage has failed, or that has to be ended: it is started again, or the run fails.
-    fn note_failure(&mut self, place: usize, stage: String, failure: Failure, is_deaf: bool) {
-        let is_restarted = self.is_restarted(place);
-        let process = &mut self.processes[place];
-        if is_restarted || is_deaf {
+    /// Handles a failed stage, or a process that has to be killed: the process is restarted, or the run fails.
+    fn note_failure(&mut self, index: usize, stage: String, failure: Failure, is_unresponsive: bool) {
+        let is_restarted = self.is_restarted(index);
+        let process = &mut self.processes[index];
+        if is_restarted || is_unresponsive {
             let _ = process.child.kill();
         }
         match is_restarted {
@@ -230,9 +230,9 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Removes what a process has left, and has it started again after a while.
-    fn start_later(&mut self, place: usize, stage: &str, failure: &Failure) {
-        let process = &mut self.processes[place];
+    /// Removes what a process has left, and schedules its restart.
+    fn schedule_restart(&mut self, index: usize, stage: &str, failure: &Failure) {
+        let process = &mut self.processes[index];
         let wait = process.backoff.fail();
         process.start_at = Some(Instant::now() + wait);
         for &stage in &process.stages {
@@ -243,10 +243,10 @@ impl Supervisor<'_> {
         self.observer.restarting(stage, &failure.to_string(), wait);
     }
 
-    /// Starts the processes whose time has come.
-    fn start_again(&mut self) {
-        for place in 0..self.processes.len() {
-            let process = &mut self.processes[place];
+    /// Restarts the processes whose delay is over.
+    fn restart_due(&mut self) {
+        for index in 0..self.processes.len() {
+            let process = &mut self.processes[index];
             if self.stopping.is_some() {
                 process.start_at = None;
             }
@@ -255,18 +255,18 @@ impl Supervisor<'_> {
             }
             process.start_at = None;
             let name = process.name.clone();
-            // What was in use when it died may be free by now.
+            // Resources that were in use when it died may be free by this time.
             remove_dead_nodes(&self.folder.names());
-            match self.start(&name, place) {
+            match self.start(&name, index) {
                 Ok((child, stdin)) => {
-                    let process = &mut self.processes[place];
+                    let process = &mut self.processes[index];
                     (process.child, process.stdin) = (child, stdin);
-                    (process.heard, process.ended) = (Instant::now(), false);
+                    (process.last_report, process.ended) = (Instant::now(), false);
                     process.running =
                         process.stages.iter().map(|&stage| self.pipeline.stages[stage].name.clone()).collect();
                     process.backoff.start();
                     if self.draining.is_some() {
-                        process.tell(&Told::Drain);
+                        process.send(&SupervisorCommand::Drain);
                     }
                 }
                 Err(failure) => self.fail(RunError::of_stage(&name, failure)),
@@ -274,7 +274,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Brings a live run to its end.
+    /// Ends a live run: stops its sources at the first call, and checks for progress afterwards.
     fn drain(&mut self) {
         match &mut self.draining {
             None => {
@@ -282,87 +282,88 @@ impl Supervisor<'_> {
                 self.processes
                     .iter_mut()
                     .filter(|process| !process.ended)
-                    .for_each(|process| process.tell(&Told::Drain));
+                    .for_each(|process| process.send(&SupervisorCommand::Drain));
             }
             Some(drain) => {
                 if drain.is_stuck(&self.counters, self.awake_for, Instant::now()) {
-                    let stages = self.not_ended();
+                    let stages = self.unfinished_stages();
                     self.fail(RunError::of_run(Failure::Stuck { seconds: STUCK_AFTER.as_secs_f64(), stages }));
                 }
             }
         }
     }
 
-    /// The stages that have not ended, each with how many messages wait in it.
-    fn not_ended(&self) -> Vec<String> {
+    /// The stages that have not ended, each with the number of its pending messages.
+    fn unfinished_stages(&self) -> Vec<String> {
         let stages = self.pipeline.stages.iter().zip(&self.counters);
         let running = stages.filter(|(_, counters)| counters.state() != StageState::Ended);
         let waiting = |counters: &StageCounters| -> u64 {
             (0..counters.wires()).map(|wire| counters.get_wire(wire, WireCounter::Waiting)).sum()
         };
-        running.map(|(stage, counters)| format!("`{}` ({} messages wait)", stage.name, waiting(counters))).collect()
+        running.map(|(stage, counters)| format!("`{}` ({} pending messages)", stage.name, waiting(counters))).collect()
     }
 
-    fn note_words(&mut self, process: usize, words: Said) {
+    fn note_report(&mut self, process: usize, report: ProcessReport) {
         let mut ended = |stage: &str| self.processes[process].running.retain(|running| running != stage);
-        match words {
-            Said::Alive => {}
-            Said::Progress { stage, share, log_time } => self.observer.progress(&stage, share, log_time),
-            Said::Done { report } => {
+        match report {
+            ProcessReport::Alive => {}
+            ProcessReport::Progress { stage, share, log_time } => self.observer.progress(&stage, share, log_time),
+            ProcessReport::Done { report } => {
                 ended(&report.name);
                 self.reports.insert(report.name.clone(), report);
             }
-            Said::Stopped { stage } => ended(&stage),
-            Said::Failed { stage, failure } => {
+            ProcessReport::Stopped { stage } => ended(&stage),
+            ProcessReport::Failed { stage, failure } => {
                 ended(&stage);
-                // One that hangs hears nothing any more.
-                let is_deaf = matches!(failure, Failure::Hung { .. });
-                self.note_failure(process, stage, failure, is_deaf);
+                // A stage that hangs does not react to a command.
+                let is_unresponsive = matches!(failure, Failure::Hung { .. });
+                self.note_failure(process, stage, failure, is_unresponsive);
             }
         }
     }
 
-    /// Kills a process that does not say that it is alive, as one does that was stopped as a whole, or that has taken
-    /// more memory than it may.
-    fn look_at_processes(&mut self) {
+    /// Kills a process that sends no reports, for example because it was suspended, or that exceeds its memory limit.
+    fn check_processes(&mut self) {
         let awake_for = self.awake_for;
         if self.stopping.is_some() {
             return;
         }
         let living =
             self.processes.iter().enumerate().filter(|(_, process)| !process.ended && process.failure.is_none());
-        let troubled =
-            living.filter_map(|(place, process)| Some((place, process.trouble(self.pipeline, awake_for)?))).next();
-        if let Some((place, failure)) = troubled {
-            let process = &self.processes[place];
+        let failed =
+            living.filter_map(|(index, process)| Some((index, process.check(self.pipeline, awake_for)?))).next();
+        if let Some((index, failure)) = failed {
+            let process = &self.processes[index];
             let stage = process.running.first().unwrap_or(&process.name).clone();
-            self.note_failure(place, stage, failure, true);
+            self.note_failure(index, stage, failure, true);
         }
     }
 
-    /// Notes why the run fails: the first reason, but for a lost link, which is the trace that a better one leaves.
+    /// Records the cause of a failed run: the first one, except that a lost link, which is only a symptom, is replaced.
     fn fail(&mut self, error: RunError) {
-        let is_trace = |failure: &Failure| matches!(failure, Failure::Link(link) if *link != LinkError::Stopped);
+        let is_symptom = |failure: &Failure| matches!(failure, Failure::Link(link) if *link != LinkError::Stopped);
         match &mut self.stopping {
-            None => self.stopping = Some(Stopping { error, since: Instant::now(), told: false }),
-            Some(stopping) if !stopping.told && is_trace(&stopping.error.failure) && !is_trace(&error.failure) => {
+            None => self.stopping = Some(Stopping { error, since: Instant::now(), was_sent: false }),
+            Some(stopping)
+                if !stopping.was_sent && is_symptom(&stopping.error.failure) && !is_symptom(&error.failure) =>
+            {
                 stopping.error = error;
             }
             Some(_) => {}
         }
     }
 
-    /// Tells the processes to stop once the reason is known, and kills those that do not.
+    /// Sends the command to stop once the cause is known, and kills the processes that do not end in time.
     fn stop(&mut self) {
         let Some(stopping) = &mut self.stopping else { return };
         let is_link = matches!(stopping.error.failure, Failure::Link(_));
-        if !stopping.told && (!is_link || stopping.since.elapsed() > CAUSE_TIMEOUT) {
-            stopping.told = true;
+        if !stopping.was_sent && (!is_link || stopping.since.elapsed() > CAUSE_TIMEOUT) {
+            stopping.was_sent = true;
             stopping.since = Instant::now();
-            let words = Told::Stop { reason: stopping.error.to_string() };
-            self.processes.iter_mut().filter(|process| !process.ended).for_each(|process| process.tell(&words));
+            let command = SupervisorCommand::Stop { reason: stopping.error.to_string() };
+            self.processes.iter_mut().filter(|process| !process.ended).for_each(|process| process.send(&command));
         }
-        if stopping.told && stopping.since.elapsed() > STOP_TIMEOUT {
+        if stopping.was_sent && stopping.since.elapsed() > STOP_TIMEOUT {
             for process in self.processes.iter_mut().filter(|process| !process.ended) {
                 let _ = process.child.kill();
             }
@@ -381,20 +382,20 @@ impl Supervisor<'_> {
     }
 }
 
-/// Removes what killed processes of a run hold in shared memory, so that others can take their place. Should it fail, the
-/// process that takes the place says what is in its way.
+/// Removes the resources of killed processes in shared memory, so that they can be restarted. A failure is ignored: the
+/// restarted process will report what it lacks.
 fn remove_dead_nodes(names: &RunNames) {
     if let Ok(node) = names.node::<ipc::Service>() {
         node.try_cleanup_dead_nodes();
     }
 }
 
-/// The finest level of events that somebody listens to, if it is finer than that of warnings.
-fn told_beyond_warnings() -> Option<&'static str> {
+/// The most verbose log level that is enabled, if it is more verbose than warnings.
+fn verbose_log_level() -> Option<&'static str> {
     let levels = [
         ("trace", event_enabled!(Level::TRACE)),
         ("debug", event_enabled!(Level::DEBUG)),
         ("info", event_enabled!(Level::INFO)),
     ];
-    levels.into_iter().find_map(|(level, is_told)| is_told.then_some(level))
+    levels.into_iter().find_map(|(level, is_enabled)| is_enabled.then_some(level))
 }

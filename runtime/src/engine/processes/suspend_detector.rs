@@ -1,32 +1,32 @@
-//! For how long this process has been running without having been halted.
+//! Detection of the suspension of this process.
 //!
-//! A process that is halted, with its container, by a debugger or by SIGSTOP, sees time pass in which nobody could do
-//! anything. What others have not done in that time is no sign that they hang.
+//! While a process is suspended, with its container, by a debugger or by SIGSTOP, time passes in which the other processes may
+//! have been suspended too. Their silence in that time does not mean that they hang.
 
 use std::time::{Duration, Instant};
 
-/// A process that looks every few milliseconds, and has not looked for so long, was halted, or as good as.
-const HALT: Duration = Duration::from_secs(1);
+/// A process that checks every few milliseconds, and has not checked for this long, counts as suspended.
+const SUSPENDED_AFTER: Duration = Duration::from_secs(1);
 
-/// Since when this process has been awake.
+/// Measures for how long this process has been running without suspension.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SuspendDetector {
     since: Instant,
-    looked: Instant,
+    checked: Instant,
 }
 
 impl SuspendDetector {
     /// SuspendDetector from `now` on.
     pub(super) fn new(now: Instant) -> Self {
-        Self { since: now, looked: now }
+        Self { since: now, checked: now }
     }
 
-    /// Looks at the time, which must be done every few milliseconds. Gives for how long the process has been awake.
-    pub(super) fn look(&mut self, now: Instant) -> Duration {
-        if now.saturating_duration_since(self.looked) > HALT {
+    /// Returns for how long the process has been running without suspension. Must be called every few milliseconds.
+    pub(super) fn check(&mut self, now: Instant) -> Duration {
+        if now.saturating_duration_since(self.checked) > SUSPENDED_AFTER {
             self.since = now;
         }
-        self.looked = now;
+        self.checked = now;
         now.saturating_duration_since(self.since)
     }
 }
@@ -36,14 +36,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_process_that_was_halted_has_been_awake_since_then_only() {
+    fn a_suspension_restarts_the_time() {
         let start = Instant::now();
         let at = |milliseconds| start + Duration::from_millis(milliseconds);
-        let mut awake = SuspendDetector::new(start);
+        let mut suspend_detector = SuspendDetector::new(start);
         for milliseconds in (0..5000).step_by(200) {
-            assert_eq!(awake.look(at(milliseconds)), Duration::from_millis(milliseconds));
+            assert_eq!(suspend_detector.check(at(milliseconds)), Duration::from_millis(milliseconds));
         }
-        assert_eq!(awake.look(at(60_000)), Duration::ZERO);
-        assert_eq!(awake.look(at(60_200)), Duration::from_millis(200));
+        assert_eq!(suspend_detector.check(at(60_000)), Duration::ZERO);
+        assert_eq!(suspend_detector.check(at(60_200)), Duration::from_millis(200));
     }
 }
