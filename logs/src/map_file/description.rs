@@ -48,6 +48,8 @@ impl<'de> Deserialize<'de> for Number {
 impl Description {
     /// Reads `text`; `path` is for errors.
     pub(super) fn parse(text: &str, path: &Path) -> Result<Self, MapFileError> {
+        // Editors of Windows write a byte order mark.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let fields: Fields = serde_norway::from_str(text)
             .map_err(|error| MapFileError::Yaml { path: path.to_owned(), message: error.to_string() })?;
         let wrong = |field, problem: String| MapFileError::Field { path: path.to_owned(), field, problem };

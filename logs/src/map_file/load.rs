@@ -1,16 +1,19 @@
 //! Reading a map.
 
 use super::description::Description;
-use super::reading::{Remark, Thresholds};
+use super::reading::Thresholds;
 use super::shades::Shades;
-use super::{GridMap, MapFileError};
+use super::{GridMap, MapFileError, MapFileWarning};
 use gridweave_runtime::input_file;
 use gridweave_runtime::ros::{MapMetaData, Pose};
 use nalgebra::{Isometry2, Vector2};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The most bytes of an image file that are read: as many as the pixels of the largest image that is decoded.
 const LARGEST_IMAGE: u64 = 512 << 20;
+/// The endings of images that lie beside a YAML file of the same name.
+const IMAGE_ENDINGS: [&str; 6] = ["pgm", "png", "bmp", "jpg", "jpeg", "ppm"];
 
 /// Reads the map that the YAML file at `yaml` describes, by its thresholds.
 ///
@@ -21,13 +24,14 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
     Ok(load_as(yaml, Thresholds::Literal)?.0)
 }
 
-/// Reads the map that the YAML file at `yaml` describes, and says if that is not as the file's thresholds have it.
+/// Reads the map that the YAML file at `yaml` describes, and warns if it is read otherwise than the file says.
 ///
 /// # Errors
 ///
 /// A file cannot be read, or is no map.
-pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<Remark>), MapFileError> {
-    let Description { image: path, resolution, origin: [x, y, yaw], reading } = describe(yaml)?;
+pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
+    let (description, missing) = describe(yaml)?;
+    let Description { image: path, resolution, origin: [x, y, yaw], reading } = description;
     let shades = input_file::read(&path, LARGEST_IMAGE)
         .map_err(image::ImageError::from)
         .and_then(|bytes| Shades::decode(&bytes))
@@ -39,22 +43,42 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<R
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };
-    let (reading, remark) = match thresholds {
-        Thresholds::Literal => (reading, None),
+    let (reading, warning) = match thresholds {
+        Thresholds::Literal => (reading, MapFileWarning::default()),
         Thresholds::ByPicture => reading.by_picture(&shades),
     };
-    Ok((GridMap { info, cells: shades.cells(|samples, white| reading.pixel(samples, white)) }, remark))
+    let warning = MapFileWarning { image: missing.map(|missing| (missing, path)), ..warning };
+    let cells = shades.cells(|samples, white| reading.pixel(samples, white));
+    Ok((GridMap { info, cells }, warning.if_any()))
 }
 
-/// The image of the map that the YAML file at `yaml` describes, which may not be there.
+/// The image of the map that the YAML file at `yaml` describes, which may not exist.
 pub fn image_of(yaml: &Path) -> Result<PathBuf, MapFileError> {
-    Ok(describe(yaml)?.image)
+    Ok(describe(yaml)?.0.image)
 }
 
-/// What the YAML file says, its image as seen from here.
-fn describe(yaml: &Path) -> Result<Description, MapFileError> {
+/// What the YAML file says, its image as seen from here; and the image that it names, if another is taken for it.
+fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError> {
     let text = input_file::read_text(yaml).map_err(|source| MapFileError::Read { path: yaml.to_owned(), source })?;
     let description = Description::parse(&text, yaml)?;
-    let image = yaml.parent().unwrap_or(Path::new("")).join(&description.image);
-    Ok(Description { image, ..description })
+    let named = yaml.parent().unwrap_or(Path::new("")).join(&description.image);
+    let (image, missing) = match image_beside_yaml(&named, yaml) {
+        Some(image) => (image, Some(named)),
+        None => (named, None),
+    };
+    Ok((Description { image, ..description }, missing))
+}
+
+/// The image beside the YAML file where the one that it names does not exist: of the same name, as in a file that was copied
+/// from another machine with its image, or called as the YAML file.
+fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
+    if !matches!(std::fs::metadata(named), Err(error) if error.kind() == io::ErrorKind::NotFound) {
+        return None;
+    }
+    let text = named.to_str()?;
+    // A path of Windows, too.
+    let name = text.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
+    let same_name = yaml.with_file_name(name);
+    let as_yaml = IMAGE_ENDINGS.iter().map(|ending| yaml.with_extension(ending));
+    std::iter::once(same_name).chain(as_yaml).find(|image| image.is_file())
 }

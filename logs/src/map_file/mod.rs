@@ -10,12 +10,14 @@ mod reading;
 mod save;
 mod shades;
 mod sink;
+mod warning;
 
 pub use error::MapFileError;
 pub use load::{image_of, load, load_as};
-pub use reading::{Remark, Thresholds};
+pub use reading::Thresholds;
 pub use save::{image_beside, save};
 pub use sink::kind;
+pub use warning::MapFileWarning;
 
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 
@@ -50,8 +52,9 @@ enum Mode {
 impl Mode {
     const NAMES: [(&'static str, Self); 3] = [("trinary", Self::Trinary), ("scale", Self::Scale), ("raw", Self::Raw)];
 
+    /// The mode of this name, without regard to case, as nav2 reads it.
     fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().find(|(known, _)| *known == name).map(|(_, mode)| *mode)
+        Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, mode)| *mode)
     }
 }
 

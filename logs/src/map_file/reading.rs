@@ -2,7 +2,7 @@
 
 use super::Mode;
 use super::shades::Shades;
-use std::fmt;
+use super::warning::MapFileWarning;
 
 /// The shade in which map savers write unknown cells.
 const UNKNOWN_SHADE: usize = 205;
@@ -35,36 +35,11 @@ pub(super) struct Reading {
     pub(super) unknown: Option<(f64, f64)>,
 }
 
-/// What was read otherwise than the thresholds of a file have it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Remark {
-    /// Cells of grey 205 that are unknown though `free_thresh`, which follows, would make them free.
-    pub unknown: Option<(u64, f64)>,
-    /// The occupancy from which cells are walls, though `occupied_thresh`, which follows, leaves none.
-    pub walls: Option<(f64, f64)>,
-}
-
-impl fmt::Display for Remark {
-    fn fmt(&self, text: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some((cells, free_thresh)) = self.unknown {
-            write!(
-                text,
-                "{cells} cells of grey 205 are read as unknown, not as free as free_thresh {free_thresh} has it; "
-            )?;
-        }
-        if let Some((from, occupied_thresh)) = self.walls {
-            write!(text, "the darkest cells, of occupancy {from:.2}, are read as walls, as none reaches ")?;
-            write!(text, "occupied_thresh {occupied_thresh}; ")?;
-        }
-        write!(text, "--literal-thresholds takes the file at its word")
-    }
-}
-
 impl Reading {
     /// The same as the image has it, and what that changes.
-    pub(super) fn by_picture(self, shades: &Shades) -> (Self, Option<Remark>) {
+    pub(super) fn by_picture(self, shades: &Shades) -> (Self, MapFileWarning) {
         if self.mode != Mode::Trinary || self.negate {
-            return (self, None);
+            return (self, MapFileWarning::default());
         }
         let greys = shades.greys();
         let spread = if shades.is_lossy() { 4 } else { 0 };
@@ -84,11 +59,12 @@ impl Reading {
             occupied_thresh: if has_grey_walls { (above + darkest) / 2.0 } else { self.occupied_thresh },
             ..self
         };
-        let remark = Remark {
+        let warning = MapFileWarning {
             unknown: is_misread.then_some((cells, self.free_thresh)),
             walls: has_grey_walls.then_some((darkest, self.occupied_thresh)),
+            ..Default::default()
         };
-        (reading, (is_misread || has_grey_walls).then_some(remark))
+        (reading, warning)
     }
 
     /// The cell of a pixel: grey or three colours, the last of an even number being its opacity.

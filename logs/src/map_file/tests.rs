@@ -107,7 +107,7 @@ fn what_the_image_shows_goes_before_the_thresholds_and_is_told() {
     let (cells, remark) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "");
     assert_eq!(cells, [100, -1, -1, 0]);
     assert!(remark.starts_with("2 cells of grey 205 are read as unknown, not as free as free_thresh 0.25"), "{remark}");
-    assert!(remark.ends_with("--literal-thresholds takes the file at its word"), "{remark}");
+    assert!(remark.ends_with("--literal-thresholds reads the file literally"), "{remark}");
     // Other modes have no shade for unknown, and where white is occupied 205 is a wall.
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale"), (vec![100, 0, 0, 0], String::new()));
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1"), (vec![0, 100, 100, 100], String::new()));
@@ -262,4 +262,32 @@ fn what_is_no_map_is_not_saved() {
     assert!(error("a.pgm", &map).contains("name the YAML file"));
     assert!(error("missing/a.yaml", &map).contains("missing/a."));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_byte_order_mark_and_a_mode_in_capitals_are_read() {
+    assert_eq!(cells(&format!("\u{feff}{}", yaml("mode: Trinary"))), cells(&yaml("mode: trinary")));
+    assert_eq!(cells(&yaml("mode: RAW")), cells(&yaml("mode: raw")));
+}
+
+#[test]
+fn an_image_beside_the_file_is_read_where_the_path_is_one_of_another_machine() {
+    for named in ["/no/such/folder/map.pgm", "../elsewhere/map.pgm", "C:\\maps\\map.pgm", "office.pgm"] {
+        let (folder, path) = folder(&yaml("").replace("map.pgm", named));
+        let (map, warning) = load_as(&path, Thresholds::Literal).unwrap();
+        assert_eq!(map.cells, cells(&yaml("")), "{named}");
+        let beside = folder.path().join("map.pgm");
+        assert_eq!(image_of(&path).unwrap(), beside);
+        let warning = warning.unwrap().to_string();
+        assert!(warning.ends_with(&format!("does not exist; {} is read", beside.display())), "{warning}");
+    }
+    // One that exists is read whatever lies beside the file, and what is missing everywhere is an error.
+    let (folder, path) = folder(&yaml("").replace("map.pgm", "sub/map.pgm"));
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    fs::write(folder.path().join("sub/map.pgm"), b"P5\n1 1\n255\n\xff").unwrap();
+    assert_eq!(load_as(&path, Thresholds::Literal).unwrap(), (load(&path).unwrap(), None));
+    assert_eq!(load(&path).unwrap().cells, [0]);
+    fs::remove_file(folder.path().join("map.pgm")).unwrap();
+    fs::remove_file(folder.path().join("sub/map.pgm")).unwrap();
+    assert!(load(&path).unwrap_err().to_string().contains("sub/map.pgm"), "the image that the file names");
 }

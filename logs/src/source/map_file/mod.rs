@@ -1,4 +1,4 @@
-//! `map_file_source`: the maps of nav2's map server, a file for each robot.
+//! `map_file_source`: maps of nav2's map server, one file per robot.
 
 mod stage;
 
@@ -17,13 +17,13 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapFileSourceParameters {
-    /// The maps to read: YAML files of nav2's map server, one for each robot. A robot is called as its file without the
-    /// ending; files that are called alike are told apart by the folders that they lie in. `--input` on the command line
-    /// stands in for it.
+    /// The maps to read: YAML files of nav2's map server, one per robot. A robot is named after its file without the
+    /// extension; files with equal names are distinguished by their folders. Set by `--input` on the command line.
     pub files: Vec<PathBuf>,
-    /// Whether the thresholds of the files are taken at their word. Else the shade 205, as which map savers write unknown
-    /// cells, is unknown in trinary files even where `free_thresh` would make it free, as the usual 0.25 does; and where no
-    /// cell reaches `occupied_thresh`, the darkest are the walls. `--literal-thresholds` on the command line.
+    /// Whether the thresholds of the files are applied literally. Otherwise the shade 205, which map savers write for
+    /// unknown cells, is unknown in trinary files even where `free_thresh` would make it free, as the usual 0.25 does;
+    /// and where no cell reaches `occupied_thresh`, the darkest cells are occupied. Set by `--literal-thresholds` on
+    /// the command line.
     pub literal_thresholds: bool,
 }
 
@@ -33,13 +33,13 @@ impl Parameters for MapFileSourceParameters {}
 pub fn kind() -> StageKind {
     StageKind::source(
         "map_file_source",
-        "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files tell no time: the maps \
-         are logged a second after each other, the first a second after the epoch, by the robots' names",
+        "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files have no time: the maps \
+         are logged one second apart, the first one second after the epoch, in the order of the robots' names",
         MapFileSource::new,
     )
 }
 
-/// The maps of the files.
+/// The outputs of `map_file_source`.
 pub struct FileMaps(Out<OccupancyGrid<'static>>);
 
 impl Outputs for FileMaps {

@@ -10,18 +10,18 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
 
-/// Files tell no time. The first map is logged so long after the epoch, since 0 stands for no time in ROS, and each other
-/// so long after the one before: what follows from one map can be handled before the next, however many there are.
+/// The interval of log times. Files have no time, and 0 is "no time" in ROS, so the first map is logged one interval
+/// after the epoch. The interval is long enough for each map to be processed before the next.
 const INTERVAL: u64 = 1_000_000_000;
 
 /// Reads map files; see the [module](super).
 pub struct MapFileSource {
-    /// By the robots' names, so that the order in which files are given changes nothing.
+    /// Sorted by the robots' names, so that the order of the files does not matter.
     maps: Vec<NamedMap>,
     sent: usize,
 }
 
-/// A map, and what its robot is called.
+/// A map, and the name of its robot.
 struct NamedMap {
     robot: String,
     file: PathBuf,
@@ -30,12 +30,12 @@ struct NamedMap {
 }
 
 impl MapFileSource {
-    /// Names the robots. The files are read one after the other, each when it is to be sent.
+    /// Names the robots. Each file is read when its map is sent.
     pub fn new(parameters: MapFileSourceParameters, context: &Context) -> Result<Self, StageError> {
         let doing = || format!("read the map files of stage `{}`", context.stage);
         if parameters.files.is_empty() {
             let help = "give --input FILE.yaml for each robot, or files = [...]";
-            return Err(StageError::new(doing(), "no file is given").with_help(help));
+            return Err(StageError::new(doing(), "no input file").with_help(help));
         }
         let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
@@ -56,7 +56,7 @@ impl Source for MapFileSource {
         let Some(map) = self.maps.get(self.sent) else { return Ok(false) };
         self.sent += 1;
         output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
-        // Channel 0 stands for messages that no log has described.
+        // 0 is the channel of messages that no log describes.
         map.send(self.sent as u32, output)?;
         Ok(self.sent < self.maps.len())
     }
@@ -67,13 +67,13 @@ impl Source for MapFileSource {
 }
 
 impl NamedMap {
-    /// Sends the map on a channel of its own, as a log would.
+    /// Sends the map on a channel for itself, as a log would.
     fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
         let doing = || format!("send the map {}", self.file.display());
         let loaded = map_file::load_as(&self.file, self.thresholds);
-        let (map, remark) = loaded.map_err(|error| StageError::new("read a map file", error))?;
-        if let Some(remark) = remark {
-            output.warn(format!("{}: {remark}", self.file.display()));
+        let (map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
+        if let Some(warning) = warning {
+            output.warn(format!("{}: {warning}", self.file.display()));
         }
         let time = output.log_time();
         let header = Header::new(time, format!("{}/map", self.robot));

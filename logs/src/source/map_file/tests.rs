@@ -2,7 +2,7 @@ use super::kind;
 use crate::map_file::{self, GridMap};
 use gridweave_runtime::message::{LogTime, Message, MessageFlags};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
-use gridweave_runtime::stage::{Context, LoneStage, RobotTopics, StageError};
+use gridweave_runtime::stage::{Context, StageHarness, RobotTopics, StageError};
 use nalgebra::{Isometry2, Vector2};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,10 +24,10 @@ fn save(folder: &Path, name: &str, map: &GridMap) -> PathBuf {
 fn run(files: Vec<PathBuf>, robots: RobotTopics) -> Result<Vec<Message>, StageError> {
     let context = Context { stage: "maps".into(), robots, ..Default::default() };
     let files: Vec<&str> = files.iter().map(|file| file.to_str().unwrap()).collect();
-    let mut source = LoneStage::with_context(&kind(), &format!("files = {files:?}"), &context)?;
+    let mut source = StageHarness::with_context(&kind(), &format!("files = {files:?}"), &context)?;
     while source.node().advance()? {}
     assert_eq!(source.node().progress(), Some(1.0));
-    assert!(!source.node().advance()?, "it stays at its end");
+    assert!(!source.node().advance()?, "it stays finished");
     let sent = source.take_messages("map").into_iter();
     Ok(sent.filter(|message| message.header().flags.contains(MessageFlags::DATA)).collect())
 }
@@ -89,7 +89,7 @@ fn unknown_cells_in_grey_205_are_unknown_unless_the_file_is_taken_at_its_word() 
     fs::write(&file, text).unwrap();
     for (more, cells, warnings) in [("", vec![0, 100, -1], 1), ("literal_thresholds = true", vec![0, 100, 0], 0)] {
         let parameters = format!("files = [{:?}]\n{more}", file.to_str().unwrap());
-        let mut source = LoneStage::with_context(&kind(), &parameters, &Context::default()).unwrap();
+        let mut source = StageHarness::with_context(&kind(), &parameters, &Context::default()).unwrap();
         while source.node().advance().unwrap() {}
         let sent = source.take_messages("map");
         let message = sent.iter().find(|message| message.header().flags.contains(MessageFlags::DATA)).unwrap();
