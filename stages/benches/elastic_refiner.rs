@@ -7,7 +7,7 @@
 
 mod building;
 
-use building::draw_bent;
+use building::draw_deformed;
 use gridweave_stages::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, pose};
@@ -30,7 +30,7 @@ struct Placed {
 
 impl Placed {
     fn new(transform_building_map: Pose2, most: f64) -> Self {
-        let map = draw_bent(CELLS, KNOWN, &transform_building_map, most);
+        let map = draw_deformed(CELLS, KNOWN, &transform_building_map, most);
         let walls = WallMap::new(&Grid::new(map.0, &map.1).unwrap(), NORMAL_RADIUS);
         Self { map, walls, transform_building_map }
     }
@@ -42,7 +42,7 @@ impl Placed {
 
 fn main() {
     let aligned = time(|| {
-        let maps = [0.0, 0.35].map(|yaw| draw_bent(CELLS, KNOWN, &pose(0.0, 0.0, yaw), 0.0));
+        let maps = [0.0, 0.35].map(|yaw| draw_deformed(CELLS, KNOWN, &pose(0.0, 0.0, yaw), 0.0));
         let [a, b] = ["a", "b"].map(str::to_owned);
         let grids = [Grid::new(maps[0].0, &maps[0].1).unwrap(), Grid::new(maps[1].0, &maps[1].1).unwrap()];
         let (a, b) = (NamedMap { robot: &a, grid: grids[0] }, NamedMap { robot: &b, grid: grids[1] });
@@ -51,14 +51,14 @@ fn main() {
         start.elapsed().as_secs_f64()
     });
     println!("To find how two maps of {CELLS} x {CELLS} cells lie takes {:.0} ms.\n", 1000.0 * aligned);
-    println!("| robots | bent, m | nodes | median, ms | by that |\n| --- | --- | --- | --- | --- |");
-    for (robots, bent) in [(2, 0.0), (2, 0.2), (16, 0.0), (16, 0.2)] {
+    println!("| robots | deformation, m | nodes | median, ms | by that |\n| --- | --- | --- | --- | --- |");
+    for (robots, displacement) in [(2, 0.0), (2, 0.2), (16, 0.0), (16, 0.2)] {
         let side = if robots > 2 { 4 } else { 1 };
         let placed: Vec<Placed> = (0..robots)
             .map(|robot| {
                 let (column, row) = if robots > 2 { (robot % side, robot / side) } else { (0, 0) };
                 let yaw = 0.35 * f64::from(robot);
-                let most = if robot % 2 == 1 { bent } else { 0.0 };
+                let most = if robot % 2 == 1 { displacement } else { 0.0 };
                 Placed::new(pose(APART * f64::from(column), APART * f64::from(row), yaw), most)
             })
             .collect();
@@ -70,13 +70,13 @@ fn main() {
                 .iter()
                 .map(|map| Body::new(&map.grid(), &map.walls, map.transform_building_map, parameters.spacing))
                 .collect();
-            let bends = refine(&bodies, &parameters).unwrap().if_likelier();
-            sharpness(&bodies, &bends, &parameters);
+            let refined = refine(&bodies, &parameters).unwrap().if_supported();
+            sharpness(&bodies, &refined, &parameters);
             let seconds = start.elapsed().as_secs_f64();
-            nodes = bends.iter().map(|bend| bend.deformation.moves.len()).sum();
+            nodes = refined.iter().map(|map| map.deformation.moves.len()).sum();
             seconds
         });
-        println!("| {robots} | {bent} | {nodes} | {:.0} | {:.2} |", 1000.0 * seconds, seconds / aligned);
+        println!("| {robots} | {displacement} | {nodes} | {:.0} | {:.2} |", 1000.0 * seconds, seconds / aligned);
     }
 }
 

@@ -8,7 +8,7 @@
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::ros::encode;
-use gridweave_runtime::stage::LoneStage;
+use gridweave_runtime::stage::StageHarness;
 use gridweave_stages::merge;
 use gridweave_stages::shared;
 use std::collections::BTreeSet;
@@ -94,7 +94,7 @@ fn time(robots: usize, nearest: usize, name: &str, share: f64) {
         .map(|index| Message::from_vec(MessageHeader::default(), encode(&team.alignment(index)).unwrap()))
         .collect();
     let run = || {
-        let mut stage = LoneStage::new(&merge::frame_solver::kind(), "").unwrap();
+        let mut stage = StageHarness::new(&merge::frame_solver::kind(), "").unwrap();
         let mut slowest = Duration::ZERO;
         let start = Instant::now();
         for message in &messages {

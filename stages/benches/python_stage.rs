@@ -15,7 +15,7 @@ use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, encode};
 use gridweave_runtime::stage::{
-    Context, LoneStage, Out, Output, OutputPorts, Outputs, Received, Source, StageError, StageKind,
+    Context, Out, Output, OutputPorts, Outputs, Received, Source, StageError, StageHarness, StageKind,
 };
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -56,7 +56,7 @@ type Stage = (StageKind, toml::Table);
 fn in_python(file: &Path, name: &str) -> Stage {
     let module = format!("{}:{name}", file.display());
     let given = [("module".to_owned(), module.into())].into_iter().collect();
-    let asked = gridweave_stages::python_stage::kind().ask(&given, Path::new("")).unwrap().unwrap();
+    let asked = gridweave_stages::python_stage::kind().resolve(&given, Path::new("")).unwrap().unwrap();
     (asked.kind.clone(), asked.parameters)
 }
 
@@ -200,7 +200,7 @@ fn calls_alone(file: &Path) {
     println!("| cells | stage | calls/s | p50, us | p99, us |\n| --- | --- | --- | --- | --- |");
     for (cells, name) in CELLS.iter().flat_map(|cells| [(*cells, "nothing"), (*cells, "same")]) {
         let (kind, parameters) = in_python(file, name);
-        let mut stage = LoneStage::new(&kind, &parameters.to_string()).unwrap();
+        let mut stage = StageHarness::new(&kind, &parameters.to_string()).unwrap();
         let bytes = bytes_of(cells);
         let mut times = Vec::new();
         let begin = Instant::now();

@@ -7,7 +7,7 @@
 mod describe;
 
 use gridweave_runtime::program::{self, Interface, Launch};
-use gridweave_runtime::stage::{Asked, ParameterError, Parameters, StageKind};
+use gridweave_runtime::stage::{ParameterError, Parameters, ResolvedStage, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ const INTERPRETER: &str = "GRIDWEAVE_PYTHON";
 
 /// `python`: what the module that it names says.
 pub fn kind() -> StageKind {
-    StageKind::asked::<PythonParameters>(
+    StageKind::dynamic::<PythonParameters>(
         "python",
         "A stage in Python, in a process of its own: the module says what it takes, gives and does. `gridweave kinds FILE.py` shows \
          that.",
@@ -47,7 +47,7 @@ pub fn kind() -> StageKind {
 /// By module and given interface: the kinds that were asked for, each with its interface.
 static ASKED: Mutex<BTreeMap<[String; 2], (&'static StageKind, String)>> = Mutex::new(BTreeMap::new());
 
-fn ask(given: &toml::Table, folder: &Path) -> Result<Asked, ParameterError> {
+fn ask(given: &toml::Table, folder: &Path) -> Result<ResolvedStage, ParameterError> {
     let module = text(given, "module")?.filter(|module| !module.is_empty());
     let module =
         module.ok_or_else(|| ParameterError::new("module", "must say what has the stage, such as \"lines.py\""))?;
@@ -75,7 +75,10 @@ fn ask(given: &toml::Table, folder: &Path) -> Result<Asked, ParameterError> {
         }
     };
     let parameters = [("module", module), ("interface", interface)];
-    Ok(Asked { kind, parameters: parameters.map(|(key, value)| (key.to_owned(), value.into())).into_iter().collect() })
+    Ok(ResolvedStage {
+        kind,
+        parameters: parameters.map(|(key, value)| (key.to_owned(), value.into())).into_iter().collect(),
+    })
 }
 
 /// What a module says, with the parameters that all stages in Python have before its own.

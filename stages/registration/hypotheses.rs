@@ -1,41 +1,43 @@
-//! The hypotheses that one stage has for one pair of robots, gathered from the messages that they come in.
+//! Gathers the hypotheses of one stage for one pair of robots from single messages.
 
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::Alignment;
 use std::collections::BTreeMap;
 
-/// Whose hypotheses they are, and of which pair of robots.
+/// Source of hypotheses, and the pair of robots.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Origin {
     /// The pair.
     pub pair: RobotPair,
-    /// What they were found from, see [`Alignment::source`].
+    /// The source, see [`Alignment::source`].
     pub source: String,
 }
 
 impl Origin {
-    /// Of an alignment.
+    /// Origin of an alignment.
     pub fn of(alignment: &Alignment) -> Self {
         Self { pair: RobotPair::of(alignment), source: alignment.source.clone() }
     }
 }
 
-/// Whether the covariance of an alignment tells how far two maps fit about as well, as that of `map_aligner` does; that of other methods
-/// is for how far off they are.
+/// Whether the covariance of an alignment is the width of the peak, within which the maps fit about as well, as that
+/// of `map_aligner` is. The covariance of other methods is that of the error.
 pub fn has_covariance_of_fit(alignment: &Alignment) -> bool {
     alignment.hypotheses > 0 && alignment.source == "maps" && alignment.method == "maps"
 }
 
-/// Gathers hypotheses until all that belong together have come: they are judged against each other, and one without the
-/// others would be believed too easily.
+/// Collects hypotheses until the last one of a source has arrived. They are judged against each other, so an
+/// incomplete list would make the others too probable.
 #[derive(Debug, Default)]
 pub struct HypothesisGatherer {
     begun: BTreeMap<Origin, Vec<Alignment>>,
 }
 
 impl HypothesisGatherer {
-    /// Takes a hypothesis. Gives all of its stage for the pair, by rank, once the last has come. A rank that does not
-    /// follow the one before is an error, and what has come is forgotten.
+    /// Adds a hypothesis. Returns all of its source for the pair, by rank, once the last has arrived.
+    ///
+    /// # Errors
+    /// A rank that does not follow the one before; the incomplete list is discarded.
     pub fn add(&mut self, alignment: Alignment) -> Result<Option<(Origin, Vec<Alignment>)>, HypothesisMissing> {
         let (rank, count, origin) = (alignment.rank as usize, alignment.hypotheses as usize, Origin::of(&alignment));
         let mut gathered = self.begun.remove(&origin).filter(|_| rank > 0).unwrap_or_default();
@@ -51,18 +53,18 @@ impl HypothesisGatherer {
     }
 }
 
-/// Hypotheses came out of order.
+/// Hypotheses arrived out of order.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the hypotheses for {} and {} by the {} were left out: number {missing} was due, and {came} came",
+    "the hypotheses of {} and {} by the {} were left out: rank {missing} is missing, rank {came} arrived",
     origin.pair.a, origin.pair.b, origin.source
 )]
 pub struct HypothesisMissing {
-    /// Whose they are.
+    /// Origin of the hypotheses.
     pub origin: Origin,
-    /// The rank that should have come.
+    /// The expected rank.
     pub missing: usize,
-    /// The rank that came.
+    /// The rank that arrived.
     pub came: usize,
 }
 
@@ -75,12 +77,12 @@ mod tests {
     }
 
     #[test]
-    fn hypotheses_come_together_when_the_last_is_there() {
+    fn hypotheses_are_returned_when_the_last_has_arrived() {
         let mut gatherer = HypothesisGatherer::default();
         assert_eq!(gatherer.add(hypothesis("maps", 0, 3)), Ok(None));
         assert_eq!(gatherer.add(hypothesis("maps", 1, 3)), Ok(None));
         let (_, alone) = gatherer.add(hypothesis("tags", 0, 0)).unwrap().unwrap();
-        assert_eq!(alone.len(), 1, "another stage's are another matter");
+        assert_eq!(alone.len(), 1, "sources are independent");
         let (origin, all) = gatherer.add(hypothesis("maps", 2, 3)).unwrap().unwrap();
         assert_eq!((origin.source.as_str(), all.len()), ("maps", 3));
         assert!(all.iter().enumerate().all(|(rank, one)| one.rank as usize == rank));
@@ -88,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_rank_begins_anew() {
+    fn rank_0_starts_a_new_list() {
         let mut gatherer = HypothesisGatherer::default();
         gatherer.add(hypothesis("maps", 0, 3)).unwrap();
         gatherer.add(hypothesis("maps", 0, 2)).unwrap();
@@ -99,9 +101,9 @@ mod tests {
     fn a_rank_out_of_order_is_an_error() {
         let mut gatherer = HypothesisGatherer::default();
         let error = gatherer.add(hypothesis("maps", 1, 2)).unwrap_err();
-        assert!(error.to_string().contains("number 0 was due, and 1 came"), "{error}");
+        assert!(error.to_string().contains("rank 0 is missing, rank 1 arrived"), "{error}");
         gatherer.add(hypothesis("maps", 0, 3)).unwrap();
         assert!(gatherer.add(hypothesis("maps", 2, 3)).is_err());
-        assert!(gatherer.add(hypothesis("maps", 1, 3)).is_err(), "what has come is forgotten");
+        assert!(gatherer.add(hypothesis("maps", 1, 3)).is_err(), "the incomplete list is discarded");
     }
 }

@@ -1,33 +1,33 @@
-//! A proposed place of map b on map a.
+//! A hypothesis: a proposed relative pose of two maps.
 
 use crate::shared::geometry::Pose2;
 use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 
-/// What `source` of an [`Alignment`] says where it rests on the maps, and where it rests on tags.
+/// Values of the field `source` of an [`Alignment`] for hypotheses from maps and from tags.
 const MAPS: &str = "maps";
 const TAGS: &str = "tags";
 
-/// What a hypothesis rests on.
+/// The evidence that a hypothesis rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Basis {
-    /// A search over all places of the two maps.
+    /// A search over all relative poses of the two maps.
     Search {
-        /// How far the peak stands out: how much its score exceeds that of the best place elsewhere, in units of the spread of all
-        /// others; 0 if it does not. By chance it is more than `t` with the probability `exp(-t)`.
+        /// Peak significance: how much the score exceeds the second-best one, in units of the spread of all others; 0
+        /// if it does not. By chance it is more than `t` with probability `exp(-t)`.
         significance: f64,
     },
-    /// Tags that both robots have seen, enough of them to agree with each other.
+    /// Common tags, enough to confirm each other.
     Tags,
-    /// Tags that both robots have seen, too few to confirm each other.
+    /// Common tags, too few to confirm each other.
     FewTags,
-    /// Something else. It is trusted no more than any place of the maps.
+    /// Anything else. It is trusted no more than any relative pose of the maps.
     Unknown,
 }
 
 impl Basis {
-    /// What an alignment rests on, by its source, and for the search by its method: the score of other methods on maps is no
-    /// significance.
+    /// Basis of an alignment, by its source; for the search by its method as well, as the score of other methods on
+    /// maps is no significance.
     pub fn of(alignment: &Alignment) -> Self {
         let is_by_search = alignment.hypotheses > 0 && alignment.method.split('+').next() == Some(MAPS);
         match alignment.source.as_str() {
@@ -47,31 +47,31 @@ impl Basis {
     }
 }
 
-/// A proposed place of map b on map a.
+/// A proposed relative pose of two maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
-    /// `T_a_b`.
+    /// Pose of map b in map a, `T_a_b`.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
     pub covariance: Matrix3<f64>,
-    /// What it rests on.
+    /// The evidence that it rests on.
     pub basis: Basis,
-    /// The name of what it rests on, for people.
+    /// Name of that evidence for the user.
     pub source: String,
-    /// Why it was proposed, for people; or why it may not be used.
+    /// Why it was proposed, or why it was refused, for the user.
     pub reason: String,
     /// Whether the stage that sent it has refused it.
     pub is_refused: bool,
-    /// Whether it only stands against others, and nobody has proposed it.
+    /// Whether it only competes with other hypotheses, and may not be accepted itself.
     pub is_rival: bool,
 }
 
 impl Hypothesis {
-    /// The hypothesis that an alignment stands for; none if it has no place in numbers.
+    /// The hypothesis of an alignment; none if its pose is missing or not finite.
     pub fn of(alignment: &Alignment) -> Option<Self> {
-        let has_place =
+        let has_pose =
             alignment.has_transform && [alignment.x, alignment.y, alignment.yaw].iter().all(|value| value.is_finite());
-        has_place.then(|| Self {
+        has_pose.then(|| Self {
             transform_a_b: alignment.transform_a_b(),
             covariance: Matrix3::from_row_slice(&alignment.covariance),
             basis: Basis::of(alignment),
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_search_and_tags_are_trusted_for_what_they_are() {
+    fn only_the_search_and_tags_have_a_basis_of_their_own() {
         let Basis::Search { significance } = Basis::of(&alignment("maps", "maps+icp")) else { panic!() };
         assert!((significance - 100.0_f64.ln()).abs() < 1e-9);
         assert_eq!(Basis::of(&alignment("tags", "tags+directions+icp")), Basis::Tags);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_is_no_number_is_no_hypothesis() {
+    fn an_alignment_without_a_finite_pose_is_no_hypothesis() {
         let good = Alignment { has_transform: true, ..alignment("maps", "maps") };
         assert!(Hypothesis::of(&good).is_some());
         assert_eq!(Hypothesis::of(&Alignment { x: f64::NAN, ..good.clone() }), None);

@@ -1,14 +1,15 @@
 //! The relative pose of two maps, and the probability that it is right.
 //!
-//! Two maps are registered in four steps, each a room of its own:
+//! Two maps are registered in four steps, each in a module of its own:
 //!
-//! 1. [`search`]: all poses of map b on map a are tried, and the peaks become hypotheses.
-//! 2. [`icp`]: each hypothesis is refined until the walls lie on each other.
+//! 1. [`search`]: all poses of map b on map a are scored, and the peaks become hypotheses.
+//! 2. [`icp`]: each hypothesis is refined by aligning the walls.
 //! 3. [`comparison`]: the walls of each map are looked up in the other, as they came and deformed.
-//! 4. [`judgement`]: one sum of evidence for each hypothesis, and one probability for each over all of them.
+//! 4. [`judgement`]: the evidence for each hypothesis is summed, and all of them together give one probability for
+//!    each.
 //!
 //! [`register`] does all four for a [`PreparedPair`] of maps. The stages [`map_aligner`], [`icp_refiner`] and
-//! [`merge_verifier`] do a step each, so that other methods can propose hypotheses, too.
+//! [`merge_verifier`] do one step each, so that other methods can propose hypotheses, too.
 
 pub mod comparison;
 pub mod hypotheses;
@@ -18,7 +19,7 @@ pub mod icp_refiner;
 pub mod judgement;
 pub mod map_aligner;
 pub mod merge_verifier;
-pub mod place_window;
+pub mod pose_window;
 mod register;
 pub mod search;
 
@@ -27,7 +28,7 @@ use gridweave_runtime::stage::StageKind;
 pub use hypothesis::{Basis, Hypothesis};
 pub use register::{PreparedPair, RegistrationParameters, register};
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![icp_refiner::kind(), map_aligner::kind(), merge_verifier::kind()]
 }

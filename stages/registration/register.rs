@@ -1,4 +1,4 @@
-//! The whole way from two maps to a verdict.
+//! Registration of two maps, from the cells to a verdict.
 
 use super::comparison::MapView;
 use super::icp::{FirstGuess, IcpParameters, IcpRefusal, refine};
@@ -8,7 +8,7 @@ use super::{Basis, Hypothesis};
 use crate::shared::geometry::Grid;
 use crate::shared::walls::{NORMAL_RADIUS, WallMap};
 
-/// Two maps, each prepared once for all steps.
+/// Two maps, prepared once for all steps.
 pub struct PreparedPair<'a> {
     grids: [Grid<'a>; 2],
     rasters: [PreparedMap; 2],
@@ -29,12 +29,12 @@ impl<'a> PreparedPair<'a> {
         Ok(Self { grids: [a, b], rasters: [raster_a?, raster_b?], walls: [walls_a, walls_b] })
     }
 
-    /// Their cells and walls, as they are compared.
+    /// Cells and walls of both maps, for the comparison.
     pub fn views(&self) -> [MapView<'_>; 2] {
         [0, 1].map(|index| MapView::rigid(self.grids[index], &self.walls[index]))
     }
 
-    /// Searches for all places of map b on map a, or all that the user thinks possible, and refines them.
+    /// Searches all relative poses, or those that the user allows, and refines the peaks.
     ///
     /// # Errors
     /// The maps fit nowhere.
@@ -50,7 +50,7 @@ impl<'a> PreparedPair<'a> {
         Ok(guesses.map(|(rank, guess)| self.refined(guess, found.reason(rank), icp)).collect())
     }
 
-    /// A place that the search has found, refined.
+    /// Refines a peak of the search.
     fn refined(&self, guess: &MapAlignment, reason: String, icp: &IcpParameters) -> Hypothesis {
         let start = FirstGuess::new(guess.transform_a_b, guess.covariance, icp);
         let [a, b] = &self.walls;
@@ -60,7 +60,7 @@ impl<'a> PreparedPair<'a> {
         Hypothesis {
             transform_a_b: registration.transform_a_b,
             covariance: registration.covariance,
-            basis: Basis::Search { significance: guess.lead.max(0.0) },
+            basis: Basis::Search { significance: guess.significance.max(0.0) },
             source: "maps".to_owned(),
             reason: refusal.as_ref().map_or(reason, ToString::to_string),
             is_refused: refusal.is_some(),
@@ -69,18 +69,18 @@ impl<'a> PreparedPair<'a> {
     }
 }
 
-/// The parameters of all steps.
+/// Parameters of all steps.
 #[derive(Clone, Debug, Default)]
 pub struct RegistrationParameters {
-    /// Of the search.
+    /// Search.
     pub search: MapAlignerParameters,
-    /// Of the refinement.
+    /// Refinement.
     pub icp: IcpParameters,
-    /// Of the comparison and the judgement.
+    /// Comparison and judgement.
     pub judgement: JudgementParameters,
 }
 
-/// Registers two maps: where map b lies on map a, if it can be known.
+/// Registers two maps: estimates the pose of map b in map a, and judges it.
 ///
 /// # Errors
 /// The maps fit nowhere.

@@ -307,12 +307,12 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_carried_there_is_carried_back(x in -7.0..13.0, y in -5.0..3.0, seed in 0.0..6.0f64) {
-            let bent = deformation(|node: Point2| {
+            let deformed = deformation(|node: Point2| {
                 let (x, y): (f64, f64) = (node.x, node.y);
                 Vector3::new(0.3 * (x / 5.0 + seed).sin(), 0.2 * (y / 7.0).cos(), 0.02 * (x / 9.0).sin())
             });
             let point = Point2::new(x, y);
-            prop_assert!((bent.inverse(&bent.apply(&point)) - point).norm() < 1e-3);
+            prop_assert!((deformed.inverse(&deformed.apply(&point)) - point).norm() < 1e-3);
         }
     }
 }

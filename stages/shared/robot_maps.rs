@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
     use gridweave_runtime::ros::MapMetaData;
-    use gridweave_runtime::stage::{LoneStage, StageError, StageKind};
+    use gridweave_runtime::stage::{StageError, StageHarness, StageKind};
     use std::cell::RefCell;
     use std::rc::Rc;
 
@@ -127,7 +127,7 @@ mod tests {
         thread_local!(static MAPS: Shared = Rc::default());
         let make = |(): (), _: &_| Ok(Keeper(MAPS.with(Rc::clone)));
         let kind = StageKind::stage("keeper", "", make).input("map", "", Keeper::receive).build();
-        let mut stage = LoneStage::new(&kind, "").unwrap();
+        let mut stage = StageHarness::new(&kind, "").unwrap();
         for (robot, map) in given {
             stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(1), map).unwrap();
         }

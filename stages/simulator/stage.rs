@@ -228,14 +228,14 @@ mod tests {
     use super::*;
     use crate::shared::geometry::Grid;
     use gridweave_runtime::message::Message;
-    use gridweave_runtime::stage::LoneStage;
+    use gridweave_runtime::stage::StageHarness;
 
     const WORLD: &str = "robots = 2\nwidth = 10\nheight = 9\nbeams = 60\ntags = 8\nduration = 20";
 
     /// What is sent on the ports `map`, `pose`, `tags`, `tf` and `truth`.
     fn run(parameters: &str, seed: u64) -> Result<[Vec<Message>; 5], StageError> {
         let context = Context { stage: "world".into(), seed, ..Default::default() };
-        let mut stage = LoneStage::with_context(&kind(), parameters, &context)?;
+        let mut stage = StageHarness::with_context(&kind(), parameters, &context)?;
         while stage.node().advance()? {
             assert!((0.0..1.0).contains(&stage.node().progress().unwrap()));
         }

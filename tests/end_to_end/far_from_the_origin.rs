@@ -84,7 +84,7 @@ fn a_robot_whose_map_lies_far_from_the_origin_of_its_frame_is_merged_right() {
 #[test]
 fn a_map_that_lies_far_from_where_its_robot_drives_is_not_merged_and_the_reason_is_told() {
     let far = Far::new(false);
-    far.run("tag_merge").assert(3, &["the maps have no walls that lie near each other"]);
+    far.run("tag_merge").assert(3, &["the maps have no walls near each other"]);
     // Without a look at the maps the tags are believed, and the map lies where its origin says.
     far.run("tag_only").assert(0, &["longer than `max_extent`, 1000 m; does the origin of each map fit the poses"]);
     let (width, height) = image::image_dimensions(far.path("map.pgm")).unwrap();

@@ -12,7 +12,7 @@ fn symmetric_world() -> SimulatedWorld {
 #[test]
 fn an_initial_pose_tells_one_end_of_a_building_from_the_other() {
     let world = symmetric_world();
-    world.merge(&[]).assert(3, &["the maps fit at 2 places", "try: --accept robot2=N", "--initial robot2=X,Y,YAW"]);
+    world.merge(&[]).assert(3, &["the maps fit at 2 poses", "try: --accept robot2=N", "--initial robot2=X,Y,YAW"]);
     let Frame { x, y, yaw, .. } = world.truth();
     let initial = format!("robot2={},{},{}", x + 0.8, y - 0.6, yaw + 0.2);
     for engine in ["threads", "processes"] {
@@ -41,20 +41,20 @@ fn an_initial_pose_tells_one_end_of_a_building_from_the_other() {
 fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
     let world = symmetric_world();
     let errors = ["1", "2"].map(|number| {
-        let headline = format!("hypothesis {number} of 2, which was asked for");
+        let headline = format!("hypothesis {number} of 2, chosen by the user");
         world.merge(&["--accept", &format!("robot2={number}")]).assert(0, &["merged 2 of 2 robots", &headline]);
         assert!(world.summary().alignments[0].score < 0.999);
         world.error()
     });
     assert!(errors[0].min(errors[1]) < 0.2 && errors[0].max(errors[1]) > 5.0, "{errors:?}");
     world.merge(&["--accept", "robot1/robot2=1"]).assert(0, &["merged 2 of 2 robots"]);
-    world.merge(&["--accept", "robot2=3"]).assert(3, &["hypothesis 3 was asked for, and there are 2"]);
+    world.merge(&["--accept", "robot2=3"]).assert(3, &["hypothesis 3 was chosen, but there are only 2"]);
     world.merge(&["--accept", "robot7=1"]).assert(3, &["`robot7` concerns no pair of robots"]);
     for wrong in ["robot2", "robot2=0", "robot2=first"] {
         world.merge(&["--accept", wrong]).assert(2, &["accepts nothing", "ROBOT=initial"]);
     }
     let initial = ["--reference", "robot1", "--initial", "robot2=5,6,0.5", "--accept", "robot2=initial"];
-    world.merge(&initial).assert(0, &["laid by the initial poses, as was asked for"]);
+    world.merge(&initial).assert(0, &["aligned by the initial poses, as the user chose"]);
     let Frame { x, y, yaw, .. } = world.summary().frames["robot2"];
     assert_eq!((x, y, yaw), (5.0, 6.0, 0.5));
 }

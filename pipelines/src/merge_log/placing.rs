@@ -44,7 +44,7 @@ impl PlacedRobot {
     /// Draws its map anew, moved to the right and up.
     fn draw(&mut self, grid: &Grid<'_>, shift: (f64, f64)) {
         self.transform_world_map.translation.vector += nalgebra::Vector2::new(shift.0, shift.1);
-        let placed = Placed { transform_world_map: self.transform_world_map, bend: self.bend.as_ref() };
+        let placed = Placed { transform_world_map: self.transform_world_map, deformation: self.bend.as_ref() };
         let area = KnownArea::of(grid);
         self.map = PlacedMap::new(*grid, &area, &placed).map(|placed| {
             let mut cells = vec![0; placed.geometry().cell_count()];

@@ -13,12 +13,12 @@ const HALF_DOOR: f64 = 0.5;
 /// The map of a robot that has seen a square of `known` metres of a building, all of it, its frame turned by `yaw`.
 #[allow(dead_code, reason = "not every bench draws such a map")]
 pub(crate) fn draw(cells: usize, known: f64, yaw: f64) -> (GridGeometry, Vec<i8>) {
-    draw_bent(cells, known, &pose(0.0, 0.0, yaw), 0.0)
+    draw_deformed(cells, known, &pose(0.0, 0.0, yaw), 0.0)
 }
 
 /// The map of a robot that has seen a square of `known` metres around the origin of its frame, and that displaces what it shows
 /// by up to `most` metres along x and along y, in waves that are longer than a building.
-pub(crate) fn draw_bent(
+pub(crate) fn draw_deformed(
     cells: usize,
     known: f64,
     transform_building_map: &Pose2,

@@ -4,7 +4,7 @@ use super::{MapSelectorParameters, changed_cells, kind, known_cells};
 use crate::shared::geometry::{Grid, GridGeometry, UNKNOWN, pose};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, decode};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 use proptest::prelude::*;
 
 /// A map of `width` x 10 cells, known in the first `known` columns, whose corner lies `column` cells to the right.
@@ -55,8 +55,8 @@ fn how_probable_an_obstacle_is_does_not_count() {
 
 /// The numbers of the maps of two robots, in turn, that are passed on of those that know so many columns; and at the end.
 fn passed_on(known: &[usize], min_change: f64) -> (Vec<usize>, Vec<usize>) {
-    let mut stage = LoneStage::new(&kind(), &format!("min_change = {min_change:?}")).unwrap();
-    let take = |stage: &mut LoneStage| -> Vec<usize> {
+    let mut stage = StageHarness::new(&kind(), &format!("min_change = {min_change:?}")).unwrap();
+    let take = |stage: &mut StageHarness| -> Vec<usize> {
         let sent = stage.take_messages("map");
         sent.iter().map(|map| decode::<OccupancyGrid<'_>>(map.bytes()).unwrap().header.stamp.sec as usize).collect()
     };
@@ -90,7 +90,7 @@ fn the_first_map_each_that_has_changed_and_the_last_are_passed_on() {
 
 #[test]
 fn what_is_no_map_is_passed_on_so_that_its_robot_is_known() {
-    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let mut stage = StageHarness::new(&kind(), "").unwrap();
     let info = MapMetaData { resolution: 0.05, width: 40, height: 10, ..Default::default() };
     let too_short = OccupancyGrid { info, data: &[0; 7], ..Default::default() };
     stage.give::<OccupancyGrid<'_>>("map", "a", LogTime(0), &too_short).unwrap();

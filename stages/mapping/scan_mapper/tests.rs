@@ -4,7 +4,7 @@ use super::kind;
 use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, is_free, is_occupied, pose};
 use gridweave_runtime::message::{LogTime, Message};
 use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, RosMessage};
-use gridweave_runtime::stage::LoneStage;
+use gridweave_runtime::stage::StageHarness;
 use std::f64::consts::TAU;
 
 /// Outer walls, and a box in the room: left, low, right, high, metres.
@@ -83,11 +83,11 @@ fn scan(seconds: f64) -> RangeScan {
     }
 }
 
-struct Bench(LoneStage);
+struct Bench(StageHarness);
 
 impl Bench {
     fn new(parameters: &str) -> Self {
-        Self(LoneStage::new(&kind(), parameters).unwrap())
+        Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
     fn scan(&mut self, seconds: f64, scan: &RangeScan) {
@@ -348,6 +348,6 @@ fn parameters_that_cannot_be_are_refused() {
         "odometry_deviation = nan",
         "scan = 1",
     ] {
-        assert!(LoneStage::new(&kind(), wrong).is_err(), "{wrong}");
+        assert!(StageHarness::new(&kind(), wrong).is_err(), "{wrong}");
     }
 }

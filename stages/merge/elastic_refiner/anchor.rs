@@ -1,14 +1,14 @@
 //! Where all maps lie together, which no wall between them shows: the reference's map stays where it is in the mean.
 
 use super::body::Body;
-use super::refine::Bend;
+use super::refine::RefinedMap;
 use crate::shared::geometry::{PointPair, Pose2, fit_rigid};
 use nalgebra::Vector3;
 
 /// Moves all bends together so that those of the reference map are zero in the mean: the rigid transform that is nearest to its bend is
 /// none. The bends of the others follow, as they are told in frames that stay.
-pub(super) fn anchor(bends: &mut [Bend], bodies: &[Body<'_>], reference: usize) {
-    let Some(change) = bends.get(reference).and_then(change) else { return };
+pub(super) fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: usize) {
+    let Some(change) = maps.get(reference).and_then(change) else { return };
     let of_maps: Vec<Pose2> = bodies
         .iter()
         .map(|body| body.transform_world_map.inverse() * bodies[reference].transform_world_map)
@@ -18,9 +18,9 @@ pub(super) fn anchor(bends: &mut [Bend], bodies: &[Body<'_>], reference: usize) 
     if !of_maps.iter().all(|of_map| of_map.translation.vector.iter().all(|value| value.is_finite())) {
         return;
     }
-    for (bend, of_map) in bends.iter_mut().zip(&of_maps) {
-        let lattice = &bend.deformation.lattice;
-        for (node, by) in bend.deformation.moves.iter_mut().enumerate() {
+    for (map, of_map) in maps.iter_mut().zip(&of_maps) {
+        let lattice = &map.deformation.lattice;
+        for (node, by) in map.deformation.moves.iter_mut().enumerate() {
             let at = lattice.position(node);
             let moved = of_map * (at + by.xy());
             *by = Vector3::new(moved.x - at.x, moved.y - at.y, by.z + change.rotation.angle());
@@ -29,7 +29,7 @@ pub(super) fn anchor(bends: &mut [Bend], bodies: &[Body<'_>], reference: usize) 
 }
 
 /// What takes the bent reference map back to where it is rigid, in its frame; none if it is not bent.
-fn change(reference: &Bend) -> Option<Pose2> {
+fn change(reference: &RefinedMap) -> Option<Pose2> {
     let moves = &reference.deformation.moves;
     if moves.iter().all(|by| by.iter().all(|value| *value == 0.0)) {
         return None;

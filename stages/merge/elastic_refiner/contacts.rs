@@ -35,31 +35,31 @@ pub(super) struct Contacts {
 
 /// A map, how it is bent so far, and the number of its first node among those of all maps.
 #[derive(Clone, Copy)]
-pub(super) struct Bent<'a> {
+pub(super) struct DeformedBody<'a> {
     pub(super) body: &'a Body<'a>,
-    pub(super) bend: &'a Deformation,
+    pub(super) deformation: &'a Deformation,
     pub(super) first: usize,
 }
 
-impl Bent<'_> {
+impl DeformedBody<'_> {
     /// Where a point of the walls lies, world, and the nodes around it.
     fn in_world(&self, index: usize) -> Option<(Point2, Corners)> {
         let corners = self.body.corners[index]?;
         let point = self.body.walls.walls.points()[index];
-        Some((self.body.transform_world_map * self.bend.apply_at(&point, &corners), corners))
+        Some((self.body.transform_world_map * self.deformation.apply_at(&point, &corners), corners))
     }
 
     /// The rectangle that holds what lies within `reach` of the walls, wherever they are bent to: least and greatest corner, map
     /// frame.
     fn bounds(&self, reach: f64) -> Option<[Point2; 2]> {
-        let margin = Vector2::repeat(reach + self.bend.largest_move());
+        let margin = Vector2::repeat(reach + self.deformation.largest_move());
         self.body.bounds.map(|[low, high]| [low - margin, high + margin])
     }
 }
 
 /// Looks the walls of map b up in map a. What lies `reach` metres apart counts a quarter of what lies on each other, and
 /// nothing beyond.
-pub(super) fn contacts(a: Bent<'_>, b: Bent<'_>, reach: f64) -> Contacts {
+pub(super) fn contacts(a: DeformedBody<'_>, b: DeformedBody<'_>, reach: f64) -> Contacts {
     let (length, found) = find_all(a, b, reach);
     // Both maps are looked up in each other, and say the same.
     let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
@@ -83,14 +83,14 @@ pub(super) struct Apart {
     /// As the rigid frames have them.
     pub(super) rigid: f64,
     /// As the maps are bent.
-    pub(super) bent: f64,
+    pub(super) deformed: f64,
 }
 
 /// The walls of map b that lie within `reach` of walls of map a, as they are bent: the length that each stands for, metres, and
 /// how far apart they lie.
-pub(super) fn apart<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
+pub(super) fn apart<'a>(a: DeformedBody<'a>, b: DeformedBody<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
     let (length, found) = find_all(a, b, reach);
-    (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), bent: contact.residual.abs() }))
+    (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), deformed: contact.residual.abs() }))
 }
 
 impl Contacts {
@@ -126,7 +126,11 @@ struct Contact {
 }
 
 /// Points of the walls of map b, each with what it meets on map a, and the length of wall that each stands for, metres.
-fn find_all<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Item = (Point2, Contact)>) {
+fn find_all<'a>(
+    a: DeformedBody<'a>,
+    b: DeformedBody<'a>,
+    reach: f64,
+) -> (f64, impl Iterator<Item = (Point2, Contact)>) {
     let points = b.body.walls.walls.points();
     let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
     let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
@@ -138,8 +142,8 @@ fn find_all<'a>(a: Bent<'a>, b: Bent<'a>, reach: f64) -> (f64, impl Iterator<Ite
 
 /// What a point of the walls of map b meets within `reach` on map a, near whose walls nothing lies outside of the rectangle.
 fn find(
-    (a, [low, high]): (Bent<'_>, &[Point2; 2]),
-    b: Bent<'_>,
+    (a, [low, high]): (DeformedBody<'_>, &[Point2; 2]),
+    b: DeformedBody<'_>,
     index: usize,
     point: &Point2,
     reach: f64,
@@ -150,7 +154,7 @@ fn find(
     if !(*low <= in_a && in_a <= *high) {
         return None;
     }
-    let partner = a.body.walls.walls.nearest(&a.bend.inverse(&in_a), reach)?.index;
+    let partner = a.body.walls.walls.nearest(&a.deformation.inverse(&in_a), reach)?.index;
     let normal = of_a_world * a.body.walls.normals[partner];
     let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
     if !a.body.seen[partner].fit(b.body.seen[index], cosine) {
@@ -178,13 +182,13 @@ impl Contact {
     }
 
     /// How far the point moves away from the wall with the moves of the nodes.
-    fn row(&self, a: Bent<'_>, b: Bent<'_>, point: &Point2) -> SVector<f64, UNKNOWNS> {
+    fn row(&self, a: DeformedBody<'_>, b: DeformedBody<'_>, point: &Point2) -> SVector<f64, UNKNOWNS> {
         let mut row = SVector::<f64, UNKNOWNS>::zeros();
         let ends = [(a, &self.of_a, &self.partner, -1.0), (b, &self.of_b, point, 1.0)];
-        for (end, (bent, corners, point, sign)) in ends.into_iter().enumerate() {
-            let normal = bent.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
+        for (end, (deformed, corners, point, sign)) in ends.into_iter().enumerate() {
+            let normal = deformed.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
             for (place, &(node, weight)) in corners.iter().enumerate() {
-                let arm = point - bent.body.lattice.position(node);
+                let arm = point - deformed.body.lattice.position(node);
                 let by_node: RowVector3<f64> = normal * node_jacobian(&arm);
                 row.fixed_rows_mut::<3>(12 * end + 3 * place).copy_from(&(sign * weight * by_node).transpose());
             }

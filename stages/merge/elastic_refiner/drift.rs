@@ -1,4 +1,4 @@
-//! How much a map is found to bend, which is what `bend` and `turn` should have been.
+//! How much a map is found to bend, which is what `deformation` and `turn` should have been.
 
 use super::ElasticRefinerParameters;
 use super::equations::{Covariances, Edge};
@@ -12,7 +12,7 @@ const LEAST_KNOWN: f64 = 6.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     /// Of the displacement of two places against each other, metres.
-    pub bend: f64,
+    pub displacement: f64,
     /// Of the turn of two places against each other, radians.
     pub turn: f64,
 }
@@ -21,16 +21,16 @@ pub struct Drift {
 /// what was assumed (one step of MacKay 1992, "Bayesian interpolation"). `first` is the number of the map's first node
 /// among those of all maps. `None` if walls tell too little.
 pub(super) fn drift(
-    bend: &Deformation,
+    deformation: &Deformation,
     first: usize,
     covariances: &Covariances<'_>,
     parameters: &ElasticRefinerParameters,
 ) -> Option<Drift> {
     let (mut squares, mut known) = ([0.0; 2], [0.0; 2]);
-    for (i, j) in bend.lattice.edges() {
-        let arm = bend.lattice.position(j) - bend.lattice.position(i);
+    for (i, j) in deformation.lattice.edges() {
+        let arm = deformation.lattice.position(j) - deformation.lattice.position(i);
         let edge = Edge::new(&arm, parameters);
-        let found = edge.by_i * bend.moves[i] + edge.by_j * bend.moves[j];
+        let found = edge.by_i * deformation.moves[i] + edge.by_j * deformation.moves[j];
         let (i, j) = (first + i, first + j);
         let mixed = edge.by_i * covariances.of(i, j) * edge.by_j.transpose();
         let left: Matrix3<f64> = edge.by_i * covariances.of(i, i) * edge.by_i.transpose()
@@ -38,12 +38,12 @@ pub(super) fn drift(
             + mixed
             + mixed.transpose();
         // The share of each part that is known from walls.
-        let told = |part: usize| (1.0 - left[(part, part)] * edge.information[(part, part)]).clamp(0.0, 1.0);
+        let from_walls = |part: usize| (1.0 - left[(part, part)] * edge.information[(part, part)]).clamp(0.0, 1.0);
         squares[0] += (found.x.powi(2) + found.y.powi(2)) / arm.norm();
         squares[1] += found.z.powi(2) / arm.norm();
-        known[0] += told(0) + told(1);
-        known[1] += told(2);
+        known[0] += from_walls(0) + from_walls(1);
+        known[1] += from_walls(2);
     }
     let is_known = known.iter().all(|known| *known >= LEAST_KNOWN);
-    is_known.then(|| Drift { bend: (squares[0] / known[0]).sqrt(), turn: (squares[1] / known[1]).sqrt() })
+    is_known.then(|| Drift { displacement: (squares[0] / known[0]).sqrt(), turn: (squares[1] / known[1]).sqrt() })
 }

@@ -27,7 +27,7 @@ pub(super) struct Equations {
 
 impl Equations {
     /// What is known of the nodes of the bodies without looking at walls.
-    pub(super) fn of_bends(
+    pub(super) fn of_deformations(
         bodies: &[Body<'_>],
         order: &Arc<Dissection>,
         parameters: &ElasticRefinerParameters,
@@ -118,10 +118,10 @@ impl Edge {
 }
 
 /// Half the squared bends between neighbouring nodes, in standard deviations.
-pub(super) fn bend_cost(bend: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
-    let edges = bend.lattice.edges().map(|(i, j)| {
-        let edge = Edge::new(&(bend.lattice.position(j) - bend.lattice.position(i)), parameters);
-        let residual = edge.by_i * bend.moves[i] + edge.by_j * bend.moves[j];
+pub(super) fn deformation_cost(deformation: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
+    let edges = deformation.lattice.edges().map(|(i, j)| {
+        let edge = Edge::new(&(deformation.lattice.position(j) - deformation.lattice.position(i)), parameters);
+        let residual = edge.by_i * deformation.moves[i] + edge.by_j * deformation.moves[j];
         0.5 * residual.dot(&(edge.information * residual))
     });
     edges.sum()

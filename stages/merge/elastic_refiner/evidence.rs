@@ -16,18 +16,18 @@ const LITTLE: f64 = 0.25;
 /// What walls say is what they said in the last round. They are taken to be as wrong as one cell in every half metre: as the
 /// cells of a map round all of a wall alike, maps that are not bent must not seem so for it.
 pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefinerParameters) -> Option<f64> {
-    let log_ratio = |of_bends: &Equations, solution: &Solution| {
-        Some(0.5 * (of_bends.log_determinant()? - solution.log_determinant() + solution.explained))
+    let log_ratio = |of_deformations: &Equations, solution: &Solution| {
+        Some(0.5 * (of_deformations.log_determinant()? - solution.log_determinant() + solution.explained))
     };
-    let mut best = log_ratio(&last.of_bends, &last.solution)?;
+    let mut best = log_ratio(&last.of_deformations, &last.solution)?;
     // It is the sign that counts, and most maps that bend do so clearly.
     if best <= 0.0 {
         let little =
             ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
-        let of_bends = Equations::of_bends(bodies, &last.of_bends.order, &little);
-        let mut equations = of_bends.clone();
+        let of_deformations = Equations::of_deformations(bodies, &last.of_deformations.order, &little);
+        let mut equations = of_deformations.clone();
         last.walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
-        best = best.max(log_ratio(&of_bends, &equations.solve()?)?);
+        best = best.max(log_ratio(&of_deformations, &equations.solve()?)?);
     }
     best.is_finite().then_some(best)
 }

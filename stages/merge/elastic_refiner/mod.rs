@@ -37,7 +37,7 @@ mod tests;
 pub use body::Body;
 pub use drift::Drift;
 pub use parameters::ElasticRefinerParameters;
-pub use refine::{Bend, Bends, refine};
+pub use refine::{RefinedMap, Refinement, refine};
 pub use sharpness::sharpness;
 
 use gridweave_runtime::stage::StageKind;

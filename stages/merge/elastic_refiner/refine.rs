@@ -2,10 +2,10 @@
 
 use super::ElasticRefinerParameters;
 use super::body::Body;
-use super::contacts::{Bent, Contacts, contacts};
+use super::contacts::{Contacts, DeformedBody, contacts};
 use super::dissection::Dissection;
 use super::drift::{Drift, drift};
-use super::equations::{Equations, Solution, bend_cost};
+use super::equations::{Equations, Solution, deformation_cost};
 use super::evidence::gain;
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
@@ -19,7 +19,7 @@ const ROUNDS: [f64; 8] = [1.0, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.15];
 
 /// How one map is bent.
 #[derive(Clone, Debug)]
-pub struct Bend {
+pub struct RefinedMap {
     /// Where its places belong.
     pub deformation: Deformation,
     /// The covariance of each node: (x, y, turn).
@@ -35,24 +35,24 @@ pub struct Bend {
 
 /// How all maps are bent.
 #[derive(Clone, Debug)]
-pub struct Bends {
+pub struct Refinement {
     /// Of each body.
-    pub bends: Vec<Bend>,
+    pub maps: Vec<RefinedMap>,
     /// How much likelier what the walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm.
-    /// Not above 0 the maps are rather not bent, and what is in `bends` is the walls' noise.
+    /// Not above 0 the maps are rather not bent, and what is in `maps` is the walls' noise.
     pub gain: f64,
 }
 
-impl Bends {
+impl Refinement {
     /// The bends if they are likelier than none; else none, as uncertain as they are.
     #[must_use]
-    pub fn if_likelier(self) -> Vec<Bend> {
-        if self.gain > 0.0 { self.bends } else { self.bends.into_iter().map(Bend::unbent).collect() }
+    pub fn if_supported(self) -> Vec<RefinedMap> {
+        if self.gain > 0.0 { self.maps } else { self.maps.into_iter().map(RefinedMap::undeformed).collect() }
     }
 }
 
-impl Bend {
-    fn unbent(self) -> Self {
+impl RefinedMap {
+    fn undeformed(self) -> Self {
         let deformation = Deformation::none(self.deformation.lattice);
         Self { deformation, cost: 0.0, drift: None, ..self }
     }
@@ -63,15 +63,16 @@ pub(super) struct Round {
     /// What the walls say, pair by pair.
     pub(super) walls: Vec<Contacts>,
     /// What is known without looking at walls.
-    pub(super) of_bends: Equations,
+    pub(super) of_deformations: Equations,
     /// What follows from both.
     pub(super) solution: Solution,
 }
 
 /// Bends placed maps, so that walls that several show lie on each other. `None` if numbers are so large that the equations have
 /// no solution.
-pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Bends> {
-    let mut bends: Vec<Deformation> = bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
+pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Refinement> {
+    let mut deformations: Vec<Deformation> =
+        bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
     let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
     let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
     let meet = |a: usize, b: usize| {
@@ -81,39 +82,44 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         (0..bodies.len()).flat_map(|a| (0..bodies.len()).map(move |b| (a, b))).filter(|&(a, b)| meet(a, b)).collect();
     let firsts: Vec<usize> =
         bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
-    let find = |bends: &[Deformation], share: f64| -> Vec<Contacts> {
-        let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body], first: firsts[body] };
-        pairs.par_iter().map(|&(a, b)| contacts(bent(a), bent(b), share * parameters.reach)).collect()
+    let find = |deformations: &[Deformation], share: f64| -> Vec<Contacts> {
+        let deformed =
+            |body: usize| DeformedBody { body: &bodies[body], deformation: &deformations[body], first: firsts[body] };
+        pairs.par_iter().map(|&(a, b)| contacts(deformed(a), deformed(b), share * parameters.reach)).collect()
     };
     let mut last: Option<Round> = None;
     for share in ROUNDS {
-        let walls = find(&bends, share);
+        let walls = find(&deformations, share);
         // What is tied to what changes from round to round, and with it the order that leaves the factor sparse.
         let order = Arc::new(order(bodies, &firsts, &walls));
-        let of_bends = Equations::of_bends(bodies, &order, parameters);
-        let mut equations = of_bends.clone();
+        let of_deformations = Equations::of_deformations(bodies, &order, parameters);
+        let mut equations = of_deformations.clone();
         walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         let solution = equations.solve()?;
-        for (bend, &first) in bends.iter_mut().zip(&firsts) {
-            let count = bend.moves.len();
-            bend.moves.copy_from_slice(&solution.moves[first..first + count]);
+        for (deformation, &first) in deformations.iter_mut().zip(&firsts) {
+            let count = deformation.moves.len();
+            deformation.moves.copy_from_slice(&solution.moves[first..first + count]);
         }
-        last = Some(Round { walls, of_bends, solution });
+        last = Some(Round { walls, of_deformations, solution });
     }
     let last = last?;
     let gain = gain(bodies, &last, parameters)?;
     let mut matched = vec![0.0; bodies.len()];
     pairs.iter().zip(&last.walls).for_each(|(&(_, b), contacts)| matched[b] += contacts.length);
     let covariances = last.solution.covariances();
-    let bend = |((deformation, wall_matched), &first): ((Deformation, f64), &usize)| Bend {
+    let refined = |((deformation, wall_matched), &first): ((Deformation, f64), &usize)| RefinedMap {
         covariances: (first..first + deformation.moves.len()).map(|node| covariances.of(node, node)).collect(),
-        cost: bend_cost(&deformation, parameters),
+        cost: deformation_cost(&deformation, parameters),
         drift: drift(&deformation, first, &covariances, parameters),
         deformation,
         wall_matched,
     };
-    let is_finite = bends.iter().flat_map(|bend| &bend.moves).all(|by| by.iter().all(|value| value.is_finite()));
-    is_finite.then(|| Bends { bends: bends.into_iter().zip(matched).zip(&firsts).map(bend).collect(), gain })
+    let is_finite = deformations
+        .iter()
+        .flat_map(|deformation| &deformation.moves)
+        .all(|by| by.iter().all(|value| value.is_finite()));
+    is_finite
+        .then(|| Refinement { maps: deformations.into_iter().zip(matched).zip(&firsts).map(refined).collect(), gain })
 }
 
 /// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.

@@ -1,7 +1,7 @@
 //! How sharp the merged map is: whether walls that several maps show come out once.
 
-use super::contacts::{Bent, apart};
-use super::{Bend, Body, ElasticRefinerParameters};
+use super::contacts::{DeformedBody, apart};
+use super::{Body, ElasticRefinerParameters, RefinedMap};
 use gridweave_runtime::ros::Sharpness;
 use rayon::prelude::*;
 
@@ -33,18 +33,22 @@ impl Sum {
 
 /// For each body, how the walls that others show as well lie on theirs: as the rigid frames have them, and as the maps are bent.
 /// Of walls that no other shows there is nothing to say.
-pub fn sharpness(bodies: &[Body<'_>], bends: &[Bend], parameters: &ElasticRefinerParameters) -> Vec<[Sharpness; 2]> {
-    let bent = |body: usize| Bent { body: &bodies[body], bend: &bends[body].deformation, first: 0 };
+pub fn sharpness(
+    bodies: &[Body<'_>],
+    maps: &[RefinedMap],
+    parameters: &ElasticRefinerParameters,
+) -> Vec<[Sharpness; 2]> {
+    let deformed = |body: usize| DeformedBody { body: &bodies[body], deformation: &maps[body].deformation, first: 0 };
     let of_body = |b: usize| {
-        let (mut rigid, mut as_bent) = (Sum::default(), Sum::default());
+        let (mut rigid, mut as_deformed) = (Sum::default(), Sum::default());
         for a in (0..bodies.len()).filter(|a| *a != b) {
-            let (length, found) = apart(bent(a), bent(b), SAME_WALL.min(parameters.reach));
+            let (length, found) = apart(deformed(a), deformed(b), SAME_WALL.min(parameters.reach));
             for at in found {
                 rigid.add(length, at.rigid);
-                as_bent.add(length, at.bent);
+                as_deformed.add(length, at.deformed);
             }
         }
-        [rigid.sharpness(), as_bent.sharpness()]
+        [rigid.sharpness(), as_deformed.sharpness()]
     };
     (0..bodies.len()).into_par_iter().map(of_body).collect()
 }

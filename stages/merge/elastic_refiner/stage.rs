@@ -1,7 +1,7 @@
 //! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
 
 use super::anchor::anchor;
-use super::{Bend, Body, ElasticRefinerParameters, refine, sharpness};
+use super::{Body, ElasticRefinerParameters, RefinedMap, refine, sharpness};
 use crate::shared::deformation::Lattice;
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
@@ -34,16 +34,16 @@ pub(super) struct ElasticRefiner {
     maps: RobotMaps<WallsOnDemand>,
     frames: RobotFrames,
     /// The frames in which the maps were bent last.
-    bent_frames: RobotFrames,
+    deformed_frames: RobotFrames,
     /// The maps that were bent last, by robot.
-    bent_maps: BTreeMap<String, BentMap>,
+    deformed_maps: BTreeMap<String, DeformedMap>,
     /// Whether any bend was sent.
     has_sent: bool,
 }
 
 /// A map as it was when it was bent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct BentMap {
+struct DeformedMap {
     /// Which of its robot's maps it was.
     number: u64,
     /// How many nodes its lattice had.
@@ -56,8 +56,8 @@ impl ElasticRefiner {
             parameters,
             maps: RobotMaps::default(),
             frames: RobotFrames::default(),
-            bent_frames: RobotFrames::default(),
-            bent_maps: BTreeMap::new(),
+            deformed_frames: RobotFrames::default(),
+            deformed_maps: BTreeMap::new(),
             has_sent: false,
         }
     }
@@ -79,30 +79,30 @@ impl ElasticRefiner {
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
         // What changes little waits for the end: bends are told in the map's own frame, and hold in a frame that lies beside.
-        if self.is_near() { output.frames.send("", &self.frames) } else { self.bend(output) }
+        if self.is_near() { output.frames.send("", &self.frames) } else { self.deform(output) }
     }
 
     pub(super) fn finish(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
-        let numbers = self.bent_maps.iter().map(|(robot, map)| (robot, map.number));
-        let is_bent = self.frames.frames == self.bent_frames.frames
+        let numbers = self.deformed_maps.iter().map(|(robot, map)| (robot, map.number));
+        let is_deformed = self.frames.frames == self.deformed_frames.frames
             && self.placed().map(|(robot, map)| (robot, map.number)).eq(numbers);
-        if is_bent { Ok(()) } else { self.bend(output) }
+        if is_deformed { Ok(()) } else { self.deform(output) }
     }
 
     /// Whether the robots are about where they were when their maps were bent, and know about as much.
     fn is_near(&self) -> bool {
-        let (before, after) = (&self.bent_frames, &self.frames);
+        let (before, after) = (&self.deformed_frames, &self.frames);
         let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
         let mut pairs = before.frames.iter().zip(&after.frames);
         before.reference == after.reference
             && before.frames.len() == after.frames.len()
-            && self.placed().map(|(robot, _)| robot).eq(self.bent_maps.keys())
+            && self.placed().map(|(robot, _)| robot).eq(self.deformed_maps.keys())
             && pairs.all(|(one, next)| one.is_near(next, min_move, min_turn))
-            && self.placed().zip(self.bent_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
+            && self.placed().zip(self.deformed_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
     }
 
     /// Whether a map knows so much that it did not when it was bent that it is to be bent again.
-    fn has_grown(&self, before: &BentMap, map: &RobotMap<WallsOnDemand>) -> bool {
+    fn has_grown(&self, before: &DeformedMap, map: &RobotMap<WallsOnDemand>) -> bool {
         let ElasticRefinerParameters { min_growth, spacing, .. } = self.parameters;
         let most = before.nodes as f64 * (1.0 + min_growth);
         map.number != before.number && Lattice::over(&map.grid(), spacing).len() as f64 > most
@@ -115,13 +115,13 @@ impl ElasticRefiner {
         placed.into_iter()
     }
 
-    fn bend(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
-        self.bent_frames = self.frames.clone();
+    fn deform(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
+        self.deformed_frames = self.frames.clone();
         let spacing = self.parameters.spacing;
         let of_map = |(robot, map): (&String, &RobotMap<WallsOnDemand>)| {
-            (robot.clone(), BentMap { number: map.number, nodes: Lattice::over(&map.grid(), spacing).len() })
+            (robot.clone(), DeformedMap { number: map.number, nodes: Lattice::over(&map.grid(), spacing).len() })
         };
-        self.bent_maps = self.placed().map(of_map).collect();
+        self.deformed_maps = self.placed().map(of_map).collect();
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
         // What is alone is not bent, which is news if it was.
@@ -138,38 +138,45 @@ impl ElasticRefiner {
                 })
                 .collect();
             match refine(&bodies, &self.parameters) {
-                Some(bends) => {
-                    let mut bends = bends.if_likelier();
+                Some(refinement) => {
+                    let mut refined = refinement.if_supported();
                     let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
-                    reference.into_iter().for_each(|reference| anchor(&mut bends, &bodies, reference));
-                    let sharpness = sharpness(&bodies, &bends, &self.parameters);
-                    for (((frame, map), bend), sharpness) in placed.iter().zip(&bends).zip(sharpness) {
+                    reference.into_iter().for_each(|reference| anchor(&mut refined, &bodies, reference));
+                    let sharpness = sharpness(&bodies, &refined, &self.parameters);
+                    for (((frame, map), refined), sharpness) in placed.iter().zip(&refined).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
-                        output.deformation.send(&frame.robot, &message(header, &frame.robot, bend, sharpness))?;
+                        output.deformation.send(&frame.robot, &message(header, &frame.robot, refined, sharpness))?;
                     }
                 }
-                None => output.warn("the maps cannot be bent onto each other: a frame lies too far away for numbers"),
+                None => output.warn(
+                    "the maps were not deformed: a frame is too far from the origin for the equations to be solved",
+                ),
             }
         }
         output.frames.send("", &self.frames)
     }
 }
 
-fn message(header: Header, robot: &str, bend: &Bend, [sharpness_rigid, sharpness]: [Sharpness; 2]) -> MapDeformation {
-    let nodes = bend.deformation.moves.iter().zip(&bend.covariances).enumerate();
+fn message(
+    header: Header,
+    robot: &str,
+    refined: &RefinedMap,
+    [sharpness_rigid, sharpness]: [Sharpness; 2],
+) -> MapDeformation {
+    let nodes = refined.deformation.moves.iter().zip(&refined.covariances).enumerate();
     let node = |(number, (by, covariance)): (usize, (&nalgebra::Vector3<f64>, _))| {
-        let at = bend.deformation.lattice.position(number);
+        let at = refined.deformation.lattice.position(number);
         DeformationNode { x: at.x, y: at.y, dx: by.x, dy: by.y, dyaw: by.z, covariance: row_by_row(covariance) }
     };
     MapDeformation {
         header,
         robot: robot.to_owned(),
-        spacing: bend.deformation.lattice.spacing(),
+        spacing: refined.deformation.lattice.spacing(),
         nodes: nodes.map(node).collect(),
-        wall_matched: bend.wall_matched,
+        wall_matched: refined.wall_matched,
         sharpness_rigid,
         sharpness,
-        bend: bend.drift.map_or(0.0, |drift| drift.bend),
-        turn: bend.drift.map_or(0.0, |drift| drift.turn),
+        bend: refined.drift.map_or(0.0, |drift| drift.displacement),
+        turn: refined.drift.map_or(0.0, |drift| drift.turn),
     }
 }

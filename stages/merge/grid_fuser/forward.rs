@@ -30,9 +30,9 @@ pub fn carry(map: &PlacedGrid<'_>, geometry: &GridGeometry) -> Vec<i8> {
     let width = map.grid.geometry.width.max(1);
     for (index, &value) in map.grid.cells.iter().enumerate().filter(|(_, value)| is_known(**value)) {
         let cell = Cell { column: index % width, row: index / width };
-        let centre = match map.bend {
+        let centre = match map.deformation {
             None => map.transform_world_map * map.grid.geometry.centre(cell),
-            Some(bend) => map.transform_world_map * bend.apply(&map.grid.geometry.centre(cell)),
+            Some(deformation) => map.transform_world_map * deformation.apply(&map.grid.geometry.centre(cell)),
         };
         let Some(place) = geometry.cell(&centre).and_then(|cell| carried.get_mut(geometry.index(cell))) else {
             continue;

@@ -51,7 +51,7 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
 struct Lookup<'a> {
     grid: Grid<'a>,
     area: &'a KnownArea,
-    bend: Option<&'a Deformation>,
+    deformation: Option<&'a Deformation>,
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
     /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
@@ -70,7 +70,7 @@ impl<'a> Lookup<'a> {
         Self {
             grid: map.grid,
             area,
-            bend: map.bend,
+            deformation: map.deformation,
             start: (transform_grid_output * Point2::new(half, half)) * scale,
             step: transform_grid_output.rotation * Vector2::new(output.resolution, 0.0) * scale,
             columns: (area.columns.0 as f64, area.columns.1 as f64),
@@ -83,17 +83,17 @@ impl<'a> Lookup<'a> {
         let row = row as f64;
         let start = Point2::new(self.start.x - row * self.step.y, self.start.y + row * self.step.x);
         let resolution = self.grid.geometry.resolution;
-        let bent = self.bend.map_or(0.0, |bend| (bend.largest_move() / resolution).ceil());
-        let widened = |(low, high): (f64, f64)| (low - bent, high + bent);
+        let deformed = self.deformation.map_or(0.0, |deformation| (deformation.largest_move() / resolution).ceil());
+        let widened = |(low, high): (f64, f64)| (low - deformed, high + deformed);
         let by_column = range_within(start.x, self.step.x, widened(self.columns), count);
         let by_row = range_within(start.y, self.step.y, widened(self.rows), count);
         LookupRow { lookup: self, start, from: by_column.0.max(by_row.0), to: by_column.1.min(by_row.1) }
     }
 
     /// The place of the map, in cells, that its bend lays at a place where the map would lie without it.
-    fn unbent(&self, place: &Point2, bend: &Deformation) -> Point2 {
+    fn undeformed(&self, place: &Point2, deformation: &Deformation) -> Point2 {
         let GridGeometry { resolution, origin, .. } = self.grid.geometry;
-        let point = bend.inverse(&(origin * (place * resolution)));
+        let point = deformation.inverse(&(origin * (place * resolution)));
         origin.inverse_transform_point(&point) / resolution
     }
 
@@ -125,23 +125,23 @@ impl LookupRow<'_> {
         if from >= to {
             return None;
         }
-        let (mut start, mut step, mut bend) = (self.start, self.lookup.step, None);
-        if let Some(bent) = self.lookup.bend {
+        let (mut start, mut step, mut deformation) = (self.start, self.lookup.step, None);
+        if let Some(deformed) = self.lookup.deformation {
             let ends = [from, to].map(|index| start + step * index as f64);
             let length = (ends[1] - ends[0]).norm() * self.lookup.grid.geometry.resolution;
             // A long stretch may bend within itself.
-            if length > LONGEST_STRAIGHT * bent.lattice.spacing() {
-                bend = Some(bent);
+            if length > LONGEST_STRAIGHT * deformed.lattice.spacing() {
+                deformation = Some(deformed);
             } else {
-                let [one, other] = ends.map(|end| self.lookup.unbent(&end, bent));
+                let [one, other] = ends.map(|end| self.lookup.undeformed(&end, deformed));
                 step = (other - one) / (to - from) as f64;
                 start = one - step * from as f64;
             }
         }
         let middle = start + step * ((from + to) as f64 / 2.0);
         // A stretch stays within a tile's length of its middle, if a step is no longer than two map cells.
-        let may_be_known = bend.is_some() || step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
-        may_be_known.then_some(Stretch { lookup: self.lookup, first, from, to, start, step, bend })
+        let may_be_known = deformation.is_some() || step.norm() > 2.0 || self.lookup.area.is_near(middle.x, middle.y);
+        may_be_known.then_some(Stretch { lookup: self.lookup, first, from, to, start, step, deformation })
     }
 }
 
@@ -158,7 +158,7 @@ struct Stretch<'a> {
     start: Point2,
     step: Vector2<f64>,
     /// Through which each cell is looked up by itself, if it is.
-    bend: Option<&'a Deformation>,
+    deformation: Option<&'a Deformation>,
 }
 
 impl Stretch<'_> {
@@ -166,7 +166,7 @@ impl Stretch<'_> {
     fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
         for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
             let place = self.start + self.step * index as f64;
-            let place = self.bend.map_or(place, |bend| self.lookup.unbent(&place, bend));
+            let place = self.deformation.map_or(place, |deformation| self.lookup.undeformed(&place, deformation));
             take(cell, self.lookup.value(&place));
         }
     }

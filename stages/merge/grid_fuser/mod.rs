@@ -37,7 +37,7 @@ pub struct PlacedGrid<'a> {
     /// `T_world_map`: the pose of the map frame in the world.
     pub transform_world_map: Pose2,
     /// How the map is bent; none if it is rigid.
-    pub bend: Option<&'a Deformation>,
+    pub deformation: Option<&'a Deformation>,
 }
 
 /// What is made of the maps: two grids of the same size.
@@ -52,15 +52,15 @@ pub struct Fused<'a> {
 impl<'a> PlacedGrid<'a> {
     /// A map that is not bent.
     pub fn rigid(grid: Grid<'a>, transform_world_map: Pose2) -> Self {
-        Self { grid, transform_world_map, bend: None }
+        Self { grid, transform_world_map, deformation: None }
     }
 
     /// Where a point of the map lies in the world, given in cells along the grid's sides from its corner.
     pub fn in_world(&self, cells: &Point2) -> Point2 {
         let in_grid = cells * self.grid.geometry.resolution;
-        match self.bend {
+        match self.deformation {
             None => self.transform_world_grid() * in_grid,
-            Some(bend) => self.transform_world_map * bend.apply(&(self.grid.geometry.origin * in_grid)),
+            Some(deformation) => self.transform_world_map * deformation.apply(&(self.grid.geometry.origin * in_grid)),
         }
     }
 

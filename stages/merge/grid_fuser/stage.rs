@@ -60,7 +60,7 @@ struct GridFuser {
     maps: RobotMaps<KnownArea>,
     placement: Placement,
     /// Whether a bend has come that is in no fused map.
-    has_new_bends: bool,
+    has_new_deformations: bool,
     /// The frames that the fused map sent last was made with.
     fused: Option<RobotFrames>,
 }
@@ -73,7 +73,7 @@ impl GridFuser {
             parameters,
             maps: RobotMaps::default(),
             placement: Placement::default(),
-            has_new_bends: false,
+            has_new_deformations: false,
             fused: None,
         }
     }
@@ -98,7 +98,7 @@ impl GridFuser {
         deformation: Received<'_, MapDeformation>,
         output: &Output<FusedMap>,
     ) -> Result<(), StageError> {
-        self.has_new_bends |= self.placement.keep_bend(&deformation, output);
+        self.has_new_deformations |= self.placement.keep_deformation(&deformation, output);
         Ok(())
     }
 
@@ -110,7 +110,7 @@ impl GridFuser {
     ) -> Result<(), StageError> {
         self.placement.frames = frames.into_content();
         let is_near = self.fused.as_ref().is_some_and(|fused| self.is_near(fused));
-        if is_near && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
+        if is_near && !self.has_new_deformations { Ok(()) } else { self.fuse(output) }
     }
 
     fn finish(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
@@ -118,7 +118,7 @@ impl GridFuser {
             (&fused.reference, self.placed(fused))
                 == (&self.placement.frames.reference, self.placed(&self.placement.frames))
         });
-        if is_sent && !self.has_new_bends { Ok(()) } else { self.fuse(output) }
+        if is_sent && !self.has_new_deformations { Ok(()) } else { self.fuse(output) }
     }
 
     /// Whether the robots are where the frames that were `fused` have them, as far as the parameters ask.
@@ -141,7 +141,7 @@ impl GridFuser {
 
     fn fuse(&mut self, output: &Output<FusedMap>) -> Result<(), StageError> {
         self.fused = Some(self.placement.frames.clone());
-        self.has_new_bends = false;
+        self.has_new_deformations = false;
         if !output.map.is_read() && !output.conflicts.is_read() && !output.agreement.is_read() {
             return Ok(());
         }
@@ -149,8 +149,8 @@ impl GridFuser {
         let mut maps = Vec::with_capacity(placed.len());
         for frame in &placed {
             let Some(map) = self.maps.get(&frame.robot) else { continue };
-            let bend = self.placement.bend(&frame.robot);
-            let placed = PlacedGrid { bend, ..PlacedGrid::rigid(map.grid(), frame.transform_reference_robot()) };
+            let deformation = self.placement.deformation(&frame.robot);
+            let placed = PlacedGrid { deformation, ..PlacedGrid::rigid(map.grid(), frame.transform_reference_robot()) };
             maps.push((placed, &map.own));
         }
 

@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{
     DeformationNode, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
     UnmergedRobot, encode,
 };
-use gridweave_runtime::stage::{Context, LoneStage, OutputEnd, OutputSink, StageError};
+use gridweave_runtime::stage::{Context, OutputEnd, OutputSink, StageError, StageHarness};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -15,11 +15,11 @@ const TIME: LogTime = LogTime(7_000_000_001);
 /// Width, height and cells.
 type Fused = (u32, u32, Vec<i8>);
 
-struct Run(LoneStage);
+struct Run(StageHarness);
 
 impl Run {
     fn new(parameters: &str) -> Self {
-        Self(LoneStage::new(&kind(), parameters).unwrap())
+        Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
     /// Gives a map and takes the fused maps that it caused.
@@ -35,11 +35,11 @@ impl Run {
     }
 
     /// The same of a bend, which displaces the map of a robot by `dx` metres about x = 0 and by nothing from x = 8 on.
-    fn bend(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
+    fn deformation(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
         let node = |x: f64, dx: f64| [0.0, 8.0].map(|y| DeformationNode { x, y, dx, ..Default::default() });
         let nodes = [node(0.0, dx), node(8.0, 0.0), node(16.0, 0.0)].concat();
-        let bend = MapDeformation { robot: robot.into(), spacing: 8.0, nodes, ..Default::default() };
-        self.0.give::<MapDeformation>("deformation", robot, TIME, &bend).unwrap();
+        let deformation = MapDeformation { robot: robot.into(), spacing: 8.0, nodes, ..Default::default() };
+        self.0.give::<MapDeformation>("deformation", robot, TIME, &deformation).unwrap();
         self.fused()
     }
 
@@ -90,12 +90,12 @@ fn a_bent_map_is_drawn_as_it_is_bent_in_both_ways_to_carry_cells() {
         run.map("robot1", 0.0, &[100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
         let straight = run.frames(&[("robot1", 0.0)]);
         assert_eq!(straight[0].2, [100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
-        assert!(run.bend("robot1", 2.4).is_empty(), "it waits for its frames");
+        assert!(run.deformation("robot1", 2.4).is_empty(), "it waits for its frames");
         // The left end goes to the right by two cells and the rest follows: the wall beyond the bend stays.
-        let bent = run.frames(&[("robot1", 0.0)]);
-        assert_eq!(bent[0].2.iter().filter(|cell| **cell == 100).count(), 2, "{bent:?}");
-        assert_eq!((bent[0].0, bent[0].2[0], bent[0].2[7]), (9, 100, 100), "{warp}: {bent:?}");
-        assert!(run.bend("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
+        let deformed = run.frames(&[("robot1", 0.0)]);
+        assert_eq!(deformed[0].2.iter().filter(|cell| **cell == 100).count(), 2, "{deformed:?}");
+        assert_eq!((deformed[0].0, deformed[0].2[0], deformed[0].2[7]), (9, 100, 100), "{warp}: {deformed:?}");
+        assert!(run.deformation("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
     }
 }
 
@@ -104,12 +104,12 @@ fn a_bend_that_no_frames_follow_is_drawn_at_the_end_and_one_that_is_none_is_left
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[100, 0, 0]);
     run.frames(&[("robot1", 0.0)]);
-    run.bend("robot1", f64::NAN);
+    run.deformation("robot1", f64::NAN);
     assert_eq!((run.0.warnings().len(), run.finish().len()), (1, 0));
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[100, 0, 0]);
     run.frames(&[("robot1", 0.0)]);
-    run.bend("robot1", 1.0);
+    run.deformation("robot1", 1.0);
     assert_eq!(run.finish().len(), 1);
 }
 

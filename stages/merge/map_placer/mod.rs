@@ -24,8 +24,8 @@ impl<'a> PlacedMap<'a> {
     /// Lays a map on cells of its own size along the axes of the world. None if nothing of it is known, or if it lies too far
     /// away for numbers.
     pub fn new(grid: Grid<'a>, area: &'a KnownArea, placed: &Placed<'a>) -> Option<Self> {
-        let Placed { transform_world_map, bend } = *placed;
-        let map = (PlacedGrid { grid, transform_world_map, bend }, area);
+        let Placed { transform_world_map, deformation } = *placed;
+        let map = (PlacedGrid { grid, transform_world_map, deformation }, area);
         let GridFuserParameters { max_extent, max_cells, .. } = Default::default();
         let anchor = map.0.transform_world_grid().translation.vector.into();
         let lattice = Lattice { anchor, resolution: grid.geometry.resolution, max_extent, max_cells };

@@ -53,7 +53,7 @@ impl MapPlacer {
         deformation: Received<'_, MapDeformation>,
         output: &Output<PlacedMaps>,
     ) -> Result<(), StageError> {
-        self.placement.keep_bend(&deformation, output);
+        self.placement.keep_deformation(&deformation, output);
         Ok(())
     }
 

@@ -59,7 +59,7 @@ struct PathPlacer {
     drives: BTreeMap<String, Drive>,
     placement: Placement,
     /// Whether a bend has come that is in no path that was sent.
-    has_new_bends: bool,
+    has_new_deformations: bool,
     /// Whether a pose has.
     has_new_poses: bool,
 }
@@ -86,7 +86,7 @@ impl PathPlacer {
         deformation: Received<'_, MapDeformation>,
         output: &Output<Paths>,
     ) -> Result<(), StageError> {
-        self.has_new_bends |= self.placement.keep_bend(&deformation, output);
+        self.has_new_deformations |= self.placement.keep_deformation(&deformation, output);
         Ok(())
     }
 
@@ -94,17 +94,17 @@ impl PathPlacer {
         let frames = frames.into_content();
         let is_same = frames.reference == self.placement.frames.reference
             && frames.frames == self.placement.frames.frames
-            && !self.has_new_bends;
+            && !self.has_new_deformations;
         self.placement.frames = frames;
         if is_same { Ok(()) } else { self.send(output) }
     }
 
     fn finish(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
-        if self.has_new_bends || self.has_new_poses { self.send(output) } else { Ok(()) }
+        if self.has_new_deformations || self.has_new_poses { self.send(output) } else { Ok(()) }
     }
 
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
-        (self.has_new_bends, self.has_new_poses) = (false, false);
+        (self.has_new_deformations, self.has_new_poses) = (false, false);
         for (robot, placed) in self.placement.placed() {
             let Some(drive) = self.drives.get(robot) else { continue };
             let stamped = |(stamp, in_map)| PoseStamped {

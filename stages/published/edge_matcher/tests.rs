@@ -6,7 +6,7 @@ use crate::shared::geometry::{Grid, Point2, Pose2, pose, row_by_row};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Point, TopologicalMap, TopologicalNode, TopologicalPath};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use proptest::prelude::*;
 
@@ -186,9 +186,9 @@ fn rotation(yaw: f64, accepted: bool) -> Alignment {
 fn the_stage_matches_a_pair_when_its_rotation_has_come() {
     let [west, east] = offices();
     let truth = west.transform_to(&east);
-    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let mut stage = StageHarness::new(&kind(), "").unwrap();
     let mut time = 0;
-    let mut give = |stage: &mut LoneStage, map: Option<&TopologicalMap>, alignment: Option<&Alignment>| {
+    let mut give = |stage: &mut StageHarness, map: Option<&TopologicalMap>, alignment: Option<&Alignment>| {
         time += 1;
         if let Some(map) = map {
             stage.give::<TopologicalMap>("topological_map", &map.robot, LogTime(time), map).unwrap();
@@ -219,7 +219,7 @@ fn the_stage_matches_a_pair_when_its_rotation_has_come() {
 
 #[test]
 fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
-    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let mut stage = StageHarness::new(&kind(), "").unwrap();
     stage.give::<Alignment>("alignment", "", LogTime(1), &rotation(0.0, true)).unwrap();
     stage.finish(LogTime(2)).unwrap();
     let sent = stage.take::<Alignment>("alignment").unwrap();

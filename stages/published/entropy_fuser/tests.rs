@@ -5,7 +5,7 @@ use crate::shared::geometry::{Grid, GridGeometry, pose};
 use crate::shared::log_odds::{LogOdds, entropy};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 use proptest::prelude::*;
 
 fn geometry(width: usize, height: usize, x: f64, y: f64) -> GridGeometry {
@@ -80,7 +80,7 @@ fn a_map_that_does_not_lie_on_the_lattice_is_left_out() {
 }
 
 /// A stage that is given maps of two cells, and what it sends.
-struct Run(LoneStage);
+struct Run(StageHarness);
 
 impl Run {
     fn map(&mut self, time: u64, robot: &str, cells: &[u8]) -> Vec<Vec<i8>> {
@@ -106,7 +106,7 @@ impl Run {
 
 #[test]
 fn the_stage_fuses_the_maps_of_one_time_once_and_the_reference_counts_first() {
-    let mut run = Run(LoneStage::new(&kind(), "").unwrap());
+    let mut run = Run(StageHarness::new(&kind(), "").unwrap());
     assert_eq!(run.map(1, "a", &[30, 100]), [[0; 0]; 0]);
     assert_eq!(run.map(1, "b", &[70, 255]), [[0; 0]; 0]);
     assert_eq!(run.frames(1, &["a", "b"]), [[70, 100]], "b is the reference");
@@ -121,7 +121,7 @@ fn the_stage_fuses_the_maps_of_one_time_once_and_the_reference_counts_first() {
 
 #[test]
 fn the_stage_tells_which_map_is_left_out() {
-    let mut run = Run(LoneStage::new(&kind(), "max_cells = 3").unwrap());
+    let mut run = Run(StageHarness::new(&kind(), "max_cells = 3").unwrap());
     run.map(1, "b", &[0, 0]);
     run.map(1, "a", &[0, 0, 0, 100]);
     assert_eq!(run.frames(1, &["a", "b"]), [[0, 0]]);

@@ -201,6 +201,6 @@ fn wrong_parameters_are_told() {
         "cell = 0.01\nmax_extent = 400.0",
         "cell = nan",
     ] {
-        assert!(gridweave_runtime::stage::LoneStage::new(&kind(), text).is_err(), "{text}");
+        assert!(gridweave_runtime::stage::StageHarness::new(&kind(), text).is_err(), "{text}");
     }
 }

@@ -5,7 +5,7 @@ use crate::shared::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN, 
 use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, TopologicalMap};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 
 const WIDTH: usize = 60;
 
@@ -102,7 +102,7 @@ fn the_diagram_is_drawn_in_the_frame_of_the_map() {
 
 #[test]
 fn the_stage_sends_the_diagram_of_each_map_that_has_changed() {
-    let mut stage = LoneStage::new(&kind(), "min_probability = 0.3").unwrap();
+    let mut stage = StageHarness::new(&kind(), "min_probability = 0.3").unwrap();
     let mut give = |robot: &str, cells: &[i8]| {
         let data: Vec<u8> = cells.iter().map(|value| *value as u8).collect();
         let header = gridweave_runtime::ros::Header { frame_id: "frame".into(), ..Default::default() };

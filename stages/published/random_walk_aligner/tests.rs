@@ -5,7 +5,7 @@ use crate::registration::search::Raster;
 use crate::shared::geometry::{Grid, GridGeometry, pose};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::shared::test_world::stage_bench::StageBench;
-use gridweave_runtime::stage::{Context, LoneStage};
+use gridweave_runtime::stage::{Context, StageHarness};
 
 /// Few walks over wide cells, which is quick.
 const QUICK: &str = "cell = 0.2\nmax_points = 300\nwalks = 8\nmax_trials = 1500\npatience = 300\nmin_omega = 0.9\n";
@@ -115,6 +115,6 @@ fn wrong_parameters_are_told() {
         "max_points = 0",
         "history = 0",
     ] {
-        assert!(LoneStage::new(&kind(), text).is_err(), "{text}");
+        assert!(StageHarness::new(&kind(), text).is_err(), "{text}");
     }
 }

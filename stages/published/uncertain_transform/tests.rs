@@ -7,7 +7,7 @@ use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
@@ -203,13 +203,13 @@ fn frames(placed: &[(&str, Pose2, Matrix3<f64>)]) -> RobotFrames {
 fn the_stage_sends_maps_of_placed_robots_on_one_lattice_when_they_have_changed() {
     let map = office(0.2);
     let message = OccupancyGrid { info: map.info(), data: &map.bytes(), ..Default::default() };
-    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let mut stage = StageHarness::new(&kind(), "").unwrap();
     let mut give = |robot: &str| {
         stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(1), &message).unwrap();
         stage.take_messages("map").len()
     };
     assert_eq!((give("b"), give("a")), (0, 0), "nobody is placed");
-    let place = |stage: &mut LoneStage, placed: &[(&str, Pose2, Matrix3<f64>)]| -> Vec<(String, GridGeometry)> {
+    let place = |stage: &mut StageHarness, placed: &[(&str, Pose2, Matrix3<f64>)]| -> Vec<(String, GridGeometry)> {
         stage.give::<RobotFrames>("frames", "", LogTime(2), &frames(placed)).unwrap();
         let read = |message: &gridweave_runtime::message::Message| {
             let grid = message.decode::<OccupancyGrid<'_>>().unwrap();

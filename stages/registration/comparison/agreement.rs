@@ -9,81 +9,81 @@ use crate::shared::geometry::{Grid, Point2, Pose2, is_known};
 use crate::shared::walls::WallMap;
 use nalgebra::Vector2;
 
-/// Two walls that lie within this many cells of the coarser map of each other may be the same one, drawn in other
-/// cells.
+/// Two walls within this many cells of the coarser map may be the same one, drawn in other cells.
 const LEAST_TOLERANCE: f64 = 1.5;
-/// The share of the walls that two maps of one place agree on, moved furniture, open doors and bends included: low, so that
-/// one poor map does not lose against its good place.
-const AGREEMENT_OF_ONE_PLACE: f64 = 0.75;
-/// The share of the walls that agree where a map is laid anywhere, least and most. What is measured on a map of a few walls
-/// is not known better.
+/// Inlier ratio expected of two maps of one place, with moved furniture, open doors and deformation. Low, so that one
+/// poor map does not lose against its correct pose.
+const INLIER_RATIO_OF_ONE_PLACE: f64 = 0.75;
+/// Bounds of the inlier ratio expected of a random pose. What is measured on a map of a few walls is not known
+/// better.
 const CHANCE_RANGE: (f64, f64) = (0.02, 0.5);
 
-/// A map: its cells, and what was made of them.
+/// A map as it is compared: its cells, its walls, and its deformation.
 #[derive(Clone, Copy, Debug)]
 pub struct MapView<'a> {
     /// Its cells.
     pub grid: Grid<'a>,
-    /// Its walls and the samples of its known space, as they are bent.
+    /// Its walls and the samples of its known space, deformed.
     pub walls: &'a WallMap,
-    /// How it is bent; none if it is rigid.
-    pub bend: Option<&'a Deformation>,
+    /// Its deformation; none if it is rigid.
+    pub deformation: Option<&'a Deformation>,
 }
 
 impl<'a> MapView<'a> {
-    /// A map as it came, with its walls.
+    /// A map without deformation.
     pub fn rigid(grid: Grid<'a>, walls: &'a WallMap) -> Self {
-        Self { grid, walls, bend: None }
+        Self { grid, walls, deformation: None }
     }
 
-    /// The value of the cell at a place of the bent map.
+    /// Value of the cell at a point of the deformed map.
     pub(super) fn value_at(&self, place: &Point2) -> i8 {
-        match self.bend {
-            Some(bend) => self.grid.value_at(&bend.inverse(place)),
+        match self.deformation {
+            Some(deformation) => self.grid.value_at(&deformation.inverse(place)),
             None => self.grid.value_at(place),
         }
     }
 }
 
-/// What two maps say of each other at one place.
+/// How far two maps agree at one relative pose.
 ///
-/// Lengths are the mean of both ways: walls of b looked up in a, and walls of a looked up in b.
+/// Lengths are the mean of both directions: walls of b looked up in a, and walls of a looked up in b.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
     /// Area that both maps know, square metres.
     pub overlap: f64,
-    /// Length of wall of one map that lies on wall of the other, runs alike and is seen from the same side, metres.
+    /// Inlier length: wall of one map on a parallel wall of the other that is seen from the same side, metres.
     pub inlier_length: f64,
-    /// Length of wall of one map that lies where the other knows free space, farther from any wall than the tolerance,
+    /// Conflict length: wall of one map on known free space of the other, farther from any wall than the tolerance,
     /// metres.
     pub conflict_length: f64,
-    /// Of that, what crosses free space: pieces as long as a door is wide, with no wall that runs alike within 0.4 m beyond the
-    /// tolerance, metres.
+    /// Crossing length, a part of the conflict length: pieces at least as long as a door is wide, with no parallel
+    /// wall within 0.4 m beyond the tolerance, metres.
     pub crossing_length: f64,
-    /// The log-likelihood ratio of the walls: how much likelier they are to meet as they do if this is the place than if map b lay
-    /// anywhere. Every region counts by itself, and no region more than walls as long as its side.
+    /// Log-likelihood ratio of the walls: of the inliers and conflicts at this pose to those of a random pose.
+    /// Regions are independent, and none counts for more than walls as long as its side.
     pub evidence: f64,
-    /// The share of the inliers, 0 to 1, that do not belong to the two straight walls of which most agrees: two walls fix a place, as
-    /// any corner fits any other, and only what agrees beside them confirms it.
+    /// Share of the inliers, 0 to 1, outside the two straight walls with the most inliers. Two walls fix a pose, as
+    /// any corner fits any other; only further walls confirm it.
     pub independent_share: f64,
-    /// The number of independent constraints in the weaker of two directions: straight walls that agree along the longest one and
-    /// across it, the fewer of both, four at the most. With none, the place along the walls is open.
+    /// Number of independent constraints in the weaker of two directions: straight walls with inliers along the
+    /// longest one and across it, the fewer of both, at most four. 0 is degenerate: the position along the walls is
+    /// open.
     pub constraints: usize,
-    /// How far regions of map b are moved to lie on map a, the root of the mean square over the inliers, metres: at places that
-    /// fit by chance, the walls of every room are a little beside those of the other map in another direction.
+    /// Local residual: by how much regions of map b are shifted to align with map a, root mean square over the
+    /// inliers, metres. Where maps fit by chance, the walls of every room are a little off in another direction.
     pub residual: f64,
-    /// The middle of the inliers of map b, frame a; the origin if there are none.
+    /// Centroid of the inliers of map b, frame a; the origin if there are none.
     pub centre: Point2,
 }
 
 impl Agreement {
-    /// The share of the walls that both maps have seen on which they agree, 0 to 1; 0 if there are none.
+    /// Inlier ratio: the share of the compared walls that are inliers, 0 to 1; 0 if there are none.
     pub fn inlier_ratio(&self) -> f64 {
         let seen = self.compared_length();
         if seen > 0.0 { self.inlier_length / seen } else { 0.0 }
     }
 
-    /// Length of wall of one map of which the other knows what is there, metres.
+    /// Length of wall of one map at which the other map is known, metres.
     pub fn compared_length(&self) -> f64 {
         self.inlier_length + self.conflict_length
     }
@@ -113,15 +113,15 @@ pub fn compare(
     };
     let chance = (chance(a, tolerance) + chance(b, tolerance)) / 2.0;
     let (for_it, against_it) =
-        ((AGREEMENT_OF_ONE_PLACE / chance).ln(), ((1.0 - AGREEMENT_OF_ONE_PLACE) / (1.0 - chance)).ln());
-    let StraightWalls { confirming, either_way } = StraightWalls::of(&on_wall, b.walls.spacing);
+        ((INLIER_RATIO_OF_ONE_PLACE / chance).ln(), ((1.0 - INLIER_RATIO_OF_ONE_PLACE) / (1.0 - chance)).ln());
+    let StraightWalls { independent_share, constraints } = StraightWalls::of(&on_wall, b.walls.spacing);
     let mut agreement = Agreement {
         overlap: overlap(a, b, transform_a_b),
         crossing_length: 0.5 * (across(&apart_of_a, a.walls) + across(&apart_of_b, b.walls)),
-        independent_share: confirming,
-        constraints: either_way,
+        independent_share,
+        constraints,
         residual: residual(&regions),
-        centre: middle(&on_wall),
+        centre: centroid(&on_wall),
         ..Default::default()
     };
     for region in &regions {
@@ -133,28 +133,28 @@ pub fn compare(
     agreement
 }
 
-/// How far regions were moved, the root of the mean square over the inliers; 0 without any.
+/// Root mean square over the inliers of the shifts of the regions, metres; 0 without inliers.
 fn residual(regions: &[Region]) -> f64 {
     let agree: f64 = regions.iter().map(|region| region.inlier_length).sum();
     let squares: f64 = regions.iter().map(|region| region.inlier_length * region.shift.powi(2)).sum();
     if agree > 0.0 { (squares / agree).sqrt() } else { 0.0 }
 }
 
-/// The middle of some walls; the origin if there are none.
-fn middle(walls: &[ComparedWall]) -> Point2 {
+/// Centroid of some walls; the origin if there are none.
+fn centroid(walls: &[ComparedWall]) -> Point2 {
     let sum: Vector2<f64> = walls.iter().map(|wall| wall.point.coords).sum();
     Point2::from(sum / walls.len().max(1) as f64)
 }
 
-/// The probability that a piece of wall that is laid anywhere in the known space of a map lies on a wall that runs alike:
-/// the share of that space within the tolerance of walls, halved for the direction.
+/// Probability that a piece of wall at a random pose in the known space of a map is an inlier: the share of that
+/// space within the tolerance of walls, halved for the direction.
 fn chance(map: &MapView<'_>, tolerance: f64) -> f64 {
     let known = map.walls.samples.len() as f64 * map.walls.sample_area;
     let length = map.walls.walls.points().len() as f64 * map.walls.spacing;
     (0.5 * 2.0 * tolerance * length / known.max(1.0)).clamp(CHANCE_RANGE.0, CHANCE_RANGE.1)
 }
 
-/// The area that both maps know, square metres.
+/// Area that both maps know, square metres.
 fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
     let samples = b.walls.samples.iter();
     let known = samples.filter(|sample| is_known(a.value_at(&(transform_a_b * sample.point)))).count();
@@ -169,7 +169,7 @@ mod tests {
     use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
 
     #[test]
-    fn walls_that_cross_rooms_are_told_from_those_drawn_beside_in_cells_of_any_size() {
+    fn crossing_walls_are_distinguished_from_walls_drawn_beside_at_any_resolution() {
         for resolution in [0.05, 0.4] {
             let fine = drawing(0.0, 0.0, 0.0);
             let seen = seen(-1.0, -1.0, 21.0, 13.0);

@@ -1,19 +1,19 @@
-//! Walls of one map that cross the free space of the other: what maps of one place have little of.
+//! Walls of one map that cross the free space of the other, which maps of one place hardly have.
 //!
-//! Where a map is bent, or drawn roughly, its walls lie beside those of the other. What lies alone on free space and is small is a
-//! leg, a person or a chair, and may have moved. What is as long as a door is wide is a wall, as a rule, and two maps of one place
-//! seldom disagree about walls in the middle of their rooms.
+//! In a deformed or roughly drawn map, walls are beside those of the other. A small piece alone in free space is a
+//! leg, a person or a chair, and may have moved. A piece as long as a door is wide is a wall, as a rule, and two maps
+//! of one place seldom disagree about walls in the middle of their rooms.
 
 use crate::shared::geometry::Point2;
 use nalgebra::Vector2;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is at least so long is a wall, metres: about as wide as a door, and larger than what is easily moved.
+/// Least extent of a wall, metres: about as wide as a door, and larger than what is easily moved.
 const LEAST_EXTENT: f64 = 0.7;
-/// Pieces of wall are one where the points of both lie in squares of this side that touch, metres.
+/// Points are connected if they are in squares of this side that touch, metres.
 const LINK: f64 = 0.25;
 
-/// The number of those points of walls on free space that belong to a piece which is large enough to be a wall. `spacing` is the
+/// Number of the points on free space that belong to a connected piece large enough to be a wall. `spacing` is the
 /// distance of neighbouring points, metres.
 pub(super) fn points_of_walls(points: &[Point2], spacing: f64) -> usize {
     let side = LINK.max(spacing);
@@ -32,7 +32,7 @@ pub(super) fn points_of_walls(points: &[Point2], spacing: f64) -> usize {
     count
 }
 
-/// The squares that hang together with one, which are taken out of those that are left.
+/// The squares connected with the first one, removed from `left`.
 fn connected(first: (i32, i32), left: &mut BTreeSet<(i32, i32)>) -> Vec<(i32, i32)> {
     let mut found = vec![first];
     let mut next = 0;
@@ -44,7 +44,7 @@ fn connected(first: (i32, i32), left: &mut BTreeSet<(i32, i32)>) -> Vec<(i32, i3
     found
 }
 
-/// The diagonal of the rectangle around some points, metres.
+/// Diagonal of the rectangle around some points, metres.
 fn extent(points: &[&Point2]) -> f64 {
     let low = points.iter().fold(Vector2::repeat(f64::INFINITY), |low, point| low.inf(&point.coords));
     let high = points.iter().fold(Vector2::repeat(f64::NEG_INFINITY), |high, point| high.sup(&point.coords));

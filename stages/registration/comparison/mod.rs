@@ -1,10 +1,10 @@
-//! Compares two maps at one place: where their walls lie on each other, and where they contradict each other.
+//! Compares two maps at one relative pose: where their walls agree, and where they contradict each other.
 //!
-//! Walls of one map on walls of the other speak for a place, and walls on known free space against it: Birk and Carpin,
-//! "Merging occupancy grid maps from multiple robots" (Proceedings of the IEEE 2006).
+//! Walls of one map on walls of the other are evidence for a pose, walls on known free space are evidence against it:
+//! Birk and Carpin, "Merging occupancy grid maps from multiple robots" (Proceedings of the IEEE 2006).
 //!
-//! - [`compare`]: what two maps say of each other, in an [`Agreement`].
-//! - [`Deformed`]: the same with map b deformed as maps of a SLAM are, where the maps contradict each other as they came.
+//! - [`compare`]: the [`Agreement`] of two maps.
+//! - [`Deformed`]: the same with map b deformed, where the maps contradict each other as they came.
 
 mod agreement;
 mod conflicts;

@@ -1,16 +1,17 @@
 //! How two maps are compared.
 
-/// The tolerances of a comparison: `merge_verifier` takes them from its own parameters.
+/// Tolerances of a comparison; `merge_verifier` takes them from its own parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ComparisonParameters {
-    /// Two walls agree when they lie within this distance, metres; never less than 1.5 cells of the coarser map.
+    /// Distance within which two walls agree, metres; never less than 1.5 cells of the coarser map.
     pub wall_tolerance: f64,
-    /// The side of the squares that are compared one by one, metres.
+    /// Side of the square regions that are compared independently, metres.
     pub region: f64,
-    /// Standard deviation of how far a square is moved along x and along y, metres.
+    /// Standard deviation of the shift of a region along x and along y, metres.
     pub region_deviation: f64,
-    /// Standard deviation of the displacement of two places of a map against each other, metres for the root of each metre between them.
+    /// Deformation: standard deviation of the displacement of two points of a map against each other, metres per
+    /// square root of a metre between them.
     pub bend: f64,
-    /// The same of their turn, radians.
+    /// The same for their turn, radians per square root of a metre.
     pub turn: f64,
 }

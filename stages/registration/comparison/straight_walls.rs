@@ -1,38 +1,39 @@
-//! What the walls that agree have to say of a place, counted in straight walls: neighbouring points of one wall say the same thing.
+//! Independent constraints on a pose from the walls that agree, counted in straight walls: neighbouring points of one
+//! wall are not independent.
 //!
-//! Two walls that are not parallel fix a place in all directions: any corner fits any other corner. So the two straight walls of
-//! which most agrees say nothing of whether the place is right; what agrees beside them does. And walls that run one way only, as
-//! those of a corridor or of a row of shelves, leave the place along them open: what counts is how many there are the other way.
+//! Two walls that are not parallel fix a pose in all directions, as any corner fits any other corner. So the inliers
+//! on the two longest straight walls are no evidence that the pose is right; only the further inliers are. And
+//! parallel walls, as in a corridor or between rows of shelves, leave the position along them open: what counts is
+//! the number of walls across.
 
 use super::regions::ComparedWall;
 use nalgebra::Vector2;
 use std::f64::consts::PI;
 
-/// So many directions of straight walls are looked at.
+/// Number of directions in which straight walls are sought.
 const DIRECTIONS: usize = 36;
-/// The least cosine of the angle between the normals of a straight wall and of what belongs to it (10 degrees).
+/// Least cosine of the angle between the normal of a straight wall and those of its points (10 degrees).
 const SAME_DIRECTION: f64 = 0.985;
-/// The largest cosine of the angle between the normals of two walls that fix a place in all directions (45 degrees).
+/// Largest cosine of the angle between the normals of two walls that fix a pose in all directions (45 degrees).
 const ANOTHER_DIRECTION: f64 = 0.707;
-/// What belongs to a straight wall lies in a strip that is so wide: its two sides, and what it is bent by, metres.
+/// Width of the strip that holds a straight wall: both of its sides, and its deformation, metres.
 const WIDTH: f64 = 0.3;
-/// Of less than this much agreement is no straight wall, metres.
+/// Least length of inliers on a straight wall, metres.
 const LEAST_LENGTH: f64 = 0.5;
-/// More walls than this in a direction tell no more.
+/// More walls in a direction are no further evidence.
 const MOST_WALLS: usize = 4;
 
-/// What some walls that agree amount to.
+/// Independent constraints from the inliers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct StraightWalls {
-    /// The share of them that does not belong to the two walls that fix the place, 0 to 1; 0 if there are none.
-    pub(super) confirming: f64,
-    /// The number of straight walls in the one of two directions in which there are fewer: along the longest, and across it.
-    /// Not more than four.
-    pub(super) either_way: usize,
+    /// Share of the inliers outside the two walls that fix the pose, 0 to 1; 0 if there are none.
+    pub(super) independent_share: f64,
+    /// Number of straight walls along the longest one or across it, the fewer of both; at most four.
+    pub(super) constraints: usize,
 }
 
 impl StraightWalls {
-    /// Of points of walls that each stand for so many metres.
+    /// Counts the straight walls among points that are `spacing` metres of wall each.
     pub(super) fn of(walls: &[ComparedWall], spacing: f64) -> Self {
         let strips = Strips::new(walls);
         let mut left = vec![true; walls.len()];
@@ -41,7 +42,7 @@ impl StraightWalls {
         longest.take_from(walls, &mut left);
         let second = strips.of_most(|index| left[index] && crosses(index));
         let is_beside = |index: usize| left[index] && !second.as_ref().is_some_and(|(_, one)| one.holds(&walls[index]));
-        let confirming = (0..walls.len()).filter(|index| is_beside(*index)).count();
+        let independent_share = (0..walls.len()).filter(|index| is_beside(*index)).count();
         // The longest is one of those along it.
         let (mut along, mut across) = (1, 0);
         while along.min(across) < MOST_WALLS {
@@ -53,20 +54,20 @@ impl StraightWalls {
             let runs_along = strip.normal.dot(&longest.normal).abs() > ANOTHER_DIRECTION;
             *(if runs_along { &mut along } else { &mut across }) += 1;
         }
-        Self { confirming: confirming as f64 / walls.len() as f64, either_way: along.min(across) }
+        Self { independent_share: independent_share as f64 / walls.len() as f64, constraints: along.min(across) }
     }
 }
 
-/// The points of walls that run along each direction.
+/// Points of walls, by the direction of the wall.
 struct Strips {
     directions: Vec<Direction>,
 }
 
-/// The points of walls that run along a direction.
+/// Points of walls that run in one direction.
 struct Direction {
-    /// Across it.
+    /// Unit normal of the direction.
     normal: Vector2<f64>,
-    /// Where they lie along the normal, metres, and their numbers; the least first.
+    /// Offset of each point along the normal, metres, and its index; the least first.
     offsets: Vec<(f64, usize)>,
 }
 
@@ -84,7 +85,7 @@ impl Strips {
         Self { directions: (0..DIRECTIONS).map(direction).collect() }
     }
 
-    /// The strip that holds most of the walls that are asked for, and how many; none if there are none.
+    /// The strip that holds most of the requested points, and their number; none if there are none.
     fn of_most(&self, is_asked_for: impl Fn(usize) -> bool) -> Option<(usize, Strip)> {
         let mut best: Option<(usize, Strip)> = None;
         for Direction { normal, offsets } in &self.directions {
@@ -107,10 +108,10 @@ impl Strips {
     }
 }
 
-/// Where a straight wall runs.
+/// A straight strip of constant width.
 struct Strip {
     normal: Vector2<f64>,
-    /// Along the normal, metres.
+    /// Offset along the normal, metres.
     start: f64,
 }
 
@@ -120,7 +121,7 @@ impl Strip {
         runs_along(wall, &self.normal) && (self.start..=self.start + WIDTH).contains(&offset)
     }
 
-    /// Takes what belongs to it out of those that are left.
+    /// Clears the flags of the points in the strip.
     fn take_from(&self, walls: &[ComparedWall], left: &mut [bool]) {
         walls.iter().zip(left).filter(|(wall, _)| self.holds(wall)).for_each(|(_, left)| *left = false);
     }
@@ -158,10 +159,10 @@ mod tests {
     }
 
     #[test]
-    fn a_corner_fixes_a_place_and_confirms_nothing() {
+    fn a_corner_fixes_a_pose_and_leaves_no_independent_inliers() {
         assert_eq!(of(&[]), StraightWalls::default());
         assert_eq!(of(&wall((0.0, 0.0), (10.0, 0.0))), StraightWalls::default());
-        let corner = StraightWalls { confirming: 0.0, either_way: 1 };
+        let corner = StraightWalls { independent_share: 0.0, constraints: 1 };
         assert_eq!(of(&[wall((0.0, 0.0), (10.0, 0.0)), wall((0.0, 0.0), (0.0, 6.0))].concat()), corner);
         // Turned, and interrupted by a door.
         let slanted =
@@ -178,29 +179,29 @@ mod tests {
             wall((10.0, 0.0), (10.0, 6.0)),
         ];
         let room = of(&room.concat());
-        assert!((room.confirming - 0.5).abs() < 0.01 && room.either_way == 2, "{room:?}");
+        assert!((room.independent_share - 0.5).abs() < 0.01 && room.constraints == 2, "{room:?}");
     }
 
     #[test]
-    fn walls_that_run_one_way_only_are_none_the_other_way() {
+    fn parallel_walls_are_no_constraint_along_them() {
         let rows: Vec<ComparedWall> =
             (0..8).flat_map(|row| wall((0.0, 2.0 * f64::from(row)), (10.0, 2.0 * f64::from(row)))).collect();
-        assert_eq!(of(&rows).either_way, 0);
+        assert_eq!(of(&rows).constraints, 0);
         let with_a_post = [rows, wall((10.0, 0.0), (10.0, 0.3))].concat();
-        assert_eq!(of(&with_a_post).either_way, 0, "what is as short as a post is no wall");
+        assert_eq!(of(&with_a_post).constraints, 0, "a piece as short as a post is no wall");
     }
 
     #[test]
-    fn doors_part_no_wall_and_more_walls_than_four_tell_no_more() {
+    fn doors_do_not_split_a_wall_and_more_than_four_walls_are_no_further_evidence() {
         let rooms: Vec<ComparedWall> = (0..7)
             .flat_map(|number| {
                 let x = 4.0 * f64::from(number);
                 [wall((x, 0.0), (x, 3.0)), wall((x, 4.0), (x, 7.0)), wall((x, 0.0), (x + 3.0, 0.0))].concat()
             })
             .collect();
-        assert_eq!(of(&rooms).either_way, 1, "one long wall with doors, and seven across");
+        assert_eq!(of(&rooms).constraints, 1, "one long wall with doors, and seven across");
         let shifted: Vec<ComparedWall> =
             (0..7).flat_map(|row| wall((0.0, f64::from(row)), (28.0, f64::from(row)))).collect();
-        assert_eq!(of(&[rooms, shifted].concat()).either_way, 4);
+        assert_eq!(of(&[rooms, shifted].concat()).constraints, 4);
     }
 }

@@ -1,21 +1,21 @@
-//! The first guess and how far it can be trusted.
+//! The initial guess of ICP, and its covariance.
 
 use super::IcpParameters;
 use crate::shared::geometry::{Point2, Pose2, wrap_angle};
 use nalgebra::{Matrix3, Vector3};
 
-/// A first guess of `T_a_b`, and the covariance of its x, y and yaw.
+/// An initial guess of `T_a_b` with the covariance of its x, y and yaw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstGuess {
-    /// `T_a_b`.
+    /// Pose of map b in map a.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
     pub covariance: Matrix3<f64>,
 }
 
 impl FirstGuess {
-    /// A first guess; a covariance that is none (not finite, not positive definite) is replaced by the one that
-    /// the parameters give for this case.
+    /// Makes an initial guess. A covariance that is not finite or not positive definite is replaced by the default of
+    /// the parameters.
     pub fn new(transform_a_b: Pose2, covariance: Matrix3<f64>, parameters: &IcpParameters) -> Self {
         let symmetric = (covariance + covariance.transpose()) / 2.0;
         let usable = symmetric.iter().all(|value| value.is_finite()) && symmetric.cholesky().is_some();
@@ -29,32 +29,32 @@ impl FirstGuess {
     }
 }
 
-/// Small changes of a transform, written as a shift and a turn about a place in frame a.
+/// Coordinates for small changes of a transform: a shift, and a turn about a point in frame a.
 ///
-/// Far from the frame's origin a turn moves everything, so x, y and yaw of the transform depend on one another. In
-/// these coordinates they hardly do: (shift x, shift y, turn x `scale`), all metres.
+/// Far from the frame's origin a turn moves everything, so x, y and yaw of the transform are correlated. In these
+/// coordinates they hardly are: (shift x, shift y, turn x `scale`), all metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LocalFrame {
     pub(super) centre: Point2,
-    /// Metres that stand for one radian: the typical distance of the wall points from the centre.
+    /// Metres per radian: the root mean square distance of the wall points from the centre.
     pub(super) scale: f64,
 }
 
 impl LocalFrame {
-    /// The derivative of (x, y, yaw) of `transform` by the local coordinates.
+    /// Derivative of (x, y, yaw) of `transform` with respect to the local coordinates.
     pub(super) fn jacobian(&self, transform: &Pose2) -> Matrix3<f64> {
         let arm = transform.translation.vector - self.centre.coords;
         let turn = 1.0 / self.scale;
         Matrix3::new(1.0, 0.0, -arm.y * turn, 0.0, 1.0, arm.x * turn, 0.0, 0.0, turn)
     }
 
-    /// The derivative of the local coordinates by (x, y, yaw) of `transform`.
+    /// Derivative of the local coordinates with respect to (x, y, yaw) of `transform`.
     pub(super) fn inverse_jacobian(&self, transform: &Pose2) -> Matrix3<f64> {
         let arm = transform.translation.vector - self.centre.coords;
         Matrix3::new(1.0, 0.0, arm.y, 0.0, 1.0, -arm.x, 0.0, 0.0, self.scale)
     }
 
-    /// The transform after a small change.
+    /// The transform after a small change in local coordinates.
     pub(super) fn moved(&self, transform: &Pose2, change: &Vector3<f64>) -> Pose2 {
         let turn = nalgebra::UnitComplex::new(change.z / self.scale);
         let offset = turn * (transform.translation.vector - self.centre.coords);
@@ -64,7 +64,7 @@ impl LocalFrame {
 }
 
 impl FirstGuess {
-    /// The first guess's covariance in local coordinates, with the slack that the parameters add to it.
+    /// Covariance of the initial guess in local coordinates, with the slack of the parameters added.
     pub(super) fn local_covariance(&self, frame: &LocalFrame, parameters: &IcpParameters) -> Matrix3<f64> {
         let derivative = frame.inverse_jacobian(&self.transform_a_b);
         let position = parameters.position_slack.powi(2);
@@ -72,16 +72,16 @@ impl FirstGuess {
         derivative * self.covariance * derivative.transpose() + Matrix3::from_diagonal(&slack)
     }
 
-    /// How far a transform has left the first guess, in local coordinates.
+    /// Deviation of a transform from the initial guess, in local coordinates.
     pub(super) fn local_deviation(&self, transform: &Pose2, frame: &LocalFrame) -> Vector3<f64> {
-        // Exact for any turn: where does the change take the centre?
+        // Exact for any turn: the change is applied to the centre.
         let change = transform * self.transform_a_b.inverse();
         let shift = change * frame.centre - frame.centre;
         let turn = wrap_angle(change.rotation.angle());
         Vector3::new(shift.x, shift.y, turn * frame.scale)
     }
 
-    /// How far a transform has left the first guess, in standard deviations, slack included.
+    /// Mahalanobis distance of a transform from the initial guess, slack included.
     pub(super) fn distance(&self, transform: &Pose2, frame: &LocalFrame, parameters: &IcpParameters) -> f64 {
         let deviation = self.local_deviation(transform, frame);
         match self.local_covariance(frame, parameters).try_inverse() {
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_covariance_that_is_none_is_replaced() {
+    fn an_invalid_covariance_is_replaced() {
         let parameters = IcpParameters::default();
         let usable = Matrix3::identity() * 0.01;
         let kept = FirstGuess::new(pose(0.0, 0.0, 0.0), usable, &parameters);

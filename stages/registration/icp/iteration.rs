@@ -1,4 +1,4 @@
-//! One iteration of ICP: pair the points, weigh the pairs, solve for the change.
+//! One iteration of ICP: find correspondences, weigh them, solve for the change.
 
 use super::first_guess::LocalFrame;
 use super::normal_equations::{Measurement, NormalEquations};
@@ -8,13 +8,13 @@ use crate::shared::walls::WallMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Walls that cross by more than this are not the same wall: the cosine of 45 degrees.
+/// Least cosine between the normals of corresponding walls: 45 degrees.
 const LEAST_NORMAL_AGREEMENT: f64 = FRAC_1_SQRT_2;
 
-/// Least scale of the local coordinates, metres: the points of a tiny common section tell no rotation.
+/// Least scale of the local coordinates, metres: the points of a tiny common section do not constrain the rotation.
 const LEAST_SCALE: f64 = 0.1;
 
-/// The work of an iteration on two maps, with the memory that iterations share.
+/// An iteration on two maps, with the memory that iterations share.
 pub(super) struct Iteration<'a> {
     a: &'a WallMap,
     b: &'a WallMap,
@@ -24,20 +24,20 @@ pub(super) struct Iteration<'a> {
     state: IterationState,
 }
 
-/// What the last iteration knew, in its local coordinates.
+/// Estimate of the last iteration, in its local coordinates.
 pub(super) struct IterationState {
     pub(super) frame: LocalFrame,
-    /// What the maps say.
+    /// Information from the maps.
     pub(super) information: Matrix3<f64>,
-    /// What the maps and the first guess leave open.
+    /// Covariance from the maps and the initial guess.
     pub(super) covariance: Matrix3<f64>,
-    /// Pairs of points.
+    /// Number of corresponding points.
     pub(super) inliers: usize,
     /// Weighted mean of the squared residuals, square metres.
     pub(super) mean_square_error: f64,
 }
 
-/// The transform after an iteration, and how far that moved the points, metres.
+/// The transform after an iteration, and the root mean square motion of the points, metres.
 pub(super) struct Change {
     pub(super) transform_a_b: Pose2,
     pub(super) length: f64,
@@ -61,20 +61,20 @@ impl<'a> Iteration<'a> {
         Self { a, b, first_guess, parameters, measurements: Vec::new(), state }
     }
 
-    /// What the last iteration knew.
+    /// Estimate of the last iteration.
     pub(super) fn into_state(self) -> IterationState {
         self.state
     }
 
-    /// Pairs every `stride`-th point of b with the wall of a that is nearest within `distance` metres, and finds the
-    /// change that fits these pairs and the first guess best. `None` if there is none that is a number.
+    /// Pairs every `stride`-th point of b with the nearest wall of a within `distance` metres, and computes the
+    /// change that best fits these pairs and the initial guess. `None` if the change is not finite.
     pub(super) fn run(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize) -> Option<Change> {
         self.solve(transform_a_b, distance, stride, self.parameters.metric)
     }
 
-    /// Measures again what the maps tell at the final transform, if it was found from point to point: that metric takes
-    /// points which may slide along their wall for points that hold on to it, and so would call a place known along a
-    /// bare corridor.
+    /// Computes the information again by point-to-line residuals at the final transform, if it was found by
+    /// point-to-point residuals. The point-to-point metric treats points that may move along their wall as fixed, so
+    /// the position along a bare corridor would seem constrained.
     pub(super) fn measure_by_lines(&mut self, transform_a_b: &Pose2) {
         if self.parameters.metric == Metric::PointToPoint {
             self.solve(transform_a_b, self.parameters.min_distance, 1, Metric::PointToLine);
@@ -98,24 +98,24 @@ impl<'a> Iteration<'a> {
         Some(Change { transform_a_b: frame.moved(transform_a_b, &change), length: change.norm() })
     }
 
-    /// The root of the weighted mean of the squared residuals of the last iteration, before its step, metres.
+    /// Root of the weighted mean of the squared residuals of the last iteration, before its step, metres.
     pub(super) fn error(&self) -> f64 {
         self.state.mean_square_error.sqrt()
     }
 
-    /// The middle and the size of the section in which the walls of the two maps lie near each other.
+    /// Centroid and size of the section in which the walls of the two maps are near each other.
     pub(super) fn common_section(&mut self, transform_a_b: &Pose2, stride: usize) -> LocalFrame {
         self.pair(transform_a_b, self.parameters.max_distance, stride, self.parameters.metric).0
     }
 
-    /// How many points lie on a wall, counted by their weights.
+    /// Sum of the weights of the points that have a wall within the least distance.
     pub(super) fn matched(&mut self, transform_a_b: &Pose2, stride: usize) -> f64 {
         self.pair(transform_a_b, self.parameters.min_distance, stride, self.parameters.metric);
         self.measurements.iter().map(|measurement| measurement.weight).sum()
     }
 
-    /// What turns information for measurements of variance one into information: cells side by side share their
-    /// errors, and no wall is known better than the cells it is drawn in.
+    /// Factor from the information of measurements of variance one to the information: neighbouring cells have
+    /// correlated errors, and no wall is known better than the cell size.
     fn gain(&self, equations: &NormalEquations, inliers: usize, stride: usize) -> f64 {
         if inliers == 0 {
             return 0.0;
@@ -126,7 +126,7 @@ impl<'a> Iteration<'a> {
         independent / points / equations.mean_square_error.max(drawn)
     }
 
-    /// Puts down what each pair of points says. Gives the local coordinates that it is written in, and the number of
+    /// Stores the residual of each pair of points. Returns the local coordinates of the residuals and the number of
     /// pairs.
     fn pair(&mut self, transform_a_b: &Pose2, distance: f64, stride: usize, metric: Metric) -> (LocalFrame, usize) {
         let (a, b) = (self.a, self.b);
@@ -141,7 +141,7 @@ impl<'a> Iteration<'a> {
             let offset = point - a.walls.points()[partner.index];
             let normal = a.normals[partner.index];
             let arm = point.coords - origin;
-            // Turns about the origin of b; moved to the middle of all pairs once that is known.
+            // Turns about the origin of b; moved to the centroid of all pairs once that is known.
             let turned = quarter_turn(&arm);
             match metric {
                 Metric::PointToLine => {
@@ -177,7 +177,7 @@ impl<'a> Iteration<'a> {
 }
 
 impl Weighting {
-    /// The weight of a pair that lies `distance` apart, where `usual` is what is usual, metres.
+    /// Weight of a pair at `distance`, where `usual` is the usual distance, metres.
     fn weight(self, distance: f64, usual: f64) -> f64 {
         match self {
             Self::None => 1.0,

@@ -1,7 +1,7 @@
 //! Refines the alignment of two maps by ICP on their walls (Tsardoulias et al., section 4.3).
 //!
-//! [`register`] moves map b until its walls lie on those of map a, where they lie near each other; [`IcpRefusal`] says why
-//! the outcome may not be used. [`refine`] does both.
+//! [`register`] moves map b until its walls are aligned with those of map a, where both are near each other;
+//! [`IcpRefusal`] is the reason why the result may not be used. [`refine`] does both.
 
 mod first_guess;
 mod iteration;

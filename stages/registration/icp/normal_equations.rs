@@ -2,38 +2,39 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// A measurement says nothing about a direction that its normal stands across by less than 12 degrees: so much do the
-/// normals of walls that are drawn in cells scatter. Without this bound the thousand cells of a straight corridor
-/// would, by their noise alone, seem to fix the place along it. (The idea is that of X-ICP, Tuna et al. 2023.)
+/// Least sine of the angle between a wall and a direction that it constrains, 12 degrees: the normals of walls drawn
+/// in cells scatter by as much. Without this bound the thousand cells of a straight corridor would seem to constrain
+/// the position along it, by noise alone. (The idea is that of X-ICP, Tuna et al. 2023.)
 const LEAST_SINE: f64 = 0.2;
 
-/// More steps than the main axes of three numbers ever take.
+/// More Jacobi sweeps than the axes of a 3 x 3 matrix ever take.
 const MOST_SWEEPS: usize = 100;
 
-/// One linear measurement of the change that is looked for.
+/// One linear measurement of the change.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measurement {
-    /// Derivative of the residual by the local coordinates.
+    /// Derivative of the residual with respect to the local coordinates.
     pub(super) derivative: Vector3<f64>,
-    /// How far the point is from where it should be, metres.
+    /// Signed distance of the point from its wall, metres.
     pub(super) residual: f64,
     /// Its weight, 0 to 1.
     pub(super) weight: f64,
 }
 
-/// What all measurements say together.
+/// Sum of all measurements.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NormalEquations {
-    /// Information about the local coordinates, for measurements of variance one.
+    /// Information on the local coordinates, for measurements of variance one.
     pub(super) information: Matrix3<f64>,
-    /// Its right-hand side: information times the change that is looked for.
+    /// Right-hand side: information times the change.
     pub(super) vector: Vector3<f64>,
     /// Weighted mean of the squared residuals, square metres.
     pub(super) mean_square_error: f64,
 }
 
 impl NormalEquations {
-    /// Sums the measurements up, in their order. In each of the three main directions count those that can see it.
+    /// Sums the measurements, in their order. For each of the three principal directions only those count that
+    /// constrain it.
     pub(super) fn new(measurements: &[Measurement]) -> Self {
         let mut information = Matrix3::zeros();
         let (mut weight, mut squares) = (0.0, 0.0);
@@ -42,7 +43,7 @@ impl NormalEquations {
             weight += measurement.weight;
             squares += measurement.weight * measurement.residual * measurement.residual;
         }
-        // Values that overflow have no axes; the solution they give is refused for being no number.
+        // Values that overflow have no axes; the solution is then refused as not finite.
         let axes = SymmetricEigen::try_new(information, f64::EPSILON, MOST_SWEEPS)
             .map_or_else(Matrix3::identity, |eigen| eigen.eigenvectors);
         let (mut seen, mut pulled) = (Vector3::zeros(), Vector3::zeros());
@@ -72,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_that_scatter_by_a_few_degrees_tell_nothing_along_a_corridor() {
+    fn normals_that_scatter_by_a_few_degrees_do_not_constrain_a_corridor() {
         let corridor: Vec<Measurement> = (0..1000)
             .map(|i| {
                 let tilt = 0.1 * f64::from(i).sin();
@@ -87,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_across_the_corridor_tells_the_place_along_it() {
+    fn a_wall_across_the_corridor_constrains_the_position_along_it() {
         let mut walls = vec![measurement(0.0, 1.0, 0.5, 0.0); 100];
         walls.extend([measurement(0.0, 1.0, -0.5, 0.0); 100]);
         walls.extend([measurement(1.0, 0.0, 0.0, 0.2); 10]);

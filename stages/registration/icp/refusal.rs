@@ -5,59 +5,59 @@ use super::{FirstGuess, IcpParameters, Registration};
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use nalgebra::Matrix2;
 
-/// Why a refined alignment may not be used. The texts are for the people who run the robots.
+/// Why a refined alignment may not be used. The texts are for the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IcpRefusal {
-    /// Nothing to align.
-    #[error("the maps have no walls that lie near each other")]
+    /// No common walls.
+    #[error("the maps have no walls near each other at this pose")]
     NoWalls,
-    /// The maps pull away from the first guess.
+    /// The result is too far from the first guess.
     #[error(
-        "the maps fit {step:.1} standard deviations away from the first guess, and {most:.1} are allowed: one of the \
-         two is wrong"
+        "ICP converged {step:.1} standard deviations away from the first guess, and {most:.1} are allowed (max_step): \
+         one of the two is wrong"
     )]
     Step {
-        /// Standard deviations of the first guess.
+        /// Mahalanobis distance from the first guess.
         step: f64,
-        /// What is allowed.
+        /// Largest distance allowed.
         most: f64,
     },
-    /// The place is open along a direction.
+    /// The position is degenerate along a direction.
     #[error(
-        "the maps only fix the place across a bare corridor that runs at {direction:.0} degrees; along it, it is known \
-         to {deviation:.2} m, and {most:.2} m are allowed"
+        "the walls do not constrain the position along a bare corridor that runs at {direction:.0} degrees: its standard \
+         deviation is {deviation:.2} m, and {most:.2} m are allowed (max_deviation)"
     )]
     OpenPosition {
-        /// The direction that is open, degrees in map a, from -90 to 90.
+        /// The degenerate direction, degrees in map a, from -90 to 90.
         direction: f64,
         /// Standard deviation along it, metres.
         deviation: f64,
-        /// What is allowed, metres.
+        /// Largest deviation allowed, metres.
         most: f64,
     },
-    /// The rotation is open.
+    /// The rotation is degenerate.
     #[error(
-        "the maps leave the rotation open: it is known to {degrees:.1} degrees, by which walls lie {deviation:.2} m beside their \
-         place, and {most:.2} m are allowed"
+        "the walls do not constrain the rotation: its standard deviation is {degrees:.1} degrees, which moves walls by \
+         {deviation:.2} m, and {most:.2} m are allowed (max_deviation)"
     )]
     OpenRotation {
         /// Standard deviation, degrees.
         degrees: f64,
-        /// The standard deviation that it makes in the place of walls, metres.
+        /// Standard deviation of the position of walls that follows from it, metres.
         deviation: f64,
-        /// What is allowed, metres.
+        /// Largest deviation allowed, metres.
         most: f64,
     },
 }
 
 impl IcpRefusal {
-    /// The first reason against a registration, if there is one.
+    /// First reason against a registration, if there is one.
     pub fn of(registration: &Registration, parameters: &IcpParameters) -> Option<Self> {
         let (along, direction) =
             widest_deviation(&registration.centre_covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let turn = registration.centre_covariance.m33.sqrt();
         let by_turn = turn * registration.radius;
-        // Negated comparisons, so that a value that is no number refuses.
+        // Negated comparisons, so that a value that is not a number refuses.
         let at_least = |value: f64, least: f64| value >= least;
         if registration.inliers == 0 {
             Some(Self::NoWalls)
@@ -74,9 +74,9 @@ impl IcpRefusal {
         }
     }
 
-    /// The reason against a registration that began where a search over all places has found the same walls to fit best, if they leave
-    /// that place open. Along a corridor with little that crosses it registration settles on what crosses it nearest, right or wrong,
-    /// and is sure of that; how far the walls fit about as well tells how sure it is.
+    /// Reason against a registration that started at a peak of the search, if the covariance of the peak is too wide.
+    /// Along a corridor with few walls across, registration converges to the nearest of them, right or wrong, and
+    /// reports a small covariance; the width of the peak is then the true uncertainty.
     pub fn of_search(
         first_guess: &FirstGuess,
         registration: &Registration,
@@ -87,13 +87,13 @@ impl IcpRefusal {
         let covariance = derivative * first_guess.covariance * derivative.transpose();
         let (along, direction) = widest_deviation(&covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let most = parameters.max_deviation;
-        // What is no number is open, too.
+        // A value that is not a number refuses, too.
         let is_fixed = along <= most;
         (!is_fixed).then(|| Self::OpenPosition { direction: direction.to_degrees(), deviation: along, most })
     }
 }
 
-/// The greatest standard deviation of a position, metres, and its direction, radians from -pi/2 to pi/2.
+/// Largest standard deviation of a position, metres, and its direction, radians from -pi/2 to pi/2.
 fn widest_deviation(covariance: &Matrix2<f64>) -> (f64, f64) {
     let ellipse = CovarianceEllipse::new(covariance, 1.0);
     ellipse.map_or((f64::INFINITY, 0.0), |ellipse| (ellipse.half_axes[0], ellipse.direction))

@@ -1,4 +1,4 @@
-//! ICP: moves map b so that its walls lie on those of map a.
+//! ICP: moves map b until its walls are aligned with those of map a.
 
 use super::iteration::Iteration;
 use super::{FirstGuess, IcpParameters};
@@ -6,48 +6,48 @@ use crate::shared::geometry::{Point2, Pose2};
 use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix3, Vector3};
 
-/// No more than this many rotations to either side of the first guess are tried.
+/// At most this many rotations to either side of the first guess are tried.
 const MOST_STARTS: usize = 10;
 
-/// The outcome of a registration.
+/// Result of a registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
     /// `T_a_b`, refined: `T_icp * T_initial` (Tsardoulias et al., equations 10 to 13).
     pub transform_a_b: Pose2,
     /// Whether the last iteration moved the points by less than the bound.
     pub converged: bool,
-    /// Iterations made, from the start that was best.
+    /// Number of iterations from the best start.
     pub iterations: usize,
-    /// For each of them the root of the weighted mean of the squared residuals before its step, metres.
+    /// For each iteration, the root of the weighted mean of the squared residuals before its step, metres.
     pub errors: Vec<f64>,
-    /// Points of map b that have a partner in map a.
+    /// Number of points of map b that have a partner in map a.
     pub inliers: usize,
     /// Weighted mean of the squared residuals of the last iteration, square metres.
     pub mean_square_error: f64,
-    /// What the maps alone say about (x, y, yaw): the inverse of a covariance, which need not exist. In a bare corridor
-    /// it is zero along the corridor.
+    /// Information on (x, y, yaw) from the maps only: the inverse of a covariance, which need not exist. In a bare
+    /// corridor it is zero along the corridor.
     pub information: Matrix3<f64>,
     /// Covariance of (x, y, yaw), metres and radians, from the maps and the first guess together.
     pub covariance: Matrix3<f64>,
-    /// The middle of the common section, frame a.
+    /// Centroid of the common section, frame a.
     pub centre: Point2,
-    /// Covariance of the place of that middle and of the turn about it (x, y, yaw), metres and radians.
+    /// Covariance of the position of that centroid and of the turn about it (x, y, yaw), metres and radians.
     pub centre_covariance: Matrix3<f64>,
-    /// How far the paired points lie from there, the root of the mean square, metres.
+    /// Root mean square distance of the paired points from the centroid, metres.
     pub radius: f64,
-    /// Distance from the first guess in standard deviations of the first guess, slack included.
+    /// Mahalanobis distance from the first guess, slack included.
     pub step: f64,
 }
 
 /// Registers map b on map a, starting at the first guess.
 ///
-/// Only points that lie near each other count (the common section of section 4.3). The first guess takes part with its
-/// covariance, so that what the maps cannot see, such as the place along a bare corridor, stays as the first guess has
-/// it.
+/// Only points near each other count (the common section of section 4.3). The first guess is a prior with its
+/// covariance, so what the maps do not constrain, such as the position along a bare corridor, stays as in the first
+/// guess.
 ///
-/// Far from the middle of the maps a small turn moves a wall by more than the distance to the next wall. So where the
-/// first guess's rotation is vague, several rotations are tried on a sample of the points, and the one that brings most
-/// of them to a wall goes on.
+/// Far from the centre of the maps a small turn moves a wall by more than the distance to the next wall. So where the
+/// first guess's rotation is uncertain, several rotations are tried on a sample of the points, and the one with most
+/// inliers is continued.
 pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
     let mut iteration = Iteration::new(a, b, first_guess, parameters);
     let stride = stride(b.walls.points().len(), parameters.coarse_points);
@@ -75,7 +75,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     iteration.measure_by_lines(&transform_a_b);
     let state = iteration.into_state();
     let frame = state.frame;
-    // What swings between partners on two sides is known as well as it swings.
+    // If the iterations oscillate between partners, the uncertainty is at least the amplitude.
     let unsettled = if converged { 0.0 } else { last_change.powi(2) };
     let covariance = state.covariance + Matrix3::from_diagonal_element(unsettled);
     let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));
@@ -96,8 +96,8 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     }
 }
 
-/// Iterates on a sample of the points while the distance of partners shrinks to its least. Gives the transform and the error
-/// of each iteration, metres.
+/// Iterates on a sample of the points while the distance of partners shrinks. Returns the transform and the error of
+/// each iteration, metres.
 fn draw_near(
     iteration: &mut Iteration<'_>,
     start: Pose2,
@@ -114,8 +114,8 @@ fn draw_near(
     (transform_a_b, errors)
 }
 
-/// The first guess, and where its rotation is vague the same turned about the middle of the common section, as far as
-/// two standard deviations to either side.
+/// The first guess; where its rotation is uncertain, also the same turned about the centroid of the common section,
+/// up to two standard deviations to either side.
 fn starts(
     iteration: &mut Iteration<'_>,
     first_guess: &FirstGuess,

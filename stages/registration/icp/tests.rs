@@ -1,4 +1,4 @@
-//! Registration and judgement on drawn floor plans.
+//! Registration on drawn floor plans.
 
 use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
 use crate::shared::geometry::{Grid, GridGeometry, Pose2, pose};
@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// The west and the east of the office, in frames of their own.
+/// The west and the east of the office, in their own frames.
 fn office_maps() -> (DrawnMap, DrawnMap) {
     let office = FloorPlan::office();
     let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
@@ -147,7 +147,7 @@ fn a_grid_without_cells_is_refused() {
 }
 
 #[test]
-fn along_a_bare_corridor_the_first_guess_stays_and_says_how_well_it_is_known() {
+fn along_a_bare_corridor_the_first_guess_stays_and_its_uncertainty_is_reported() {
     let corridor = FloorPlan::corridor();
     let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
     let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
@@ -163,7 +163,7 @@ fn along_a_bare_corridor_the_first_guess_stays_and_says_how_well_it_is_known() {
     assert!(centre_deviation(&along) > 0.5, "{}", centre_deviation(&along));
     assert!(centre_deviation(&across) < 0.02, "{}", centre_deviation(&across));
     let known_to = |axis: &Vector3<f64>| axis.dot(&(registration.information * axis)).sqrt().recip();
-    assert!(known_to(&along) > 0.5, "the maps alone tell the place along the corridor to {} m", known_to(&along));
+    assert!(known_to(&along) > 0.5, "the position along the corridor is known to {} m", known_to(&along));
     assert!(known_to(&across) < 0.02, "{}", known_to(&across));
     let shift = a.transform_world_map.rotation
         * (registration.transform_a_b * b.transform_world_map.inverse() * nalgebra::Point2::new(30.0, 0.0)

@@ -13,9 +13,9 @@ use stage::IcpRefiner;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "icp_refiner",
-        "Refines first guesses of how two maps lie to each other by ICP on their walls. A guess is refused, with the \
-         reason, where ICP does not settle, where the walls leave the place or the rotation open, and where they fit only \
-         far from the guess. merge_verifier says of the others whether the maps agree there.",
+        "Refines first guesses of the relative pose of two maps by ICP on their walls. A guess is refused, with the \
+         reason, if ICP does not converge, if the walls do not constrain the position or the rotation, and if the result is \
+         far from the guess. merge_verifier judges whether the maps agree at the others.",
         |parameters: IcpParameters, _| Ok(IcpRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", IcpRefiner::receive_map)

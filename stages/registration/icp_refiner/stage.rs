@@ -1,4 +1,4 @@
-//! The stage: keeps each robot's map with its walls, and refines the first guesses for a pair when one of the maps or the
+//! The stage: keeps each robot's map with its walls, and refines the first guesses of a pair when a map or the
 //! guesses change.
 
 use crate::registration::hypotheses::{HypothesisGatherer, Origin, has_covariance_of_fit};
@@ -12,7 +12,7 @@ use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, Stag
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct RefinedAlignments {
     alignment: Out<Alignment>,
     errors: Out<IcpErrors>,
@@ -20,10 +20,10 @@ pub(super) struct RefinedAlignments {
 
 impl Outputs for RefinedAlignments {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let summary = "The refined alignments, ranked as before, each settled or refused.";
+        let summary = "The refined alignments, ranked as before, each accepted or refused.";
         Self {
             alignment: ports.output("alignment", summary),
-            errors: ports.output("errors", "How far the walls lay apart in each iteration, of each registration."),
+            errors: ports.output("errors", "The residual of the walls in each iteration of each registration."),
         }
     }
 }
@@ -36,19 +36,19 @@ pub(super) struct IcpRefiner {
     guesses: BTreeMap<Origin, Guesses>,
 }
 
-/// The last first guesses of one stage for one pair of robots, by rank, and what was made of them.
+/// The latest first guesses of one source for one pair of robots, by rank, and their refinements.
 #[derive(Default)]
 struct Guesses {
-    /// The robot that the message was about; empty as a rule.
+    /// The robot of the message's topic; usually empty.
     robot: String,
     first: Vec<Alignment>,
     refined: Vec<Refined>,
     sent: Vec<Alignment>,
 }
 
-/// A refinement and what it was made from.
+/// A refinement, and what it was computed from.
 struct Refined {
-    /// The numbers of the two maps.
+    /// Numbers of the two maps.
     maps: (u64, u64),
     first_guess: Alignment,
     refinement: Refinement,
@@ -102,7 +102,7 @@ impl IcpRefiner {
         }
     }
 
-    /// Sends what is known of some guesses, if it is not what was sent last.
+    /// Refines the guesses of an origin, and sends the result if it has changed.
     fn update(&mut self, origin: &Origin, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
         let Some(guesses) = self.guesses.get_mut(origin) else { return Ok(()) };
         let maps = self.maps.pair(&origin.pair);
@@ -141,7 +141,7 @@ impl IcpRefiner {
         guesses.send(alignments, output)
     }
 
-    /// Guesses that wait for a map to the end are refused, so that they do not go missing.
+    /// Refuses guesses that still wait for a map at the end, so that they are reported.
     pub(super) fn finish(&mut self, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
         for (origin, guesses) in &mut self.guesses {
             let Some(missing) = self.maps.missing(&origin.pair) else { continue };
@@ -157,7 +157,7 @@ impl IcpRefiner {
 }
 
 impl Guesses {
-    /// Sends alignments, unless they tell only what was sent last. They are sent together, as they are judged together.
+    /// Sends alignments, unless they equal those sent last. They are sent together, as they are judged together.
     fn send(&mut self, alignments: Vec<Alignment>, output: &Output<RefinedAlignments>) -> Result<(), StageError> {
         let is_same = |(sent, alignment): (&Alignment, &Alignment)| {
             *sent == Alignment { header: sent.header.clone(), ..alignment.clone() }
@@ -174,24 +174,24 @@ impl Guesses {
 }
 
 impl Refined {
-    /// Whether the refinement would come out the same from another first guess.
+    /// Whether the refinement is valid for another first guess.
     ///
-    /// One that was accepted holds for every first guess nearby. One that was refused might have failed for its first
-    /// guess, and holds for that alone.
+    /// An accepted one is valid for every first guess nearby. A refused one might have failed because of its first
+    /// guess, and is valid for that only.
     fn holds_for(&self, first_guess: &Alignment, parameters: &IcpParameters) -> bool {
         let before = &self.first_guess;
         if self.refinement.refusal.is_some() {
             return (before.x, before.y, before.yaw, before.covariance)
                 == (first_guess.x, first_guess.y, first_guess.yaw, first_guess.covariance);
         }
-        // In the middle of the common section: at the frame's origin a turn far away looks like a shift.
+        // At the centroid of the common section: at the frame's origin a turn far away looks like a shift.
         let centre_b = self.refinement.registration.transform_a_b.inverse() * self.refinement.registration.centre;
         let shift = before.transform_a_b() * centre_b - first_guess.transform_a_b() * centre_b;
         shift.norm() <= parameters.reuse_within
             && wrap_angle(before.yaw - first_guess.yaw).abs() <= parameters.reuse_within_yaw
     }
 
-    /// The message that tells how its error fell.
+    /// The message with the error of each iteration.
     fn errors(&self, log_time: LogTime) -> IcpErrors {
         let guess = &self.first_guess;
         IcpErrors {
@@ -205,7 +205,7 @@ impl Refined {
         }
     }
 
-    /// The message that tells of it. What the first guess rests on is part of the reason.
+    /// The message with the refined alignment. The reason of the first guess is part of its reason.
     fn alignment(&self, first_guess: &Alignment, log_time: LogTime) -> Alignment {
         let Refinement { registration, refusal } = &self.refinement;
         let mut alignment = Alignment {
@@ -215,7 +215,7 @@ impl Refined {
             accepted: refusal.is_none(),
             reason: match refusal {
                 None => format!("{}; {}", first_guess.reason, self.refinement.reason()),
-                // What is in the way comes first, and behind an empty line what it was about.
+                // The refusal comes first, and after an empty line the reason of the first guess.
                 Some(_) => format!("{}\n\n{}", self.refinement.reason(), first_guess.reason),
             },
             ..first_guess.clone()

@@ -45,7 +45,7 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
     assert_eq!(refined.method, "tags+icp");
     assert_eq!(refined.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
     assert_eq!((refined.score, refined.provisional), (0.9, false), "these are the first guess's");
-    assert!(refined.reason.starts_with("three tags; walls lie within "), "{}", refined.reason);
+    assert!(refined.reason.starts_with("three tags; walls are aligned to "), "{}", refined.reason);
     let off = truth.inverse() * refined.transform_a_b();
     assert!(off.translation.vector.norm() < 0.03 && off.rotation.angle().abs() < 0.003, "{off}");
     assert_eq!(bench.finish(), []);
@@ -53,7 +53,7 @@ fn a_first_guess_is_refined_once_both_maps_are_there() {
 }
 
 #[test]
-fn the_error_of_each_iteration_is_told_and_falls() {
+fn the_error_of_each_iteration_is_sent_and_falls() {
     let (a, b, _) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -84,7 +84,7 @@ fn nothing_is_sent_or_registered_again_while_maps_and_guess_stay() {
 }
 
 #[test]
-fn a_kept_alignment_tells_of_the_method_of_the_last_first_guess() {
+fn a_reused_alignment_names_the_method_of_the_latest_first_guess() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
     let mut bench = StageBench::new(&super::kind(), "");
@@ -116,7 +116,7 @@ fn a_wrong_first_guess_is_refused_until_a_better_one_comes() {
     bench.give_map("robot2", &b);
     let sent = bench.give(&first_guess(&(truth * pose(60.0, 1.5, 0.5))));
     assert_eq!(sent.len(), 1);
-    assert!(!sent[0].accepted && sent[0].reason.contains("no walls that lie near each other"), "{sent:?}");
+    assert!(!sent[0].accepted && sent[0].reason.contains("no walls near each other"), "{sent:?}");
     assert!(bench.give(&first_guess(&truth))[0].accepted);
 }
 
@@ -133,7 +133,7 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
 }
 
 #[test]
-fn what_is_no_map_or_no_transform_is_warned_of() {
+fn a_warning_is_given_for_an_invalid_map_or_transform() {
     let (a, b, _) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -167,7 +167,7 @@ fn ranked_guesses_are_refined_and_sent_together() {
 }
 
 #[test]
-fn where_a_search_leaves_the_place_open_registration_does_not_fix_it() {
+fn where_a_search_leaves_the_position_open_registration_does_not_constrain_it() {
     let (a, b, _) = maps();
     let truth = a.transform_to(&b);
     let found = |along: f64, method: &str| {
@@ -183,5 +183,5 @@ fn where_a_search_leaves_the_place_open_registration_does_not_fix_it() {
     let open = found(4.0, "maps");
     assert!(!open.accepted && open.reason.contains("bare corridor"), "{}", open.reason);
     assert!(found(0.05, "maps").accepted);
-    assert!(found(4.0, "hough_spectrum").accepted, "there it tells how rough the guess is");
+    assert!(found(4.0, "hough_spectrum").accepted, "there the covariance is that of the error");
 }

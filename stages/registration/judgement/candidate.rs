@@ -1,4 +1,4 @@
-//! A place of map b that hypotheses propose, and what the maps say there.
+//! A candidate: hypotheses at one relative pose, and the agreement of the maps there.
 
 use super::Terms;
 use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed, MapView, compare};
@@ -6,36 +6,36 @@ use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::{Point2, Pose2, point_jacobian};
 use nalgebra::Matrix3;
 
-/// Hypotheses whose middles lie within this many metres of each other, and that are turned by less than [`SAME_TURN`], are one place:
-/// ICP leads what is so near to one place, unless the walls fit at both.
-const SAME_PLACE: f64 = 0.3;
+/// Hypotheses whose inliers are shifted by less than this, metres, and turned by less than [`SAME_TURN`] count as
+/// one: ICP converges from either to the same pose, unless the walls fit at both.
+const SAME_POSITION: f64 = 0.3;
 /// Radians.
 const SAME_TURN: f64 = 0.2;
-/// The inlier ratio from which on a deformation has nothing to explain.
+/// Inlier ratio above which a deformation has nothing to explain.
 const CLEAR_AGREEMENT: f64 = 0.95;
 
-/// A place of map b that hypotheses propose, and what the maps say there.
+/// Hypotheses at one relative pose, and the agreement of the maps there.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The hypothesis that stands for it.
+    /// The hypothesis that represents the candidate.
     pub hypothesis: Hypothesis,
-    /// Its number among all that were judged.
+    /// Its index among all that were judged.
     pub number: usize,
-    /// Others at the same place.
+    /// Further hypotheses at the same pose.
     pub others: Vec<Hypothesis>,
-    /// The numbers of those.
+    /// Indices of those.
     numbers: Vec<usize>,
-    /// What the maps say, as map b is deformed if it is.
+    /// Agreement of the maps, with map b deformed if `deformed` is given.
     pub agreement: Agreement,
-    /// Where map b lies deformed, if that explains more than it costs.
+    /// Deformation of map b, if it explains more than it costs.
     pub deformed: Option<Deformed>,
-    /// The covariance of (x, y, yaw) that the deformation of the maps leaves, whether it is worth its cost or not; none if it was not
-    /// looked at.
+    /// Covariance of (x, y, yaw) that the deformation of the maps leaves, whether it is worth its cost or not; none
+    /// if it was not computed.
     pub left_by_deformation: Option<Matrix3<f64>>,
 }
 
 impl Candidate {
-    /// Compares the maps at a hypothesis, as they came.
+    /// Compares the maps at a hypothesis, without deformation.
     pub(super) fn new(
         (number, hypothesis): (usize, &Hypothesis),
         a: &MapView<'_>,
@@ -48,7 +48,7 @@ impl Candidate {
         Self { hypothesis, number, others, numbers, agreement, deformed: None, left_by_deformation: None }
     }
 
-    /// The same with map b deformed, where that can explain what contradicts.
+    /// Deforms map b, where that can explain contradictions.
     pub(super) fn deform(mut self, a: &MapView<'_>, b: &MapView<'_>, parameters: &ComparisonParameters) -> Self {
         let is_worth_it = parameters.bend > 0.0
             && !self.hypothesis.is_refused
@@ -62,7 +62,8 @@ impl Candidate {
         self
     }
 
-    /// This and another one at the same place as one. What was proposed and not refused stands for it, of two such the first.
+    /// Merges a candidate at the same pose into this one. It is represented by what was proposed and not refused, of
+    /// two such by the first.
     pub(super) fn unite(&mut self, mut other: Self) {
         let rank = |candidate: &Self| (candidate.hypothesis.is_refused, candidate.hypothesis.is_rival);
         if rank(&other) < rank(self) {
@@ -74,27 +75,27 @@ impl Candidate {
         self.numbers.append(&mut other.numbers);
     }
 
-    /// Whether the hypothesis of a number proposes the place.
+    /// Whether it includes the hypothesis with an index.
     pub(super) fn has(&self, number: usize) -> bool {
         self.number == number || self.numbers.contains(&number)
     }
 
-    /// Where map b lies: `T_a_b`.
+    /// Pose of map b in map a, `T_a_b`.
     pub fn transform_a_b(&self) -> Pose2 {
         self.deformed.map_or(self.hypothesis.transform_a_b, |deformed| deformed.transform_a_b)
     }
 
-    /// All hypotheses at the place.
+    /// All hypotheses of the candidate.
     fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
         std::iter::once(&self.hypothesis).chain(&self.others)
     }
 
-    /// Whether a condition holds for the basis of any hypothesis at the place.
+    /// Whether a condition holds for the basis of any hypothesis that is not refused.
     pub(super) fn rests_on(&self, is_meant: impl Fn(Basis) -> bool) -> bool {
         self.hypotheses().any(|hypothesis| !hypothesis.is_refused && is_meant(hypothesis.basis))
     }
 
-    /// The values of the terms of the sum.
+    /// Values of the terms of the sum.
     pub fn terms(&self) -> Terms {
         let significance = self.hypotheses().filter_map(|hypothesis| match hypothesis.basis {
             Basis::Search { significance } => Some(significance),
@@ -104,27 +105,27 @@ impl Candidate {
         Terms::new(significance.fold(0.0, f64::max), self.deviation(), &self.agreement, cost)
     }
 
-    /// The standard deviation of the middle of the inliers in its least known direction, metres.
+    /// Largest standard deviation of the centroid of the inliers over all directions, metres.
     fn deviation(&self) -> f64 {
         let Hypothesis { transform_a_b, covariance, .. } = &self.hypothesis;
         let jacobian = point_jacobian(transform_a_b, &(transform_a_b.inverse() * self.agreement.centre));
         let of_centre = jacobian * covariance * jacobian.transpose();
         let (mean, half) = (0.5 * (of_centre.m11 + of_centre.m22), 0.5 * (of_centre.m11 - of_centre.m22));
         let widest = (mean + half.hypot(of_centre.m12)).sqrt();
-        // What is no number is not known.
+        // A value that is not a number counts as unknown.
         if widest.is_finite() { widest } else { f64::INFINITY }
     }
 
-    /// How far another place is: the shift of the middle of the inliers, metres, and the turn, radians.
+    /// Shift of the centroid of the inliers to another relative pose, metres, and the turn, radians.
     pub(super) fn change(&self, other: &Pose2) -> (f64, f64) {
         let change = other * self.transform_a_b().inverse();
         let centre: Point2 = self.agreement.centre;
         ((change * centre - centre).norm(), change.rotation.angle())
     }
 
-    /// Whether another place is the same.
+    /// Whether another relative pose counts as the same.
     pub(super) fn is_at(&self, other: &Pose2) -> bool {
         let (shift, turn) = self.change(other);
-        shift < SAME_PLACE && turn.abs() < SAME_TURN
+        shift < SAME_POSITION && turn.abs() < SAME_TURN
     }
 }

@@ -1,25 +1,27 @@
-//! Which of all hypotheses for a pair of maps is right, if any.
+//! Decides which of all hypotheses for a pair of maps is right, if any.
 
 use super::priors::prior;
 use super::verdict::{Rival, Verdict};
 use super::{Candidate, JudgementParameters, Listed, Refusal, Term};
 use crate::registration::comparison::{ComparisonParameters, MapView};
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 
-/// What the user knows of a pair of robots.
+/// What the user knows about a pair of robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UserKnowledge {
-    /// Where the maps can lie to each other; none if it is not known.
-    pub window: Option<PlaceWindow>,
-    /// The number of the hypothesis that is right, from 1, as they are listed in the reason of a refusal.
+    /// Relative poses that the initial poses allow; none if they are not known.
+    pub window: Option<PoseWindow>,
+    /// Number of the hypothesis that the user has chosen, from 1, in the list that is part of the reason of a
+    /// refusal.
     pub hypothesis: Option<usize>,
 }
 
-/// Judges the hypotheses of all sources for one pair; `None` without any.
+/// Judges the hypotheses of all sources for one pair; `None` if there are none.
 ///
-/// The most probable is the answer, and it is refused if it is not as probable as is asked for. Where the user knows where the maps can
-/// lie to each other, only what lies there takes part; and a hypothesis that he has chosen is accepted.
+/// The most probable one is returned, refused unless it is as probable as the parameters require. If the user's
+/// initial poses are known, only hypotheses that they allow compete. A hypothesis that the user has chosen is
+/// accepted.
 pub fn judge(
     a: &MapView<'_>,
     b: &MapView<'_>,
@@ -40,16 +42,16 @@ pub fn judge(
     let is_expected = known.window.is_some();
     let count = all.len();
     let chosen = known.hypothesis.map(|asked| (asked, asked.checked_sub(1).and_then(|index| all.get(index).cloned())));
-    let candidates = places(all, a, b, &comparison);
+    let candidates = distinct(all, a, b, &comparison);
     let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
     let probabilities = posterior(&log_odds);
     if let Some((asked, chosen)) = chosen {
         let number = chosen.as_ref().map_or(0, |chosen| chosen.number);
-        let (place, probability) =
-            candidates.iter().zip(&probabilities).find(|(place, _)| chosen.is_none() || place.has(number))?;
+        let (found, probability) =
+            candidates.iter().zip(&probabilities).find(|(candidate, _)| chosen.is_none() || candidate.has(number))?;
         let refusal = chosen.is_none().then_some(Refusal::NoSuchHypothesis { asked, count });
-        // It lies where it was listed, and not where another at the place does.
-        let candidate = chosen.map_or_else(|| place.clone(), |chosen| chosen.deform(a, b, &comparison));
+        // The chosen pose is used, and not another one of its candidate.
+        let candidate = chosen.map_or_else(|| found.clone(), |chosen| chosen.deform(a, b, &comparison));
         let chosen = refusal.is_none().then_some((asked, count));
         return Some(Verdict { refusal, chosen, listed, probability: *probability, ..Verdict::of(candidate) });
     }
@@ -67,17 +69,18 @@ pub fn judge(
     Some(verdict)
 }
 
-/// The places that hypotheses propose, each once, and what the maps say there: what [`judge`] sums up where nothing else is known.
+/// Merges equal hypotheses and compares the maps at each: the candidates that [`judge`] chooses from if nothing else
+/// is known.
 pub fn candidates(
     a: &MapView<'_>,
     b: &MapView<'_>,
     hypotheses: &[Hypothesis],
     parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    places(compared(a, b, hypotheses, parameters), a, b, parameters)
+    distinct(compared(a, b, hypotheses, parameters), a, b, parameters)
 }
 
-/// What the maps say at each hypothesis as they came, the best first.
+/// Agreement of the maps at each hypothesis, without deformation, the best first.
 fn compared(
     a: &MapView<'_>,
     b: &MapView<'_>,
@@ -86,7 +89,8 @@ fn compared(
 ) -> Vec<Candidate> {
     let compare = |numbered| Candidate::new(numbered, a, b, parameters);
     let mut all: Vec<Candidate> = hypotheses.iter().enumerate().map(compare).collect();
-    // What tags fix comes first, then what most speaks for; equals stay in the order of their sources and ranks.
+    // What tags determine comes first, then what has most evidence; equals stay in the order of their sources and
+    // ranks.
     all.sort_by(|one, other| {
         let is_by_maps = |candidate: &Candidate| candidate.hypothesis.basis != Basis::Tags;
         let by_evidence = other.agreement.evidence.total_cmp(&one.agreement.evidence);
@@ -95,68 +99,70 @@ fn compared(
     all
 }
 
-/// Each place once, deformed. Several places may be one once map b is deformed.
-fn places(
+/// Merges equal candidates, before and after the deformation of map b, as several may become one by it.
+fn distinct(
     compared: Vec<Candidate>,
     a: &MapView<'_>,
     b: &MapView<'_>,
     parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    united(united(compared).into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
+    merged(merged(compared).into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
 }
 
-/// The probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum of exp(s_j))`.
+/// Probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum
+/// of exp(s_j))`.
 pub fn posterior(log_odds: &[f64]) -> Vec<f64> {
     let most = log_odds.iter().copied().fold(0.0, f64::max);
     let sum = (-most).exp() + log_odds.iter().map(|odds| (odds - most).exp()).sum::<f64>();
     log_odds.iter().map(|odds| (odds - most).exp() / sum).collect()
 }
 
-/// Each place once, where map b lies deformed if it is.
-fn united(all: Vec<Candidate>) -> Vec<Candidate> {
-    let mut places: Vec<Candidate> = Vec::new();
+/// Merges candidates with the same relative pose.
+fn merged(all: Vec<Candidate>) -> Vec<Candidate> {
+    let mut distinct: Vec<Candidate> = Vec::new();
     for candidate in all {
-        match places.iter_mut().find(|place| place.is_at(&candidate.transform_a_b())) {
-            Some(place) => place.unite(candidate),
-            None => places.push(candidate),
+        match distinct.iter_mut().find(|known| known.is_at(&candidate.transform_a_b())) {
+            Some(known) => known.unite(candidate),
+            None => distinct.push(candidate),
         }
     }
-    places
+    distinct
 }
 
-/// Those that a stage before has refused take part: the maps may lie there, though it is not known well enough.
+/// Log-odds of a candidate. Those that an earlier stage has refused compete, too: they may be right, though not
+/// certain enough.
 fn log_odds(candidate: &Candidate, is_expected: bool) -> f64 {
     candidate.terms().log_odds() + prior(candidate, is_expected)
 }
 
-/// The judgement on a place at which the maps cannot lie by what the user knows.
-fn unexpected(candidate: Candidate, window: &PlaceWindow) -> Verdict {
+/// Verdict on a candidate that the initial poses do not allow.
+fn unexpected(candidate: Candidate, window: &PoseWindow) -> Verdict {
     let (shift, turn) = window.change(&candidate.hypothesis.transform_a_b);
     let refusal = match candidate.hypothesis.is_refused {
-        false => Refusal::Unexpected { shift, turn: turn.to_degrees() },
-        true => Refusal::Before(candidate.hypothesis.reason.clone()),
+        false => Refusal::OutsideWindow { shift, turn: turn.to_degrees() },
+        true => Refusal::RefusedUpstream(candidate.hypothesis.reason.clone()),
     };
     Verdict { refusal: Some(refusal), ..Verdict::of(candidate) }
 }
 
-/// Why a verdict is no acceptance; none if it is as probable as is asked for.
+/// Why a verdict is refused; none if it is as probable as required.
 fn refusal(verdict: &Verdict, parameters: &JudgementParameters) -> Option<Refusal> {
     let JudgementParameters { accept, max_bend: most, .. } = *parameters;
     let Verdict { candidate, probability, rival, .. } = verdict;
     if candidate.hypothesis.is_refused {
-        return Some(Refusal::Before(candidate.hypothesis.reason.clone()));
+        return Some(Refusal::RefusedUpstream(candidate.hypothesis.reason.clone()));
     }
     if *probability >= accept {
-        let bend = candidate.deformed.map(|deformed| deformed.bend);
-        return bend.filter(|bend| *bend > most).map(|bend| Refusal::Bent { bend, most });
+        let rms = candidate.deformed.map(|deformed| deformed.rms);
+        return rms.filter(|rms| *rms > most).map(|rms| Refusal::Deformed { rms, most });
     }
-    // What is missing lies with another place, or with none.
+    // The missing probability is that of another candidate, or of none of them.
     let of_none = 1.0 - probability - rival.as_ref().map_or(0.0, |rival| rival.probability);
     if let Some(rival) = rival.as_ref().filter(|rival| rival.probability > of_none) {
         let (shift, turn) = (rival.shift, rival.turn.to_degrees());
-        let told_otherwise = rival.is_by_tags != candidate.rests_on(Basis::is_by_tags);
-        return Some(match told_otherwise {
-            true => Refusal::Elsewhere {
+        let is_other_source = rival.is_by_tags != candidate.rests_on(Basis::is_by_tags);
+        return Some(match is_other_source {
+            true => Refusal::SourcesDisagree {
                 source_of_rival: rival.source.clone(),
                 shift,
                 turn,

@@ -1,13 +1,13 @@
-//! Judges all hypotheses for a pair of maps against each other: one sum for each, and one probability for each over all.
+//! Judges all hypotheses for a pair of maps against each other, and gives each a probability.
 //!
-//! The log-odds of a hypothesis is a sum of [`Term`]s: how far it stands out in the search, how much the maps share there, how many
-//! walls agree that need not, what contradicts, and how much map b must be deformed; and what tags or the user know before the maps
-//! are compared. The probability of each is `exp(s_i) / (1 + sum of exp(s_j))` over all hypotheses, where the 1 stands for none of them
-//! (a conditional logit; McFadden 1974). So a hypothesis that fits nearly as well takes probability away, wherever it comes from:
-//! another peak of the search, tags that say otherwise, or a part of the building that looks alike ([`SelfSimilarity`]).
+//! The log-odds of a hypothesis is a sum of [`Term`]s: peak significance of the search, common area, independent
+//! inliers, conflicts, and the deformation of map b; and a prior from tags and from initial poses. The probability of
+//! each is `exp(s_i) / (1 + sum of exp(s_j))` over all hypotheses, where the 1 is for none of them (a conditional
+//! logit; McFadden 1974). So a hypothesis that fits nearly as well takes probability away, wherever it comes from:
+//! another peak of the search, other tags, or a self-similar part of the building ([`SelfSimilarity`]).
 //!
-//! The weights are fitted by `experiments fit-judgement`, which writes [`weights`], to pairs of published maps, recorded and simulated
-//! ones, cross-validated by place.
+//! The weights are fitted by `experiments fit-judgement`, which writes [`weights`], to pairs of published maps,
+//! recorded and simulated ones, cross-validated by building.
 
 mod candidate;
 mod judge;

@@ -1,4 +1,4 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use crate::registration::comparison::ComparisonParameters;
 use gridweave_runtime::stage::{ParameterError, Parameters};
@@ -6,37 +6,40 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Parameters of the merge verifier. What takes them expects values that have passed [`check`](Parameters::check).
+/// Parameters of the merge verifier. Functions expect values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct JudgementParameters {
-    /// The least probability of being right at which an alignment is accepted.
+    /// Least probability of being right at which an alignment is accepted.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub accept: f64,
-    /// Two walls agree when they lie within this distance, metres; never less than 1.5 cells of the coarser map.
+    /// Distance within which two walls agree, metres; never less than 1.5 cells of the coarser map.
     #[schemars(range(min = 1e-3, max = 10.0))]
     pub wall_tolerance: f64,
-    /// Maps are compared in squares of this side, each of which may be moved a little: a map is right in every room and bent as
-    /// a whole. Metres.
+    /// Side of the square regions in which maps are compared, metres. Each may be shifted a little: a map is right in
+    /// every room and deformed as a whole.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub region: f64,
-    /// Standard deviation of how far a region is moved, metres.
+    /// Standard deviation of the shift of a region, metres.
     #[schemars(range(min = 1e-3, max = 10.0))]
     pub region_deviation: f64,
-    /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of each
-    /// metre between them; more than `elastic_refiner` has, as maps of any sensor are to be told from those of other places. Maps that
-    /// contradict each other are compared once more with one bent onto the other. 0 compares them as they came.
+    /// Deformation: standard deviation of the displacement of two points of a map against each other, metres per
+    /// square root of a metre between them. It is more than that of `elastic_refiner`, as it must hold for maps of
+    /// any sensor. Maps that contradict each other are compared once more with one deformed onto the other. 0
+    /// compares them without deformation.
     pub bend: f64,
-    /// Maps that are bent by more than this against each other, the root mean square, have no one place, and are refused, metres. Each of
-    /// them may be right in every room; a greater value merges them where most of map b lies nearest.
+    /// Largest deformation of two maps against each other, root mean square, metres. Maps that are deformed more have
+    /// no common rigid pose, and are refused; each of them may be right in every room. A greater value merges them at
+    /// the nearest rigid pose.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub max_bend: f64,
-    /// How maps turn: standard deviation of the turn of two places of a map against each other,
-    /// radians for the root of each metre between them.
+    /// Deformation: standard deviation of the turn of two points of a map against each other, radians per square root
+    /// of a metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub turn: f64,
-    /// Which of the hypotheses that a refusal has listed is right, by somebody who has looked: by robot, which means its
-    /// pair with the reference or with the only other robot, or by pair as ROBOT/ROBOT. From 1; 0 is the initial pose itself.
+    /// Number of the right hypothesis in the list of a refusal, as the user has chosen it. The key is a robot, for
+    /// its pair with the reference or with the only other robot, or a pair as ROBOT/ROBOT. From 1; 0 is the initial
+    /// pose itself.
     pub hypotheses: BTreeMap<String, usize>,
 }
 
@@ -56,7 +59,7 @@ impl Default for JudgementParameters {
 }
 
 impl JudgementParameters {
-    /// Those of the comparison.
+    /// Parameters of the comparison.
     pub fn comparison(&self) -> ComparisonParameters {
         let Self { wall_tolerance, region, region_deviation, bend, turn, .. } = *self;
         ComparisonParameters { wall_tolerance, region, region_deviation, bend, turn }
@@ -65,7 +68,7 @@ impl JudgementParameters {
 
 impl Parameters for JudgementParameters {
     fn check_together(&self) -> Vec<ParameterError> {
-        // Between them, squares of their inverses are no numbers.
+        // Outside of these bounds, squares or their inverses overflow.
         let is_usable = self.bend == 0.0 || (1e-6..=10.0).contains(&self.bend);
         let problem = || format!("must be 0 or lie between 1e-6 and 10, not {}", self.bend);
         (!is_usable).then(|| ParameterError::new("bend", problem())).into_iter().collect()

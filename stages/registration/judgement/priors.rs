@@ -1,18 +1,19 @@
-//! What is known of a place before the maps are compared.
+//! Prior log-odds of a hypothesis, before the maps are compared.
 
 use super::Candidate;
 use crate::registration::Basis;
 
-/// The log-odds that tags add. It was not fitted, as no recorded pairs with wrong tags are at hand: with the logarithm of 100 they decide
-/// between two places that the maps fit equally well, and do not make a mirrored map or that of another building fit.
+/// Log-odds that tags add. It was not fitted, as no recorded pairs with wrong tags are available. With the logarithm
+/// of 100 tags decide between two poses that the maps fit equally well, and do not make a mirrored map or that of
+/// another building fit.
 const BY_TAGS: f64 = 4.6;
-/// The log-odds that initial poses add to a place that they allow: half as much, about.
+/// Log-odds that initial poses add to a pose that they allow: about half as much.
 const BY_INITIAL_POSES: f64 = 2.0;
-/// The log-odds that it adds where enough tags and the best peak of the search come to the same place, each by itself: the logarithm of
-/// 100, as even a small building has as many places that lie a metre or ten degrees apart.
+/// Log-odds where enough tags and the best peak of the search independently give the same pose: the logarithm of 100,
+/// as even a small building has as many poses that are a metre or ten degrees apart.
 const BY_COINCIDENCE: f64 = 4.6;
 
-/// The log-odds that tags add to a place, and the user if he expects the maps there.
+/// Prior log-odds of a candidate from tags and from initial poses.
 pub(super) fn prior(candidate: &Candidate, is_expected: bool) -> f64 {
     let has_tags = candidate.rests_on(|basis| basis == Basis::Tags);
     let is_best_peak =

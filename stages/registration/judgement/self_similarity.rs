@@ -1,98 +1,100 @@
-//! Perceptual aliasing: whether the building looks alike in two places, so that a robot may have been in either.
+//! Perceptual aliasing: whether the building is self-similar, so that a robot may have been in either of two places.
 //!
-//! Where two robots have seen the opposite ends of a symmetric building, much of their maps agrees half a turn off, and little at the
-//! right place, where only the middle is in both. No search for other places finds that, as more wall agrees at the wrong one. But each
-//! map that reaches beyond the middle shows that the building is alike there: it agrees with itself, half a turn off.
+//! Where two robots have seen the opposite ends of a symmetric building, much of their maps agrees half a turn off,
+//! and little at the right pose, where only the middle is in both. A search for other poses does not show that, as
+//! more wall agrees at the wrong one. But each map that reaches beyond the middle shows that the building is
+//! self-similar: it agrees with itself, half a turn off.
 //!
-//! So an accepted place has an alias wherever a map agrees with itself, and the alias is a hypothesis like any other, with odds of its own
-//! against the place:
+//! So an accepted pose has an alias for each pose at which a map agrees with itself, and the alias is a hypothesis
+//! like any other, with log-odds against the accepted pose:
 //!
-//! - Likeness must explain all that agrees at the place, and a map that is like itself in little says little of that.
-//! - Where parts of a building are alike but not the same, walls that agree by likeness contradict each other as often as the map
-//!   contradicts itself; and walls that are the same contradict each other for noise alone, which is less.
+//! - Self-similarity must explain all inliers, and little of it is little evidence.
+//! - Where parts of a building are similar but not the same, walls that agree by self-similarity contradict each
+//!   other as often as the map contradicts itself; walls that are the same contradict each other by noise only, which
+//!   is less.
 
 use super::weights::ALIAS;
 use super::{JudgementParameters, Verdict};
 use crate::registration::comparison::{Agreement, MapView, compare};
 use crate::registration::icp::{FirstGuess, IcpParameters, refine};
-use crate::registration::place_window::PlaceWindow;
-use crate::registration::search::{MapAlignerParameters, PreparedMap, self_similar_places};
+use crate::registration::pose_window::PoseWindow;
+use crate::registration::search::{MapAlignerParameters, PreparedMap, self_similar_poses};
 use crate::shared::geometry::Pose2;
 use crate::shared::walls::{CORRELATION_LENGTH, WallMap};
 use nalgebra::Matrix3;
 
-/// Two places are alike if so large a share of the walls agrees where they are laid on each other, and so many metres, in more than a room:
-/// rooms of one building are alike, and less wall meets at many places by chance.
+/// Least inlier ratio and inlier length of self-similar poses, in more than a room: rooms of one building are alike,
+/// and less wall agrees at many poses by chance.
 const ALIKE_SHARE: f64 = 0.75;
 const ALIKE_WALL: f64 = 20.0;
-/// More of a log-likelihood ratio of contradictions is no surer: what was moved is in none of them.
+/// Bound of the log-likelihood ratio of contradictions: furniture that was moved is not in the model.
 const MOST_CONTRADICTION: f64 = 10.0;
-/// So large is a room, square metres.
+/// Area of a room, square metres.
 const ROOM: f64 = 25.0;
 
-/// Where a map looks like itself.
+/// Poses at which a map is similar to itself.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SelfSimilarity {
-    /// Places at which the map lies on itself, `T_map_map`, and what it says of itself there.
-    places: Vec<(Pose2, Agreement)>,
+    /// `T_map_map` of these poses, and the agreement of the map with itself there.
+    poses: Vec<(Pose2, Agreement)>,
 }
 
 impl SelfSimilarity {
-    /// Searches for it in a map.
+    /// Searches a map for them.
     pub fn new(map: &MapView<'_>, parameters: &JudgementParameters) -> Self {
         let aligner = MapAlignerParameters::default();
         let cell = PreparedMap::least_cell(&map.grid).max(0.5 * aligner.cell);
         let prepared = PreparedMap::new("", &map.grid, cell, aligner.max_extent);
-        let places = prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_places(&prepared, &aligner));
-        let registered = places.iter().map(|place| registered(map.walls, map.walls, place));
+        let poses = prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_poses(&prepared, &aligner));
+        let registered = poses.iter().map(|place| registered(map.walls, map.walls, place));
         let compared = registered.map(|place| (place, compare(map, map, &place, &parameters.comparison())));
-        Self { places: compared.filter(|(_, agreement)| is_alike(agreement)).collect() }
+        Self { poses: compared.filter(|(_, agreement)| is_alike(agreement)).collect() }
     }
 }
 
-/// Another place of map b that may be the right one, as the building is alike there.
+/// Another pose of map b that may be the right one, as the building is self-similar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alias {
-    /// How far the middle of the inliers is moved there, metres.
+    /// Shift of the centroid of the inliers, metres.
     pub shift: f64,
-    /// By how much map b is turned there, radians.
+    /// Rotation of map b, radians.
     pub turn: f64,
-    /// `T_a_b` there.
+    /// Pose of map b in map a, `T_a_b`.
     pub transform_a_b: Pose2,
-    /// What the maps say of each other there.
+    /// Agreement of the maps at that pose.
     pub there: Agreement,
-    /// What the one map that is alike says of itself.
+    /// Agreement of the self-similar map with itself.
     pub itself: Agreement,
-    /// What the log-odds are a weighted sum of, after the 1 that the first weight stands for.
+    /// Terms of the log-odds, after the 1 of the first weight.
     pub terms: [f64; 2],
-    /// The log-odds that it is right and not the place that it is an alias of.
+    /// Log-odds that the alias is right and not the accepted pose.
     pub log_odds: f64,
 }
 
 impl Alias {
-    /// The alias of an accepted place that is likeliest to be the right one; none if the building is alike nowhere.
+    /// The most probable alias of an accepted pose; none if neither map is self-similar.
     pub fn likeliest(
         verdict: &Verdict,
         a: (&MapView<'_>, &SelfSimilarity),
         b: (&MapView<'_>, &SelfSimilarity),
-        window: Option<&PlaceWindow>,
+        window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Option<Self> {
         let all = Self::all(verdict, a, b, window, parameters).into_iter();
         all.max_by(|one, other| one.log_odds.total_cmp(&other.log_odds))
     }
 
-    /// All aliases of a place, or those in a window. Each map comes with where it looks like itself.
+    /// All aliases of a pose, or those in a window. Each map is given with its self-similarity.
     pub fn all(
         verdict: &Verdict,
         (a, similar_a): (&MapView<'_>, &SelfSimilarity),
         (b, similar_b): (&MapView<'_>, &SelfSimilarity),
-        window: Option<&PlaceWindow>,
+        window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Vec<Self> {
         let (place, here) = (verdict.candidate.transform_a_b(), verdict.candidate.agreement);
-        let by_a = similar_a.places.iter().map(|(change, itself)| (change * place, itself));
-        let by_b = similar_b.places.iter().map(|(change, itself)| (place * change, itself));
+        let by_a = similar_a.poses.iter().map(|(change, itself)| (change * place, itself));
+        let by_b = similar_b.poses.iter().map(|(change, itself)| (place * change, itself));
         let alias = |(guess, itself): (Pose2, &Agreement)| {
             let transform_a_b = registered(a.walls, b.walls, &guess);
             let is_possible = window.is_none_or(|window| window.contains(&transform_a_b, 0.0, 0.0));
@@ -118,19 +120,20 @@ fn is_alike(agreement: &Agreement) -> bool {
     is_much && agreement.inlier_ratio() >= ALIKE_SHARE
 }
 
-/// The logarithm of the self-similar length as a share of the inliers at the place: likeness must explain all of them.
+/// Logarithm of the self-similar length as a share of the inliers: self-similarity must explain all of them.
 fn extent(here: &Agreement, itself: &Agreement) -> f64 {
     ((itself.inlier_length + 1.0) / (here.inlier_length + 1.0)).ln().min(0.0)
 }
 
-/// The place near a guess at which the walls of the maps lie on each other.
+/// Pose near a guess at which the walls of the maps are aligned.
 fn registered(a: &WallMap, b: &WallMap, guess: &Pose2) -> Pose2 {
     let icp = IcpParameters::default();
     refine(a, b, &FirstGuess::new(*guess, Matrix3::zeros(), &icp), &icp).registration.transform_a_b
 }
 
-/// The logarithm of how much likelier it is that the maps contradict each other `here` for noise, and `there` as the building contradicts
-/// `itself` in likeness, than the other way round. Each length at which walls are independent of each other is one sample.
+/// Log-likelihood ratio of two explanations of the conflicts: those `here` are noise and those `there` are as
+/// frequent as the building's own self-conflicts (`itself`), or the other way round. Each correlation length of wall
+/// is one sample.
 fn by_contradiction(here: &Agreement, there: &Agreement, itself: &Agreement) -> f64 {
     let [here, there, itself] =
         [here, there, itself].map(|agreement| (agreement.inlier_length, agreement.conflict_length));
@@ -139,15 +142,15 @@ fn by_contradiction(here: &Agreement, there: &Agreement, itself: &Agreement) -> 
     (right - wrong) / CORRELATION_LENGTH
 }
 
-/// Lengths of wall that agree and that contradict, metres.
+/// Inlier length and conflict length, metres.
 type Lengths = (f64, f64);
 
 fn sum(one: Lengths, other: Lengths) -> Lengths {
     (one.0 + other.0, one.1 + other.1)
 }
 
-/// Of two places, by the shares of contradiction that are likeliest, where that of likeness, which has noise as well, is at least that of
-/// noise.
+/// Log-likelihood of two agreements by their most likely conflict ratios, where that of self-similarity, which
+/// contains noise as well, is at least that of noise.
 fn log_likelihood_of_noise_and_likeness(noise: Lengths, likeness: Lengths) -> f64 {
     match noise.1 * likeness.0 <= likeness.1 * noise.0 {
         true => log_likelihood(noise) + log_likelihood(likeness),
@@ -155,7 +158,7 @@ fn log_likelihood_of_noise_and_likeness(noise: Lengths, likeness: Lengths) -> f6
     }
 }
 
-/// By the share of contradiction that is likeliest.
+/// Log-likelihood by the most likely conflict ratio.
 fn log_likelihood((agree, contradict): Lengths) -> f64 {
     let of = |length: f64| if length > 0.0 { length * (length / (agree + contradict)).ln() } else { 0.0 };
     of(agree) + of(contradict)
@@ -178,8 +181,8 @@ mod tests {
         (west, plan.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1)))
     }
 
-    /// The judgement on a place that stands out from all others by the walls alone, first without its alias, and then with it.
-    fn judged(a: &DrawnMap, b: &DrawnMap, place: &Pose2, window: Option<&PlaceWindow>) -> [Option<Refusal>; 2] {
+    /// The verdict on a pose with a significant peak, first without its alias, and then with it.
+    fn judged(a: &DrawnMap, b: &DrawnMap, place: &Pose2, window: Option<&PoseWindow>) -> [Option<Refusal>; 2] {
         let hypothesis = Hypothesis {
             transform_a_b: *place,
             covariance: Matrix3::identity(),
@@ -205,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_a_symmetric_building_are_not_taken_for_each_other() {
+    fn the_ends_of_a_symmetric_building_are_not_confused() {
         let (a, b) = ends(&FloorPlan::nearly_symmetric());
         let wrong = a.transform_world_map.inverse() * half_turn() * b.transform_world_map;
         let [alone, with_alias] = judged(&a, &b, &wrong, None);
@@ -216,26 +219,26 @@ mod tests {
     }
 
     #[test]
-    fn an_alias_that_the_user_rules_out_is_none() {
+    fn an_alias_outside_the_window_does_not_count() {
         let (a, b) = ends(&FloorPlan::nearly_symmetric());
         let right = a.transform_to(&b);
         let initial = InitialPose { yaw_stddev: 0.2, ..InitialPose::default() };
         let at = |place: &Pose2| {
             let (x, y, yaw) = (place.translation.x, place.translation.y, place.rotation.angle());
-            PlaceWindow::between(&initial, &InitialPose { x, y, yaw, ..initial })
+            PoseWindow::between(&initial, &InitialPose { x, y, yaw, ..initial })
         };
         assert!(judged(&a, &b, &right, None)[1].is_some());
         assert_eq!(judged(&a, &b, &right, Some(&at(&right)))[1], None);
     }
 
     #[test]
-    fn a_building_that_is_alike_in_little_is_told_from_what_it_is_like() {
+    fn a_building_with_little_self_similarity_has_no_alias() {
         let (a, b) = ends(&FloorPlan::office());
         assert_eq!(judged(&a, &b, &a.transform_to(&b), None), [None, None]);
     }
 
     #[test]
-    fn a_place_without_contradiction_is_told_from_one_that_is_only_like_it() {
+    fn a_pose_without_conflicts_is_distinguished_from_a_similar_one() {
         // One half has rooms that the other has not.
         let plan =
             FloorPlan::nearly_symmetric().with(&[[0.0, 8.0, 3.0, 8.0], [6.0, 9.0, 6.0, 12.0], [14.0, 9.5, 17.0, 9.5]]);
@@ -249,11 +252,11 @@ mod tests {
     }
 
     #[test]
-    fn what_contradicts_as_likeness_does_is_the_alias() {
+    fn conflicts_as_frequent_as_those_of_the_building_with_itself_show_the_alias() {
         let itself = walls(80.0, 8.0);
         assert!(by_contradiction(&walls(160.0, 0.5), &walls(50.0, 6.0), &itself) > 10.0);
         assert!(by_contradiction(&walls(160.0, 15.0), &walls(50.0, 0.2), &itself) < -5.0);
-        // However well the building is like itself, it is no reason to contradict more at the right place.
+        // However self-similar the building is, that does not explain more conflicts at the right pose.
         assert!(by_contradiction(&walls(160.0, 1.0), &walls(90.0, 25.0), &walls(50.0, 0.5)) > 10.0);
         assert!(by_contradiction(&walls(160.0, 15.0), &walls(50.0, 5.0), &itself).abs() < 1.0);
         assert_eq!(by_contradiction(&walls(0.0, 0.0), &walls(0.0, 0.0), &itself), 0.0);
@@ -261,7 +264,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_odds_of_a_place_against_its_alias_are_those_of_the_alias_turned_round(lengths: [u16; 6]) {
+        fn the_odds_of_a_pose_against_its_alias_are_the_inverse_of_those_of_the_alias(lengths: [u16; 6]) {
             let [here, there, itself] = [0, 2, 4].map(|at| walls(f64::from(lengths[at]), f64::from(lengths[at + 1])));
             let (odds, turned) = (by_contradiction(&here, &there, &itself), by_contradiction(&there, &here, &itself));
             prop_assert!(odds.is_finite() && (odds + turned).abs() <= 1e-6 * (1.0 + odds.abs()));

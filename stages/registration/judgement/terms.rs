@@ -1,17 +1,18 @@
-//! The terms of the sum.
+//! The terms of the log-odds.
 
 use super::weights::{INTERCEPT, WEIGHTS};
 use crate::registration::comparison::Agreement;
 
-/// So large must the independent share of the inliers be for what speaks for a place to count in full: two walls fit any corner.
+/// Least independent share of the inliers for the evidence to count in full: two walls fit any corner.
 const FULL_SHARE: f64 = 0.5;
-/// From there on the model of chance itself is in doubt.
+/// Beyond this the model of chance itself is in doubt.
 const MOST_SIGNIFICANCE: f64 = 300.0;
-/// No place is known better, metres.
+/// Least standard deviation of a position, metres.
 const LEAST_DEVIATION: f64 = 0.01;
-/// A larger area says no more, square metres.
+/// A larger common area is no further evidence, square metres.
 const MOST_AREA: f64 = 500.0;
-/// So many metres that contradict, and that agree, are taken to be there in any case: a share of little is a small one.
+/// Lengths of conflicts and of inliers that are added before taking the ratio, metres: a share of little wall is
+/// uncertain.
 const MORE_CONFLICT: f64 = 5.0;
 const MORE_WALL: f64 = 40.0;
 
@@ -21,32 +22,32 @@ pub const COUNT: usize = 11;
 /// A term of the log-odds that a hypothesis is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
-    /// The logarithm of how far the peak of the search stands out, in units of the spread of all others.
+    /// Logarithm of the peak significance.
     PeakSignificance,
-    /// The logarithm of the standard deviation of the place in its least known direction, metres.
+    /// Logarithm of the largest standard deviation of the position over all directions, metres.
     Deviation,
-    /// The logarithm of the inliers, as a multiple of the walls that cross free space.
+    /// Logarithm of the ratio of inlier length to crossing length.
     InliersToCrossings,
-    /// The logarithm of the area that both maps know.
+    /// Logarithm of the area that both maps know.
     CommonArea,
-    /// The share of the inliers that does not belong to the two walls that fix the place.
+    /// Share of the inliers outside the two walls that fix the pose.
     IndependentInliers,
-    /// The logarithm of the number of independent constraints in the weaker direction.
+    /// Logarithm of the number of independent constraints in the weaker direction.
     Constraints,
-    /// The local residual, metres.
+    /// Local residual, metres.
     Residual,
-    /// The share of the conflicts that crosses free space.
+    /// Share of the conflict length that crosses free space.
     CrossingConflicts,
-    /// The share of all compared walls that crosses free space.
+    /// Share of the compared length that crosses free space.
     Crossings,
-    /// The root of the cost of the deformation.
+    /// Root of the cost of the deformation.
     Deformation,
-    /// The root of the log-likelihood ratio of the walls, less the cost of the deformation.
+    /// Root of the log-likelihood ratio of the walls, less the cost of the deformation.
     Evidence,
 }
 
 impl Term {
-    /// All, in the order of [`Terms`].
+    /// All terms, in the order of [`Terms`].
     pub const ALL: [Self; COUNT] = [
         Self::PeakSignificance,
         Self::Deviation,
@@ -61,7 +62,7 @@ impl Term {
         Self::Evidence,
     ];
 
-    /// What it is called, in the explanation of a verdict and in the tables of the fit.
+    /// Name in the explanation of a verdict and in the tables of the fit.
     pub fn name(self) -> &'static str {
         match self {
             Self::PeakSignificance => "peak significance",
@@ -92,13 +93,13 @@ impl Term {
     }
 }
 
-/// The values of all terms for a hypothesis, in the order of [`Term::ALL`].
+/// Values of all terms for a hypothesis, in the order of [`Term::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms(pub [f64; COUNT]);
 
 impl Terms {
-    /// Of a place whose peak in the search has a significance, that is known to a deviation, metres, and at which the maps agree so, with
-    /// map b deformed at that cost.
+    /// Terms of a hypothesis with a peak significance, the standard deviation of its position, metres, the agreement
+    /// of the maps, and the cost of the deformation of map b.
     pub fn new(significance: f64, deviation: f64, agreement: &Agreement, deformation_cost: f64) -> Self {
         let Agreement {
             overlap,
@@ -127,13 +128,13 @@ impl Terms {
         ])
     }
 
-    /// What each term adds to the log-odds.
+    /// Contribution of each term to the log-odds.
     pub fn contributions(&self) -> [f64; COUNT] {
         // Not -0.
         std::array::from_fn(|index| WEIGHTS[index] * self.0[index] + 0.0)
     }
 
-    /// The log-odds by the maps.
+    /// Log-odds from the maps.
     pub fn log_odds(&self) -> f64 {
         INTERCEPT + self.contributions().iter().sum::<f64>()
     }

@@ -2,15 +2,15 @@
 
 use super::{JudgementParameters, Refusal, UserKnowledge, Verdict, judge};
 use crate::registration::comparison::compare;
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::{Point2, Pose2, point_jacobian, pose};
-use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, bend_at, drawing, seen};
+use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, deformation_at, drawing, seen};
 use gridweave_runtime::stage::{InitialPose, Parameters};
 use nalgebra::{Matrix3, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The west and the east of the office, in frames of their own.
+/// The west and the east of the office, in their own frames.
 fn office_maps() -> (DrawnMap, DrawnMap) {
     let office = FloorPlan::office();
     let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
@@ -18,7 +18,7 @@ fn office_maps() -> (DrawnMap, DrawnMap) {
     (a, b)
 }
 
-/// A hypothesis that rests on enough tags.
+/// A hypothesis from enough tags.
 fn by_tags(transform_a_b: &Pose2) -> Hypothesis {
     Hypothesis {
         transform_a_b: *transform_a_b,
@@ -31,24 +31,24 @@ fn by_tags(transform_a_b: &Pose2) -> Hypothesis {
     }
 }
 
-/// Hypotheses of the maps alone, of which the first stands out.
-fn by_maps(places: &[Pose2]) -> Vec<Hypothesis> {
+/// Hypotheses from the maps only, of which the first has a significant peak.
+fn by_maps(poses: &[Pose2]) -> Vec<Hypothesis> {
     let hypothesis = |(rank, place): (usize, &Pose2)| Hypothesis {
         basis: Basis::Search { significance: if rank == 0 { 7.0 } else { 0.0 } },
         source: "maps".into(),
         reason: "the maps alone".into(),
         ..by_tags(place)
     };
-    places.iter().enumerate().map(hypothesis).collect()
+    poses.iter().enumerate().map(hypothesis).collect()
 }
 
-/// Hypotheses of the maps alone, of which none stands out.
-fn by_maps_alike(places: &[Pose2]) -> Vec<Hypothesis> {
+/// Hypotheses from the maps only, none with a significant peak.
+fn by_maps_alike(poses: &[Pose2]) -> Vec<Hypothesis> {
     let alike = |(rank, hypothesis)| Hypothesis {
         basis: Basis::Search { significance: if rank == 0 { 0.2 } else { 0.0 } },
         ..hypothesis
     };
-    by_maps(places).into_iter().enumerate().map(alike).collect()
+    by_maps(poses).into_iter().enumerate().map(alike).collect()
 }
 
 fn judged(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis]) -> Verdict {
@@ -81,10 +81,10 @@ fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
 }
 
 #[test]
-fn a_bent_map_is_compared_as_it_is_bent_and_laid_where_all_of_it_is_nearest() {
+fn a_deformed_map_is_compared_with_its_deformation_and_its_pose_is_the_nearest_rigid_one() {
     const MOST: f64 = 1.0;
     let a = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let b = a.bent(MOST);
+    let b = a.deformed(MOST);
     // Where one part of it fits, and where another does.
     let maps = by_maps(&[pose(-0.65, -0.9, 0.0), pose(-0.75, 0.0, -0.04)]);
     let rigid = JudgementParameters { bend: 0.0, ..Default::default() };
@@ -92,24 +92,24 @@ fn a_bent_map_is_compared_as_it_is_bent_and_laid_where_all_of_it_is_nearest() {
     assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
     let verdict = judged(&a, &b, &maps);
     assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
-    assert!(reason(&verdict).contains("as the maps are bent by 0.4"), "{}", reason(&verdict));
-    let bent = verdict.candidate.deformed.unwrap();
-    assert!(bent.agreement.inlier_ratio() > 0.95 && bent.cost > 1.0, "{bent:?}");
-    let places: Vec<Point2> =
+    assert!(reason(&verdict).contains("with a deformation of 0.4"), "{}", reason(&verdict));
+    let deformed = verdict.candidate.deformed.unwrap();
+    assert!(deformed.agreement.inlier_ratio() > 0.95 && deformed.cost > 1.0, "{deformed:?}");
+    let poses: Vec<Point2> =
         (1..20).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect();
-    let off = places.iter().map(|place| bent.transform_a_b * (place + bend_at(MOST, place)) - place);
+    let off = poses.iter().map(|place| deformed.transform_a_b * (place + deformation_at(MOST, place)) - place);
     let off: Vec<Vector2<f64>> = off.collect();
     let mean = off.iter().sum::<Vector2<f64>>() / off.len() as f64;
     let variance = off.iter().map(|off| off.norm_squared()).sum::<f64>() / off.len() as f64;
     assert!(mean.norm() < 0.1, "{mean}");
-    assert!((bent.bend / variance.sqrt() - 1.0).abs() < 0.2, "{} {}", bent.bend, variance.sqrt());
-    let about_middle = point_jacobian(&bent.transform_a_b, &Point2::new(10.0, 6.0));
-    let covariance = about_middle * bent.covariance * about_middle.transpose();
+    assert!((deformed.rms / variance.sqrt() - 1.0).abs() < 0.2, "{} {}", deformed.rms, variance.sqrt());
+    let about_middle = point_jacobian(&deformed.transform_a_b, &Point2::new(10.0, 6.0));
+    let covariance = about_middle * deformed.covariance * about_middle.transpose();
     assert!((covariance.trace() / variance - 1.0).abs() < 0.5, "{covariance} {variance}");
 }
 
 #[test]
-fn the_map_of_another_building_is_not_bent_to_fit() {
+fn the_map_of_another_building_is_not_deformed_to_fit() {
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let a = FloorPlan::office().draw(part, drawing(0.0, 0.0, 0.0));
     let b = FloorPlan::another_office().draw(part, drawing(0.0, 0.0, 0.0));
@@ -121,7 +121,7 @@ fn the_map_of_another_building_is_not_bent_to_fit() {
 }
 
 #[test]
-fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
+fn poses_that_fit_equally_well_are_ambiguous_and_tags_decide_between_them() {
     let plan = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
@@ -131,17 +131,17 @@ fn places_that_fit_as_well_are_ambiguous_and_tags_decide_between_them() {
     let verdict = judged(&a, &b, &maps);
     let Some(Refusal::Ambiguous { turn, probability, listed, .. }) = &verdict.refusal else { panic!("{verdict:?}") };
     assert!((turn.abs() - 180.0).abs() < 0.1 && *probability > 0.01 && listed.0.len() == 2);
-    assert!(reason(&verdict).contains("it cannot be told which is right"), "{}", reason(&verdict));
+    assert!(reason(&verdict).contains("the evidence does not decide which is right"), "{}", reason(&verdict));
 
     let both: Vec<Hypothesis> = [vec![by_tags(&truth)], by_maps_alike(&[turned, truth])].concat();
     let verdict = judged(&a, &b, &both);
     assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
     assert!(verdict.candidate.hypothesis.transform_a_b == truth);
-    assert!(verdict.found_too_by().is_some());
+    assert!(verdict.also_found_by().is_some());
 }
 
 #[test]
-fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
+fn tags_lose_where_the_maps_do_not_fit() {
     let (a, b) = office_maps();
     let truth = a.transform_to(&b);
     let hypotheses: Vec<Hypothesis> = [vec![by_tags(&(pose(1.5, 0.0, 0.0) * truth))], by_maps(&[truth])].concat();
@@ -151,10 +151,10 @@ fn tags_that_lay_the_maps_where_they_do_not_fit_are_outdone() {
 
 /// Furniture was moved all over the building, so that the maps contradict each other in much at their right place.
 #[test]
-fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_tell_the_same() {
-    let places = (0..10).flat_map(|x| [1.1, 2.6, 3.9, 8.2, 9.6, 11.0].map(|y| (0.9 + 1.9 * f64::from(x), y)));
+fn maps_with_many_conflicts_are_merged_where_tags_and_a_search_agree() {
+    let poses = (0..10).flat_map(|x| [1.1, 2.6, 3.9, 8.2, 9.6, 11.0].map(|y| (0.9 + 1.9 * f64::from(x), y)));
     let turned = |(x, y): (f64, f64)| ([x - 0.6, y, x + 0.6, y], [x, y - 0.6, x, y + 0.6]);
-    let (before, after): (Vec<_>, Vec<_>) = places.map(turned).unzip();
+    let (before, after): (Vec<_>, Vec<_>) = poses.map(turned).unzip();
     let a = FloorPlan::office().with(&before).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(3.0, 2.0, 0.4));
     let b = FloorPlan::office().with(&after).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
     let truth = a.transform_to(&b);
@@ -165,11 +165,11 @@ fn maps_that_contradict_each_other_in_much_are_merged_where_tags_and_a_search_te
     let together = [std::slice::from_ref(&tags), &maps].concat();
     assert_eq!(judged(&a, &b, &together).refusal, None);
     let second = [std::slice::from_ref(&tags), &by_maps(&[pose(4.0, 0.0, 0.0) * truth, truth])].concat();
-    assert!(judged(&a, &b, &second).refusal.is_some(), "the search has come to another place first");
+    assert!(judged(&a, &b, &second).refusal.is_some(), "the best peak of the search is elsewhere");
 }
 
 #[test]
-fn what_its_stage_has_refused_is_not_accepted_but_counts_as_a_rival() {
+fn a_refused_hypothesis_is_not_accepted_but_competes() {
     let plan = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
@@ -219,7 +219,7 @@ fn maps_that_hardly_overlap_are_refused() {
 }
 
 #[test]
-fn walls_that_are_seen_from_different_sides_are_no_evidence() {
+fn walls_that_are_seen_from_opposite_sides_are_no_evidence() {
     // Two rooms on either side of one wall, each map of one of them.
     let plan = FloorPlan::new(&[
         [0.0, 0.0, 6.0, 0.0],
@@ -237,7 +237,7 @@ fn walls_that_are_seen_from_different_sides_are_no_evidence() {
 }
 
 #[test]
-fn a_region_may_slide_a_little_and_not_far() {
+fn a_region_may_be_shifted_a_little_and_not_far() {
     let (a, b) = office_maps();
     let truth = a.transform_to(&b);
     let evidence = |shift: f64| {
@@ -249,7 +249,7 @@ fn a_region_may_slide_a_little_and_not_far() {
 }
 
 #[test]
-fn what_is_accepted_follows_from_the_probability_that_is_asked_for() {
+fn acceptance_follows_from_the_required_probability() {
     let (a, b) = office_maps();
     let hypotheses = by_maps(&[a.transform_to(&b)]);
     for (accept, is_accepted) in [(0.0, true), (0.98, true), (1.0, false)] {
@@ -265,7 +265,7 @@ fn the_wrong_quarter_is_refused() {
     let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.0));
     let b = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.3));
     for turn in [FRAC_PI_2, PI, -FRAC_PI_2] {
-        // What a search finds stands against the tags.
+        // The peaks of a search compete with the tags.
         let found = by_maps(&[a.transform_to(&b)]).into_iter().map(|one| Hypothesis { is_rival: true, ..one });
         let wrong = by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)));
         let hypotheses: Vec<Hypothesis> = std::iter::once(wrong).chain(found).collect();
@@ -289,7 +289,7 @@ fn the_defaults_are_in_range_and_nonsense_is_not() {
     assert_eq!(nonsense.check().len(), 6);
 }
 
-/// The nearly symmetric building, twice, and a place in each of its halves.
+/// The nearly symmetric building, twice, and a pose in each of its halves.
 fn ambiguous() -> (DrawnMap, DrawnMap, [Pose2; 2]) {
     let building = FloorPlan::nearly_symmetric();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
@@ -309,28 +309,28 @@ fn window_at(place: &Pose2) -> UserKnowledge {
         stddev: 0.5,
         yaw_stddev: 0.1,
     };
-    UserKnowledge { window: Some(PlaceWindow::between(&InitialPose::ORIGIN, &known)), hypothesis: None }
+    UserKnowledge { window: Some(PoseWindow::between(&InitialPose::ORIGIN, &known)), hypothesis: None }
 }
 
 #[test]
-fn an_initial_pose_decides_between_places_that_are_alike() {
-    let (a, b, places) = ambiguous();
-    let hypotheses = by_maps_alike(&places);
+fn an_initial_pose_decides_between_poses_that_fit_equally_well() {
+    let (a, b, poses) = ambiguous();
+    let hypotheses = by_maps_alike(&poses);
     assert!(matches!(judged(&a, &b, &hypotheses).refusal, Some(Refusal::Ambiguous { .. })));
-    for (rank, place) in (0..).zip(&places) {
+    for (rank, place) in (0..).zip(&poses) {
         let verdict = judged_knowing(&a, &b, &hypotheses, &window_at(place));
         assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, rank), "{}", reason(&verdict));
     }
-    let elsewhere = window_at(&(pose(5.0, 0.0, 0.0) * places[0]));
+    let elsewhere = window_at(&(pose(5.0, 0.0, 0.0) * poses[0]));
     let verdict = judged_knowing(&a, &b, &hypotheses, &elsewhere);
-    assert!(matches!(verdict.refusal, Some(Refusal::Unexpected { shift, .. }) if (shift - 5.0).abs() < 1.0));
+    assert!(matches!(verdict.refusal, Some(Refusal::OutsideWindow { shift, .. }) if (shift - 5.0).abs() < 1.0));
     assert!(reason(&verdict).contains("from the initial poses only\ntry: "), "{}", reason(&verdict));
 }
 
 #[test]
 fn a_hypothesis_that_was_listed_can_be_chosen() {
-    let (a, b, places) = ambiguous();
-    let hypotheses = by_maps_alike(&places);
+    let (a, b, poses) = ambiguous();
+    let hypotheses = by_maps_alike(&poses);
     let refused = judged(&a, &b, &hypotheses);
     let listed = &refused.listed.0;
     assert_eq!(listed.len(), 2);
@@ -340,7 +340,7 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
         assert_eq!(verdict.refusal, None);
         let translation = verdict.candidate.hypothesis.transform_a_b.translation;
         assert_eq!((place.x, place.y), (translation.x, translation.y));
-        assert!(reason(&verdict).starts_with(&format!("hypothesis {number} of 2, which was asked for")));
+        assert!(reason(&verdict).starts_with(&format!("hypothesis {number} of 2, chosen by the user")));
     }
     let known = UserKnowledge { hypothesis: Some(3), ..UserKnowledge::default() };
     let refusal = judged_knowing(&a, &b, &hypotheses, &known).refusal;
@@ -348,13 +348,13 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
 }
 
 #[test]
-fn what_everybody_is_shown_of_a_refusal_fits_in_eighty_columns() {
-    let (a, b, places) = ambiguous();
-    let reason = reason(&judged(&a, &b, &by_maps_alike(&places)));
+fn the_short_text_of_a_refusal_fits_in_eighty_columns() {
+    let (a, b, poses) = ambiguous();
+    let reason = reason(&judged(&a, &b, &by_maps_alike(&poses)));
     let (shown, whole) = reason.split_once("\n\n").unwrap();
     let lines: Vec<&str> = shown.lines().collect();
     assert!(lines.iter().all(|line| line.len() <= 78), "{shown}");
-    assert_eq!(lines[0], "the maps fit at 2 places, and it cannot be told which is right");
+    assert_eq!(lines[0], "the maps fit at 2 poses, and the evidence does not decide which is right");
     assert!(lines[1].starts_with("missing: a probability of 0.98 (--set verifier.accept); this is 0."), "{shown}");
     assert!(lines[2].starts_with("try: --accept robot2=N") && lines[4].starts_with("  2: x "), "{shown}");
     assert!(whole.starts_with("the maps alone; the maps do not confirm it"), "{whole}");

@@ -1,4 +1,4 @@
-//! The judgement on all hypotheses for a pair of maps, and its reason in words.
+//! The verdict on all hypotheses for a pair of maps, and its reason as text.
 
 use super::weights::{INTERCEPT, TYPICAL, WEIGHTS};
 use super::{Alias, Candidate, JudgementParameters, Listed, Refusal, Term};
@@ -6,25 +6,25 @@ use crate::registration::comparison::{Agreement, Deformed};
 use crate::registration::{Basis, Hypothesis};
 use std::fmt::Write;
 
-/// The second most probable place.
+/// The second most probable candidate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rival {
-    /// How far the middle of the inliers is moved there, metres.
+    /// Shift of the centroid of the inliers to it, metres.
     pub shift: f64,
-    /// By how much map b is turned there, radians.
+    /// Rotation of map b to it, radians.
     pub turn: f64,
-    /// What the maps say of each other there.
+    /// Agreement of the maps there.
     pub agreement: Agreement,
-    /// How probable it is.
+    /// Its probability.
     pub probability: f64,
-    /// What it rests on, for people.
+    /// Its source, for the user.
     pub source: String,
-    /// Whether tags propose it.
+    /// Whether it rests on tags.
     pub is_by_tags: bool,
 }
 
 impl Rival {
-    /// One candidate as the rival of another.
+    /// Describes one candidate relative to the best.
     pub(super) fn new(best: &Candidate, other: &Candidate, probability: f64) -> Self {
         let (shift, turn) = best.change(&other.transform_a_b());
         Self {
@@ -38,27 +38,27 @@ impl Rival {
     }
 }
 
-/// The judgement on all hypotheses for a pair.
+/// The verdict on all hypotheses for a pair.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// The place that is right, or came nearest to it.
+    /// The candidate that is accepted, or that is most probable.
     pub candidate: Candidate,
-    /// Why it is not accepted; none if it is.
+    /// Why it is refused; none if it is accepted.
     pub refusal: Option<Refusal>,
-    /// The second most probable place, if there is one.
+    /// The second most probable candidate, if there is one.
     pub rival: Option<Rival>,
-    /// The probability that it is right, 0 to 1.
+    /// Probability that the candidate is right, 0 to 1.
     pub probability: f64,
-    /// The log-odds of it before the maps were compared, by tags and by what the user knows.
+    /// Prior log-odds of the candidate, from tags and from initial poses.
     pub prior: f64,
-    /// If the user has chosen it: its number, and of how many.
+    /// If the user has chosen it: its number, and the number of hypotheses.
     pub chosen: Option<(usize, usize)>,
-    /// All hypotheses that took part, in the order in which the user can choose one.
+    /// All hypotheses that competed, in the order in which the user can choose one.
     pub listed: Listed,
 }
 
 impl Verdict {
-    /// Of a place that was not judged.
+    /// Verdict on a candidate that was not judged.
     pub(super) fn of(candidate: Candidate) -> Self {
         Self {
             candidate,
@@ -71,15 +71,15 @@ impl Verdict {
         }
     }
 
-    /// Whether it accepts a place for which the maps alone speak.
+    /// Whether it accepts a candidate that rests on the maps only.
     pub fn rests_on_maps_alone(&self) -> bool {
         self.refusal.is_none() && self.chosen.is_none() && !self.candidate.rests_on(Basis::is_by_tags)
     }
 
-    /// The same verdict where the building looks alike at another place, if there is one: the alias takes part in the sum.
+    /// The same verdict with an alias as a further hypothesis, if there is one.
     pub fn against(self, alias: Option<&Alias>, parameters: &JudgementParameters) -> Self {
         let Some(alias) = alias else { return self };
-        // The odds against all others, and the alias beside them.
+        // The odds of all others against the candidate, and those of the alias.
         let others = (1.0 - self.probability) / self.probability;
         let probability = 1.0 / (1.0 + others + alias.log_odds.exp());
         let refusal = match probability < parameters.accept {
@@ -89,10 +89,10 @@ impl Verdict {
         Self { probability, refusal, ..self }
     }
 
-    /// The term by which it falls short most of a usual right place.
+    /// The term by which the candidate is most below a usual right hypothesis.
     pub(super) fn weakest_term(&self) -> Term {
         let terms = self.candidate.terms();
-        // What no search has proposed has no peak to fall short by.
+        // A hypothesis that is not from a search has no peak significance.
         let is_by_search = self.candidate.rests_on(|basis| matches!(basis, Basis::Search { .. }));
         let counts = |index: &usize| is_by_search || Term::ALL[*index] != Term::PeakSignificance;
         let shortfall = |index: &usize| WEIGHTS[*index] * (TYPICAL[*index] - terms.0[*index]);
@@ -101,20 +101,20 @@ impl Verdict {
         Term::ALL[weakest.unwrap_or_default()]
     }
 
-    /// Another source that proposes the same place.
-    pub fn found_too_by(&self) -> Option<&Hypothesis> {
+    /// A hypothesis of another source at the same pose.
+    pub fn also_found_by(&self) -> Option<&Hypothesis> {
         let source = &self.candidate.hypothesis.source;
         self.candidate.others.iter().find(|other| other.source != *source)
     }
 
-    /// The reason of the verdict: a paragraph of short lines for all, and behind an empty line the whole for those who ask.
-    /// `accept` is the probability that is asked for, and `stage` the name of the stage that asks.
+    /// Reason of the verdict: a short paragraph, and after an empty line all details. `accept` is the required
+    /// probability, and `stage` the name of the stage that has this parameter.
     pub fn reason(&self, accept: f64, stage: &str, robot_a: &str, robot_b: &str) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = match &self.refusal {
             None => self.write_acceptance(&mut text),
-            Some(Refusal::Before(reason)) => write!(text, "{reason}"),
+            Some(Refusal::RefusedUpstream(reason)) => write!(text, "{reason}"),
             Some(refusal) => self.write_refusal(refusal, accept, stage, (robot_a, robot_b), &mut text),
         };
         text
@@ -125,14 +125,14 @@ impl Verdict {
         let agree =
             format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, in {overlap:.0} m2");
         match self.chosen {
-            Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, which was asked for: {agree}")?,
-            None => writeln!(text, "{agree} that both know")?,
+            Some((number, count)) => writeln!(text, "hypothesis {number} of {count}, chosen by the user: {agree}")?,
+            None => writeln!(text, "{agree} of common area")?,
         }
-        if let Some(Deformed { bend, .. }) = self.candidate.deformed {
-            writeln!(text, "as the maps are bent by {bend:.2} m against each other")?;
+        if let Some(Deformed { rms, .. }) = self.candidate.deformed {
+            writeln!(text, "with a deformation of {rms:.2} m between the maps")?;
         }
         write!(text, "\n{}", self.candidate.hypothesis.reason)?;
-        if let Some(other) = self.found_too_by() {
+        if let Some(other) = self.also_found_by() {
             write!(text, ", found by the {}, too", other.source)?;
         }
         if self.chosen.is_some() {
@@ -141,7 +141,7 @@ impl Verdict {
         write!(text, "; the maps confirm it")?;
         if let Some(Rival { agreement, .. }) = &self.rival {
             let share = 100.0 * agreement.inlier_ratio();
-            write!(text, "; at the best of other places {share:.0} % of {:.0} m agree", agreement.compared_length())?;
+            write!(text, "; at the second-best pose {share:.0} % of {:.0} m agree", agreement.compared_length())?;
         }
         self.write_sum(text)
     }
@@ -155,10 +155,10 @@ impl Verdict {
         text: &mut String,
     ) -> std::fmt::Result {
         writeln!(text, "{}", refusal.headline())?;
-        let is_judged = !matches!(refusal, Refusal::Unexpected { .. } | Refusal::NoSuchHypothesis { .. });
-        let lacks_probability = is_judged && !matches!(refusal, Refusal::Bent { .. });
+        let is_judged = !matches!(refusal, Refusal::OutsideWindow { .. } | Refusal::NoSuchHypothesis { .. });
+        let lacks_probability = is_judged && !matches!(refusal, Refusal::Deformed { .. });
         if lacks_probability {
-            // Rounded down, so that what is too little is not shown as enough.
+            // Rounded down, so that a value below the bound is not shown as the bound.
             let probability = (1000.0 * self.probability).floor() / 1000.0;
             writeln!(text, "missing: a probability of {accept} (--set {stage}.accept); this is {probability:.3}")?;
         }
@@ -174,16 +174,20 @@ impl Verdict {
             self.write_sum(text)?;
         }
         if !listed.is_empty() {
-            write!(text, "\nplaces of the map of {robot_b} on that of {robot_a}:\n{}", listed.trim_end())?;
+            write!(
+                text,
+                "\nhypotheses, as poses of the map of {robot_b} in that of {robot_a}:\n{}",
+                listed.trim_end()
+            )?;
         }
         Ok(())
     }
 
-    /// The sum term by term.
+    /// Writes the sum term by term.
     fn write_sum(&self, text: &mut String) -> std::fmt::Result {
         let terms = self.candidate.terms();
         write!(text, "\nlog-odds that it is right:")?;
-        write!(text, "\n  {:<36} {INTERCEPT:>7.1}", "before anything is known")?;
+        write!(text, "\n  {:<36} {INTERCEPT:>7.1}", "intercept")?;
         if self.prior != 0.0 {
             write!(text, "\n  {:<36} {:>7.1}", "tags and initial poses", self.prior)?;
         }
@@ -192,7 +196,7 @@ impl Verdict {
         }
         write!(text, "\n  {:<36} {:>7.1}", "sum", terms.log_odds() + self.prior)?;
         if let Some(Rival { probability, .. }) = &self.rival {
-            write!(text, "\n  probability {:.6}, of the best other place {probability:.6}", self.probability)?;
+            write!(text, "\n  probability {:.6}, of the second-best hypothesis {probability:.6}", self.probability)?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Robots whose maps are laid together.
+//! Groups of robots whose maps are merged for the search.
 
 use crate::registration::search::{PreparedMap, Raster};
 use crate::shared::geometry::Pose2;
@@ -6,18 +6,18 @@ use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// Robots whose maps are laid together, to be searched as one map.
+/// Robots whose maps are merged, to be searched as one map.
 pub(super) struct Group {
     pub(super) number: u64,
     /// `T_group_robot`.
     pub(super) members: BTreeMap<String, Pose2>,
-    /// Their maps as one, once that is asked for; none if they lie too far apart for that.
+    /// Their merged map, once it is requested; none if they are too far apart for that.
     joint: OnceCell<Option<PreparedMap>>,
 }
 
 impl Group {
     pub(super) fn new(number: u64, mut members: BTreeMap<String, Pose2>) -> Self {
-        // The frame of a robot alone is that of its map.
+        // The frame of a single robot is that of its map.
         if members.len() == 1 {
             members.values_mut().for_each(|place| *place = Pose2::identity());
         }
@@ -28,12 +28,12 @@ impl Group {
         self.members.keys().next().map_or("", String::as_str)
     }
 
-    /// The larger comes first, of equals the first by name.
+    /// Sort key: the larger group first, of equals the first by name.
     pub(super) fn rank(&self) -> (Reverse<usize>, &str) {
         (Reverse(self.members.len()), self.name())
     }
 
-    /// What its members know together, where `map_of` gives the map of each.
+    /// Merged map of the group, where `map_of` returns the map of each member.
     pub(super) fn map<'a>(&'a self, map_of: impl Fn(&str) -> Option<&'a PreparedMap>) -> Option<&'a PreparedMap> {
         if self.members.len() == 1 {
             return map_of(self.name());
@@ -51,12 +51,12 @@ impl Group {
 #[derive(Default)]
 pub(super) struct Groups {
     groups: Vec<Group>,
-    /// The number of the next group.
+    /// Number of the next group.
     next: u64,
 }
 
 impl Groups {
-    /// Adds a group of robots with their places. Its number, which no group has had.
+    /// Adds a group of robots with their poses. Returns its number, which is unique.
     pub(super) fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
         let number = self.next;
         self.next += 1;
@@ -64,7 +64,7 @@ impl Groups {
         number
     }
 
-    /// Gives a group another number, and forgets what its members knew together: the map of one of them has changed.
+    /// Gives a group another number and drops its merged map, as the map of a member has changed.
     pub(super) fn renew(&mut self, number: u64) {
         if let Some(index) = self.groups.iter().position(|group| group.number == number) {
             let members = self.groups.remove(index).members;
@@ -72,7 +72,8 @@ impl Groups {
         }
     }
 
-    /// Lays two groups together, where `transform_groups` takes places of the second to the first. The number of the group of both.
+    /// Unites two groups, where `transform_groups` is the pose of the second in the first. Returns the number of the
+    /// united group.
     pub(super) fn unite(&mut self, first: u64, second: u64, transform_groups: &Pose2) -> Option<u64> {
         let mut members = self.get(first)?.members.clone();
         let moved = self.get(second)?.members.iter();
@@ -81,7 +82,7 @@ impl Groups {
         Some(self.add(members))
     }
 
-    /// Takes robots out of their groups.
+    /// Removes robots from their groups.
     pub(super) fn leave(&mut self, robots: &[&str]) {
         let left = |group: &mut Group| robots.iter().any(|robot| group.members.contains_key(*robot));
         let groups: Vec<Group> = self.groups.extract_if(.., left).collect();
@@ -97,12 +98,12 @@ impl Groups {
         self.groups.iter().find(|group| group.number == number)
     }
 
-    /// The group that a robot is in.
+    /// Group of a robot.
     pub(super) fn of(&self, robot: &str) -> Option<&Group> {
         self.groups.iter().find(|group| group.members.contains_key(robot))
     }
 
-    /// The numbers of all groups, by their rank.
+    /// Numbers of all groups, in the order of their sort keys.
     pub(super) fn by_size(&self) -> Vec<u64> {
         let mut groups: Vec<&Group> = self.groups.iter().collect();
         groups.sort_by_key(|group| group.rank());
@@ -120,7 +121,7 @@ mod tests {
     use crate::shared::geometry::pose;
 
     #[test]
-    fn a_robot_that_is_left_alone_lies_in_its_own_frame() {
+    fn a_robot_that_is_left_alone_is_at_the_origin_of_its_own_frame() {
         let members = |robots: &[&str]| {
             let places = robots.iter().map(|robot| ((*robot).to_owned(), pose(1.0, 2.0, 0.5)));
             Group::new(7, places.collect()).members
@@ -130,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_are_laid_together_and_left() {
+    fn groups_are_united_and_left() {
         let mut groups = Groups::default();
         let numbers = ["c", "a", "b"].map(|robot| groups.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())])));
         let [c, a, b] = numbers;
@@ -139,7 +140,7 @@ mod tests {
         let both = groups.unite(b, c, &place).unwrap();
         assert_eq!((groups.by_size(), groups.len()), (vec![both, a], 2));
         assert_eq!(groups.of("c").unwrap().members["c"], place);
-        assert_eq!(groups.unite(b, c, &place), None, "they are no groups any more");
+        assert_eq!(groups.unite(b, c, &place), None, "the groups no longer exist");
         groups.leave(&["b", "a"]);
         let alone = groups.of("c").unwrap();
         assert_eq!((groups.len(), alone.members["c"]), (1, Pose2::identity()));

@@ -1,19 +1,19 @@
-//! Plans which maps of many robots are searched for their places on each other, and sends what was found.
+//! Plans which maps of many robots are searched for their relative poses, and sends the hypotheses.
 //!
 //! The search itself is [`registration::search`](crate::registration::search).
 
 mod group;
+mod pair_report;
 mod plan;
 mod stage;
-mod statement;
 
 #[cfg(test)]
 mod plan_tests;
 #[cfg(test)]
 mod stage_tests;
 
+pub use pair_report::PairReport;
 pub use plan::MergePlan;
-pub use statement::Statement;
 
 use crate::registration::search::MapAlignerParameters;
 use gridweave_runtime::stage::StageKind;
@@ -23,10 +23,10 @@ use stage::MapAligner;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "map_aligner",
-        "Finds how the maps of each pair of robots may lie to each other from the maps alone: every rotation and every \
-         translation is tried, and the places are taken at which walls lie on walls and not on free space of the other \
-         map. It sends the best few, ranked and marked as provisional: icp_refiner makes them exact, and merge_verifier \
-         decides between them. Where initial poses are given, only places near them are tried.",
+        "Searches the relative pose of the maps of each pair of robots by the maps only: every rotation and every \
+         translation is scored by the walls on walls, less the walls on free space of the other map. It sends the best \
+         hypotheses, ranked and marked as provisional: icp_refiner refines them, and merge_verifier decides between them. \
+         If initial poses are given, only poses near them are searched.",
         |parameters: MapAlignerParameters, context| Ok(MapAligner::new(parameters, context.initial_poses.clone())),
     )
     .input("map", "The robots' maps.", MapAligner::receive_map)

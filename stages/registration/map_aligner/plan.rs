@@ -1,8 +1,8 @@
-//! Which maps of many robots are searched, so that not every pair of them must be.
+//! Which maps of many robots are searched, so that not every pair must be.
 
 use super::group::{Group, Groups};
-use super::statement::{Statement, with_reasons};
-use crate::registration::place_window::PlaceWindow;
+use super::pair_report::{PairReport, with_reasons};
+use crate::registration::pose_window::PoseWindow;
 use crate::registration::search::{
     CommonWalls, JUDGED, MapAlignerParameters, MapAlignment, MapAlignments, PreparedMap, SearchRefusal, align_near,
     align_prepared, is_near, overlay,
@@ -12,44 +12,44 @@ use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::stage::InitialPoses;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// As many groups, the largest first, are tried for a robot when its map comes; the others at the end, when all groups that are left are
-/// tried on each other as long as any two of them come to lie together.
+/// Number of groups, the largest first, on which a robot is searched when its map arrives. At the end all remaining
+/// groups are searched on each other, until no further two are united.
 const GROUPS_TRIED: usize = 3;
-/// Guesses are kept for a map that has grown a little if they score at least this share of what they did.
+/// Hypotheses of a map that has grown a little are kept if they score at least this share of their former score.
 const KEPT_SCORE: f64 = 0.9;
 
-/// Robots whose maps are searched, and those that are laid together.
+/// Robots whose maps are searched, and the groups of robots whose maps are merged.
 ///
-/// Maps that fit clearly at one place make a group, which is searched as one map: so a robot that comes in takes one
-/// search, however many robots there are.
+/// Maps with one clear relative pose are merged into a group, which is searched as one map: so a further robot takes
+/// one search, however many robots there are.
 pub struct MergePlan {
     parameters: MapAlignerParameters,
-    /// Where the user knows maps to lie.
+    /// Initial poses that the user knows.
     initial_poses: InitialPoses,
-    /// The side of the narrowest cells, metres.
+    /// Side of the narrowest cells, metres.
     cell: f64,
     robots: BTreeMap<String, Robot>,
     groups: Groups,
     /// Pairs of groups that were searched, by number.
     tried: BTreeSet<(u64, u64)>,
-    /// What was told last of each pair.
-    told: BTreeMap<RobotPair, Statement>,
-    /// Searches made since they were last counted.
+    /// Latest report on each pair.
+    reported: BTreeMap<RobotPair, PairReport>,
+    /// Searches since they were last counted.
     pub searches: u64,
-    /// Guesses made without a search since they were last counted.
+    /// Hypotheses without a search of their own since they were last counted.
     pub predictions: u64,
 }
 
 struct Robot {
     map: Result<PreparedMap, SearchRefusal>,
-    /// Known cells when it was searched last.
+    /// Known cells at the last search.
     searched_cells: usize,
-    /// Whether it is this map that was searched last.
+    /// Whether the latest map was searched.
     is_searched: bool,
 }
 
 impl MergePlan {
-    /// Without any robots.
+    /// A plan without robots.
     pub fn new(parameters: MapAlignerParameters, initial_poses: InitialPoses) -> Self {
         Self {
             initial_poses,
@@ -58,14 +58,15 @@ impl MergePlan {
             robots: BTreeMap::new(),
             groups: Groups::default(),
             tried: BTreeSet::new(),
-            told: BTreeMap::new(),
+            reported: BTreeMap::new(),
             searches: 0,
             predictions: 0,
         }
     }
 
-    /// A robot has another map. `grids` are the last maps of all robots, itself among them.
-    pub fn update(&mut self, robot: &str, grids: &BTreeMap<String, Grid<'_>>) -> Vec<Statement> {
+    /// Replaces the map of a robot. `grids` are the latest maps of all robots, including this one. Returns what has
+    /// changed.
+    pub fn update(&mut self, robot: &str, grids: &BTreeMap<String, Grid<'_>>) -> Vec<PairReport> {
         let Some(grid) = grids.get(robot) else { return Vec::new() };
         let least = PreparedMap::least_cell(grid);
         if least > self.cell {
@@ -90,23 +91,23 @@ impl MergePlan {
             }
             if let Some(kept) = self.kept(robot) {
                 self.groups.renew(number);
-                return self.tell(kept);
+                return self.changed(kept);
             }
         }
         self.groups.leave(&[robot]);
         let number = self.add_alone(robot);
-        let mut statements = self.refusals(robot);
+        let mut reports = self.refusals(robot);
         if let Some(number) = number {
-            self.tie_with_others(number, GROUPS_TRIED, &mut statements);
+            self.tie_with_others(number, GROUPS_TRIED, &mut reports);
         }
-        statements.extend(self.retractions(robot, &statements));
-        self.tell(statements)
+        reports.extend(self.retractions(robot, &reports));
+        self.changed(reports)
     }
 
-    /// No more maps come: the last maps that were not searched are searched, so that what is told rests on them, and all that
-    /// has not found its place is tried on all else.
-    pub fn finish(&mut self) -> Vec<Statement> {
-        let mut statements = Vec::new();
+    /// Searches the latest maps that were not searched, so that the final reports rest on them, and tries all groups
+    /// on each other. Returns what has changed.
+    pub fn finish(&mut self) -> Vec<PairReport> {
+        let mut reports = Vec::new();
         let not_searched = self.robots.iter().filter(|(_, known)| known.map.is_ok() && !known.is_searched);
         let robots: Vec<String> = not_searched.map(|(robot, _)| robot.clone()).collect();
         self.groups.leave(&robots.iter().map(String::as_str).collect::<Vec<_>>());
@@ -115,40 +116,40 @@ impl MergePlan {
         }
         for robot in &robots {
             if let Some(number) = self.groups.of(robot).map(|group| group.number) {
-                self.tie_with_others(number, usize::MAX, &mut statements);
+                self.tie_with_others(number, usize::MAX, &mut reports);
             }
         }
         for robot in &robots {
-            statements.extend(self.retractions(robot, &statements));
+            reports.extend(self.retractions(robot, &reports));
         }
         loop {
             let count = self.groups.len();
             for number in self.groups.by_size() {
-                self.tie_with_others(number, usize::MAX, &mut statements);
+                self.tie_with_others(number, usize::MAX, &mut reports);
             }
             if self.groups.len() == count {
                 break;
             }
         }
-        self.tell(statements)
+        self.changed(reports)
     }
 
-    /// Tries to lay a group together with others, the largest first.
-    fn tie_with_others(&mut self, number: u64, most: usize, statements: &mut Vec<Statement>) {
+    /// Searches a group on others, the largest first.
+    fn tie_with_others(&mut self, number: u64, most: usize, reports: &mut Vec<PairReport>) {
         let mut mine = number;
         let others: Vec<u64> = self.groups.by_size().into_iter().filter(|other| *other != number).take(most).collect();
         for other in others {
             let pair = (mine.min(other), mine.max(other));
             if self.tried.insert(pair) {
-                mine = self.tie(mine, other, statements).unwrap_or(mine);
+                mine = self.tie(mine, other, reports).unwrap_or(mine);
             }
         }
     }
 
-    /// Searches one group on another. The number of the group of both, if they fit clearly.
-    fn tie(&mut self, one: u64, other: u64, statements: &mut Vec<Statement>) -> Option<u64> {
+    /// Searches one group on another. Returns the number of the united group, if the relative pose is clear.
+    fn tie(&mut self, one: u64, other: u64, reports: &mut Vec<PairReport>) -> Option<u64> {
         let (one, other) = (self.groups.get(one)?, self.groups.get(other)?);
-        // The larger stays; of two robots the first by name.
+        // The larger one is map a; of two robots the first by name.
         let (group_a, group_b) = if one.rank() < other.rank() { (one, other) } else { (other, one) };
         let (first, second) = (group_a.number, group_b.number);
         let window = self.window(group_a, group_b);
@@ -159,64 +160,64 @@ impl MergePlan {
         let found = match found {
             Ok(found) => found,
             Err(refusal) => {
-                statements.push(Statement::of(pair, Err(refusal.to_string())));
+                reports.push(PairReport::of(pair, Err(refusal.to_string())));
                 return None;
             }
         };
-        let is_clear = found.runner_up_share <= self.parameters.tie_runner_up && self.agrees_in_much(&found);
-        let MapAlignment { transform_a_b: best, lead, .. } = *found.hypotheses.first()?;
+        let is_clear = found.second_best_share <= self.parameters.tie_second_best && self.agrees_in_much(&found);
+        let MapAlignment { transform_a_b: best, significance, .. } = *found.hypotheses.first()?;
         if count_a + count_b == 2 {
-            statements.push(Statement::of(pair, Ok(with_reasons(&found))));
+            reports.push(PairReport::of(pair, Ok(with_reasons(&found))));
             return is_clear.then(|| self.groups.unite(first, second, &best)).flatten();
         }
         let pairs = self.pairs_in_common(group_a, group_b, &best);
         if is_clear {
-            let told = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), lead));
-            let told = told.map(|told| Statement { is_supported: true, ..told });
-            let told: Vec<Statement> = told.take(1 + self.parameters.predictions).collect();
-            self.predictions += told.len() as u64;
-            let fits = !told.is_empty();
-            statements.extend(told);
+            let reported = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), significance));
+            let reported = reported.map(|reported| PairReport { is_supported: true, ..reported });
+            let reported: Vec<PairReport> = reported.take(1 + self.parameters.predictions).collect();
+            self.predictions += reported.len() as u64;
+            let fits = !reported.is_empty();
+            reports.extend(reported);
             return fits.then(|| self.groups.unite(first, second, &best)).flatten();
         }
         if self.has_alike(&found) {
             let reason = format!(
-                "on the maps of {} robots together the map fits at several places, and it cannot be told which is right: {}",
+                "on the merged maps of {} robots the map fits at several poses, and the maps do not decide which is right: {}",
                 count_a + count_b - 1,
                 found.reason(0)
             );
-            statements.extend(pairs.first().map(|PairInCommon { pair, .. }| Statement::of(pair.clone(), Err(reason))));
+            reports.extend(pairs.first().map(|PairInCommon { pair, .. }| PairReport::of(pair.clone(), Err(reason))));
             return None;
         }
-        // On all maps together it is not clear. What the two robots with the most in common have to say is told as it is.
-        statements.extend(self.searched(pairs.first()?));
+        // The merged maps are ambiguous. The two robots with the most wall in common are searched alone.
+        reports.extend(self.searched(pairs.first()?));
         None
     }
 
-    /// Where one group can lie on another, by the first robots of both of which it is known.
-    fn window(&self, group_a: &Group, group_b: &Group) -> Option<PlaceWindow> {
+    /// Window of the relative poses of two groups, by the first robot of each with a known initial pose.
+    fn window(&self, group_a: &Group, group_b: &Group) -> Option<PoseWindow> {
         let known = |group: &Group| {
             let mut poses =
-                group.members.iter().filter_map(|(robot, place)| Some((*self.initial_poses.get(robot)?, *place)));
+                group.members.iter().filter_map(|(robot, pose)| Some((*self.initial_poses.get(robot)?, *pose)));
             poses.next()
         };
         let ((a, place_a), (b, place_b)) = (known(group_a)?, known(group_b)?);
-        Some(PlaceWindow::between(&a, &b).of_wholes(place_a, place_b))
+        Some(PoseWindow::between(&a, &b).of_wholes(place_a, place_b))
     }
 
-    /// Whether at another guess, which scores too much for the place to be clear, about as large a share of the walls agrees: the building
-    /// is alike in both, and what two of the maps say alone is no more.
+    /// Whether a second-best hypothesis, which scores too high for a clear pose, has about as large an inlier ratio:
+    /// then the building is self-similar, and a search of two of the maps alone is no better.
     fn has_alike(&self, found: &MapAlignments) -> bool {
         let Some((best, others)) = found.hypotheses.split_first() else { return false };
         let is_alike = |other: &MapAlignment| {
-            other.share > self.parameters.tie_runner_up
+            other.share > self.parameters.tie_second_best
                 && other.wall_agreement + self.parameters.alike_margin >= best.wall_agreement
         };
         others.iter().any(is_alike)
     }
 
-    /// Whether two groups agree on so much wall, and so well, that they can be laid together. What is laid together wrongly shows a
-    /// part of the building twice, and no map that comes later has one place on it.
+    /// Whether two groups have enough inliers to be merged. A wrongly merged map shows a part of the building twice,
+    /// and no later map has a clear pose on it.
     fn agrees_in_much(&self, found: &MapAlignments) -> bool {
         let MapAlignerParameters { tie_wall_length, tie_wall_agreement, .. } = self.parameters;
         let agrees =
@@ -224,36 +225,36 @@ impl MergePlan {
         found.hypotheses.first().is_some_and(agrees)
     }
 
-    /// The guesses for a pair of robots by a search of their own.
-    fn searched(&mut self, PairInCommon { pair, .. }: &PairInCommon) -> Option<Statement> {
-        let window = PlaceWindow::of(pair, &self.initial_poses);
+    /// Hypotheses of a pair of robots by a search of their own.
+    fn searched(&mut self, PairInCommon { pair, .. }: &PairInCommon) -> Option<PairReport> {
+        let window = PoseWindow::of(pair, &self.initial_poses);
         let found = align_prepared(self.map(&pair.a)?, self.map(&pair.b)?, window.as_ref(), &self.parameters);
         self.searches += 1;
         let found = found.map(|found| with_reasons(&found)).map_err(|refusal| refusal.to_string());
-        Some(Statement::of(pair.clone(), found))
+        Some(PairReport::of(pair.clone(), found))
     }
 
-    /// The guess for a pair of robots where their groups put it.
-    /// The lead is that of the search in which the groups were found to lie so.
+    /// Hypothesis of a pair of robots from the relative pose of their groups. The peak significance is that of the
+    /// search of the groups.
     fn predicted(
         &self,
         PairInCommon { pair, transform_a_b, .. }: &PairInCommon,
         others: usize,
-        lead: f64,
-    ) -> Option<Statement> {
-        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, lead, &self.parameters)?;
+        significance: f64,
+    ) -> Option<PairReport> {
+        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, significance, &self.parameters)?;
         if found.wall_in_common < self.parameters.min_wall_length {
             return None;
         }
         let reason = format!(
-            "the maps alone: {:.0} m of walls in common, at the place that stands out on the maps of {others} robots \
-             together",
+            "the maps alone: {:.0} m of walls in common, at the clear peak on the merged maps of {others} robots",
             found.wall_in_common
         );
-        Some(Statement::of(pair.clone(), Ok(vec![(found, reason)])))
+        Some(PairReport::of(pair.clone(), Ok(vec![(found, reason)])))
     }
 
-    /// The pairs of a robot of each group, those with the most wall in common first, if the groups lie so.
+    /// Pairs with one robot of each group, those with the most wall in common first, for a relative pose of the
+    /// groups.
     fn pairs_in_common(&self, group_a: &Group, group_b: &Group, transform_groups: &Pose2) -> Vec<PairInCommon> {
         let mut pairs = Vec::new();
         for (a, to_group_a) in &group_a.members {
@@ -268,15 +269,15 @@ impl MergePlan {
         pairs
     }
 
-    /// The guesses of a robot whose map has grown a little, if all still fit.
-    fn kept(&mut self, robot: &str) -> Option<Vec<Statement>> {
+    /// Hypotheses of a robot whose map has grown a little, if all still fit.
+    fn kept(&mut self, robot: &str) -> Option<Vec<PairReport>> {
         let mut kept = Vec::new();
-        for statement in self.told.values().filter(|told| told.pair.concerns(robot)) {
-            let Ok(found) = &statement.found else { continue };
-            let (map_a, map_b) = (self.map(&statement.pair.a)?, self.map(&statement.pair.b)?);
+        for report in self.reported.values().filter(|reported| reported.pair.concerns(robot)) {
+            let Ok(found) = &report.found else { continue };
+            let (map_a, map_b) = (self.map(&report.pair.a)?, self.map(&report.pair.b)?);
             let mut refined = Vec::new();
             for (before, reason) in found {
-                let again = align_near(map_a, map_b, &before.transform_a_b, before.lead, &self.parameters)?;
+                let again = align_near(map_a, map_b, &before.transform_a_b, before.significance, &self.parameters)?;
                 if again.score < KEPT_SCORE * before.score {
                     return None;
                 }
@@ -284,57 +285,57 @@ impl MergePlan {
             }
             let best = refined.first().map_or(1.0, |(best, _)| best.score);
             refined.iter_mut().for_each(|(again, _)| again.share = again.score / best);
-            kept.push(Statement { found: Ok(refined), ..statement.clone() });
+            kept.push(PairReport { found: Ok(refined), ..report.clone() });
         }
         self.predictions += kept.len() as u64;
         Some(kept)
     }
 
-    /// Why a robot cannot be aligned with others, for those of them for which a map alone says so.
-    fn refusals(&self, robot: &str) -> Vec<Statement> {
+    /// Refusals of pairs of a robot where one of the two maps cannot be searched.
+    fn refusals(&self, robot: &str) -> Vec<PairReport> {
         let Some(mine) = self.robots.get(robot) else { return Vec::new() };
         let others = self.robots.iter().filter(|(other, _)| *other != robot);
         let refusals = others.filter_map(|(other, known)| {
             let (first, second) = if robot < other.as_str() { (mine, known) } else { (known, mine) };
             let refusal = first.map.as_ref().err().or(second.map.as_ref().err())?;
-            Some(Statement::of(RobotPair::by_name(robot, other), Err(refusal.to_string())))
+            Some(PairReport::of(RobotPair::by_name(robot, other), Err(refusal.to_string())))
         });
         refusals.collect()
     }
 
-    /// What was told of a robot before, and cannot be so any more.
-    fn retractions(&self, robot: &str, statements: &[Statement]) -> Vec<Statement> {
+    /// Retractions of earlier reports on a robot that no longer hold.
+    fn retractions(&self, robot: &str, reports: &[PairReport]) -> Vec<PairReport> {
         let group = self.groups.of(robot);
-        let stands = |told: &Statement| {
-            let (Some(group), Ok(found)) = (group, &told.found) else { return told.found.is_err() };
-            let places = group.members.get(&told.pair.a).zip(group.members.get(&told.pair.b));
-            places.zip(found.first()).is_some_and(|((a, b), (best, _))| {
-                let common = self.common_walls(&told.pair.a, &told.pair.b, &best.transform_a_b);
-                let place = a.inverse() * b;
-                common.is_some_and(|common| is_near(&best.transform_a_b, &place, &common.centre, &self.parameters))
+        let stands = |reported: &PairReport| {
+            let (Some(group), Ok(found)) = (group, &reported.found) else { return reported.found.is_err() };
+            let poses = group.members.get(&reported.pair.a).zip(group.members.get(&reported.pair.b));
+            poses.zip(found.first()).is_some_and(|((a, b), (best, _))| {
+                let common = self.common_walls(&reported.pair.a, &reported.pair.b, &best.transform_a_b);
+                let pose = a.inverse() * b;
+                common.is_some_and(|common| is_near(&best.transform_a_b, &pose, &common.centre, &self.parameters))
             })
         };
-        let is_told_again = |told: &Statement| statements.iter().any(|new| new.pair == told.pair);
-        let told = self.told.values().filter(|told| told.pair.concerns(robot));
-        let fallen = told.filter(|told| !is_told_again(told) && !stands(told));
-        let reason = format!("the map of {robot} has changed, and does not lie where it lay on this map any more");
-        fallen.map(|told| Statement { found: Err(reason.clone()), ..told.clone() }).collect()
+        let is_reported_again = |reported: &PairReport| reports.iter().any(|new| new.pair == reported.pair);
+        let reported = self.reported.values().filter(|reported| reported.pair.concerns(robot));
+        let fallen = reported.filter(|reported| !is_reported_again(reported) && !stands(reported));
+        let reason = format!("the map of {robot} has changed, and no longer fits on this map at the earlier pose");
+        fallen.map(|reported| PairReport { found: Err(reason.clone()), ..reported.clone() }).collect()
     }
 
-    /// Remembers what is told, and leaves out what was told before.
-    fn tell(&mut self, statements: Vec<Statement>) -> Vec<Statement> {
-        let mut news = Vec::new();
-        for statement in statements {
-            if self.told.get(&statement.pair) != Some(&statement) {
-                self.told.insert(statement.pair.clone(), statement.clone());
-                news.push(statement);
+    /// Stores reports, and returns those that differ from the latest ones.
+    fn changed(&mut self, reports: Vec<PairReport>) -> Vec<PairReport> {
+        let mut changed = Vec::new();
+        for report in reports {
+            if self.reported.get(&report.pair) != Some(&report) {
+                self.reported.insert(report.pair.clone(), report.clone());
+                changed.push(report);
             }
         }
-        news
+        changed
     }
 
-    /// Makes a robot that is in no group, and is about to be searched, a group of its own. Its number, if its map can be
-    /// searched.
+    /// Makes a robot without a group, which is about to be searched, a group of its own. Returns its number, if its
+    /// map can be searched.
     fn add_alone(&mut self, robot: &str) -> Option<u64> {
         let known = self.robots.get_mut(robot)?;
         known.is_searched = true;
@@ -355,11 +356,11 @@ impl MergePlan {
     }
 }
 
-/// Two robots of different groups, and how they lie if the groups lie so.
+/// Two robots of different groups, and their relative pose by that of the groups.
 struct PairInCommon {
     /// The first by name as robot a.
     pair: RobotPair,
     transform_a_b: Pose2,
-    /// About the length of wall in common, metres.
+    /// Approximate length of wall in common, metres.
     length: f64,
 }

@@ -4,7 +4,7 @@ use crate::registration::search::tests::angular_office;
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::shared::test_world::stage_bench::StageBench;
 use gridweave_runtime::ros::OccupancyGrid;
-use gridweave_runtime::stage::{Context, InitialPose, InitialPoses, LoneStage};
+use gridweave_runtime::stage::{Context, InitialPose, InitialPoses, StageHarness};
 
 /// West, east, and more of the east.
 fn maps() -> (DrawnMap, DrawnMap, DrawnMap) {
@@ -38,7 +38,7 @@ fn a_pair_is_aligned_when_both_maps_are_there_and_again_when_one_has_changed() {
 }
 
 #[test]
-fn what_is_refused_says_why() {
+fn a_refusal_has_a_reason() {
     let (a, b, _) = maps();
     let corner = angular_office().draw(seen(-0.2, -0.2, 3.0, 3.0), drawing(1.0, 1.0, 1.0));
     let mut bench = StageBench::new(&super::kind(), "min_wall_length = 15.0");
@@ -60,7 +60,7 @@ fn hypotheses_are_ranked_and_counted_and_their_scores_fall() {
     assert!((2..=3).contains(&sent.len()), "{sent:?}");
     let ranks: Vec<(u32, u32)> = sent.iter().map(|one| (one.rank, one.hypotheses)).collect();
     assert_eq!(ranks, (0..sent.len() as u32).map(|rank| (rank, sent.len() as u32)).collect::<Vec<_>>());
-    assert!(sent[0].score < 0.1, "two places are alike: {sent:?}");
+    assert!(sent[0].score < 0.1, "two poses fit equally well: {sent:?}");
     assert!(sent.is_sorted_by(|one, other| one.score >= other.score));
 }
 
@@ -83,7 +83,7 @@ fn the_parameters_decide() {
 }
 
 #[test]
-fn a_map_that_cannot_be_is_left_out_with_a_warning() {
+fn an_invalid_map_is_left_out_with_a_warning() {
     let (a, b, _) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -94,16 +94,16 @@ fn a_map_that_cannot_be_is_left_out_with_a_warning() {
 }
 
 #[test]
-fn parameters_that_cannot_be_are_refused() {
+fn invalid_parameters_are_refused() {
     for parameters in
         ["cell = 0.0", "rotation_step = nan", "least_share = 1.5", "max_hypotheses = 0", "max_extent = 9000.0"]
     {
-        assert!(LoneStage::new(&super::kind(), parameters).is_err(), "{parameters}");
+        assert!(StageHarness::new(&super::kind(), parameters).is_err(), "{parameters}");
     }
 }
 
 #[test]
-fn where_initial_poses_are_known_only_places_near_them_are_found() {
+fn with_initial_poses_only_poses_near_them_are_found() {
     let hall = FloorPlan::hall();
     let part = seen(-0.2, -0.2, 20.2, 12.2);
     let (a, b) = (hall.draw(part, drawing(3.0, 2.0, 0.4)), hall.draw(part, drawing(12.0, 6.0, -2.1)));

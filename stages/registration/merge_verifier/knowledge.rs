@@ -1,7 +1,7 @@
-//! What the user knows of robots, as it concerns the judgement on a pair.
+//! The user's knowledge of robots, applied to pairs.
 
 use crate::registration::judgement::{JudgementParameters, UserKnowledge};
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Header};
@@ -9,16 +9,16 @@ use gridweave_runtime::stage::{Context, InitialPoses};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The hypothesis that stands for the initial poses themselves.
+/// Number of the hypothesis that is the initial poses themselves.
 const INITIAL: usize = 0;
 
-/// What the user knows of all robots.
+/// The user's knowledge of all robots.
 pub(super) struct Knowledge {
     initial_poses: InitialPoses,
     reference: Option<String>,
     /// The chosen hypotheses, by robot or `ROBOT/ROBOT`.
     chosen: BTreeMap<String, usize>,
-    /// Those that concerned a pair.
+    /// Keys of those that matched a pair.
     used: BTreeSet<String>,
 }
 
@@ -32,7 +32,7 @@ impl Knowledge {
         }
     }
 
-    /// What is known of a pair, of so many robots in all.
+    /// Knowledge of a pair, where `robots` is the number of all robots.
     pub(super) fn of(&mut self, pair: &RobotPair, robots: usize) -> UserKnowledge {
         let is_meant = |name: &str| match name.split_once('/') {
             Some((one, other)) => pair.concerns(one) && pair.concerns(other) && one != other,
@@ -41,7 +41,7 @@ impl Knowledge {
         let chosen = self.chosen.iter().find(|(name, _)| is_meant(name));
         self.used.extend(chosen.map(|(name, _)| name.clone()));
         UserKnowledge {
-            window: PlaceWindow::of(pair, &self.initial_poses),
+            window: PoseWindow::of(pair, &self.initial_poses),
             hypothesis: chosen.map(|(_, number)| *number),
         }
     }
@@ -53,19 +53,19 @@ impl Knowledge {
         }
     }
 
-    /// What is wrong with the choices that concerned no pair.
+    /// Warnings on choices that matched no pair.
     pub(super) fn unused(&self) -> impl Iterator<Item = String> {
         let unused = self.chosen.keys().filter(|name| !self.used.contains(*name));
         unused.map(|name| {
             format!(
-                "the hypothesis that was asked for `{name}` concerns no pair of robots: write ROBOT for its pair with the \
+                "the hypothesis that was chosen for `{name}` matches no pair of robots: write ROBOT for its pair with the \
                  reference, or ROBOT/ROBOT"
             )
         })
     }
 }
 
-/// The alignment that the user asks for without any look at the maps, or why there is none; `None` if he does not ask for it.
+/// The alignment by the initial poses only, or why there is none; `None` if the user has not chosen it.
 pub(super) fn by_initial_poses(pair: &RobotPair, known: &UserKnowledge, frame_id: &str) -> Option<Alignment> {
     known.hypothesis.filter(|number| *number == INITIAL)?;
     let mut alignment = Alignment {
@@ -77,15 +77,15 @@ pub(super) fn by_initial_poses(pair: &RobotPair, known: &UserKnowledge, frame_id
         ..Alignment::default()
     };
     let Some(window) = &known.window else {
-        let headline = "the initial pose was asked for, and there is none of both robots";
+        let headline = "the initial poses were chosen, but not both robots have one";
         alignment.reason = format!("{headline}\ntry: --initial {}=X,Y,YAW", pair.b);
         return Some(alignment);
     };
     let (metres, radians) = window.deviations();
     let variances = Vector3::new(metres * metres, metres * metres, radians * radians);
-    alignment.set_transform_a_b(&window.middle());
+    alignment.set_transform_a_b(&window.centre());
     alignment.covariance = row_by_row(&Matrix3::from_diagonal(&variances));
     alignment.accepted = true;
-    alignment.reason = "laid by the initial poses, as was asked for; the maps were not compared".into();
+    alignment.reason = "aligned by the initial poses, as the user chose; the maps were not compared".into();
     Some(alignment)
 }

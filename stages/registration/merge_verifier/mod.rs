@@ -1,8 +1,8 @@
-//! Judges all hypotheses of how the maps of each pair of robots lie to each other, and accepts one or none: the stage round
+//! Judges all hypotheses of the relative pose of each pair of robots, and accepts one or none: the stage of
 //! [`registration::judgement`](crate::registration::judgement).
 
 mod knowledge;
-mod place_searches;
+mod map_searches;
 mod self_similarities;
 mod stage;
 
@@ -17,9 +17,9 @@ use stage::MergeVerifier;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "merge_verifier",
-        "Judges all alignments that were proposed for each pair of robots, from tags and from maps, against each other and \
-         by the maps: how probable is it that walls lie on walls, and not on free space, for another reason than that it \
-         is the place? It accepts one or none, from a probability on, and says why.",
+        "Judges all hypotheses of each pair of robots, from tags and from maps, against each other: the evidence of the \
+         maps gives each a probability of being right. The most probable one is accepted if its probability is at least \
+         `accept`, else none; with the reason.",
         |parameters: JudgementParameters, context| Ok(MergeVerifier::new(parameters, context)),
     )
     .input("map", "The robots' maps.", MergeVerifier::receive_map)

@@ -1,37 +1,37 @@
-//! What is kept of where the maps of robots look like themselves, so that not every map is searched for it.
+//! Cache of the self-similarity of the robots' maps, so that not every map is searched.
 
 use crate::registration::comparison::MapView;
 use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::is_known;
 use crate::shared::robot_pair::RobotPair;
 use std::collections::BTreeMap;
 
-/// What was found in a map holds for others of the robot until as large a share of its known area is new, or is gone.
+/// The result for a map is valid for later ones of the robot until this share of its known area is added or removed.
 const LITTLE_CHANGE: f64 = 0.2;
 
-/// What was found in maps of robots, by robot.
+/// Self-similarity of maps, by robot.
 #[derive(Debug, Default)]
 pub(super) struct SelfSimilarities(BTreeMap<String, Searched>);
 
 #[derive(Debug)]
 struct Searched {
-    /// The number of the map among those of its robot.
+    /// Number of the map among those of its robot.
     number: u64,
-    /// How many of its cells are known.
+    /// Number of its known cells.
     known_cells: usize,
     found: SelfSimilarity,
 }
 
 impl SelfSimilarities {
-    /// The likeliest alias of a place that was accepted by the walls of two maps, which are searched if that is due. Each map comes with
-    /// its number among those of its robot.
+    /// The most probable alias of a pose that was accepted by the maps only; searches the maps if necessary. Each map
+    /// is given with its number among those of its robot.
     pub(super) fn alias(
         &mut self,
         verdict: &Verdict,
         pair: &RobotPair,
         (a, b): ((u64, &MapView<'_>), (u64, &MapView<'_>)),
-        window: Option<&PlaceWindow>,
+        window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Option<Alias> {
         self.search(&pair.a, a, parameters);
@@ -40,7 +40,7 @@ impl SelfSimilarities {
         Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters)
     }
 
-    /// Searches a map of a robot if nothing that is known of others of it holds.
+    /// Searches a map of a robot, unless an earlier result is still valid.
     fn search(&mut self, robot: &str, (number, map): (u64, &MapView<'_>), parameters: &JudgementParameters) {
         let known_cells = map.grid.cells.iter().filter(|value| is_known(**value)).count();
         let holds = |searched: &Searched| {
@@ -52,7 +52,8 @@ impl SelfSimilarities {
         }
     }
 
-    /// Forgets what was found in a map that was not the last of its robot, of which `last` gives the number. The robots whose it was.
+    /// Drops the results of maps that are not the latest of their robot, of which `last` returns the number. Returns
+    /// those robots.
     pub(super) fn forget_former(&mut self, last: impl Fn(&str) -> Option<u64>) -> Vec<String> {
         self.0.extract_if(.., |robot, searched| last(robot) != Some(searched.number)).map(|(robot, _)| robot).collect()
     }

@@ -1,7 +1,7 @@
-//! The stage: keeps each robot's map and all that was proposed for each pair, and judges a pair when any of it changes.
+//! The stage: keeps each robot's map and all hypotheses of each pair, and judges a pair when any of them changes.
 
 use super::knowledge::{Knowledge, by_initial_poses};
-use super::place_searches::PlaceSearches;
+use super::map_searches::MapSearches;
 use super::self_similarities::SelfSimilarities;
 use crate::registration::Hypothesis;
 use crate::registration::comparison::{Agreement, Deformed, MapView};
@@ -16,7 +16,7 @@ use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Recei
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct Judgements {
     alignment: Out<Alignment>,
     evidence: Out<Evidence>,
@@ -31,27 +31,27 @@ impl Outputs for Judgements {
             ),
             evidence: ports.side_output(
                 "evidence",
-                "What the maps say of the place that was judged for each pair of robots, and of the best of other places.",
+                "The evidence of the maps for the most probable and the second most probable hypothesis of each pair of robots.",
             ),
         }
     }
 }
 
-/// Judges the alignments of pairs of robots.
+/// Judges the hypotheses of pairs of robots.
 pub(super) struct MergeVerifier {
-    /// The stage's name, as the user may set its parameters.
+    /// Name of the stage, by which the user sets its parameters.
     name: String,
     parameters: JudgementParameters,
     knowledge: Knowledge,
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
-    /// Where else the maps fit, of pairs for which nobody else has looked.
-    place_searches: PlaceSearches,
-    /// Where maps that were accepted by their walls alone look like themselves.
+    /// Peaks of a search, for pairs whose hypotheses come from other sources.
+    map_searches: MapSearches,
+    /// Self-similarity of maps that were accepted without tags.
     self_similarities: SelfSimilarities,
     sent: BTreeMap<RobotPair, Alignment>,
-    /// What was sent last of what the maps say, without headers.
+    /// Evidence that was sent last, without headers.
     evidence: BTreeMap<RobotPair, Evidence>,
 }
 
@@ -64,7 +64,7 @@ impl MergeVerifier {
             maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
-            place_searches: PlaceSearches::default(),
+            map_searches: MapSearches::default(),
             self_similarities: SelfSimilarities::default(),
             sent: BTreeMap::new(),
             evidence: BTreeMap::new(),
@@ -102,8 +102,8 @@ impl MergeVerifier {
         }
     }
 
-    /// What was accepted is judged once more if the maps have changed since they were searched for places that look alike. And a pair
-    /// that waits for a map to the end is refused, so that it does not go missing.
+    /// Judges accepted pairs once more if the maps have changed since they were searched for self-similarity. Refuses
+    /// pairs that still wait for a map, so that they are reported.
     pub(super) fn finish(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
         let changed = self.self_similarities.forget_former(|robot| self.maps.get(robot).map(|map| map.number));
         let is_concerned = |pair: &&RobotPair| changed.iter().any(|robot| pair.concerns(robot));
@@ -124,12 +124,12 @@ impl MergeVerifier {
         Ok(())
     }
 
-    /// The pairs that anything was proposed for, once for each source.
+    /// The pairs with any hypothesis, once for each source.
     fn pairs(&self) -> impl Iterator<Item = &RobotPair> {
         self.hypotheses.keys().map(|origin| &origin.pair)
     }
 
-    /// Judges a pair, and sends the outcome and what it went by if they are not what was sent last.
+    /// Judges a pair, and sends the verdict and the evidence if they have changed.
     fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
         let known = self.knowledge.of(pair, self.maps.iter().count());
         let proposed = proposed(&self.hypotheses, pair);
@@ -144,9 +144,9 @@ impl MergeVerifier {
             let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
             let (view_a, view_b) = (view(a), view(b));
             let mut verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
-            if PlaceSearches::is_due(&hypotheses, &verdict) {
+            if MapSearches::is_due(&hypotheses, &verdict) {
                 let grids = ((a.number, a.grid()), (b.number, b.grid()));
-                hypotheses.extend_from_slice(self.place_searches.of(pair, grids, &known));
+                hypotheses.extend_from_slice(self.map_searches.of(pair, grids, &known));
                 verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
             }
             if !verdict.rests_on_maps_alone() {
@@ -194,7 +194,7 @@ impl MergeVerifier {
     }
 }
 
-/// Everything of all that was proposed that is for a pair, by source and rank.
+/// All hypotheses of a pair, by source and rank.
 fn proposed<'a>(hypotheses: &'a BTreeMap<Origin, Vec<Alignment>>, pair: &RobotPair) -> Vec<&'a Alignment> {
     let of_pair = hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
     of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
@@ -204,7 +204,7 @@ fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
     MapView::rigid(map.grid(), map.walls(NORMAL_RADIUS))
 }
 
-/// What a judgement on a pair goes by, of so many hypotheses, without a header.
+/// Evidence of a verdict on a pair, with the number of hypotheses, without a header.
 fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
     let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
     let elsewhere = verdict.rival.as_ref().map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
@@ -220,7 +220,7 @@ fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence 
     }
 }
 
-/// The outcome for a pair of which a place was proposed: `judged_of` are the alignments that were judged, in the order of the hypotheses.
+/// Verdict for a pair with a pose: `judged_of` are the alignments that were judged, in the order of the hypotheses.
 fn judged(verdict: &Verdict, judged_of: &[&Alignment], proposed: &[&Alignment], reason: String) -> Alignment {
     let accepted = verdict.refusal.is_none();
     let source = &verdict.candidate.hypothesis.source;
@@ -242,14 +242,14 @@ fn judged(verdict: &Verdict, judged_of: &[&Alignment], proposed: &[&Alignment], 
     }
 }
 
-/// The outcome for a pair of which none was.
+/// Verdict for a pair without a pose.
 fn refused(proposed: &[&Alignment]) -> Alignment {
     let Some(first) = proposed.first() else { return Alignment::default() };
     let reason = with_other_sources(first.reason.clone(), &first.source, proposed);
     Alignment { accepted: false, provisional: false, rank: 0, hypotheses: 0, reason, ..(*first).clone() }
 }
 
-/// A refusal, with what the other sources have against the pair: whoever reads it wants to know why nothing helped.
+/// Adds the reasons of the other sources to a refusal, so that the user sees why none of them helped.
 fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> String {
     let others = proposed.iter().filter(|alignment| alignment.source != source && alignment.rank == 0);
     let others: Vec<String> =
@@ -257,7 +257,7 @@ fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> 
     if others.is_empty() {
         return reason;
     }
-    // Behind the empty line stands what only those read who ask for it.
+    // Details follow after the empty line.
     let gap = if reason.contains("\n\n") { "\n" } else { "\n\n" };
     format!("{reason}{gap}{}", others.join("\n"))
 }

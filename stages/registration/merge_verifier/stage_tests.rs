@@ -52,7 +52,7 @@ fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map(
 }
 
 #[test]
-fn what_a_judgement_went_by_is_sent_when_it_changes() {
+fn evidence_is_sent_when_it_changes() {
     let (a, b) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give(&proposed("tags", &a.transform_to(&b)));
@@ -73,7 +73,7 @@ fn what_a_judgement_went_by_is_sent_when_it_changes() {
 }
 
 #[test]
-fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_last() {
+fn hypotheses_are_judged_together_and_replace_the_earlier_ones_of_their_source() {
     let (a, b) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -92,13 +92,13 @@ fn hypotheses_are_judged_together_and_those_of_a_source_take_the_place_of_its_la
     assert!(sent[0].accepted && sent[0].method == "tags", "{sent:?}");
 }
 
-/// What another crate's aligner, which knows no doubt, sends of a place.
+/// An alignment of a plug-in that reports no uncertainty.
 fn by_a_plug_in(transform_a_b: &Pose2) -> Alignment {
     Alignment { score: 1.0, hypotheses: 1, method: "tags".into(), ..proposed("a plug-in", transform_a_b) }
 }
 
 #[test]
-fn a_plug_in_that_proposes_nonsense_is_not_believed_however_sure_it_is() {
+fn a_wrong_plug_in_is_not_trusted_however_certain_it_is() {
     let (a, b) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -111,7 +111,7 @@ fn a_plug_in_that_proposes_nonsense_is_not_believed_however_sure_it_is() {
 }
 
 #[test]
-fn a_plug_in_is_believed_where_a_search_of_the_maps_finds_the_same_place_alone() {
+fn a_plug_in_is_trusted_where_a_search_of_the_maps_finds_the_same_pose_only() {
     let (a, b) = maps();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
@@ -129,7 +129,7 @@ fn a_plug_in_is_believed_where_a_search_of_the_maps_finds_the_same_place_alone()
 }
 
 #[test]
-fn what_nobody_has_a_place_for_is_refused_with_all_that_they_say() {
+fn a_pair_without_any_pose_is_refused_with_all_reasons() {
     let mut bench = StageBench::new(&super::kind(), "");
     let nothing = |source: &str, reason: &str| Alignment {
         accepted: false,
@@ -155,13 +155,13 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
 }
 
 #[test]
-fn a_hypothesis_out_of_order_is_warned_of() {
+fn a_hypothesis_out_of_order_gives_a_warning() {
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give(&Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
     assert_eq!(bench.stage.warnings().len(), 1, "{:?}", bench.stage.warnings());
 }
 
-/// Two robots of which it is known where they are.
+/// Two robots with known initial poses.
 fn knowing(parameters: &str) -> StageBench {
     let robot2 = InitialPose { x: 5.0, y: 1.0, yaw: 0.5, ..InitialPose::default() };
     let initial_poses = InitialPoses::from([("robot1".into(), InitialPose::ORIGIN), ("robot2".into(), robot2)]);
@@ -169,7 +169,7 @@ fn knowing(parameters: &str) -> StageBench {
 }
 
 #[test]
-fn an_initial_pose_is_taken_as_it_is_when_that_is_asked_for() {
+fn an_initial_pose_is_used_as_it_is_if_the_user_chooses_it() {
     let (a, b) = maps();
     let mut bench = knowing("hypotheses = { robot2 = 0 }");
     bench.give_map("robot1", &a);
@@ -190,7 +190,7 @@ fn an_initial_pose_is_taken_as_it_is_when_that_is_asked_for() {
 }
 
 #[test]
-fn a_choice_that_concerns_no_pair_is_warned_of() {
+fn a_choice_that_matches_no_pair_gives_a_warning() {
     let (a, b) = maps();
     let warnings = |parameters: &str| {
         let mut bench = knowing(parameters);

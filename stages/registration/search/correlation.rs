@@ -1,4 +1,4 @@
-//! The score of every translation of one map on another, at one rotation and at the opposite one.
+//! Score of every translation of one map on another, at one rotation and at the opposite one.
 
 use super::fourier::{Buffers, Fourier};
 use super::raster::{Content, Raster};
@@ -6,33 +6,33 @@ use super::walk::Walk;
 use nalgebra::{UnitComplex, Vector2};
 use rustfft::num_complex::Complex32;
 
-/// Scores translations of map b on map a, which stays.
+/// Scores translations of map b on map a.
 ///
-/// Both maps are drawn in cells twice as wide as those of their rasters: what share of such a cell is dilated wall, and
-/// what share is free. A translation's score is the sum over all cells of the product of both maps' walls, less `penalty`
-/// times the products of walls of one and free space of the other. Each of these sums is a cross-correlation, and so a
-/// product of spectra (the convolution theorem).
+/// Both maps are drawn in cells twice as wide as those of their rasters, as shares of dilated wall and of free space.
+/// The score of a translation is the sum over all cells of the product of both maps' walls, less `penalty` times the
+/// products of walls of one and free space of the other. Each of these sums is a cross-correlation, and so a product
+/// of spectra (the convolution theorem).
 ///
-/// Walls and free space of b are the real and the imaginary part of one plane. Turned by half a turn more, its
-/// spectrum is the complex conjugate but for a shift; so the scores of two opposite rotations come back as the
-/// real and the imaginary part of one plane too.
+/// Walls and free space of b are the real and the imaginary part of one plane. Turned by another half turn, its
+/// spectrum is the complex conjugate but for a shift; so the scores of two opposite rotations are the real and the
+/// imaginary part of one plane, too.
 pub struct Correlator {
     fourier: Fourier,
     /// The side of a cell, metres.
     cell: f64,
-    /// The lower corner of map a.
+    /// Lower corner of map a, metres.
     corner: Vector2<f64>,
-    /// Spectrum of a's walls less `penalty` times a's free space: what a wall of b meets. Its first half, as the other is the
-    /// complex conjugate.
+    /// Spectrum of a's walls less `penalty` times a's free space, which is multiplied with the walls of b. Only its
+    /// first half, as the other is the complex conjugate.
     for_walls: Vec<Complex32>,
-    /// Spectrum of a's walls times `-penalty`: what free space of b meets. Its first half.
+    /// Spectrum of a's walls times `-penalty`, which is multiplied with the free space of b. Only its first half.
     for_free: Vec<Complex32>,
 }
 
-/// What the calling thread works in, and the scores of all translations that were scored last.
+/// Buffers of one thread, and the scores of the last translations.
 pub struct Workspace {
     buffers: Buffers,
-    /// The lower corner of map b as it was turned, and its cells along x and y.
+    /// Lower corner of map b as it was turned, and its number of cells along x and y.
     corner: Vector2<f64>,
     size: (usize, usize),
 }
@@ -42,13 +42,13 @@ pub struct Workspace {
 pub struct ScoredShift {
     /// The translation, metres.
     pub translation: Vector2<f64>,
-    /// Rounded to whole cells, so that the rounding errors of the transform decide nothing.
+    /// Rounded to whole cells, so that rounding errors of the transform do not matter.
     pub score: f64,
 }
 
 impl Correlator {
-    /// For a raster `a`, and rasters b with cells of the same size whose map, turned, is at most `size_b` metres long
-    /// along x and along y.
+    /// Correlator of a raster `a` with rasters b of the same cell size whose map, turned, is at most `size_b` metres
+    /// long along x and along y.
     pub fn new(a: &Raster, size_b: Vector2<f64>, penalty: f64) -> Self {
         let cell = 2.0 * a.cell;
         let (_, size_a) = a.box_turned(0.0);
@@ -92,8 +92,8 @@ impl Correlator {
         self.fourier.inverse(&mut workspace.buffers);
     }
 
-    /// The best translation in each block of `side` metres, of those just scored at `angle`, and of those half a turn on, as
-    /// far as its score is above zero; of these the best `most`, the best first.
+    /// The best translation in each block of `side` metres, of those last scored at `angle` and of those half a turn
+    /// on, if its score is above zero; of these the best `most`, the best first.
     pub fn best_of_blocks(&self, workspace: &Workspace, side: f64, most: usize) -> [Vec<ScoredShift>; 2] {
         let side = ((side / self.cell).round() as usize).max(1);
         let [forth, opposite] = self.blocks(&workspace.buffers.plane, side);
@@ -103,7 +103,7 @@ impl Correlator {
         ]
     }
 
-    /// The best translations of the best `most` blocks of `side` cells, with what gives the score of a number in the plane.
+    /// The best translations of the best `most` blocks of `side` cells.
     fn best_shifts(
         &self,
         workspace: &Workspace,
@@ -114,7 +114,7 @@ impl Correlator {
         score: impl Fn(&Complex32) -> f32,
     ) -> Vec<ScoredShift> {
         let plane = &workspace.buffers.plane;
-        // Of equals the first comes first, so that the order is the same however it is sorted.
+        // Of equals the first comes first, so that the order does not depend on the sort.
         let order =
             |one: &Block, other: &Block| (other.score, one.row, one.column).cmp(&(one.score, other.row, other.column));
         if best.len() > most {
@@ -157,7 +157,7 @@ impl Correlator {
         [forth, opposite]
     }
 
-    /// The translation that a place in the plane of scores stands for.
+    /// The translation of a column and row of the plane of scores.
     fn translation(&self, workspace: &Workspace, opposite: bool, column: usize, row: usize) -> Vector2<f64> {
         let Fourier { width, height, .. } = self.fourier;
         let (width_b, height_b) = workspace.size;
@@ -176,20 +176,20 @@ impl Correlator {
 
 /// A square of the plane of scores.
 struct Block {
-    /// The best in it.
+    /// Best score in it.
     score: i32,
-    /// Its first.
+    /// First row.
     row: usize,
-    /// Its first.
+    /// First column.
     column: usize,
 }
 
-/// A score above zero in whole cells.
+/// A score in whole cells.
 fn rounded(score: f32) -> i32 {
     (score + 0.5) as i32
 }
 
-/// A shift below zero has wrapped round.
+/// A negative shift is wrapped round.
 fn signed(index: usize, period: usize, size_b: usize) -> f64 {
     match index + size_b > period {
         true => index as f64 - period as f64,
@@ -197,7 +197,7 @@ fn signed(index: usize, period: usize, size_b: usize) -> f64 {
     }
 }
 
-/// The cells that a length takes, wherever they begin.
+/// Number of cells that a length covers, wherever it begins.
 fn cells_of(length: f64, cell: f64) -> usize {
     (length / cell) as usize + 2
 }
@@ -208,8 +208,9 @@ fn greater(one: &Complex32, other: &Complex32) -> Complex32 {
     Complex32::new(greater(one.re, other.re), greater(one.im, other.im))
 }
 
-/// Goes through the first half of the columns of a spectrum: with the place of the first number of each, it, and the numbers of
-/// the opposite frequencies. Both may be changed; of the column that is its own opposite, the first counts.
+/// Visits the first half of the columns of a spectrum: the index of the first number of each, the column, and the
+/// numbers of the opposite frequencies. Both may be changed; of the column that is its own opposite, the first
+/// counts.
 fn for_each_opposite(
     fourier: &Fourier,
     spectrum: &mut [Complex32],
@@ -228,7 +229,7 @@ fn for_each_opposite(
     }
 }
 
-/// Copies a column with its frequencies turned round.
+/// Copies a column with its frequencies in reverse order.
 fn mirror(from: &[Complex32], to: &mut [Complex32]) {
     to[0] = from[0];
     to[1..].iter_mut().zip(from[1..].iter().rev()).for_each(|(to, from)| *to = *from);
@@ -245,10 +246,10 @@ impl Workspace {
         Self { buffers: fourier.buffers(), corner: Vector2::zeros(), size: (0, 0) }
     }
 
-    /// Writes a raster, turned, into the plane: in each cell the share that is near a wall, and that is free.
+    /// Draws a turned raster into the plane: the share of each cell that is near a wall, and the share that is free.
     fn draw(&mut self, fourier: &Fourier, raster: &Raster, angle: f64, cell: f64) {
         let (least, size) = raster.box_turned(angle);
-        // What is at the least coordinates lies in the midst of the first cell, and rounding cannot put it outside.
+        // The least coordinates are in the middle of the first cell, so rounding cannot move them outside.
         self.corner = least - Vector2::repeat(0.5 * raster.cell);
         self.size = (cells_of(size.x, cell).min(fourier.width), cells_of(size.y, cell).min(fourier.height));
         let plane = &mut self.buffers.plane;
@@ -299,7 +300,7 @@ mod tests {
         (1usize..12, 1usize..12).prop_flat_map(move |(width, height)| {
             let contents = prop::collection::vec(content.clone(), width * height);
             contents.prop_map(move |mut contents| {
-                // What is known reaches to the corners, so that its box is the raster's.
+                // The corners are known, so that the bounding box is the raster's.
                 let last = contents.len() - 1;
                 (contents[0], contents[last]) = (Content::Free, Content::Free);
                 raster(width, height, &contents)
@@ -323,7 +324,7 @@ mod tests {
         (rows, -(workspace.corner + Vector2::new(width as f64, height as f64) * 2.0 * raster.cell))
     }
 
-    /// The best score of all translations by the definition, and whether a translation reaches it.
+    /// The best score of all translations by the definition, and that of the found translation.
     fn counted(a: &Raster, b: &Raster, opposite: bool, penalty: f32, found: &Vector2<f64>) -> (f32, f32) {
         let ((cells_a, corner_a), (cells_b, corner_b)) = (drawn(a, false), drawn(b, opposite));
         let score_at = |x: i64, y: i64| {

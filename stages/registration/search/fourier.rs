@@ -4,14 +4,14 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
-/// Rows and columns that are transposed at once, so that they stay in the caches.
+/// Number of rows and columns that are transposed at once, so that they stay in the caches.
 const BLOCK: usize = 16;
 
-/// The transform of planes of one size.
+/// Fourier transform of planes of one size.
 pub(super) struct Fourier {
     /// Numbers in a row.
     pub(super) width: usize,
-    /// Rows.
+    /// Number of rows.
     pub(super) height: usize,
     rows: Arc<dyn Fft<f32>>,
     rows_back: Arc<dyn Fft<f32>>,
@@ -19,7 +19,7 @@ pub(super) struct Fourier {
     columns_back: Arc<dyn Fft<f32>>,
 }
 
-/// What a transform works in: made once for each thread.
+/// Buffers of a transform, one set for each thread.
 pub(super) struct Buffers {
     /// Row by row.
     pub(super) plane: Vec<Complex32>,
@@ -29,7 +29,7 @@ pub(super) struct Buffers {
 }
 
 impl Fourier {
-    /// For planes of at least this size.
+    /// Transform of planes of at least this size.
     pub(super) fn new(least_width: usize, least_height: usize) -> Self {
         let (width, height) = (fast_size(least_width), fast_size(least_height));
         let mut planner = FftPlanner::new();
@@ -51,7 +51,7 @@ impl Fourier {
         Buffers { spectrum: numbers.clone(), plane: numbers, scratch: vec![zero; scratch] }
     }
 
-    /// The spectrum of a plane of which only the first `filled` rows are not zero. The plane is lost.
+    /// Computes the spectrum of a plane of which only the first `filled` rows are not zero. Overwrites the plane.
     pub(super) fn forward(&self, buffers: &mut Buffers, filled: usize) {
         let Buffers { plane, spectrum, scratch } = buffers;
         let plane = &mut plane[..filled.min(self.height) * self.width];
@@ -61,7 +61,7 @@ impl Fourier {
         self.columns.process_with_scratch(spectrum, scratch);
     }
 
-    /// The plane of a spectrum, `width * height` times too large. The spectrum is lost.
+    /// Computes the plane of a spectrum, `width * height` times too large. Overwrites the spectrum.
     pub(super) fn inverse(&self, buffers: &mut Buffers) {
         let Buffers { plane, spectrum, scratch } = buffers;
         self.columns_back.process_with_scratch(spectrum, scratch);
@@ -70,7 +70,7 @@ impl Fourier {
     }
 }
 
-/// Writes what is in rows of `width` numbers into columns of `height`.
+/// Copies rows of `width` numbers to columns of `height`.
 fn transpose(rows: &[Complex32], width: usize, columns: &mut [Complex32], height: usize) {
     let row_count = rows.len() / width;
     for first_row in (0..row_count).step_by(BLOCK) {
@@ -84,7 +84,7 @@ fn transpose(rows: &[Complex32], width: usize, columns: &mut [Complex32], height
     }
 }
 
-/// The least number from `least` up that is a product of 2, 3 and 5, of which transforms are quick.
+/// Least product of 2, 3 and 5 from `least` up: transforms of that size are fast.
 fn fast_size(least: usize) -> usize {
     let is_fast = |size: &usize| {
         let mut rest = *size;
@@ -110,7 +110,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn there_and_back_gives_the_plane(width in 1usize..40, height in 1usize..40, filled in 0usize..40) {
+        fn the_inverse_of_the_spectrum_is_the_plane(width in 1usize..40, height in 1usize..40, filled in 0usize..40) {
             let fourier = Fourier::new(width, height);
             let mut buffers = fourier.buffers();
             let filled = filled.min(fourier.height);

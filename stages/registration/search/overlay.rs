@@ -1,36 +1,37 @@
-//! How well one map lies on another at one place.
+//! Score of one map on another at one relative pose.
 
 use super::raster::{Content, Raster};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_4;
 
-/// The length of wall in a cell of its outline, in sides of the cell: the mean over all directions in which a straight
-/// wall may run (Cauchy and Crofton).
+/// Length of wall per cell of its outline, in sides of the cell: the mean over all directions of a straight wall
+/// (Cauchy and Crofton).
 const WALL_PER_CELL: f64 = FRAC_PI_4;
 
-/// So many cells round a wall show from which side it was seen.
+/// Radius in cells in which the side is determined from which a wall was seen.
 const AROUND: i32 = 2;
-/// So many cells before a wall is the space from which it was seen, beyond those that are wall by a shift of one cell.
+/// Distance in cells at which the space before a wall is looked up, beyond those that are wall by a shift of one
+/// cell.
 const FRONT: f64 = 2.5;
-/// About as wide as a corridor, metres.
+/// Bound of that distance, about the width of a corridor, metres.
 const MOST_AHEAD: f64 = 1.0;
 
-/// Points on the walls of a map, evenly chosen.
+/// Evenly sampled points on the walls of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walls {
     points: Vec<Point2>,
-    /// The direction to the space before each, if it was seen from one side.
+    /// Direction to the free space before each, if it was seen from one side only.
     faces: Vec<Option<Vector2<f64>>>,
-    /// The length of wall that a point stands for, metres.
+    /// Length of wall per point, metres.
     spacing: f64,
 }
 
 impl Walls {
-    /// At most `most` for all walls of a raster.
+    /// Samples at most `most` points on the walls of a raster.
     pub fn new(raster: &Raster, most: usize) -> Self {
         let all: Vec<Point2> = raster.wall_cells().collect();
-        // Half of what lies beside walls lies on either side, however thick they are drawn.
+        // Cells beside walls are on both sides, however thick the walls are drawn, so they count one half.
         let beside = raster.cells.iter().filter(|content| **content == Content::BesideWall).count();
         let length = 0.5 * beside as f64 * raster.cell * WALL_PER_CELL;
         let count = all.len().min(most);
@@ -45,18 +46,19 @@ impl Walls {
     }
 }
 
-/// The direction to the space before a wall; none of a wall that is free on both sides or on neither.
+/// Direction to the free space before a wall; none if both sides are free, or neither.
 fn face(raster: &Raster, wall: &Point2) -> Option<Vector2<f64>> {
     let around =
         (-AROUND..=AROUND).flat_map(|x| (-AROUND..=AROUND).map(move |y| Vector2::new(f64::from(x), f64::from(y))));
     let free = around.filter(|offset| raster.at(&(wall + offset * raster.cell)) == Content::Free);
     let direction = free.fold(Vector2::zeros(), |sum, offset| sum + offset);
-    // What is free all around has no side.
+    // A wall that is free all around has no side.
     let is_one_sided = direction.norm() > f64::from(AROUND);
     is_one_sided.then(|| direction.normalize())
 }
 
-/// Whether a raster knows the space before a wall which another map has seen from one side, where the wall lies by `transform`.
+/// Whether a raster knows the space before a wall that another map has seen from one side, with the wall moved by
+/// `transform`.
 fn is_faced(raster: &Raster, transform: &Pose2, wall: &Point2, face: Option<Vector2<f64>>) -> bool {
     let ahead = FRONT * raster.cell;
     // In wide cells the space before a wall may be narrower than that.
@@ -64,44 +66,44 @@ fn is_faced(raster: &Raster, transform: &Pose2, wall: &Point2, face: Option<Vect
     raster.at(&(transform * (wall + face * ahead))) != Content::Unknown
 }
 
-/// Two maps that are laid on each other.
+/// Two maps, to be overlaid at any relative pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Overlay<'a> {
-    /// The map that stays.
+    /// The fixed map.
     pub a: &'a Raster,
-    /// The map that is moved.
+    /// The moved map.
     pub b: &'a Raster,
     /// The walls of a.
     pub walls_a: &'a Walls,
     /// The walls of b.
     pub walls_b: &'a Walls,
-    /// What a wall on free space counts against a place, where a wall on a wall counts 1 for it.
+    /// Weight of a wall on free space, against the pose, where a wall on a wall has a weight of 1.
     pub penalty: f64,
 }
 
-/// The walls of map b that meet walls of map a, to within a cell.
+/// Common walls: walls of map b within a cell of walls of map a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommonWalls {
-    /// Their middle, in frame a.
+    /// Centroid, in frame a.
     pub centre: Point2,
-    /// How far they lie from there, the root of the mean square, metres.
+    /// Root mean square distance from the centroid, metres.
     pub radius: f64,
-    /// About their length, metres.
+    /// Approximate length, metres.
     pub length: f64,
-    /// The length of those of them that both maps have seen from the same side, metres.
+    /// Length of those that both maps have seen from the same side, metres.
     pub faced_length: f64,
-    /// Their share in the walls of map b that meet anything known, 0 to 1.
+    /// Their share of the walls of map b on known cells of map a, 0 to 1.
     pub agreement: f64,
 }
 
 impl Overlay<'_> {
-    /// The length of wall on wall, less `penalty` times that of wall on free space, metres: the mean of both maps.
+    /// Length of wall on wall, less `penalty` times that of wall on free space, metres: the mean of both maps.
     pub fn score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
         self.sum(transform_a_b, |raster, place| values[raster.content(place.x, place.y) as usize])
     }
 
-    /// The same, with the values between the centres of cells interpolated, so that it is smooth in the place.
+    /// The same, interpolated between the centres of cells, so that it is smooth in the pose.
     pub fn smooth_score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
         self.sum(transform_a_b, |raster, place| {
@@ -115,7 +117,7 @@ impl Overlay<'_> {
         })
     }
 
-    /// The walls in common at a place, if there are any.
+    /// The common walls at a relative pose, if there are any.
     pub fn common_walls(&self, transform_a_b: &Pose2) -> Option<CommonWalls> {
         let (mut sum, mut squares, mut on_wall, mut on_free, mut faced) = (Vector2::zeros(), 0.0, 0.0, 0.0, 0.0);
         let middle = transform_a_b * self.walls_b.points.first()?;
@@ -123,7 +125,7 @@ impl Overlay<'_> {
             let wall = transform_a_b * point;
             match self.a.at(&wall) {
                 Content::Wall | Content::BesideWall => {
-                    // Differences from a point nearby, so that frames far away cost no digits.
+                    // Differences from a nearby point, so that frames far away lose no digits.
                     let offset = wall - middle;
                     sum += offset;
                     squares += offset.norm_squared();
@@ -144,8 +146,8 @@ impl Overlay<'_> {
         })
     }
 
-    /// The score, where walls that the two maps have not seen from the same side count nothing: those of two buildings back to back lie
-    /// on each other, too.
+    /// The score without walls that the maps have not seen from the same side: the walls of two adjacent buildings
+    /// coincide, too.
     pub fn faced_score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
         let of = |walls: &Walls, raster: &Raster, transform: &Pose2| {
@@ -170,10 +172,10 @@ impl Overlay<'_> {
         0.5 * (of(self.walls_b, self.a, transform_a_b) + of(self.walls_a, self.b, &transform_a_b.inverse()))
     }
 
-    /// What a wall counts that meets each [`Content`].
+    /// Weight of a wall on each [`Content`].
     fn values(&self) -> [f64; 4] {
         let mut values = [0.0; 4];
-        // Walls that meet are counted in both maps, and a wall on free space in its own only.
+        // Walls on walls are counted in both maps, and a wall on free space in its own map only.
         values[Content::Free as usize] = -2.0 * self.penalty;
         values[Content::BesideWall as usize] = 0.5;
         values[Content::Wall as usize] = 1.0;

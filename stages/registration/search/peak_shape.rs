@@ -1,25 +1,25 @@
-//! How sure a place is: the covariance from the shape of the peak.
+//! Covariance of a pose from the shape of its peak.
 
-use super::climb::moved;
+use super::coordinate_ascent::moved;
 use super::overlay::{CommonWalls, Overlay};
 use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// The variance in a direction is this share of the square of the peak's width, where the width is that of a parabola
-/// of the same curvature, from its top to its foot. Fitted to the errors in simulated and real maps.
+/// Variance in a direction as a share of the squared width of the peak, where the width is that of a parabola of the
+/// same curvature, from its top to its foot. Fitted to the errors in simulated and real maps.
 const VARIANCE_OF_WIDTH: f64 = 0.01;
 
-/// The least standard deviation of any point in the midst of the walls in common, in cells of the overlay: as far apart
-/// lie the cells of the two maps, and so far are they bent by drift.
+/// Least standard deviation of a point in the middle of the common walls, in cells of the overlay, for the offset of
+/// the two maps' cells and for deformation by drift.
 const LEAST_DEVIATION: f64 = 0.25;
 
 /// The covariance of (x, y, yaw) of `T_a_b` at a peak, metres and radians.
 ///
-/// Along a direction in which the score does not fall, as along a corridor, the standard deviation is that of a place
-/// anywhere along the walls in common.
+/// Along a direction in which the score does not fall, as along a corridor, the standard deviation is that of a
+/// position anywhere along the common walls.
 pub fn covariance(overlay: &Overlay<'_>, transform_a_b: &Pose2, common: &CommonWalls) -> Matrix3<f64> {
     let step = overlay.a.cell;
-    // A turn counts as far as it moves the walls.
+    // A turn is scaled to how far it moves the walls.
     let radius = common.radius.max(step);
     let score = |x: i32, y: i32, turn: i32| {
         let step = Vector3::new(f64::from(x) * step, f64::from(y) * step, f64::from(turn) * step / radius);
@@ -56,7 +56,7 @@ pub fn covariance(overlay: &Overlay<'_>, transform_a_b: &Pose2, common: &CommonW
     jacobian * about_centre * jacobian.transpose()
 }
 
-/// The second difference along an axis, the mean over all lines.
+/// Second difference along an axis, the mean over all lines.
 fn second(at: &impl Fn([usize; 3]) -> f64, axis: usize) -> f64 {
     mean(|place| {
         let value = |along: usize| {
@@ -68,7 +68,7 @@ fn second(at: &impl Fn([usize; 3]) -> f64, axis: usize) -> f64 {
     })
 }
 
-/// The mixed second difference along two axes, the mean over all planes.
+/// Mixed second difference along two axes, the mean over all planes.
 fn mixed(at: &impl Fn([usize; 3]) -> f64, one: usize, other: usize) -> f64 {
     mean(|place| {
         let value = |along_one: usize, along_other: usize| {
@@ -80,7 +80,7 @@ fn mixed(at: &impl Fn([usize; 3]) -> f64, one: usize, other: usize) -> f64 {
     })
 }
 
-/// The mean over all places of the stencil.
+/// Mean over all points of the stencil.
 fn mean(difference: impl Fn([usize; 3]) -> f64) -> f64 {
     let places = (0..27).map(|number| [number / 9, number / 3 % 3, number % 3]);
     places.map(difference).sum::<f64>() / 27.0

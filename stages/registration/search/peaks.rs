@@ -1,96 +1,103 @@
-//! The places at which two maps fit best, each away from the others.
+//! The relative poses at which two maps fit best, each apart from the others.
 
-use super::climb::{Steps, climb};
+use super::coordinate_ascent::{Steps, coordinate_ascent};
+use super::exhaustive::ScoredPose;
 use super::overlay::Overlay;
-use super::places::Place;
 use super::prepared_map::JUDGED;
 use super::scales::{Scale, search_scales};
 use super::{MapAlignerParameters, PreparedMap};
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Point2, Pose2, turn_difference};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Less than this share of the walls in common is seen from the same side where two buildings lie back to back.
+/// Least share of the common walls that both maps see from the same side: less shows two adjacent buildings.
 const FACED: f64 = 0.5;
-/// As many places of those found in cells of one size, each away from the others, are looked at closely.
+/// Number of distinct poses of the search in cells of one size that are refined.
 const CANDIDATES: usize = 64;
 
-/// Places that were judged in the same way, the best first.
+/// Distinct poses that were scored in the same way, the best first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Peaks {
-    /// Where the search and the way up from there came by: the best place, then all that are elsewhere.
-    visited: Vec<Place>,
-    /// The peaks that it led to.
-    peaks: Vec<Place>,
+    /// Poses of the search and of the ascent from there: the best one, then all that are elsewhere.
+    visited: Vec<ScoredPose>,
+    /// The peaks that they converge to.
+    peaks: Vec<ScoredPose>,
 }
 
 impl Peaks {
-    /// Searches for all places of map b on map a, or all in a window.
+    /// Searches all poses of map b in map a, or all in a window.
     pub fn find(
         a: &PreparedMap,
         b: &PreparedMap,
-        window: Option<&PlaceWindow>,
+        window: Option<&PoseWindow>,
         parameters: &MapAlignerParameters,
     ) -> Self {
         let penalty = parameters.free_space_penalty;
         let candidates: Vec<(usize, f64, (Pose2, Point2))> = search_scales(a, b, window, parameters)
             .into_iter()
-            .flat_map(|Scale { level, step, places }| {
+            .flat_map(|Scale { level, step, poses }| {
                 let overlay = overlay(a, b, level, penalty);
-                let apart = apart_from_better(&overlay, &places, parameters, 2.0 * step);
+                let apart = apart_from_better(&overlay, &poses, parameters, 2.0 * step);
                 apart.into_iter().map(move |candidate| (level, step, candidate))
             })
             .collect();
         let ways = candidates.par_iter().map(|(level, step, (start, centre))| {
-            let mut place = *start;
+            let mut pose = *start;
             for number in (JUDGED..=*level).rev() {
                 let walls = (a.few_walls(), b.few_walls());
                 let overlay = Overlay { walls_a: walls.0, walls_b: walls.1, ..overlay(a, b, number, penalty) };
                 let radians = 0.5 * step / (1 << (level - number)) as f64;
                 let steps = Steps { metres: overlay.a.cell, radians, halvings: 1 };
-                place = climb(|place| overlay.score(place), &place, centre, steps).transform_a_b;
+                pose = coordinate_ascent(|pose| overlay.score(pose), &pose, centre, steps).transform_a_b;
             }
             let overlay = overlay(a, b, JUDGED, penalty);
-            let judged = |transform_a_b: Pose2| Place { transform_a_b, score: overlay.faced_score(&transform_a_b) };
-            (judged(*start), judged(place))
+            let judged =
+                |transform_a_b: Pose2| ScoredPose { transform_a_b, score: overlay.faced_score(&transform_a_b) };
+            (judged(*start), judged(pose))
         });
-        let (starts, mut peaks): (Vec<Place>, Vec<Place>) = ways.collect::<Vec<_>>().into_iter().unzip();
-        let is_possible = |place: &Place| window.is_none_or(|window| window.contains(&place.transform_a_b, 0.0, 0.0));
-        peaks.retain(|place| place.score > 0.0 && is_possible(place));
-        peaks.sort_by(Place::best_first);
+        let (starts, mut peaks): (Vec<ScoredPose>, Vec<ScoredPose>) = ways.collect::<Vec<_>>().into_iter().unzip();
+        let is_possible =
+            |pose: &ScoredPose| window.is_none_or(|window| window.contains(&pose.transform_a_b, 0.0, 0.0));
+        peaks.retain(|pose| pose.score > 0.0 && is_possible(pose));
+        peaks.sort_by(ScoredPose::best_first);
         let mut visited = [starts, peaks.clone()].concat();
         visited.retain(is_possible);
-        visited.sort_by(Place::best_first);
+        visited.sort_by(ScoredPose::best_first);
         Self { visited, peaks }
     }
 
     /// The peaks, the best first.
-    pub fn all(&self) -> &[Place] {
+    pub fn all(&self) -> &[ScoredPose] {
         &self.peaks
     }
 
-    /// The best place that is apart from a given one, of whose walls in common `centre` is the middle, if it scores at
-    /// all. It may lie on the slope of a peak that is wide.
-    pub fn best_elsewhere(&self, place: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> Option<&Place> {
+    /// The best pose that is apart from a given one, whose common walls have the centroid `centre`, if its score is
+    /// positive. It may be on the slope of a wide peak.
+    pub fn best_elsewhere(
+        &self,
+        pose: &Pose2,
+        centre: &Point2,
+        parameters: &MapAlignerParameters,
+    ) -> Option<&ScoredPose> {
         let mut elsewhere = self.visited.iter().filter(|other| {
-            let (metres, radians) = change(place, &other.transform_a_b, centre);
+            let (metres, radians) = change(pose, &other.transform_a_b, centre);
             other.score > 0.0 && (metres > parameters.apart || radians.abs() > parameters.apart_yaw)
         });
         elsewhere.next()
     }
 }
 
-/// The first of some places within `apart` and `radians` at which most walls in common are seen from the same side, each with the
-/// middle of its walls in common.
+/// The first of some poses within `apart` and `radians` at which most common walls are seen from the same side, each
+/// with the centroid of its common walls.
 fn apart_from_better(
     overlay: &Overlay<'_>,
-    places: &[Place],
+    poses: &[ScoredPose],
     parameters: &MapAlignerParameters,
     radians: f64,
 ) -> Vec<(Pose2, Point2)> {
     let mut kept: Vec<(Pose2, Point2)> = Vec::new();
-    for Place { transform_a_b, .. } in places {
+    for ScoredPose { transform_a_b, .. } in poses {
         let is_apart = |(other, centre): &(Pose2, Point2)| {
             let (shift, turn) = change(other, transform_a_b, centre);
             shift > parameters.apart || turn.abs() > radians
@@ -107,20 +114,20 @@ fn apart_from_better(
     kept
 }
 
-/// Two maps on each other, in the cells of a level.
+/// Overlay of two maps, in the cells of a level.
 pub(crate) fn overlay<'a>(a: &'a PreparedMap, b: &'a PreparedMap, level: usize, penalty: f64) -> Overlay<'a> {
     Overlay { a: a.level(level), b: b.level(level), walls_a: a.walls(), walls_b: b.walls(), penalty }
 }
 
-/// How far a point of map b that lies at `centre` in frame a is moved from one transform to another, metres, and by how
-/// much the map is turned, radians.
+/// Distance of a point of map b, at `centre` in frame a, from one transform to another, metres, and the rotation,
+/// radians.
 pub(super) fn change(one: &Pose2, other: &Pose2, centre: &Point2) -> (f64, f64) {
     let moved = other * (one.inverse() * centre);
     let turn = turn_difference(other.rotation.angle(), one.rotation.angle(), TAU);
     ((moved - centre).norm(), turn)
 }
 
-/// Whether two places are one, `centre` being the middle of the walls in common at the first.
+/// Whether two poses are the same, where `centre` is the centroid of the common walls at the first.
 pub(crate) fn is_near(one: &Pose2, other: &Pose2, centre: &Point2, parameters: &MapAlignerParameters) -> bool {
     let (metres, radians) = change(one, other, centre);
     metres <= parameters.apart && radians.abs() <= parameters.apart_yaw

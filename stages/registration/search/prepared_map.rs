@@ -1,19 +1,19 @@
-//! A map as the search takes it.
+//! A map prepared for the search.
 
 use super::{Raster, SearchRefusal, Walls};
 use crate::shared::geometry::Grid;
 
-/// Rasters of a map, each in cells twice as wide as the one before.
+/// Number of rasters of a map, each in cells twice as wide as the one before.
 const LEVELS: usize = 6;
 
-/// The level in whose cells places are judged.
+/// Level in whose cells poses are scored.
 pub(crate) const JUDGED: usize = 1;
 
-/// A cell of a raster is at least as many cells of the grid wide: then, however the grid is turned, none in its midst is
-/// left out.
+/// Least width of a cell of a raster in cells of the grid, so that none in its middle is left out, however the grid
+/// is turned.
 const LEAST_CELLS: f64 = 1.5;
 
-/// As many points stand for all walls where a place is judged, and on the way to it.
+/// Number of points on walls where a pose is scored, and in the ascent.
 const POINTS: usize = 1200;
 const FEW_POINTS: usize = 400;
 
@@ -26,7 +26,7 @@ pub struct PreparedMap {
 }
 
 impl PreparedMap {
-    /// The least cells in which a grid can be prepared, metres.
+    /// Least cell size in which a grid can be prepared, metres.
     pub fn least_cell(grid: &Grid<'_>) -> f64 {
         LEAST_CELLS * grid.geometry.resolution
     }
@@ -39,7 +39,7 @@ impl PreparedMap {
         if map.walls.is_empty() { Err(SearchRefusal::NoWalls { robot: robot.to_owned() }) } else { Ok(map) }
     }
 
-    /// A map of which there is a raster.
+    /// A map from its finest raster.
     pub fn of_raster(finest: Raster) -> Self {
         let (walls, few_walls) = (Walls::new(&finest, POINTS), Walls::new(&finest, FEW_POINTS));
         let mut levels = vec![finest];
@@ -49,12 +49,12 @@ impl PreparedMap {
         Self { levels, walls, few_walls }
     }
 
-    /// The raster whose cells are `2 ^ number` times as wide as those of the finest, or the widest that there is.
+    /// The raster whose cells are `2 ^ number` times as wide as those of the finest, or the widest one.
     pub fn level(&self, number: usize) -> &Raster {
         &self.levels[number.min(LEVELS - 1)]
     }
 
-    /// The number of the level whose cells are the least with which the map is at most `most` cells long.
+    /// Index of the level with the least cells in which the map is at most `most` cells long.
     pub(super) fn level_of_size(&self, most: usize) -> usize {
         let is_small = |raster: &Raster| raster.width.max(raster.height) <= most;
         self.levels.iter().position(is_small).unwrap_or(LEVELS - 1)

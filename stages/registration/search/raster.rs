@@ -1,38 +1,38 @@
-//! A map in wider cells, cropped to what is known.
+//! A map in wider cells, cropped to its known part.
 
 use super::walk::Walk;
 use crate::shared::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
 use nalgebra::{UnitComplex, Vector2};
 
-/// Cells round what is known: walls can be dilated into them, and still the outermost are unknown.
+/// Number of cells around the known part: walls can be dilated into them, and still the outermost are unknown.
 const RIM: f64 = 3.0;
 
-/// What a cell of a raster holds. What is greater wins where several things lie in one cell.
+/// Content of a cell of a raster. The greatest wins where several things are in one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Content {
-    /// Nothing is known of it.
+    /// Unknown.
     #[default]
     Unknown,
-    /// It is known, and free.
+    /// Known and free.
     Free,
-    /// It lies beside a wall, and may be one by a shift of one cell.
+    /// Beside a wall; it may be one by a shift of one cell.
     BesideWall,
-    /// There is a wall in it.
+    /// A wall.
     Wall,
 }
 
 impl Content {
-    /// Whether it is wall once walls are dilated by one cell.
+    /// Whether it is wall after a dilation by one cell.
     pub fn is_near_wall(self) -> bool {
         matches!(self, Self::Wall | Self::BesideWall)
     }
 }
 
-/// A map in square cells whose sides run along the axes of its frame, cropped to what is known.
+/// A map in square cells whose sides run along the axes of its frame, cropped to its known part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
-    /// Where the outer corner of cell (0, 0) lies, metres.
+    /// Position of the outer corner of cell (0, 0), metres.
     pub corner: Vector2<f64>,
     /// The side of a cell, metres.
     pub cell: f64,
@@ -47,8 +47,8 @@ pub struct Raster {
 impl Raster {
     /// The raster of a grid, in the frame of the map. `None` if it would be longer than `max_extent` metres.
     ///
-    /// A cell is wall if any cell of the grid in it is occupied, and free if any other is free. `cell` must be so wide
-    /// that every cell in the midst of the grid gets one.
+    /// A cell is wall if any cell of the grid in it is occupied, and free if any other is free. `cell` must be so
+    /// wide that every cell in the middle of the grid is mapped to one.
     pub fn new(grid: &Grid<'_>, cell: f64, max_extent: f64) -> Option<Self> {
         let geometry = &grid.geometry;
         let rows = || {
@@ -95,7 +95,7 @@ impl Raster {
         for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
             let start = (row / 2 + 1) * width + 1;
             for (column, content) in cells.iter().enumerate() {
-                // What lies beside a wall lies beside it in wider cells too, and is marked so below.
+                // Cells beside walls are marked again below.
                 if *content != Content::BesideWall {
                     let cell = &mut halved.cells[start + column / 2];
                     *cell = (*cell).max(*content);
@@ -106,28 +106,28 @@ impl Raster {
         halved
     }
 
-    /// What several maps know together, in the frame that each is taken to by its transform. Where one has a wall there
-    /// is a wall. Cells are as wide as those of the first. `None` if the maps lie so far apart that they cannot hang together,
-    /// as the union takes memory by that distance, and not by what is known.
+    /// Union of several maps, each with its transform to the common frame. A cell is wall if it is wall in any of
+    /// them. Cells are as wide as those of the first. `None` if the maps are so far apart that they cannot be
+    /// connected, as the memory depends on that distance, and not on the known area.
     pub fn union(maps: &[(Pose2, &Self)]) -> Option<Self> {
         let Some((_, first)) = maps.first() else { return Some(Self::default()) };
         let (cell, mut bounds, mut reach) = (first.cell, Bounds::default(), 0.0);
         for (transform, map) in maps {
             map.for_each_end(|point| bounds.add(&(transform * point)));
-            // Maps that meet reach no farther than their diagonals together; with twice that there is room for gaps.
+            // Connected maps extend no farther than their diagonals together; with twice that there is room for gaps.
             reach += 2.0 * map.cell * (map.width as f64).hypot(map.height as f64);
         }
-        // A place that is no number is not within reach.
+        // A pose that is not finite is not within reach.
         let is_within_reach = bounds.0.is_none_or(|(least, most)| (most - least).iter().all(|side| *side <= reach));
         if !is_within_reach {
             return None;
         }
-        // So the cells of a map that is not turned come to lie on cells.
+        // So the cells of a map that is not turned coincide with cells.
         let mut union = Self::unknown(&bounds, cell, 0.0);
         for (transform, map) in maps {
             for (index, content) in map.cells.iter().enumerate() {
                 let centre = map.centre(index % map.width, index / map.width);
-                // A cell that is turned may leave a gap beside it; its quarters do not.
+                // A turned cell may leave a gap beside it; its quarters do not.
                 let quarter = 0.25 * map.cell;
                 let offsets: &[(f64, f64)] = match content {
                     Content::Unknown | Content::BesideWall => continue,
@@ -147,13 +147,13 @@ impl Raster {
         Some(union)
     }
 
-    /// The number of cells of which anything is known.
+    /// Number of known cells.
     pub fn known_cells(&self) -> usize {
         self.cells.iter().filter(|content| **content != Content::Unknown).count()
     }
 
-    /// The least box that holds the map turned by an angle about the origin of its frame: its lower corner, and its
-    /// size, metres.
+    /// Bounding box of the map turned by an angle about the origin of its frame: its lower corner, and its size,
+    /// metres.
     pub(super) fn box_turned(&self, angle: f64) -> (Vector2<f64>, Vector2<f64>) {
         let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
         self.for_each_end(|point| bounds.add(&(turn * point)));
@@ -161,7 +161,7 @@ impl Raster {
         (least, most - least)
     }
 
-    /// Goes through the centres of the first and the last known cell of each row.
+    /// Visits the centres of the first and the last known cell of each row.
     fn for_each_end(&self, mut visit: impl FnMut(Point2)) {
         for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
             let ends = known_range(cells, |content| *content != Content::Unknown);
@@ -174,14 +174,14 @@ impl Raster {
         Point2::from(self.corner + Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * self.cell)
     }
 
-    /// What is at a point.
+    /// Content at a point.
     pub fn at(&self, point: &Point2) -> Content {
         let place = (point.coords - self.corner) / self.cell;
         self.content(place.x, place.y)
     }
 
-    /// What is at a place given in cells from the corner. What lies outside is drawn to the outermost cells, which
-    /// are unknown.
+    /// Content at a position given in cells from the corner. Positions outside are clamped to the outermost cells,
+    /// which are unknown.
     #[inline]
     pub(super) fn content(&self, x: f64, y: f64) -> Content {
         let within = |place: f64, count: usize| (place as i32).clamp(0, count.saturating_sub(1) as i32) as usize;
@@ -195,11 +195,12 @@ impl Raster {
         walls.map(|(index, _)| self.centre(index % self.width, index / self.width))
     }
 
-    /// Nothing but unknown cells, for centres of cells of a grid within some bounds.
+    /// A raster of unknown cells, for centres of cells of a grid within some bounds.
     fn unknown(bounds: &Bounds, cell: f64, resolution: f64) -> Self {
         let Some((least, most)) = bounds.0 else { return Self { cell, ..Self::default() } };
         let size = ((most - least) / cell).map(|cells| cells as usize + 2 * RIM as usize);
-        // With half a cell of the grid more no centre comes to lie on a border between cells, where rounding would decide.
+        // Half a cell of the grid is added, so that no centre is on a border between cells, where rounding would
+        // decide.
         let corner = least - Vector2::repeat((RIM - 0.5) * cell + 0.5 * resolution);
         Self { corner, cell, width: size.x, height: size.y, cells: vec![Content::Unknown; size.x * size.y] }
     }
@@ -227,12 +228,12 @@ impl Default for Raster {
     }
 }
 
-/// The first and the last known cell of a row. Those of all rows bound the map however it is turned.
+/// Indices of the first and the last known cell of a row. Those of all rows bound the map however it is turned.
 fn known_range<T>(row: &[T], is_known: impl Fn(&T) -> bool) -> Option<(usize, usize)> {
     Some((row.iter().position(&is_known)?, row.iter().rposition(&is_known)?))
 }
 
-/// The least box that holds some points, if there are any.
+/// Bounding box of points, if there are any.
 #[derive(Default)]
 struct Bounds(Option<(Vector2<f64>, Vector2<f64>)>);
 
@@ -266,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_union_knows_what_its_maps_know() {
+    fn a_union_holds_the_cells_of_its_maps() {
         let (geometry, cells) = map(0.0);
         let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.1, 100.0).unwrap();
         let alone = Raster::union(&[(Pose2::identity(), &raster)]).unwrap();

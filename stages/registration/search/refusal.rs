@@ -1,43 +1,43 @@
 //! Why maps cannot be aligned.
 
-/// Why there is no first guess for two maps. The texts are for the people who run the robots.
+/// Why there is no hypothesis for two maps. The texts are for the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SearchRefusal {
     /// A map without walls.
     #[error("the map of {robot} has no walls")]
     NoWalls {
-        /// Whose.
+        /// Name of the robot.
         robot: String,
     },
     /// A map that would take too much time and memory.
-    #[error("the known part of the map of {robot} is longer than {most:.0} m, which is the most that is searched")]
+    #[error("the known part of the map of {robot} is longer than {most:.0} m (max_extent of map_aligner)")]
     TooLarge {
-        /// Whose.
+        /// Name of the robot.
         robot: String,
-        /// What is allowed, metres.
+        /// Largest extent allowed, metres.
         most: f64,
     },
-    /// No place speaks for itself.
+    /// No pose has a positive score.
     #[error(
-        "the maps fit nowhere\ntry: drive one robot on where the other was, or one tag seen by both\n\nwherever walls lie on walls, \
-         as many lie on free space of the other map"
+        "the maps fit nowhere\ntry: let one robot drive where the other was, or let both see one tag\n\nat every pose at which \
+         walls agree, at least as many walls are on free space of the other map"
     )]
     NoFit,
-    /// No place speaks for itself of those that are possible.
+    /// No pose that the initial poses allow has a positive score.
     #[error(
         "the maps fit nowhere near the initial poses\ntry: are the poses right? --initial ROBOT=X,Y,YAW,STDDEV widens them\n\n\
-         wherever walls lie on walls there, as many lie on free space of the other map"
+         at every pose there at which walls agree, at least as many walls are on free space of the other map"
     )]
     NoFitInWindow,
-    /// Too little in common.
+    /// Too little wall in common.
     #[error(
-        "the maps have too little in common: {length:.0} m of wall agree at the best place\nmissing: {least:.0} m of wall \
-         (min_wall_length)\ntry: drive one robot on where the other was, or one tag seen by both"
+        "the maps have too little in common: {length:.0} m of wall agree at the best pose\nmissing: {least:.0} m of wall \
+         (min_wall_length)\ntry: let one robot drive where the other was, or let both see one tag"
     )]
     TooLittleInCommon {
-        /// Metres of wall on which the maps agree.
+        /// Inlier length, metres.
         length: f64,
-        /// What is asked for, metres.
+        /// Least inlier length required, metres.
         least: f64,
     },
 }

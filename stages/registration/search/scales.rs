@@ -1,41 +1,41 @@
-//! The search in cells of several sizes, at rotations that lie close enough for each.
+//! The search in cells of several sizes, at rotations of a spacing that suits each.
 //!
-//! Large maps are searched in wide cells first, which bear with bends, and then in narrow ones, in which rooms can still be told from each
-//! other: of a building that is much longer than its rooms, wide cells show hardly anything but walls.
+//! Large maps are searched in wide cells first, which tolerate deformation, and then in narrow ones, which still
+//! resolve rooms: of a building that is much longer than its rooms, wide cells show hardly anything but walls.
 
-use super::places::{Place, Rotations, search};
+use super::exhaustive::{Rotations, ScoredPose, search};
 use super::prepared_map::JUDGED;
 use super::{Content, MapAlignerParameters, PreparedMap, Raster};
-use crate::registration::place_window::PlaceWindow;
+use crate::registration::pose_window::PoseWindow;
 
 /// Maps that are longer, in cells of the search, are searched in wider ones.
 const MOST_CELLS: usize = 320;
-/// Maps are searched at all rotations in cells of so many sizes, each twice as wide as the one before: the narrow ones for small maps, of
-/// which little is in common, and the wide ones for those that are bent.
+/// Number of cell sizes in which maps are searched at all rotations, each twice as wide as the one before: the narrow
+/// ones for small maps with little in common, and the wide ones for deformed maps.
 const SCALES: usize = 2;
-/// In the narrowest cells that do not make the maps too long, rotations may have to lie too close to try them all. These are tried, those
-/// nearest to the best places in wider cells: as walls stand at right angles, places that fit at all have few rotations.
+/// Number of rotations in the narrowest cells where these need a spacing too small to try all. Those nearest to the
+/// best poses in wider cells are tried: as walls are at right angles, poses that fit at all have few rotations.
 const NARROW_ROTATIONS: usize = 90;
-/// Cells as wide as the spaces between walls tell nothing, with any penalty.
+/// Bound of the penalty: cells as wide as the space between walls are useless with any.
 const MOST_PENALTY: f64 = 100.0;
-/// As many places are taken from the search in cells of one size.
-const PLACES: usize = 1024;
+/// Number of poses from the search in cells of one size.
+const MOST_POSES: usize = 1024;
 
-/// What was found in cells of one size.
+/// Poses of the search in cells of one size.
 pub(super) struct Scale {
-    /// The level of the prepared maps.
+    /// Level of the prepared maps.
     pub(super) level: usize,
-    /// How far the rotations lay apart, radians.
+    /// Spacing of the rotations, radians.
     pub(super) step: f64,
-    /// The places, the best first.
-    pub(super) places: Vec<Place>,
+    /// The poses, the best first.
+    pub(super) poses: Vec<ScoredPose>,
 }
 
-/// Searches for all places of map b on map a, or all in a window; the scales from narrow cells to wide ones.
+/// Searches all poses of map b in map a, or all in a window; the scales from narrow cells to wide ones.
 pub(super) fn search_scales(
     a: &PreparedMap,
     b: &PreparedMap,
-    window: Option<&PlaceWindow>,
+    window: Option<&PoseWindow>,
     parameters: &MapAlignerParameters,
 ) -> Vec<Scale> {
     let step = 2.0 * parameters.rotation_step;
@@ -44,16 +44,16 @@ pub(super) fn search_scales(
     let search_at = |level: usize, rotations: &Rotations| {
         let (coarse_a, coarse_b) = (a.level(level), b.level(level));
         let MapAlignerParameters { free_space_penalty, apart, .. } = *parameters;
-        // Wide cells are for maps that are bent, which contradict each other at the right place, too.
+        // Wide cells are for deformed maps, which contradict each other at the right pose, too.
         let penalty = match level == narrowest {
             true => free_space_penalty.max(chance_penalty(coarse_a, coarse_b)),
             false => free_space_penalty,
         };
-        let places = search(coarse_a, coarse_b, window, rotations, penalty, apart, PLACES);
-        Scale { level, step: rotations.step(), places }
+        let poses = search(coarse_a, coarse_b, window, rotations, penalty, apart, MOST_POSES);
+        Scale { level, step: rotations.step(), poses }
     };
     let all_rotations = |level: usize| Rotations::all(step.min(close_step(level)));
-    // A window holds few places, and the narrowest cells come by the right one.
+    // A window holds few poses, so the narrowest cells find the right one.
     if window.is_some() {
         return vec![search_at(narrowest, &all_rotations(narrowest))];
     }
@@ -62,13 +62,14 @@ pub(super) fn search_scales(
     let rotations = all_rotations(first);
     let found = search_at(first, &rotations);
     let narrow = (first > narrowest)
-        .then(|| search_at(narrowest, &rotations.nearest_to(&found.places, close_step(narrowest), NARROW_ROTATIONS)));
+        .then(|| search_at(narrowest, &rotations.nearest_to(&found.poses, close_step(narrowest), NARROW_ROTATIONS)));
     let wider = (first + 1..first + SCALES).map(|level| search_at(level, &all_rotations(level)));
     narrow.into_iter().chain([found]).chain(wider).collect()
 }
 
-/// How far rotations may lie apart, radians, so that maps that are turned by half of that lie less than one cell of a level, which are
-/// twice as wide in the search, beside their place at the ends of the shorter of them: or else the right place lies between two rotations.
+/// Spacing of rotations, radians, at which the ends of the shorter map move by less than one cell of a level (which
+/// are twice as wide in the search) by half of it. With a wider spacing the right pose could be missed between two
+/// rotations.
 fn close_step(a: &PreparedMap, b: &PreparedMap, level: usize) -> f64 {
     let radius = |map: &PreparedMap| {
         let raster = map.level(JUDGED);
@@ -77,8 +78,8 @@ fn close_step(a: &PreparedMap, b: &PreparedMap, level: usize) -> f64 {
     4.0 * a.level(level).cell / radius(a).min(radius(b))
 }
 
-/// The penalty with which the score of two maps that are laid on each other by chance is 0 in the mean. Where most of what is known lies
-/// beside walls, maps would score the more with less of a penalty, the more of them lies on each other, wherever that is.
+/// Penalty at which a random relative pose scores 0 in the mean. With less of a penalty, maps with little free space
+/// would score by their overlap, wherever that is.
 fn chance_penalty(a: &Raster, b: &Raster) -> f64 {
     let share_of_walls = |raster: &Raster| {
         let count = |is: fn(&Content) -> bool| raster.cells.iter().filter(|content| is(content)).count() as f64;
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_each_other_by_chance_scores_nothing_in_the_mean() {
+    fn a_random_pose_scores_nothing_in_the_mean() {
         let (a, b) = (raster(6, 2, 5), raster(9, 3, 0));
         // Of 8 times 12 pairs of known cells.
         let (on_walls, on_free) = (6.0 * 9.0, 6.0 * 3.0 + 2.0 * 9.0);

@@ -1,4 +1,4 @@
-//! Maps of known places, aligned.
+//! Maps with known relative poses, aligned.
 
 use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, SearchRefusal, align_maps};
 use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
@@ -14,7 +14,7 @@ fn hypotheses(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignments, SearchRefusal
     align_grids(a.view().grid, b.view().grid, &MapAlignerParameters::default())
 }
 
-/// The best guess.
+/// The best hypothesis.
 fn align(a: &DrawnMap, b: &DrawnMap) -> Result<MapAlignment, SearchRefusal> {
     Ok(hypotheses(a, b)?.hypotheses[0].clone())
 }
@@ -26,7 +26,7 @@ fn assert_right(a: &DrawnMap, b: &DrawnMap) {
     let (metres, radians) = apart(&found.transform_a_b, &truth, b);
     assert!(metres < 0.15 && radians.to_degrees() < 0.8, "{metres} m, {} degrees: {found:?}", radians.to_degrees());
 
-    // The covariance says as much, wherever the origins of the frames are.
+    // The covariance is consistent, wherever the origins of the frames are.
     let offset = found.transform_a_b.translation.vector - truth.translation.vector;
     let turn = truth.rotation.angle_to(&found.transform_a_b.rotation);
     let error = Vector3::new(offset.x, offset.y, turn);
@@ -34,7 +34,7 @@ fn assert_right(a: &DrawnMap, b: &DrawnMap) {
     assert!(deviations < 3.0, "{deviations} standard deviations");
 }
 
-/// A place of 20 x 12 m that looks the same from nowhere else: an L, rooms of all sizes, and slanted walls.
+/// A building of 20 x 12 m that is not self-similar: an L, rooms of all sizes, and slanted walls.
 pub(crate) fn angular_office() -> FloorPlan {
     FloorPlan::new(&[
         [0.0, 0.0, 20.0, 0.0],
@@ -65,7 +65,7 @@ fn long_building() -> FloorPlan {
     for (side, (corridor, outside)) in [(9.0, 0.0), (11.5, 22.0)].into_iter().enumerate() {
         let mut x = 0.0;
         for number in 0..40 {
-            // Between 2.5 and 7.5 m, in no order that comes again.
+            // Between 2.5 and 7.5 m, in no order that repeats.
             let width = 2.5 + f64::from((number * 37 + side as i32 * 23) % 51) / 10.0;
             let end = f64::min(x + width, 70.0);
             walls.push([x + 1.0, corridor, end, corridor]);
@@ -87,22 +87,22 @@ fn filled(width: usize, height: usize, value: i8) -> (GridGeometry, Vec<i8>) {
 }
 
 #[test]
-fn long_maps_that_are_bent_are_found() {
+fn long_deformed_maps_are_found() {
     let plan = long_building();
     let whole = seen(-0.2, -0.2, 70.2, 22.2);
     // Turned by half a step of the search in narrow cells.
     for (most, yaw) in [(0.0, 0.0175), (0.7, 0.0175), (0.7, 1.0)] {
         let drawn = Drawing { resolution: 0.1, ..drawing(0.0, 0.0, 0.0) };
         let a = plan.draw(whole, drawn);
-        let b = plan.draw(whole, Drawing { transform_world_map: pose(5.0, 3.0, yaw), ..drawn }).bent(most);
+        let b = plan.draw(whole, Drawing { transform_world_map: pose(5.0, 3.0, yaw), ..drawn }).deformed(most);
         let found = align(&a, &b).unwrap();
         let (metres, radians) = apart(&found.transform_a_b, &a.transform_to(&b), &b);
-        assert!(metres < 1.5 && radians < 0.06, "bent by {most}: {metres} m, {radians} rad: {found:?}");
+        assert!(metres < 1.5 && radians < 0.06, "deformed by {most}: {metres} m, {radians} rad: {found:?}");
     }
 }
 
 #[test]
-fn a_map_lies_on_itself_as_it_is() {
+fn a_map_is_aligned_with_itself_at_the_identity() {
     let map = angular_office().draw(all(), drawing(3.0, 2.0, 0.0));
     assert_right(&map, &map);
 }
@@ -136,14 +136,14 @@ fn the_other_order_gives_the_inverse() {
 }
 
 #[test]
-fn of_a_room_that_looks_the_same_after_half_a_turn_there_are_two_hypotheses() {
+fn a_room_that_looks_the_same_after_half_a_turn_gives_two_hypotheses() {
     let walls = [[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]];
     let hall = FloorPlan::new(&walls);
     let (a, b) = (hall.draw(all(), drawing(3.0, 2.0, 0.4)), hall.draw(all(), drawing(12.0, 6.0, -2.1)));
     let found = hypotheses(&a, &b).unwrap();
-    let (_, turn) = found.runner_up_change;
-    assert!(found.runner_up_share > 0.9 && turn.abs().to_degrees() > 178.0, "{found:?}");
-    assert!(found.hypotheses.len() >= 2 && found.hypotheses[1].share == found.runner_up_share, "{found:?}");
+    let (_, turn) = found.second_best_change;
+    assert!(found.second_best_share > 0.9 && turn.abs().to_degrees() > 178.0, "{found:?}");
+    assert!(found.hypotheses.len() >= 2 && found.hypotheses[1].share == found.second_best_share, "{found:?}");
     let truth = a.transform_to(&b);
     let errors = found.hypotheses.iter().map(|found| apart(&found.transform_a_b, &truth, &b).0);
     assert!(errors.fold(f64::MAX, f64::min) < 0.15, "{found:?}");
@@ -162,7 +162,7 @@ fn a_round_hall_fits_at_every_angle_and_a_corridor_at_both_ways_round() {
         let part = seen(-0.2, -1.2, 20.2, 12.2);
         let (a, b) = (place.draw(part, drawing(3.0, 2.0, 0.4)), place.draw(part, drawing(12.0, 6.0, -2.1)));
         let found = hypotheses(&a, &b).unwrap();
-        assert!(found.runner_up_share > 0.9 && found.hypotheses[1].share > 0.9, "{found:?}");
+        assert!(found.second_best_share > 0.9 && found.hypotheses[1].share > 0.9, "{found:?}");
     }
 }
 
@@ -188,7 +188,7 @@ fn maps_of_other_buildings_and_mirrored_ones_fit_nowhere_better_than_elsewhere()
     for other in [FloorPlan::another_office(), office.mirrored(6.0)] {
         let b = other.draw(all(), drawing(12.0, 6.0, -2.1));
         match hypotheses(&a, &b) {
-            Ok(found) => assert!(found.runner_up_share > 0.6, "{found:?}"),
+            Ok(found) => assert!(found.second_best_share > 0.6, "{found:?}"),
             Err(refusal) => assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. }), "{refusal}"),
         }
     }
@@ -199,7 +199,7 @@ fn maps_with_a_corner_in_common_have_too_little() {
     let office = FloorPlan::office();
     let a = office.draw(seen(-0.2, -0.2, 4.0, 4.0), drawing(3.0, 2.0, 0.4));
     let b = office.draw(seen(-0.2, -0.2, 5.0, 5.2), drawing(12.0, 6.0, -2.1));
-    assert!(align(&a, &b).unwrap().lead < 1.0, "a corner fits at many places");
+    assert!(align(&a, &b).unwrap().significance < 1.0, "a corner fits at many places");
     let parameters = MapAlignerParameters { min_wall_length: 15.0, ..Default::default() };
     let refusal = align_grids(a.view().grid, b.view().grid, &parameters).unwrap_err();
     assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. }), "{refusal}");
@@ -262,7 +262,7 @@ fn an_unknown_margin_changes_nothing() {
     let (wide, narrow) = (wide.unwrap(), hypotheses(&a, &b).unwrap());
     let (of_wide, of_narrow) = (&wide.hypotheses[0].transform_a_b, &narrow.hypotheses[0].transform_a_b);
     assert!((of_wide.to_homogeneous() - of_narrow.to_homogeneous()).norm() < 1e-9);
-    assert!((wide.runner_up_share - narrow.runner_up_share).abs() < 1e-9);
+    assert!((wide.second_best_share - narrow.second_best_share).abs() < 1e-9);
 }
 
 #[test]
@@ -275,7 +275,7 @@ fn along_a_corridor_the_covariance_is_long() {
     let along = pose(0.0, 0.0, -0.5) * nalgebra::Vector2::x();
     let across = pose(0.0, 0.0, -0.5) * nalgebra::Vector2::y();
     let position = found.covariance.fixed_view::<2, 2>(0, 0);
-    // Without the part that comes from the turn about the middle of the walls.
+    // Without the part that comes from the turn about the centroid of the walls.
     let deviation = |direction: nalgebra::Vector2<f64>| direction.dot(&(position * direction)).sqrt();
     assert!(deviation(along) > 1.5 && deviation(along) > 3.0 * deviation(across), "{found:?}");
 }
@@ -284,7 +284,7 @@ fn along_a_corridor_the_covariance_is_long() {
 fn campus() -> FloorPlan {
     let mut walls = Vec::new();
     for number in 0..26 {
-        // Spread by irrational steps, so that no two places look alike.
+        // Spread by irrational steps, so that no two parts look alike.
         let (x, y) = (60.0 * (0.618 * f64::from(number)).fract(), 40.0 * (0.445 * f64::from(number)).fract());
         let corner = |turn: i32, side: f64| {
             let at = pose(x, y, 0.7 * f64::from(number)) * pose(0.0, 0.0, TAU * f64::from(turn) / 4.0);
@@ -307,7 +307,7 @@ fn an_open_campus_with_scattered_huts_is_aligned() {
         let b = campus.draw(seen(16.0, -2.0, 62.0, 42.0), Drawing { resolution: 0.1, ..drawing(50.0, 6.0, yaw) });
         assert_right(&a, &b);
         let found = hypotheses(&a, &b).unwrap();
-        assert!(found.runner_up_share < 0.5, "{found:?}");
+        assert!(found.second_best_share < 0.5, "{found:?}");
     }
 }
 

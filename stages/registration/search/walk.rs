@@ -1,14 +1,14 @@
-//! Which cells of one lattice the cells of a row of another come to lie in.
+//! Indices of the cells of one lattice along a row of another.
 
 use nalgebra::Vector2;
 
-/// Bits behind the point: a step is so exact that a row of ten thousand cells ends within a hundred-thousandth of a cell.
+/// Bits after the binary point: a row of ten thousand cells ends within a hundred-thousandth of a cell.
 const FRACTION: u32 = 32;
 
-/// The places of the cells of a row, one after the other, in the row-by-row list of another lattice's cells.
+/// The cells of another lattice, by their row-by-row indices, in which the cells of a row are.
 ///
-/// In numbers with a fixed point, whose whole part costs a shift: a row is walked in a fraction of the time that it takes to
-/// round each place.
+/// It uses fixed-point numbers, whose whole part costs one shift: that takes a fraction of the time of rounding each
+/// position.
 pub(super) struct Walk {
     place: (i64, i64),
     step: (i64, i64),
@@ -24,7 +24,7 @@ impl Walk {
 }
 
 impl Iterator for Walk {
-    /// Beyond all cells for what lies before the first row.
+    /// Beyond all cells for positions before the first row.
     type Item = usize;
 
     #[inline]
@@ -42,7 +42,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_walk_comes_by_the_cells_that_its_places_lie_in(
+        fn a_walk_visits_the_cells_at_its_positions(
             x in 0.0..5000.0, y in 0.0..5000.0, angle in 0.0..1.57, count in 1usize..10_000,
         ) {
             let (start, step) = (Vector2::new(x, y), 0.7 * Vector2::new(f64::cos(angle), f64::sin(angle)));

@@ -187,13 +187,13 @@ impl DrawnMap {
         MapView::rigid(Grid::new(self.geometry, &self.cells).unwrap(), &self.walls)
     }
 
-    /// The map of a robot that errs: what this one shows at a place shows there displaced by [`bend_at`].
-    pub(crate) fn bent(&self, most: f64) -> Self {
+    /// The map of a robot that errs: what this one shows at a place shows there displaced by [`deformation_at`].
+    pub(crate) fn deformed(&self, most: f64) -> Self {
         let grid = Grid::new(self.geometry, &self.cells).unwrap();
         let cells = (0..self.cells.len()).map(|index| {
             let cell = Cell { column: index % self.geometry.width, row: index / self.geometry.width };
             let shown = self.geometry.centre(cell);
-            grid.value_at(&(0..5).fold(shown, |place, _| shown - bend_at(most, &place)))
+            grid.value_at(&(0..5).fold(shown, |place, _| shown - deformation_at(most, &place)))
         });
         let cells: Vec<i8> = cells.collect();
         let walls = WallMap::new(&Grid::new(self.geometry, &cells).unwrap(), NORMAL_RADIUS);
@@ -207,7 +207,7 @@ impl DrawnMap {
 }
 
 /// How a bent map displaces a place: by up to `most` metres along x and along y, in waves that are longer than a building.
-pub(crate) fn bend_at(most: f64, place: &Point2) -> Vector2<f64> {
+pub(crate) fn deformation_at(most: f64, place: &Point2) -> Vector2<f64> {
     most * Vector2::new((place.y / 7.0).sin(), (place.x / 13.0).sin())
 }
 

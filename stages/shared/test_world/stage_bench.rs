@@ -3,23 +3,23 @@
 use super::floor_plan::DrawnMap;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
-use gridweave_runtime::stage::{Context, LoneStage, StageKind};
+use gridweave_runtime::stage::{Context, StageHarness, StageKind};
 
 /// A stage that is given a message each second.
 pub(crate) struct StageBench {
-    pub(crate) stage: LoneStage,
+    pub(crate) stage: StageHarness,
     seconds: u64,
 }
 
 impl StageBench {
     /// A stage of a kind, with parameters in TOML.
     pub(crate) fn new(kind: &StageKind, parameters: &str) -> Self {
-        Self { stage: LoneStage::new(kind, parameters).unwrap(), seconds: 0 }
+        Self { stage: StageHarness::new(kind, parameters).unwrap(), seconds: 0 }
     }
 
     /// The same, in a pipeline of which `context` tells.
     pub(crate) fn with_context(kind: &StageKind, parameters: &str, context: &Context) -> Self {
-        Self { stage: LoneStage::with_context(kind, parameters, context).unwrap(), seconds: 0 }
+        Self { stage: StageHarness::with_context(kind, parameters, context).unwrap(), seconds: 0 }
     }
 
     /// Gives the stage an alignment; what it sends then.

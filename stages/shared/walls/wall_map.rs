@@ -57,11 +57,12 @@ impl WallMap {
 
     /// The same walls and samples where a bend puts them. Bends turn so little that the normals stay.
     #[must_use]
-    pub fn bent(&self, bend: &Deformation) -> Self {
-        let moved: Vec<Point2> = self.walls.points().iter().map(|point| bend.apply(point)).collect();
+    pub fn deformed(&self, deformation: &Deformation) -> Self {
+        let moved: Vec<Point2> = self.walls.points().iter().map(|point| deformation.apply(point)).collect();
         let (walls, order) = PointIndex::new(&moved, BUCKET_SIDE);
         let normals = order.iter().map(|&i| self.normals[i]).collect();
-        let samples = self.samples.iter().map(|sample| KnownSample { point: bend.apply(&sample.point), ..*sample });
+        let samples =
+            self.samples.iter().map(|sample| KnownSample { point: deformation.apply(&sample.point), ..*sample });
         Self { walls, normals, samples: samples.collect(), ..*self }
     }
 }

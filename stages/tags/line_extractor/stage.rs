@@ -53,12 +53,12 @@ mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
     use gridweave_runtime::ros::{Header, MapMetaData};
-    use gridweave_runtime::stage::{Context, LoneStage};
+    use gridweave_runtime::stage::{Context, StageHarness};
 
     #[test]
     fn a_map_gives_its_segments_and_a_bad_one_a_warning() {
         let context = Context { seed: 4, ..Default::default() };
-        let mut stage = LoneStage::with_context(&kind(), "", &context).unwrap();
+        let mut stage = StageHarness::with_context(&kind(), "", &context).unwrap();
         let cells: Vec<u8> = (0..1500).map(|index| if index / 50 == 12 { 100 } else { 0 }).collect();
         for width in [50, 49, 50] {
             let info = MapMetaData { resolution: 0.05, width, height: 30, ..Default::default() };

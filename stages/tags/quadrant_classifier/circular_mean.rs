@@ -137,8 +137,8 @@ mod tests {
             (0..40).map(|i| wall(degrees * (f64::from(i) * 2.4).sin() + 90.0 * f64::from(i % 4), 4.0)).collect()
         };
         assert_eq!(scatter(&walls(0.2), 0.0, 0.1), 1.0);
-        let bent = scatter(&walls(2.0), 0.0, 0.1);
-        assert!(bent > 5.0 && bent < 9.0, "{bent}");
+        let deformed = scatter(&walls(2.0), 0.0, 0.1);
+        assert!(deformed > 5.0 && deformed < 9.0, "{deformed}");
         assert_eq!(scatter(&[], 0.0, 0.1), 1.0);
     }
 
@@ -150,8 +150,8 @@ mod tests {
         assert!((mean.to_degrees() - 10.02).abs() < 0.01, "{}", mean.to_degrees());
         assert_eq!(members.len(), 10);
         // Where all walls scatter by as much, it is one of them.
-        let bent: Vec<WallDirection> = (0..10).map(|i| wall(9.0 + 0.3 * f64::from(i), 4.0)).collect();
-        assert_eq!(circular_mean(&bent, 0.09).unwrap().1.len(), 10);
+        let deformed: Vec<WallDirection> = (0..10).map(|i| wall(9.0 + 0.3 * f64::from(i), 4.0)).collect();
+        assert_eq!(circular_mean(&deformed, 0.09).unwrap().1.len(), 10);
     }
 
     proptest! {

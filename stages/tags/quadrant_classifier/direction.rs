@@ -145,17 +145,18 @@ mod tests {
 
     #[test]
     fn a_bent_map_is_known_worse_than_its_walls_scatter_tells_but_no_worse_than_one_wall() {
-        let bent = |degrees: f64, count: i32| -> Direction {
+        let deformed = |degrees: f64, count: i32| -> Direction {
             let angle = |i: i32| 90.0 * f64::from(i % 4) + degrees * f64::from(i - count / 2) / f64::from(count);
             let walls: Vec<Segment> = (0..count).map(|i| wall(angle(i), 5.0)).collect();
             map_direction(&walls, &QuadrantClassifierParameters::default())
         };
-        let (straight, bent_twice) = (bent(0.2, 40).deviation.to_degrees(), bent(4.0, 40).deviation.to_degrees());
+        let (straight, scattered) =
+            (deformed(0.2, 40).deviation.to_degrees(), deformed(4.0, 40).deviation.to_degrees());
         assert!(straight < 0.15, "{straight}");
         // The walls lie within 2 degrees to either side: 1.2 degrees in the mean.
-        assert!(bent_twice > 0.4 && bent_twice < 1.3, "{bent_twice}");
-        let few = bent(4.0, 4).deviation.to_degrees();
-        assert!(few > bent_twice && few < 1.8, "{few}");
+        assert!(scattered > 0.4 && scattered < 1.3, "{scattered}");
+        let few = deformed(4.0, 4).deviation.to_degrees();
+        assert!(few > scattered && few < 1.8, "{few}");
     }
 
     #[test]

@@ -4,14 +4,14 @@ use super::kind;
 use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, MapDirection, Segment, Segments};
-use gridweave_runtime::stage::{Context, InputWire, LoneStage};
+use gridweave_runtime::stage::{Context, InputWire, StageHarness};
 use std::f64::consts::TAU;
 
-struct Run(LoneStage);
+struct Run(StageHarness);
 
 impl Run {
     fn new(parameters: &str) -> Self {
-        Self(LoneStage::new(&kind(), parameters).unwrap())
+        Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
     /// Gives the stage walls, and gives the alignments that it sends.
@@ -104,7 +104,7 @@ fn refused_tags_are_passed_on_with_their_reason() {
 fn walls_may_be_left_unwired_where_the_tags_alone_tell_the_rotation() {
     let common = InputWire { port: "common", ..Default::default() };
     let context = Context { inputs: vec![common], ..Default::default() };
-    let make = |parameters: &str| LoneStage::with_context(&kind(), parameters, &context).err();
+    let make = |parameters: &str| StageHarness::with_context(&kind(), parameters, &context).err();
     assert!(make("rotation = \"tags\"").is_none());
     for rotation in ["directions", "both"] {
         let error = make(&format!("rotation = \"{rotation}\"")).unwrap().to_string();

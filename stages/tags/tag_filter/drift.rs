@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 /// Tags whose places are as uncertain as those in maps that drift: the farther from the middle of all the more, by `drift`
 /// metres for the root of each metre.
-pub(super) fn of_bent_maps(tags: &[CommonTag], drift: f64) -> Vec<CommonTag> {
+pub(super) fn of_deformed_maps(tags: &[CommonTag], drift: f64) -> Vec<CommonTag> {
     let count = tags.len().max(1) as f64;
     let middle = |place: fn(&CommonTag) -> [f64; 2]| {
         tags.iter().fold(Vector2::zeros(), |sum, tag| sum + Vector2::from(place(tag)) / count)
@@ -30,11 +30,11 @@ mod tests {
     #[test]
     fn what_is_far_from_the_middle_is_known_less_well() {
         let tag = |x: f64| CommonTag { a: [x, 0.0], b: [0.0, 2.0 * x], ..Default::default() };
-        let drifted = of_bent_maps(&[tag(-9.0), tag(0.0), tag(9.0)], 0.1);
+        let drifted = of_deformed_maps(&[tag(-9.0), tag(0.0), tag(9.0)], 0.1);
         for (tag, expected) in drifted.iter().zip([0.09, 0.0, 0.09]) {
             assert!((tag.covariance_a[0] - expected).abs() < 1e-12, "{tag:?}");
         }
         assert!((drifted[0].covariance_b[3] - 0.18).abs() < 1e-12 && drifted[0].covariance_b[1] == 0.0);
-        assert_eq!(of_bent_maps(&[], 0.1), []);
+        assert_eq!(of_deformed_maps(&[], 0.1), []);
     }
 }

@@ -1,7 +1,7 @@
 //! Whether the tags that two robots have in common suffice for a merge.
 
 use super::common::is_usable;
-use super::drift::of_bent_maps;
+use super::drift::of_deformed_maps;
 use super::{Consensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
 use crate::shared::geometry::RigidFit;
 use gridweave_runtime::ros::{CommonTag, TagEstimate};
@@ -51,7 +51,7 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
     let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| {
         let rigid = agreement(&tags, parameters).map(|agreement| (tags.clone(), agreement));
         rigid.or_else(|reason| {
-            let tags = of_bent_maps(&tags, parameters.map_drift);
+            let tags = of_deformed_maps(&tags, parameters.map_drift);
             let parameters =
                 TagFilterParameters { min_tags: parameters.min_tags.max(LEAST_BENT), ..parameters.clone() };
             agreement(&tags, &parameters).map(|agreement| (tags, agreement)).map_err(|_| reason)

@@ -53,7 +53,7 @@ fn a_moved_tag_is_left_out_by_name() {
 }
 
 /// As a map shows places whose west lies too far south and whose east too far north.
-fn bent(most: f64) -> Vec<TagEstimate> {
+fn deformed(most: f64) -> Vec<TagEstimate> {
     let wide = SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y));
     let mut tags = tags(&pose(-4.0, 0.0, 1.0), &wide);
     for (tag, (x, _)) in tags.iter_mut().zip(wide) {
@@ -66,14 +66,14 @@ fn bent(most: f64) -> Vec<TagEstimate> {
 #[test]
 fn tags_in_bent_maps_agree_as_far_as_maps_drift() {
     let a = tags(&pose(1.0, 2.0, 3.0), &SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y)));
-    let judgement = judged(&a, &bent(0.4));
+    let judgement = judged(&a, &deformed(0.4));
     assert!(judgement.accepted && judgement.tags.len() >= 5, "{judgement:?}");
     let far = judgement.tags.iter().map(|tag| tag.covariance_b[0]).fold(0.0, f64::max);
     assert!(far > 0.03, "what is far from the middle is known less well: {far}");
-    refused(&a, &bent(3.0), "the same ids");
+    refused(&a, &deformed(3.0), "the same ids");
     let rigid = TagFilterParameters { map_drift: 0.0, ..Default::default() };
     let robot = |robot, tags| RobotTags { robot, tags };
-    assert!(!judge(robot("robot1", &a), robot("robot2", &bent(0.4)), &rigid).accepted);
+    assert!(!judge(robot("robot1", &a), robot("robot2", &deformed(0.4)), &rigid).accepted);
 }
 
 #[test]

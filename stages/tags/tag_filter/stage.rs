@@ -115,13 +115,13 @@ mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
     use gridweave_runtime::ros::TagEstimate;
-    use gridweave_runtime::stage::LoneStage;
+    use gridweave_runtime::stage::StageHarness;
 
-    struct Bench(LoneStage);
+    struct Bench(StageHarness);
 
     impl Bench {
         fn new() -> Self {
-            Self(LoneStage::new(&kind(), "").unwrap())
+            Self(StageHarness::new(&kind(), "").unwrap())
         }
 
         fn send(&mut self, robot: &str, tags: &[TagEstimate]) -> Vec<CommonTags> {

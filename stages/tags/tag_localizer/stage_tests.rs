@@ -3,17 +3,17 @@
 use super::kind;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, Pose, PoseStamped, PoseWithCovarianceStamped, TagEstimates, TagRange};
-use gridweave_runtime::stage::LoneStage;
+use gridweave_runtime::stage::StageHarness;
 
 /// The stage, fed with messages about `robot1`.
 struct Bench {
-    stage: LoneStage,
+    stage: StageHarness,
     seconds: f64,
 }
 
 impl Bench {
     fn new(parameters: &str) -> Self {
-        Self { stage: LoneStage::new(&kind(), parameters).unwrap(), seconds: 0.0 }
+        Self { stage: StageHarness::new(&kind(), parameters).unwrap(), seconds: 0.0 }
     }
 
     fn pose(&mut self, seconds: f64, x: f64, y: f64) {

@@ -5,7 +5,7 @@ use crate::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
 use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, TopologicalMap};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 
 fn office(yaw: f64) -> (Topology, Vec<Point2>) {
     let map = FloorPlan::office().draw(seen(-0.5, -0.5, 20.5, 12.5), drawing(3.0, 4.0, yaw));
@@ -81,7 +81,7 @@ fn small_pieces_are_left_out() {
 
 #[test]
 fn every_map_gets_an_answer_and_a_wrong_one_a_warning() {
-    let mut stage = LoneStage::new(&kind(), "").unwrap();
+    let mut stage = StageHarness::new(&kind(), "").unwrap();
     let info = MapMetaData { resolution: 0.05, width: 2, height: 1, ..Default::default() };
     for data in [&[0, 0][..], &[255, 255], &[0]] {
         let map = OccupancyGrid { info, data, ..Default::default() };

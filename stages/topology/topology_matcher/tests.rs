@@ -4,7 +4,7 @@ use super::*;
 use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, TopologicalMap, TopologicalNode, TopologicalPath};
-use gridweave_runtime::stage::{LoneStage, Parameters};
+use gridweave_runtime::stage::{Parameters, StageHarness};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
@@ -163,7 +163,7 @@ fn message(robot: &str, topology: &Topology) -> TopologicalMap {
 
 /// What the stage sends for maps that come one after the other.
 fn sent(parameters: &str, maps: &[(&str, TopologicalMap)]) -> (Vec<Alignment>, Vec<Alignment>, usize) {
-    let mut stage = LoneStage::new(&kind(), parameters).unwrap();
+    let mut stage = StageHarness::new(&kind(), parameters).unwrap();
     for (robot, map) in maps {
         stage.give::<TopologicalMap>("topology", robot, LogTime(1), map).unwrap();
     }

@@ -8,10 +8,10 @@ use super::kind;
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts};
-use gridweave_runtime::stage::{Context, LoneStage, StageError};
+use gridweave_runtime::stage::{Context, StageError, StageHarness};
 
 struct Run {
-    stage: LoneStage,
+    stage: StageHarness,
     /// What was sent last.
     latest: Option<RobotFrames>,
     verdicts: Option<Verdicts>,
@@ -20,7 +20,7 @@ struct Run {
 impl Run {
     fn new(reference: Option<&str>) -> Self {
         let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
-        let stage = LoneStage::with_context(&kind(), "", &context).unwrap();
+        let stage = StageHarness::with_context(&kind(), "", &context).unwrap();
         Self { stage, latest: None, verdicts: None }
     }
 

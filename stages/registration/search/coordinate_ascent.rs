@@ -1,27 +1,29 @@
-//! From a place to the peak near it.
+//! Coordinate ascent from a pose to the peak near it.
 
-use super::Place;
+use super::ScoredPose;
+use super::overlay::Overlay;
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{UnitComplex, Vector3};
 
-/// A place that still gets better after so many rounds is a slope, not a peak.
+/// Most rounds. A pose that still improves is on a slope, not near a peak.
 const MOST_ROUNDS: usize = 16;
+/// Number of halvings of the steps when a peak is refined.
+const HALVINGS: usize = 3;
 
-/// How far is gone at once.
+/// Step sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steps {
     /// In x and in y, metres.
     pub metres: f64,
     /// In rotation, radians.
     pub radians: f64,
-    /// How often both are halved before the peak is found.
+    /// Number of halvings of both.
     pub halvings: usize,
 }
 
-/// Goes from `start` wherever the score gets better, in steps to either side in x, in y, and in rotation about `centre`,
-/// a point in frame a.
-pub fn climb(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &Point2, steps: Steps) -> Place {
-    let mut best = Place { transform_a_b: *start, score: score(start) };
+/// Maximizes a score by steps in x, in y, and in rotation about `centre`, a point in frame a, starting at `start`.
+pub fn coordinate_ascent(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &Point2, steps: Steps) -> ScoredPose {
+    let mut best = ScoredPose { transform_a_b: *start, score: score(start) };
     let Steps { mut metres, mut radians, halvings } = steps;
     let mut halved = 0;
     for _ in 0..MOST_ROUNDS {
@@ -31,7 +33,7 @@ pub fn climb(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &Point2, step
                 let mut step = Vector3::zeros();
                 step[axis] = direction * if axis == 2 { radians } else { metres };
                 let transform_a_b = moved(&best.transform_a_b, centre, &step);
-                Place { transform_a_b, score: score(&transform_a_b) }
+                ScoredPose { transform_a_b, score: score(&transform_a_b) }
             };
             let (left, right) = (beside(-1.0), beside(1.0));
             let better = if right.score > left.score { right } else { left };
@@ -49,9 +51,16 @@ pub fn climb(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &Point2, step
     best
 }
 
-/// A transform after a shift, and a turn about a place in frame a: metres and radians.
+/// Applies a shift and a turn about a point in frame a, metres and radians.
 pub(super) fn moved(transform_a_b: &Pose2, centre: &Point2, step: &Vector3<f64>) -> Pose2 {
     let turn = UnitComplex::new(step.z);
     let arm = turn * (transform_a_b.translation.vector - centre.coords);
     Pose2::from_parts((centre.coords + arm + step.xy()).into(), turn * transform_a_b.rotation)
+}
+
+/// Refines a pose to the peak of the smooth score near it, to an eighth of a cell of the overlay and of `radians`. Rotations are
+/// about `centre`, the centroid of the walls in common, in frame a.
+pub fn refine_peak(overlay: &Overlay<'_>, transform_a_b: &Pose2, centre: &Point2, radians: f64) -> Pose2 {
+    let steps = Steps { metres: overlay.a.cell, radians, halvings: HALVINGS };
+    coordinate_ascent(|pose| overlay.smooth_score(pose), transform_a_b, centre, steps).transform_a_b
 }
