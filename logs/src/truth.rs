@@ -70,13 +70,13 @@ mod tests {
     use super::*;
     use gridweave_runtime::message::LogTime;
     use gridweave_runtime::ros::{CommonPlace, TrueFrame, TrueTag};
-    use gridweave_runtime::stage::LoneStage;
+    use gridweave_runtime::stage::StageHarness;
 
     #[test]
     fn the_file_has_the_form_of_a_truth_file() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("truth.json");
-        let mut sink = LoneStage::new(&kind(), &format!("file = {file:?}")).unwrap();
+        let mut sink = StageHarness::new(&kind(), &format!("file = {file:?}")).unwrap();
         let truth = SimulationTruth {
             resolution: 0.05,
             frames: vec![TrueFrame { robot: "robot2".into(), x: 1.0, y: 2.0, yaw: 0.5, centre: [5.0, 6.0] }],

@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{
     Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
 use gridweave_runtime::stage::{
-    Context, LoneStage, OutputEnd, OutputPort, OutputSink, RobotTopics, StageError, TfFrames,
+    Context, StageHarness, OutputEnd, OutputPort, OutputSink, RobotTopics, StageError, TfFrames,
 };
 use nalgebra::{Isometry2, Vector2};
 use std::cell::RefCell;
@@ -19,10 +19,10 @@ mod map_updates;
 const ODOMETRY: &str = Odometry::NAME;
 const POSE_WITH_COVARIANCE: &str = PoseWithCovarianceStamped::NAME;
 
-/// What was sent: the port, the header and the bytes.
+/// A sent message: port, header and bytes.
 type Sending = (&'static str, MessageHeader, Vec<u8>);
 
-/// All that was sent, announcements among it.
+/// All that was sent, including announcements.
 #[derive(Clone, Default)]
 struct Everything(Rc<RefCell<Vec<Sending>>>);
 
@@ -84,7 +84,7 @@ fn run(files: Vec<PathBuf>) -> Run {
     try_run(files, "", RobotTopics::default()).unwrap()
 }
 
-/// The same, with the names that are in the logs.
+/// The same, with the names in the logs.
 fn run_as_logged(files: Vec<PathBuf>) -> Run {
     try_run(files, "names = 'as_logged'", RobotTopics::default()).unwrap()
 }
@@ -193,8 +193,8 @@ fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
     let header = *run.on("pose")[0].header();
     assert_eq!((header.channel, header.topic.as_str(), header.robot.as_str()), (0, "/robot1/log/pose", "robot1"));
     assert_eq!(header.log_time.0, 10);
-    assert!(run.announced("pose").is_empty(), "what was made here was not logged");
-    assert_eq!(run.times("other"), [10, 11, 12, 13, 14], "what they were made of goes on");
+    assert!(run.announced("pose").is_empty(), "derived messages are not announced");
+    assert_eq!(run.times("other"), [10, 11, 12, 13, 14], "their originals are passed on");
     assert_eq!(run.on("other")[0].decode::<Odometry>().unwrap(), odometry);
     assert_eq!(run.on("other")[3].decode::<PoseStamped>().unwrap(), without);
     assert_eq!(
@@ -305,7 +305,7 @@ fn a_source_without_files_says_how_to_give_them() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_reported() {
     let wrong =
         SourceParameters { rename: vec!["/map".into()], start: -1.0, end: Some(f64::NAN), ..Default::default() };
     assert_eq!(wrong.check().iter().map(|error| error.field.as_str()).collect::<Vec<_>>(), ["start", "end", "rename"]);
@@ -334,7 +334,7 @@ fn a_source_that_is_done_has_done_all_its_work() {
     let (_folder, files) = write(|log| {
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
     });
-    let mut source = LoneStage::new(&kind(), &format!("files = [{:?}]", files[0])).unwrap();
+    let mut source = StageHarness::new(&kind(), &format!("files = [{:?}]", files[0])).unwrap();
     while source.node().advance().unwrap() {}
     assert_eq!(source.node().progress(), Some(1.0));
 }
@@ -346,7 +346,7 @@ fn a_name_that_is_too_long_is_warned_of_where_nobody_needs_it() {
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
         log.raw(&long, "p/msg/A", 2, b"a");
         log.raw(&long, "p/msg/A", 3, b"a");
-        // It fits the topics of poses, but carries something else.
+        // The topic matches the pose pattern, but the type is another.
         log.raw(&format!("/{robot}/pose"), "p/msg/A", 4, b"a");
         log.raw(&long[..128], "p/msg/A", 5, b"a");
     });

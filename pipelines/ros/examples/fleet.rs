@@ -12,7 +12,7 @@
 use anyhow::{Context as _, Result, bail};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TagRange};
-use gridweave_runtime::stage::{Context, InputWire, LoneStage, Registry};
+use gridweave_runtime::stage::{Context, InputWire, StageHarness, Registry};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -84,7 +84,7 @@ fn simulate(robots: usize, overlap: f64, registry: &Registry) -> Result<Vec<Robo
         (20.0 * scale).min(300.0),
         (15.0 * scale).min(300.0)
     );
-    let mut simulator = LoneStage::new(kind, &parameters)?;
+    let mut simulator = StageHarness::new(kind, &parameters)?;
     while simulator.node().advance()? {}
     let mut by_robot: BTreeMap<String, Vec<_>> = BTreeMap::new();
     for (wire, output) in ["map", "pose", "tags"].into_iter().enumerate() {
@@ -183,7 +183,7 @@ fn drive(robot: &Robot, to: u16, start: Instant, all: &Mutex<Sending>) -> Result
     };
     let context = Context { stage: "base".into(), inputs: wires.map(wire).to_vec(), ..Default::default() };
     let parameters = format!("connect = [\"tcp/127.0.0.1:{to}\"]\nsender = \"{name}\"");
-    let mut sink = LoneStage::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context)?;
+    let mut sink = StageHarness::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context)?;
     let first = messages.first().map_or(0, |(_, _, time, _)| *time);
     for (wire, topic, time, bytes) in messages {
         let at = start + Duration::from_nanos(time - first);
@@ -260,7 +260,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
     }
     let folder = tempfile::tempdir()?;
     let last = port()?;
-    let mut collector = LoneStage::new(
+    let mut collector = StageHarness::new(
         &gridweave_ros::bridge::source::kind(),
         &format!("listen = [\"tcp/127.0.0.1:{last}\"]\nclock_tolerance = 1e9"),
     )?;

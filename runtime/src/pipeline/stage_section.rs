@@ -8,7 +8,7 @@ use super::parameters::{out_of_range, read_parameters};
 use super::settings::{Settings, depth};
 use super::topics::{Topic, read_topics};
 use super::values::text;
-use crate::stage::{Asked, RESERVED_KEYS, Registry, StageKind};
+use crate::stage::{ResolvedStage, RESERVED_KEYS, Registry, StageKind};
 use std::path::Path;
 
 /// The longest name of a stage, in bytes. It is part of the names of topics and of links.
@@ -66,9 +66,9 @@ pub(super) fn read_stage<'a>(
     let find = |key: &str| entries.iter().find(|entry| entry.key == key);
     let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
     draft.kind = read_kind(stage, find("kind"), registry, problems);
-    let asked = draft.kind.filter(|kind| kind.is_asked()).and_then(|kind| ask(stage, kind, &given, folder, problems));
-    if draft.kind.is_some_and(StageKind::is_asked) {
-        draft.kind = asked.as_ref().map(|asked| asked.kind);
+    let resolved = draft.kind.filter(|kind| kind.is_dynamic()).and_then(|kind| resolve(stage, kind, &given, folder, problems));
+    if draft.kind.is_some_and(StageKind::is_dynamic) {
+        draft.kind = resolved.as_ref().map(|resolved| resolved.kind);
     }
     draft.inputs = find("inputs").map(|entry| &entry.item);
     draft.depth = find("depth").and_then(|entry| depth(&entry.item, problems)).unwrap_or(settings.depth);
@@ -86,17 +86,17 @@ pub(super) fn read_stage<'a>(
         check_mode(stage, kind, settings.mode, problems);
         draft.overflow = read_overflow(kind, find("overflow").map(|entry| &entry.item), problems);
         draft.parameters = read_parameters(kind, &given, &stage.key_at, problems);
-        draft.parameters.extend(asked.map(|asked| asked.parameters).unwrap_or_default());
+        draft.parameters.extend(resolved.map(|resolved| resolved.parameters).unwrap_or_default());
         draft.topics = read_topics(stage, kind, find("topics").map(|entry| &entry.item), problems);
     }
     draft
 }
 
 /// Finds out what a stage is whose kind leaves that to it. What is wrong is reported.
-fn ask(stage: &Entry, kind: &StageKind, given: &[&Entry], folder: &Path, problems: &mut Problems) -> Option<Asked> {
+fn resolve(stage: &Entry, kind: &StageKind, given: &[&Entry], folder: &Path, problems: &mut Problems) -> Option<ResolvedStage> {
     let table = given.iter().map(|entry| (entry.key.clone(), entry.item.to_toml())).collect();
-    let asked = kind.ask(&table, folder)?;
-    asked.map_err(|error| problems.push(out_of_range(&error, given, &stage.key_at, "cannot be used"))).ok()
+    let resolved = kind.resolve(&table, folder)?;
+    resolved.map_err(|error| problems.push(out_of_range(&error, given, &stage.key_at, "cannot be used"))).ok()
 }
 
 /// A kind whose messages come from outside of the run has nobody to wait for in a replay.

@@ -1,7 +1,7 @@
 //! A program as its stage calls it: the shared memory between them, and one call at a time.
 
-use super::header::{CALL_VERSION, CallHeader, Said, Told};
-use super::process::{Launch, Lost, Process};
+use super::header::{CALL_VERSION, CallHeader, Reply, Request};
+use super::process::{Launch, ProcessError, Process};
 use crate::engine::RunFolder;
 use crate::link::{LinkError, SharedMemory, RunNames};
 use crate::message::MessageHeader;
@@ -18,13 +18,13 @@ use std::time::Duration;
 /// How many samples of a program may wait for its stage.
 pub const CREDITS: usize = 16;
 /// How many messages a program may hold without copying them.
-const HELD: usize = 32;
+const MAX_BORROWED: usize = 32;
 /// So long a program may take to come to the end of a call when nothing that it sends is of use any more.
 const END_TIME: Duration = Duration::from_secs(5);
 /// So much sooner than the engine gives up on the stage a call is given up, at the most: the program then says where it hangs.
-const FOR_LAST_WORDS: Duration = Duration::from_secs(2);
+const REPORT_MARGIN: Duration = Duration::from_secs(2);
 /// For how large a payload, in bytes, room is set aside before the first is sent.
-const FIRST_PLACE: usize = 4 * 1024;
+const INITIAL_CAPACITY: usize = 4 * 1024;
 
 /// A program that runs, and the memory that it shares with its stage.
 pub(super) struct Program {
@@ -49,7 +49,7 @@ impl Ports {
         let node = names.node::<Service>()?;
         let to = open(&node, names, "to", 1)?;
         let from = open(&node, names, "from", CREDITS)?;
-        let publisher = to.publisher_builder().initial_max_slice_len(FIRST_PLACE).max_loaned_samples(1);
+        let publisher = to.publisher_builder().initial_max_slice_len(INITIAL_CAPACITY).max_loaned_samples(1);
         let publisher = publisher
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
@@ -73,7 +73,7 @@ fn open(
         .enable_safe_overflow(false)
         .history_size(0)
         .subscriber_max_buffer_size(buffer)
-        .subscriber_max_borrowed_samples(HELD)
+        .subscriber_max_borrowed_samples(MAX_BORROWED)
         .max_publishers(1)
         .max_subscribers(1)
         .max_nodes(2)
@@ -94,7 +94,7 @@ impl Program {
         let process = Process::start(launch, folder.path()).map_err(|error| StageError::new(program(), error))?;
         let (ports, folder) = (Some(ports), Some(folder));
         // A little before the engine would end the stage, which could not say where its program hangs.
-        let longest = longest.map(|longest| longest - (longest / 4).min(FOR_LAST_WORDS));
+        let longest = longest.map(|longest| longest - (longest / 4).min(REPORT_MARGIN));
         let mut started = Self { process, ports, folder, shared_memory: SharedMemory::default(), longest, is_alive: true };
         match started.process.wait(longest) {
             Ok(b'r') => Ok(started),
@@ -107,22 +107,22 @@ impl Program {
     /// have all later calls.
     pub(super) fn call(
         &mut self,
-        what: Told,
+        what: Request,
         (port, wire): (usize, usize),
         (message, bytes): (&MessageHeader, &[u8]),
-        take: impl FnMut(Said, &CallHeader, &[u8]) -> Result<(), StageError>,
+        take: impl FnMut(Reply, &CallHeader, &[u8]) -> Result<(), StageError>,
     ) -> Result<(), CallError> {
         if !self.is_alive {
             return Ok(());
         }
         let (port, wire) = (port as u32, wire as u32);
         let header = CallHeader { version: CALL_VERSION, what: what as u32, port, wire, message: *message };
-        let result = self.tell(header, bytes).map_err(CallError::from).and_then(|()| self.hear(take));
+        let result = self.send_request(header, bytes).map_err(CallError::from).and_then(|()| self.receive_replies(take));
         self.is_alive &= matches!(result, Ok(()) | Err(CallError::Stage(_)));
         result
     }
 
-    fn tell(&mut self, header: CallHeader, bytes: &[u8]) -> Result<(), LinkError> {
+    fn send_request(&mut self, header: CallHeader, bytes: &[u8]) -> Result<(), LinkError> {
         let Some(ports) = &self.ports else { return Ok(()) };
         let doing = || format!("send {} bytes to a program", bytes.len());
         self.shared_memory.check_free(bytes.len(), doing)?;
@@ -137,9 +137,9 @@ impl Program {
     }
 
     /// Hears what the program says until it is done.
-    fn hear(
+    fn receive_replies(
         &mut self,
-        mut take: impl FnMut(Said, &CallHeader, &[u8]) -> Result<(), StageError>,
+        mut take: impl FnMut(Reply, &CallHeader, &[u8]) -> Result<(), StageError>,
     ) -> Result<(), CallError> {
         let Some(ports) = &self.ports else { return Ok(()) };
         // What cannot be passed on ends the run, and the program comes to the end of its call, so that it can be told.
@@ -151,21 +151,21 @@ impl Program {
             };
             if let Err(lost) = self.process.wait(longest) {
                 self.is_alive = false;
-                return Err(refused.map_or(CallError::Lost(lost), CallError::Stage));
+                return Err(refused.map_or(CallError::Process(lost), CallError::Stage));
             }
             let sample =
                 ports.subscriber.receive().map_err(|error| CallError::Link(failed("hear from a program")(&error)))?;
             let header = sample.as_ref().map(|sample| *sample.user_header()).unwrap_or_default();
-            let said = Said::of(header.what).filter(|_| header.version == CALL_VERSION);
-            let (Some(sample), Some(said)) = (sample, said) else { return Err(CallError::Words) };
+            let reply = Reply::of(header.what).filter(|_| header.version == CALL_VERSION);
+            let (Some(sample), Some(reply)) = (sample, reply) else { return Err(CallError::Protocol) };
             self.process.ring(b'c');
-            match said {
-                Said::Done => return refused.map_or(Ok(()), |error| Err(CallError::Stage(error))),
-                Said::Failed => {
+            match reply {
+                Reply::Done => return refused.map_or(Ok(()), |error| Err(CallError::Stage(error))),
+                Reply::Failed => {
                     let says = || CallError::Failed(String::from_utf8_lossy(sample.payload()).into_owned());
                     return Err(refused.map_or_else(says, CallError::Stage));
                 }
-                said if refused.is_none() => refused = take(said, &header, sample.payload()).err(),
+                reply if refused.is_none() => refused = take(reply, &header, sample.payload()).err(),
                 _ => {}
             }
         }
@@ -189,7 +189,7 @@ pub(super) enum CallError {
     Failed(String),
     /// The program is no more.
     #[error("{0}")]
-    Lost(Lost),
+    Process(ProcessError),
     /// The memory between them fails.
     #[error("{0}")]
     Link(LinkError),
@@ -198,7 +198,7 @@ pub(super) enum CallError {
     Full,
     /// It does not keep to the protocol.
     #[error("it rings without saying anything that is known")]
-    Words,
+    Protocol,
     /// What it says cannot be passed on.
     #[error("{0}")]
     Stage(StageError),

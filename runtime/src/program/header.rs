@@ -25,7 +25,7 @@ pub struct CallHeader {
 
 /// What a sample to a program says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Told {
+pub(super) enum Request {
     Start = 1,
     Message = 2,
     Finish = 3,
@@ -35,7 +35,7 @@ pub(super) enum Told {
 
 /// What a sample of a program says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Said {
+pub(super) enum Reply {
     Output,
     Warning,
     Done,
@@ -43,7 +43,7 @@ pub(super) enum Said {
     End,
 }
 
-impl Said {
+impl Reply {
     /// By its number.
     pub(super) fn of(what: u32) -> Option<Self> {
         Some(match what {

@@ -11,13 +11,13 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// So long is waited at a time.
-const LOOK: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// What counts of such a wait at the most: a process that has been away for longer was halted, and so was its program.
-const HALT: Duration = Duration::from_secs(1);
+const MAX_COUNTED_WAIT: Duration = Duration::from_secs(1);
 /// So long a program may take to exit that has been told to.
 const EXIT_TIME: Duration = Duration::from_secs(5);
 /// So long a program may take to say where it hangs.
-const LAST_WORDS_TIME: Duration = Duration::from_millis(500);
+const REPORT_TIME: Duration = Duration::from_millis(500);
 
 /// How a program is started: with these arguments and, behind them, the folder of the run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub struct Launch {
 
 /// Why nothing more is to be expected of a program.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Lost {
+pub(super) enum ProcessError {
     /// Its process has ended.
     #[error("its process {0}")]
     Ended(String),
@@ -54,7 +54,7 @@ pub(super) struct Process {
     input: Option<ChildStdin>,
     output: ChildStdout,
     /// Bells that were heard, and for which nothing was taken yet.
-    heard: Vec<u8>,
+    received: Vec<u8>,
 }
 
 impl Process {
@@ -64,60 +64,60 @@ impl Process {
         command.args(&launch.arguments).arg(folder).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn()?;
         match (child.stdin.take(), child.stdout.take()) {
-            (input @ Some(_), Some(output)) => Ok(Self { child, input, output, heard: Vec::new() }),
+            (input @ Some(_), Some(output)) => Ok(Self { child, input, output, received: Vec::new() }),
             _ => Err(io::Error::other("it has no standard input and output")),
         }
     }
 
     /// Rings at the program. That one is gone is heard when it is waited for.
-    pub(super) fn ring(&mut self, bell: u8) {
-        let _ = self.input.as_mut().map(|input| input.write_all(&[bell]));
+    pub(super) fn ring(&mut self, byte: u8) {
+        let _ = self.input.as_mut().map(|input| input.write_all(&[byte]));
     }
 
     /// Waits until the program rings, but not for longer than `longest`.
-    pub(super) fn wait(&mut self, longest: Option<Duration>) -> Result<u8, Lost> {
+    pub(super) fn wait(&mut self, longest: Option<Duration>) -> Result<u8, ProcessError> {
         let mut waited = Duration::ZERO;
-        while self.heard.is_empty() {
+        while self.received.is_empty() {
             let start = Instant::now();
-            if self.listen(LOOK)? {
+            if self.read_doorbell(POLL_INTERVAL)? {
                 continue;
             }
-            waited += start.elapsed().min(HALT);
+            waited += start.elapsed().min(MAX_COUNTED_WAIT);
             if let Some(longest) = longest.filter(|longest| waited >= *longest) {
                 self.end_hung();
-                return Err(Lost::Hung { seconds: longest.as_secs_f64() });
+                return Err(ProcessError::Hung { seconds: longest.as_secs_f64() });
             }
         }
-        Ok(self.heard.remove(0))
+        Ok(self.received.remove(0))
     }
 
     /// Takes in what the program has rung, waiting for so long at the most. `false` if it has not.
-    fn listen(&mut self, longest: Duration) -> Result<bool, Lost> {
+    fn read_doorbell(&mut self, longest: Duration) -> Result<bool, ProcessError> {
         let timeout = Timespec { tv_sec: 0, tv_nsec: i64::from(longest.subsec_nanos()) };
         match poll(&mut [PollFd::new(&self.output, PollFlags::IN)], Some(&timeout)) {
             Ok(0) | Err(Errno::INTR) => return Ok(false),
             Ok(_) => {}
-            Err(error) => return Err(Lost::Unwatched(error.into())),
+            Err(error) => return Err(ProcessError::Unwatched(error.into())),
         }
-        let mut bells = [0; 64];
-        match self.output.read(&mut bells) {
+        let mut bytes = [0; 64];
+        match self.output.read(&mut bytes) {
             Ok(0) => Err(self.ended()),
             Ok(count) => {
-                self.heard.extend_from_slice(&bells[..count]);
+                self.received.extend_from_slice(&bytes[..count]);
                 Ok(true)
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => Ok(false),
-            Err(error) => Err(Lost::Unwatched(error)),
+            Err(error) => Err(ProcessError::Unwatched(error)),
         }
     }
 
     /// How it ended. Its end of the pipe is closed; if it lives on all the same, it is ended.
-    fn ended(&mut self) -> Lost {
+    fn ended(&mut self) -> ProcessError {
         match self.exit_within(EXIT_TIME) {
-            Some(how) => Lost::Ended(how),
+            Some(how) => ProcessError::Ended(how),
             None => {
                 self.kill();
-                Lost::Ended("has closed its standard output, and was ended".to_owned())
+                ProcessError::Ended("has closed its standard output, and was ended".to_owned())
             }
         }
     }
@@ -127,7 +127,7 @@ impl Process {
         if let Some(process) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw) {
             // The number is that of the child until it is waited for.
             let _ = kill_process(process, Signal::USR1);
-            let _ = self.exit_within(LAST_WORDS_TIME);
+            let _ = self.exit_within(REPORT_TIME);
         }
         self.kill();
     }

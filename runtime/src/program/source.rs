@@ -1,6 +1,6 @@
 //! The source round a program that has no inputs.
 
-use super::header::{Said, Told};
+use super::header::{Reply, Request};
 use super::stage::{Ports, ProgramStage, take};
 use crate::message::{LogTime, MessageHeader};
 use crate::stage::{Output, Source, StageError};
@@ -28,23 +28,23 @@ impl Source for ProgramSource {
         }
         let (reached, has_ended) = (&mut self.reached, &mut self.has_ended);
         let nothing = (&MessageHeader::default(), &[][..]);
-        let called = self.stage.program.call(Told::Next, (0, 0), nothing, |said, header, bytes| {
-            match said {
-                Said::End => *has_ended = true,
-                Said::Output if header.message.log_time < *reached => {
+        let called = self.stage.program.call(Request::Next, (0, 0), nothing, |reply, header, bytes| {
+            match reply {
+                Reply::End => *has_ended = true,
+                Reply::Output if header.message.log_time < *reached => {
                     let cause = format!(
                         "its log time, {} ns, is before that of the last, {} ns",
                         header.message.log_time.0, reached.0
                     );
                     return Err(StageError::new("send a message of a source", cause));
                 }
-                Said::Output => {
+                Reply::Output => {
                     *reached = header.message.log_time;
                     output.set_log_time(*reached);
                 }
                 _ => {}
             }
-            take(output, said, header, bytes)
+            take(output, reply, header, bytes)
         });
         called.map_err(|error| self.stage.failed(error, |what| format!("make the next messages in {what}")))?;
         Ok(!self.has_ended)

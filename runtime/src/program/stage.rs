@@ -1,7 +1,7 @@
 //! The stage round a program.
 
 use super::call::{CallError, Program};
-use super::header::{CallHeader, Said, Told};
+use super::header::{CallHeader, Reply, Request};
 use super::source::ProgramSource;
 use super::{Interface, Launch};
 use crate::message::{Message, MessageHeader};
@@ -80,7 +80,7 @@ impl ProgramStage {
         });
         let bytes = (&MessageHeader::default(), start.to_string().into_bytes());
         let nothing_yet = |_, _: &CallHeader, _: &[u8]| Ok(());
-        let started = self.program.call(Told::Start, (0, 0), (bytes.0, &bytes.1), nothing_yet);
+        let started = self.program.call(Request::Start, (0, 0), (bytes.0, &bytes.1), nothing_yet);
         started.map_err(|error| StageError::new(format!("start {}", self.what), error))
     }
 
@@ -90,24 +90,24 @@ impl ProgramStage {
             let of_robot = if message.robot().is_empty() { String::new() } else { format!(" of {}", message.robot()) };
             format!("take a message{of_robot} on the input `{name}` in {what}")
         };
-        let said = (message.header(), message.bytes());
+        let reply = (message.header(), message.bytes());
         let called = self
             .program
-            .call(Told::Message, (port, message.wire()), said, |said, header, bytes| take(output, said, header, bytes));
+            .call(Request::Message, (port, message.wire()), reply, |reply, header, bytes| take(output, reply, header, bytes));
         called.map_err(|error| self.failed(error, doing))
     }
 
     fn finish(&mut self, output: &Output<Ports>) -> Result<(), StageError> {
         let nothing = (&MessageHeader::default(), &[][..]);
         let called =
-            self.program.call(Told::Finish, (0, 0), nothing, |said, header, bytes| take(output, said, header, bytes));
+            self.program.call(Request::Finish, (0, 0), nothing, |reply, header, bytes| take(output, reply, header, bytes));
         called.map_err(|error| self.failed(error, |what| format!("finish in {what}")))
     }
 
     pub(super) fn abort(&mut self, reason: &str) {
         let words = (&MessageHeader::default(), reason.as_bytes());
         // The run has failed already.
-        let _ = self.program.call(Told::Abort, (0, 0), words, |_, _, _| Ok(()));
+        let _ = self.program.call(Request::Abort, (0, 0), words, |_, _, _| Ok(()));
     }
 
     pub(super) fn failed(&self, error: CallError, doing: impl FnOnce(&str) -> String) -> StageError {
@@ -119,16 +119,16 @@ impl ProgramStage {
 }
 
 /// Passes on what a program says.
-pub(super) fn take(output: &Output<Ports>, said: Said, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
-    match said {
-        Said::Output => match output.0.get(header.port as usize) {
+pub(super) fn take(output: &Output<Ports>, reply: Reply, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
+    match reply {
+        Reply::Output => match output.0.get(header.port as usize) {
             Some(port) => port.send_bytes(header.message.robot.as_str(), bytes),
             None => Err(StageError::new("send a message", format!("the program has no output {}", header.port))),
         },
-        Said::Warning => {
+        Reply::Warning => {
             output.warn(String::from_utf8_lossy(bytes));
             Ok(())
         }
-        Said::Done | Said::Failed | Said::End => Ok(()),
+        Reply::Done | Reply::Failed | Reply::End => Ok(()),
     }
 }

@@ -162,7 +162,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         let handlers = Arc::new(handlers);
         let make = move |parameters: P, context: &Context, mut ports: OutputPorts| {
             let outputs = declare(&mut ports);
-            let output = ports.tied_to(outputs);
+            let output = ports.bind(outputs);
             let state = make(parameters, context)?;
             let running = Running { state, output, handlers: Arc::clone(&handlers) };
             Ok(Node { role: Role::Stage(Box::new(running)), sent: ports.counted() })

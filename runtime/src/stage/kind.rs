@@ -18,7 +18,7 @@ pub(crate) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth"
 
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
 type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
-type AskFn = dyn Fn(&toml::Table, &Path) -> Result<Asked, ParameterError> + Send + Sync;
+type ResolveFn = dyn Fn(&toml::Table, &Path) -> Result<ResolvedStage, ParameterError> + Send + Sync;
 
 /// A kind of stage: its name, ports and parameters, and how to make one.
 #[derive(Clone)]
@@ -38,12 +38,12 @@ pub struct StageKind {
     schema: Schema,
     check: Arc<CheckFn>,
     make: Arc<MakeFn>,
-    ask: Option<Arc<AskFn>>,
+    resolve: Option<Arc<ResolveFn>>,
 }
 
 /// What a stage is of which only its own program knows the ports and parameters.
 #[derive(Clone, Debug)]
-pub struct Asked {
+pub struct ResolvedStage {
     /// Its kind, kept for as long as this program runs, as all kinds are.
     pub kind: &'static StageKind,
     /// Parameters that stand in place of those that were given, such as a path that holds from every folder.
@@ -139,7 +139,7 @@ impl StageKind {
         drop(declare(&mut declared));
         let make = move |parameters, context: &Context, mut ports: OutputPorts| {
             let outputs = declare(&mut ports);
-            let output = ports.tied_to(outputs);
+            let output = ports.bind(outputs);
             let source = make(parameters, context)?;
             Ok(Node { role: Role::Source(Box::new(Running { source, output })), sent: ports.counted() })
         };
@@ -172,7 +172,7 @@ impl StageKind {
             outputs,
             definitions: BTreeMap::new(),
             external: false,
-            ask: None,
+            resolve: None,
             live_only: false,
             schema: P::schema(),
             check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
@@ -189,16 +189,16 @@ impl StageKind {
 
     /// A kind whose stages differ in ports and parameters, which only the program behind each of them knows: `ask` finds them
     /// out from the parameters that are given and the folder that paths among them begin at. `P` are those that all have.
-    pub fn asked<P: Parameters>(
+    pub fn dynamic<P: Parameters>(
         name: &'static str,
         summary: &'static str,
-        ask: impl Fn(&toml::Table, &Path) -> Result<Asked, ParameterError> + Send + Sync + 'static,
+        resolve: impl Fn(&toml::Table, &Path) -> Result<ResolvedStage, ParameterError> + Send + Sync + 'static,
     ) -> Self {
-        let ask: Arc<AskFn> = Arc::new(ask);
-        let asked = Arc::clone(&ask);
+        let resolve: Arc<ResolveFn> = Arc::new(resolve);
+        let resolve_now = Arc::clone(&resolve);
         let make = move |mut table: toml::Table, context: &Context, ports| {
             let failed = |error| StageError::new(format!("make stage `{}`", context.stage), error);
-            let Asked { kind, parameters } = asked(&table, Path::new("")).map_err(failed)?;
+            let ResolvedStage { kind, parameters } = resolve_now(&table, Path::new("")).map_err(failed)?;
             table.extend(parameters);
             (kind.make)(table, context, ports)
         };
@@ -213,13 +213,13 @@ impl StageKind {
             schema: P::schema(),
             check: Arc::new(|table| Ok(P::read(table.clone())?.check())),
             make: Arc::new(make),
-            ask: Some(ask),
+            resolve: Some(resolve),
         }
     }
 
     /// Whether each stage of the kind has ports and parameters of its own, which it must be asked for.
-    pub fn is_asked(&self) -> bool {
-        self.ask.is_some()
+    pub fn is_dynamic(&self) -> bool {
+        self.resolve.is_some()
     }
 
     /// What the stage with the given parameters is, where each has ports and parameters of its own; paths among them begin at
@@ -227,8 +227,8 @@ impl StageKind {
     ///
     /// # Errors
     /// The parameters do not lead to a stage.
-    pub fn ask(&self, parameters: &toml::Table, folder: &Path) -> Option<Result<Asked, ParameterError>> {
-        self.ask.as_ref().map(|ask| ask(parameters, folder))
+    pub fn resolve(&self, parameters: &toml::Table, folder: &Path) -> Option<Result<ResolvedStage, ParameterError>> {
+        self.resolve.as_ref().map(|resolve| resolve(parameters, folder))
     }
 
     /// The same kind with parameters that a JSON schema describes, by which they are checked.
@@ -291,7 +291,7 @@ impl StageKind {
     /// # Errors
     /// The parameters are wrong, or the stage cannot begin.
     pub fn make(&self, parameters: toml::Table, context: &Context, ends: Vec<OutputEnd>) -> Result<Node, StageError> {
-        (self.make)(parameters, context, OutputPorts::leading_to(ends))
+        (self.make)(parameters, context, OutputPorts::connected_to(ends))
     }
 }
 

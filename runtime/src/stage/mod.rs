@@ -29,8 +29,8 @@
 //!         .input("map", "the robots' maps", MapCorner::receive)
 //!         .build()
 //! }
-//! # use gridweave_runtime::{message::LogTime, ros::{MapMetaData, Pose}, stage::LoneStage};
-//! # let mut stage = LoneStage::new(&kind(), "").unwrap();
+//! # use gridweave_runtime::{message::LogTime, ros::{MapMetaData, Pose}, stage::StageHarness};
+//! # let mut stage = StageHarness::new(&kind(), "").unwrap();
 //! # let mut info = MapMetaData::default();
 //! # info.origin.position.x = 4.5;
 //! # stage.give::<OccupancyGrid<'_>>("map", "robot1", LogTime(7), &OccupancyGrid { info, ..Default::default() }).unwrap();
@@ -48,7 +48,7 @@ mod error;
 mod initial_poses;
 mod json_schema;
 mod kind;
-mod lone_stage;
+mod stage_harness;
 mod node;
 mod output;
 mod parameters;
@@ -65,8 +65,8 @@ pub use context::{Context, InputWire, RobotTopics, TfFrames, frame_of_robot, mat
 pub use error::StageError;
 pub use initial_poses::{InitialPose, InitialPoses};
 pub(crate) use kind::RESERVED_KEYS;
-pub use kind::{Asked, Source, StageKind};
-pub use lone_stage::LoneStage;
+pub use kind::{ResolvedStage, Source, StageKind};
+pub use stage_harness::StageHarness;
 pub use node::Node;
 pub use output::{AnyMessage, Out, Output, OutputEnd, OutputPorts, OutputSink, Outputs};
 pub use parameters::{ParameterError, Parameters};

@@ -83,7 +83,7 @@ struct Port {
 
 impl OutputPorts {
     /// The ports of a stage in a pipeline, which lead to these ends in the order in which they are declared.
-    pub(super) fn leading_to(ends: Vec<OutputEnd>) -> Self {
+    pub(super) fn connected_to(ends: Vec<OutputEnd>) -> Self {
         Self { ends: ends.into_iter(), ..Self::default() }
     }
 
@@ -146,7 +146,7 @@ impl OutputPorts {
         SentCounts { ports: self.ports, state: self.state }
     }
 
-    pub(super) fn tied_to<O>(&self, outputs: O) -> Output<O> {
+    pub(super) fn bind<O>(&self, outputs: O) -> Output<O> {
         Output { outputs, state: Rc::clone(&self.state) }
     }
 }

@@ -5,7 +5,7 @@ use super::*;
 use crate::sink::kind;
 use gridweave_runtime::message::{LogTime, MessageHeader};
 use gridweave_runtime::ros::{self, OccupancyGrid, Segments, TFMessage};
-use gridweave_runtime::stage::{InputWire, LoneStage};
+use gridweave_runtime::stage::{InputWire, StageHarness};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -17,7 +17,7 @@ const SEGMENTS: &str = "gridweave_msgs/msg/Segments";
 /// A sink with two sources on wires 0 and 1, and results on wires 2 (`/map`), 3 (`/tf_static`) and 4 (segments).
 struct Run {
     folder: TempDir,
-    sink: LoneStage,
+    sink: StageHarness,
 }
 
 fn context() -> Context {
@@ -31,8 +31,8 @@ fn context() -> Context {
     Context { stage: "sink".into(), inputs: wires.map(wire).to_vec(), ..Default::default() }
 }
 
-fn make(file: &Path, more: &str) -> Result<LoneStage, StageError> {
-    LoneStage::with_context(&kind(), &format!("file = {file:?}\n{more}"), &context())
+fn make(file: &Path, more: &str) -> Result<StageHarness, StageError> {
+    StageHarness::with_context(&kind(), &format!("file = {file:?}\n{more}"), &context())
 }
 
 impl Run {
@@ -58,12 +58,12 @@ impl Run {
         self.sink.node().announce(wire, number, &channel).unwrap();
     }
 
-    /// A message of the input's channel `number`.
+    /// Sends a message of input channel `number`.
     fn input(&mut self, wire: usize, number: u32, time: u64, bytes: &[u8]) -> Result<(), StageError> {
         self.send(wire, number, "/not/used", time, bytes)
     }
 
-    /// A message that a stage has made.
+    /// Sends a result of a stage.
     fn result(&mut self, wire: usize, topic: &str, time: u64, bytes: &[u8]) -> Result<(), StageError> {
         self.send(wire, 0, topic, time, bytes)
     }

@@ -1,4 +1,4 @@
-//! Updates of maps, from a log to the maps that stages see.
+//! Map updates in a log, and the maps that stages receive.
 
 use super::*;
 use gridweave_runtime::ros::OccupancyGridUpdate;
@@ -35,22 +35,22 @@ fn log() -> (Folder, Vec<PathBuf>) {
     })
 }
 
-/// A source that has sent all that it has.
-fn read(files: &[PathBuf], more: &str) -> LoneStage {
-    let mut source = LoneStage::new(&kind(), &format!("files = [{:?}]\n{more}", files[0])).unwrap();
+/// A source that has sent all its messages.
+fn read(files: &[PathBuf], more: &str) -> StageHarness {
+    let mut source = StageHarness::new(&kind(), &format!("files = [{:?}]\n{more}", files[0])).unwrap();
     while source.node().advance().unwrap() {}
     source
 }
 
-/// What it has sent on a port, without announcements.
-fn sent(source: &mut LoneStage, port: &str) -> Vec<Message> {
+/// The messages sent on a port, without announcements.
+fn sent(source: &mut StageHarness, port: &str) -> Vec<Message> {
     let mut sent = source.take_messages(port);
     sent.retain(|message| message.header().flags.contains(MessageFlags::DATA));
     sent
 }
 
-/// When each map was sent, its stamp in seconds, and its cells.
-fn maps(source: &mut LoneStage) -> Vec<(u64, i32, Vec<u8>)> {
+/// For each sent map: log time, stamp in seconds, and cells.
+fn maps(source: &mut StageHarness) -> Vec<(u64, i32, Vec<u8>)> {
     let seen = |message: &Message| {
         let map: OccupancyGrid<'_> = message.decode().unwrap();
         assert_eq!(map.header.frame_id, format!("{}/map", message.robot()));
@@ -66,15 +66,15 @@ fn stages_see_whole_maps_with_the_updates_in_them() {
     let expected = [
         (1, 1, vec![0, 0, 0]),
         (1, 1, vec![0, 0]),
-        // By then, updates have brought three cells, which is all that there are.
+        // By then, updates have brought three cells, as many as the map has.
         (3, 3, vec![2, 3, 1]),
         // The last state is sent at the end.
         (6, 5, vec![2, 3, 6]),
     ];
     assert_eq!(maps(&mut source), expected);
     assert_eq!(sent(&mut source, "other").len(), 6, "updates are passed on");
-    for why in ["no whole map came before them", "they reach beyond the last map", "they do not fit their type"] {
-        let warning = format!("updates on `/robot1/map_updates` were left out: {why}");
+    for why in ["no whole map was received before them", "they reach beyond the latest map", "they do not match their type"] {
+        let warning = format!("updates on `/robot1/map_updates` were ignored: {why}");
         assert_eq!(source.warnings().get(&warning), Some(&1), "{:?}", source.warnings());
     }
 }

@@ -1,16 +1,16 @@
 use super::{kind, load};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::TopologicalMap;
-use gridweave_runtime::stage::{LoneStage, StageError};
+use gridweave_runtime::stage::{StageHarness, StageError};
 use std::fs;
 use std::path::PathBuf;
 
-/// All topological maps that the source sends of files with these names and texts.
+/// All topological maps that the source sends for files with these names and contents.
 fn run(texts: &[(&str, &str)]) -> Result<Vec<TopologicalMap>, StageError> {
     let folder = tempfile::tempdir().unwrap();
     let files: Vec<PathBuf> = texts.iter().map(|(name, _)| folder.path().join(name)).collect();
     files.iter().zip(texts).for_each(|(file, (_, text))| fs::write(file, text).unwrap());
-    let mut source = LoneStage::new(&kind(), &format!("files = {files:?}"))?;
+    let mut source = StageHarness::new(&kind(), &format!("files = {files:?}"))?;
     while source.node().advance()? {}
     assert_eq!(source.node().progress(), Some(1.0));
     source.take("topology")
@@ -32,7 +32,7 @@ fn every_file_is_the_topological_map_of_a_robot() {
 }
 
 #[test]
-fn what_is_no_topological_map_is_named() {
+fn invalid_topological_maps_are_reported_with_their_file() {
     for (text, expected) in [
         ("{", "EOF"),
         (r#"{"nodes": []}"#, "missing field `paths`"),
@@ -43,6 +43,6 @@ fn what_is_no_topological_map_is_named() {
         let error = run(&[("a.json", text)]).unwrap_err().to_string();
         assert!(error.contains(expected) && error.contains("a.json"), "{error}");
     }
-    assert!(run(&[]).unwrap_err().to_string().contains("no file is given"));
+    assert!(run(&[]).unwrap_err().to_string().contains("no input file"));
     assert!(load("/nowhere/a.json".as_ref()).unwrap_err().to_string().contains("cannot read /nowhere/a.json"));
 }

@@ -7,7 +7,7 @@ use super::wire::{Answer, Link, Outcome};
 use super::{sink, source};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage};
-use gridweave_runtime::stage::{Context, InputWire, LoneStage};
+use gridweave_runtime::stage::{Context, InputWire, StageHarness};
 use proptest::prelude::*;
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
@@ -150,13 +150,13 @@ fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
 fn a_clock_that_is_off_by_an_hour_is_seen_when_the_ends_meet() {
     const HOUR: u64 = 3600 * SECOND as u64;
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let mut source = LoneStage::new(&source::kind(), &format!("listen = [\"tcp/127.0.0.1:{port}\"]")).unwrap();
+    let mut source = StageHarness::new(&source::kind(), &format!("listen = [\"tcp/127.0.0.1:{port}\"]")).unwrap();
     let wire = InputWire { port: "in", output: "map", ros_type: OccupancyGrid::NAME.to_owned(), ..Default::default() };
     let context = Context { inputs: vec![wire], ..Default::default() };
     let mut sink = |name: &str, ahead: u64| {
         let parameters = format!("connect = [\"tcp/127.0.0.1:{port}\"]\nsender = \"{name}\"");
         let kind = sink::kind_with(Clock { ahead: ahead as i64 });
-        let mut sink = LoneStage::with_context(&kind, &parameters, &context).unwrap();
+        let mut sink = StageHarness::with_context(&kind, &parameters, &context).unwrap();
         let now = Clock::default().nanoseconds() as u64;
         let message = Message::from_vec(header("/robot1/map", now + ahead), vec![1; 30]);
         sink.give_message("in", message).unwrap();

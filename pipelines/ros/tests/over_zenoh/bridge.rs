@@ -3,7 +3,7 @@
 use crate::wire::WATCHDOG;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseWithCovarianceStamped, RosMessage, encode};
-use gridweave_runtime::stage::{Context, InputWire, LoneStage};
+use gridweave_runtime::stage::{Context, InputWire, StageHarness};
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,12 +16,12 @@ pub(crate) fn free_endpoint() -> (String, u16) {
     (format!("tcp/127.0.0.1:{port}"), port)
 }
 
-pub(crate) fn source(endpoint: &str, more: &str) -> LoneStage {
+pub(crate) fn source(endpoint: &str, more: &str) -> StageHarness {
     let parameters = format!("listen = [\"{endpoint}\"]\n{more}");
-    LoneStage::new(&gridweave_ros::bridge::source::kind(), &parameters).unwrap()
+    StageHarness::new(&gridweave_ros::bridge::source::kind(), &parameters).unwrap()
 }
 
-pub(crate) fn sink(endpoint: &str, more: &str) -> LoneStage {
+pub(crate) fn sink(endpoint: &str, more: &str) -> StageHarness {
     let wire = |(output, ros_type): (&'static str, &str)| InputWire {
         port: "in",
         from: "robots".into(),
@@ -33,7 +33,7 @@ pub(crate) fn sink(endpoint: &str, more: &str) -> LoneStage {
         [("map", OccupancyGrid::NAME), ("pose", PoseWithCovarianceStamped::NAME), ("conflicts", OccupancyGrid::NAME)];
     let context = Context { stage: "base".into(), inputs: wires.map(wire).to_vec(), ..Default::default() };
     let parameters = format!("connect = [\"{endpoint}\"]\n{more}");
-    LoneStage::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context).unwrap()
+    StageHarness::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context).unwrap()
 }
 
 pub(crate) fn map(frame: &str, time: u64, size: usize) -> Vec<u8> {
@@ -42,20 +42,20 @@ pub(crate) fn map(frame: &str, time: u64, size: usize) -> Vec<u8> {
     encode(&OccupancyGrid { header: Header::new(LogTime(time), frame), info, data: &data }).unwrap()
 }
 
-pub(crate) fn give(sink: &mut LoneStage, wire: usize, robot: &str, topic: &str, time: u64, bytes: Vec<u8>) {
+pub(crate) fn give(sink: &mut StageHarness, wire: usize, robot: &str, topic: &str, time: u64, bytes: Vec<u8>) {
     let (robot, topic) = (FixedText::new(robot).unwrap(), FixedText::new(topic).unwrap());
     let header = MessageHeader { robot, topic, log_time: LogTime(time), publish_time: time, ..Default::default() };
     sink.give_message("in", Message::from_vec(header, bytes).on_wire(wire)).unwrap();
 }
 
-pub(crate) fn give_pose(sink: &mut LoneStage, time: u64) {
+pub(crate) fn give_pose(sink: &mut StageHarness, time: u64) {
     let pose = PoseWithCovarianceStamped { header: Header::new(LogTime(time), "robot1/map"), ..Default::default() };
     give(sink, 1, "robot1", "/robot1/pose", time, encode(&pose).unwrap());
 }
 
 /// Lets a source go on until this is so.
 #[track_caller]
-fn wait_for(source: &mut LoneStage, what: &str, mut is_so: impl FnMut(&mut LoneStage) -> bool) {
+fn wait_for(source: &mut StageHarness, what: &str, mut is_so: impl FnMut(&mut StageHarness) -> bool) {
     let until = Instant::now() + WATCHDOG;
     while !is_so(source) {
         assert!(Instant::now() < until, "{what}: {:?} {:?}", source.warnings(), source.counts());
@@ -66,7 +66,7 @@ fn wait_for(source: &mut LoneStage, what: &str, mut is_so: impl FnMut(&mut LoneS
 
 /// Lets a source go on until so many messages have come on an output, and gives them.
 #[track_caller]
-pub(crate) fn come(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
+pub(crate) fn come(source: &mut StageHarness, output: &str, count: usize) -> Vec<Message> {
     let mut messages = Vec::new();
     wait_for(source, output, |source| {
         let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
@@ -222,7 +222,7 @@ fn a_wire_that_is_cut_again_and_again_delays_and_no_more() {
         poses.extend(come(&mut source, "pose", 5));
         assert!(poses.len() > so_far);
         wire.cut();
-        let gone = |source: &LoneStage| {
+        let gone = |source: &StageHarness| {
             source.warnings().iter().filter(|(text, _)| text.contains("is gone")).map(|(_, count)| *count).sum::<u64>()
         };
         wait_for(&mut source, "gone", |source| gone(source) > round as u64);
@@ -294,7 +294,7 @@ fn what_is_open_to_others_must_be_told_to_be() {
         (gridweave_ros::bridge::source::kind(), "listen = [\"tcp/0.0.0.0:0\"]"),
         (gridweave_ros::bridge::sink::kind(), "connect = [\"tcp/10.0.0.1:7448\"]"),
     ] {
-        let error = LoneStage::new(&kind, parameters).err().unwrap().to_string();
+        let error = StageHarness::new(&kind, parameters).err().unwrap().to_string();
         assert!(error.contains("not encrypted") && error.contains("insecure = true"), "{error}");
     }
 }

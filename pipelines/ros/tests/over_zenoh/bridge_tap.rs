@@ -6,7 +6,7 @@ use crate::command::{GRIDWEAVE, Running, run, wait_until};
 use crate::wire::WATCHDOG;
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{PoseStamped, RosMessage};
-use gridweave_runtime::stage::{Context, InputWire, LinkView, LoneStage, RunLink, RunLinks, StageError, StageKind};
+use gridweave_runtime::stage::{Context, InputWire, LinkView, StageHarness, RunLink, RunLinks, StageError, StageKind};
 use std::io::Read;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -143,7 +143,7 @@ impl Drop for Viewer {
 }
 
 /// The end of a bridge on a robot, whose run has one link.
-pub(crate) fn robot(endpoint: &str, more: &str, link: Option<&Link>) -> LoneStage {
+pub(crate) fn robot(endpoint: &str, more: &str, link: Option<&Link>) -> StageHarness {
     let links = link.map(|link| {
         let (stage, output, ros_type) = ("slam".to_owned(), "pose".to_owned(), PoseStamped::NAME.to_owned());
         let of_open = Arc::clone(link);
@@ -155,17 +155,17 @@ pub(crate) fn robot(endpoint: &str, more: &str, link: Option<&Link>) -> LoneStag
     let inputs = vec![InputWire { port: "in", output: "map", ..Default::default() }];
     let context = Context { inputs, links, ..Default::default() };
     let parameters = format!("connect = [\"{endpoint}\"]\nsender = \"robot-1\"\n{more}");
-    LoneStage::with_context(&kind("bridge_sink"), &parameters, &context).unwrap()
+    StageHarness::with_context(&kind("bridge_sink"), &parameters, &context).unwrap()
 }
 
-pub(crate) fn tap_stage(endpoint: &str, more: &str) -> LoneStage {
+pub(crate) fn tap_stage(endpoint: &str, more: &str) -> StageHarness {
     let parameters = format!("connect = [\"{endpoint}\"]\nsender = \"robot-1\"\nlink = \"slam\"\n{more}");
-    LoneStage::new(&kind("bridge_tap"), &parameters).unwrap()
+    StageHarness::new(&kind("bridge_tap"), &parameters).unwrap()
 }
 
 /// Lets a tap go on until this is so. Gives what was the error, if there was one.
 #[track_caller]
-pub(crate) fn go_on(tap: &mut LoneStage, what: &str, mut is_so: impl FnMut(&mut LoneStage) -> bool) -> Option<String> {
+pub(crate) fn go_on(tap: &mut StageHarness, what: &str, mut is_so: impl FnMut(&mut StageHarness) -> bool) -> Option<String> {
     let until = Instant::now() + WATCHDOG;
     while !is_so(tap) {
         assert!(Instant::now() < until, "{what}: {:?} {:?}", tap.warnings(), tap.counts());
@@ -177,7 +177,7 @@ pub(crate) fn go_on(tap: &mut LoneStage, what: &str, mut is_so: impl FnMut(&mut 
     None
 }
 
-pub(crate) fn times(tap: &mut LoneStage) -> Vec<u64> {
+pub(crate) fn times(tap: &mut StageHarness) -> Vec<u64> {
     let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
     tap.take_messages("messages")
         .iter()
@@ -215,7 +215,7 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_mended(
     let warnings = tap.warnings();
     assert!(warnings.keys().any(|text| text.contains("is lost: it is tried again")), "{warnings:?}");
     assert_eq!(warnings["`slam.pose` is looked on at anew: messages may have been missed"], 2, "{warnings:?}");
-    let is_told = |tap: &mut LoneStage| tap.counts().get("messages missed") == Some(&(3 * MISSED));
+    let is_told = |tap: &mut StageHarness| tap.counts().get("messages missed") == Some(&(3 * MISSED));
     assert_eq!(go_on(&mut tap, "missed", is_told), None);
     // The end of the tap.
     assert_eq!(go_on(&mut tap, "open", |_| viewers() == 1), None);
@@ -226,7 +226,7 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_mended(
 #[test]
 fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_the_tap() {
     let (endpoint, port) = free_endpoint();
-    let told = |words: &'static str| move |tap: &mut LoneStage| tap.warnings().keys().any(|text| text.contains(words));
+    let told = |words: &'static str| move |tap: &mut StageHarness| tap.warnings().keys().any(|text| text.contains(words));
     // Nobody is there yet.
     let mut tap = tap_stage(&endpoint, "");
     assert_eq!(go_on(&mut tap, "base", told("no machine is reached")), None);
@@ -235,7 +235,7 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
     let link = Link::default();
     let pass = |time: u64| link.lock().unwrap().0.push(time);
     let mut came = Vec::new();
-    let mut all_came = |tap: &mut LoneStage, count: usize| {
+    let mut all_came = |tap: &mut StageHarness, count: usize| {
         came.extend(times(tap));
         came.len() == count
     };

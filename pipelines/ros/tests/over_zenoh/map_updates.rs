@@ -4,7 +4,7 @@ use crate::stages::{give, sent, sink, source_with, wait_until_heard};
 use crate::wire::{Hearer, Robot, Router, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
-use gridweave_runtime::stage::LoneStage;
+use gridweave_runtime::stage::StageHarness;
 use std::time::Instant;
 
 const WIDTH: usize = 40;
@@ -12,7 +12,7 @@ const CELLS: usize = 40 * 30;
 
 /// Publishes maps of which each differs in one cell from the one before.
 struct Merge {
-    sink: LoneStage,
+    sink: StageHarness,
     cells: Vec<u8>,
     sent: usize,
 }
@@ -174,7 +174,7 @@ fn without_updates_every_map_is_whole() {
 }
 
 /// A robot that publishes a map of 40 x 30 cells and one update of one cell, and the source that takes them.
-fn updated_by_one_cell(router: &Router, parameters: &str) -> (LoneStage, Robot) {
+fn updated_by_one_cell(router: &Router, parameters: &str) -> (StageHarness, Robot) {
     let mut source = source_with(router, parameters);
     let robot = Robot::start(router, "slam");
     let mut maps = robot.publish(&topic("/robot1/map", OccupancyGrid::NAME), Qos::latched(1));

@@ -8,12 +8,12 @@ use gridweave_runtime::ros::{
     Header, LaserEcho, LaserScan, MultiEchoLaserScan, OccupancyGrid, Odometry, PoseWithCovarianceStamped, RangeScan,
     RosMessage, TFMessage, Transform, TransformStamped, Vector3, encode,
 };
-use gridweave_runtime::stage::{Context, LoneStage, OutputEnd};
+use gridweave_runtime::stage::{Context, StageHarness, OutputEnd};
 use std::time::{Duration, Instant};
 
-fn source(router: &Router, wait_for_map: f64) -> LoneStage {
+fn source(router: &Router, wait_for_map: f64) -> StageHarness {
     let parameters = format!("{}\nwait_for_map = {wait_for_map:?}", router.parameters());
-    LoneStage::new(&gridweave_ros::source::kind(), &parameters).unwrap()
+    StageHarness::new(&gridweave_ros::source::kind(), &parameters).unwrap()
 }
 
 fn edge(parent: &str, child: &str, x: f64) -> TransformStamped {
@@ -36,7 +36,7 @@ fn scan() -> Vec<u8> {
 
 /// Sends until a message comes out on an output: what is sent before all is known that it needs is left out.
 #[track_caller]
-fn first_of(source: &mut LoneStage, output: &str, mut send: impl FnMut()) -> Message {
+fn first_of(source: &mut StageHarness, output: &str, mut send: impl FnMut()) -> Message {
     let until = Instant::now() + WATCHDOG;
     loop {
         assert!(Instant::now() < until, "nothing came on {output}: {:?}", source.warnings());
@@ -148,7 +148,7 @@ fn a_pipeline_that_reads_no_scans_asks_for_none() {
 
 /// Lets a source go on until it hears what is published no longer.
 #[track_caller]
-fn wait_until_not_heard(source: &mut LoneStage, sender: &Sender) {
+fn wait_until_not_heard(source: &mut StageHarness, sender: &Sender) {
     let until = Instant::now() + WATCHDOG;
     while sender.is_heard() {
         assert!(Instant::now() < until, "the source still subscribes");

@@ -8,7 +8,7 @@ use gridweave_runtime::ros::{
     Header, MapMetaData, MarkerArray, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RobotFrame, RobotFrames,
     RosMessage, TFMessage, TransformStamped, Vector3, decode, encode,
 };
-use gridweave_runtime::stage::{Context, InputWire, LoneStage};
+use gridweave_runtime::stage::{Context, InputWire, StageHarness};
 use std::time::{Duration, Instant};
 
 pub(crate) fn map(robot: &str, occupied: u8) -> Vec<u8> {
@@ -17,17 +17,17 @@ pub(crate) fn map(robot: &str, occupied: u8) -> Vec<u8> {
     encode(&OccupancyGrid { header, info, data: &[0, occupied] }).unwrap()
 }
 
-fn source(router: &Router) -> LoneStage {
+fn source(router: &Router) -> StageHarness {
     source_with(router, "")
 }
 
-pub(crate) fn source_with(router: &Router, parameters: &str) -> LoneStage {
-    LoneStage::new(&gridweave_ros::source::kind(), &format!("{}\n{parameters}", router.parameters())).unwrap()
+pub(crate) fn source_with(router: &Router, parameters: &str) -> StageHarness {
+    StageHarness::new(&gridweave_ros::source::kind(), &format!("{}\n{parameters}", router.parameters())).unwrap()
 }
 
 /// Lets a source go on until it has sent so many messages on an output, and gives them.
 #[track_caller]
-pub(crate) fn sent(source: &mut LoneStage, output: &str, count: usize) -> Vec<Message> {
+pub(crate) fn sent(source: &mut StageHarness, output: &str, count: usize) -> Vec<Message> {
     let (mut messages, until) = (Vec::new(), Instant::now() + WATCHDOG);
     while messages.len() < count {
         assert!(Instant::now() < until, "{} of {count} came on {output}: {:?}", messages.len(), source.warnings());
@@ -42,7 +42,7 @@ pub(crate) fn sent(source: &mut LoneStage, output: &str, count: usize) -> Vec<Me
 
 /// Lets a source go on until it hears what is published.
 #[track_caller]
-pub(crate) fn wait_until_heard(source: &mut LoneStage, sender: &Sender) {
+pub(crate) fn wait_until_heard(source: &mut StageHarness, sender: &Sender) {
     let until = Instant::now() + WATCHDOG;
     while !sender.is_heard() {
         assert!(Instant::now() < until, "the source does not subscribe");
@@ -53,7 +53,7 @@ pub(crate) fn wait_until_heard(source: &mut LoneStage, sender: &Sender) {
 
 /// Lets a source go on until it has warned of something, and gives that.
 #[track_caller]
-fn warned(source: &mut LoneStage, of: &str) -> String {
+fn warned(source: &mut StageHarness, of: &str) -> String {
     let until = Instant::now() + WATCHDOG;
     loop {
         assert!(Instant::now() < until, "no warning of {of}: {:?}", source.warnings());
@@ -66,7 +66,7 @@ fn warned(source: &mut LoneStage, of: &str) -> String {
 }
 
 /// A sink with wires that carry messages of these types on these topics.
-pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> LoneStage {
+pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> StageHarness {
     let wire = |(ros_type, topic): &(&str, &str)| InputWire {
         port: "in",
         from: "a".into(),
@@ -75,10 +75,10 @@ pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> LoneStag
         ..Default::default()
     };
     let context = Context { stage: "ros".into(), inputs: wires.iter().map(wire).collect(), ..Default::default() };
-    LoneStage::with_context(&gridweave_ros::sink::kind(), parameters, &context).unwrap()
+    StageHarness::with_context(&gridweave_ros::sink::kind(), parameters, &context).unwrap()
 }
 
-pub(crate) fn give(sink: &mut LoneStage, wire: usize, topic: &str, bytes: Vec<u8>) {
+pub(crate) fn give(sink: &mut StageHarness, wire: usize, topic: &str, bytes: Vec<u8>) {
     let topic = FixedText::new(topic).unwrap();
     let message = Message::from_vec(MessageHeader { topic, ..Default::default() }, bytes);
     sink.give_message("in", message.on_wire(wire)).unwrap();
@@ -312,6 +312,6 @@ fn what_robots_have_sent_is_not_sent_to_them_again() {
         ..Default::default()
     }];
     let context = Context { stage: "ros".into(), inputs, ..Default::default() };
-    let error = LoneStage::with_context(&gridweave_ros::sink::kind(), "", &context).err().unwrap();
+    let error = StageHarness::with_context(&gridweave_ros::sink::kind(), "", &context).err().unwrap();
     assert!(error.to_string().contains("it would be sent to them again"), "{error}");
 }

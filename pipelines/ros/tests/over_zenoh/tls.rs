@@ -4,7 +4,7 @@ use crate::bridge::{Wire, come, give, give_pose, map, sink, source};
 use crate::bridge_tap::{Link, go_on, robot, tap_stage, times};
 use crate::command::{GRIDWEAVE, Running, wait_until};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::stage::LoneStage;
+use gridweave_runtime::stage::StageHarness;
 use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
 use std::fs;
 use std::net::TcpListener;
@@ -172,7 +172,7 @@ fn who_has_no_right_certificate_is_refused_and_both_ends_say_why() {
             "BadCertificate: the other end does not take",
         ),
     ];
-    let mut sinks: Vec<LoneStage> =
+    let mut sinks: Vec<StageHarness> =
         refused.iter().map(|(endpoint, files, ..)| sink(endpoint, &format!("linger = 0.0\n{files}"))).collect();
     for (sink, (endpoint, _, words, _)) in sinks.iter_mut().zip(&refused) {
         let mut told = String::new();

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A stage that runs by itself. Ports are named.
-pub struct LoneStage {
+pub struct StageHarness {
     node: Node,
     kind: StageKind,
     sent: Vec<Rc<RefCell<Vec<Message>>>>,
@@ -30,7 +30,7 @@ impl OutputSink for List {
     }
 }
 
-impl LoneStage {
+impl StageHarness {
     /// A stage of a kind, with parameters in TOML.
     ///
     /// # Errors
