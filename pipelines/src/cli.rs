@@ -1,24 +1,24 @@
-//! What the command line may say, and who does it.
+//! The command line and its subcommands.
 
 use crate::commands::{
     cat, check, compare, convert, demo, evaluate, golden, graph, info, kinds, live, merge, pipelines, processes,
     recover, render, report, run, shell, simulate,
 };
 use crate::interrupt;
+use crate::logging::LoggingArgs;
 use crate::status::Status;
-use crate::telling::TellingArgs;
 use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
 
-/// Merges the maps of several robots that explore one building, each with a map frame of its own.
+/// Merges the maps of several robots that explore one building, each in its own map frame.
 ///
 /// Exit status: 0 done, 1 failed, 2 bad use, 3 done but something could not be merged.
 #[derive(Debug, Parser)]
 #[command(name = "gridweave", version, max_term_width = 110)]
 pub(crate) struct Cli {
     #[command(flatten)]
-    telling: TellingArgs,
+    logging: LoggingArgs,
     #[command(subcommand)]
     command: Command,
 }
@@ -29,7 +29,7 @@ enum Command {
     Run(run::RunArgs),
     /// Merge the maps in logs, or map files, by the shipped pipeline that fits.
     Merge(merge::MergeArgs),
-    /// Check pipeline files and show everything that is wrong with them.
+    /// Check pipeline files and show all errors in them.
     Check(check::CheckArgs),
     /// Show which stages a pipeline has and how they are wired.
     Graph(graph::GraphArgs),
@@ -37,22 +37,22 @@ enum Command {
     Pipelines(pipelines::PipelinesArgs),
     /// List the stage kinds with their ports and parameters.
     Kinds(kinds::KindsArgs),
-    /// Show what is in logs (topics, types, counts, times, robots) or in map files.
+    /// Show the contents of logs (topics, types, counts, times, robots) or of map files.
     Info(info::InfoArgs),
-    /// Write logs of any kind that is read, or some topics, robots or seconds of them, as one MCAP file or rosbag2 folder.
+    /// Write logs of any format, or some topics, robots or seconds of them, as one MCAP file or rosbag2 folder.
     #[command(visible_alias = "filter")]
     Convert(convert::ConvertArgs),
-    /// Write all that can be read of a log that is cut or damaged, and tell what cannot.
+    /// Write what can be read of a cut or damaged log, and report what cannot.
     Recover(recover::RecoverArgs),
     /// Print messages of logs as lines of JSON.
     Cat(cat::CatArgs),
     /// Draw the maps of a log, or map files, as a picture (PNG, SVG or PDF).
     Render(render::RenderArgs),
-    /// Show what a merge has found and how, as one page for a browser.
+    /// Write a report on a merge, as one page for a browser.
     Report(report::ReportArgs),
     /// Compare a summary with the truth.
     Evaluate(evaluate::EvaluateArgs),
-    /// Run several pipelines on the same logs, and compare how right, how fast and how large they are.
+    /// Run several pipelines on the same logs, and compare their errors, times and memory.
     Compare(compare::CompareArgs),
     /// Simulate robots in a building, and write a log and its truth.
     Simulate(simulate::SimulateArgs),
@@ -62,31 +62,31 @@ enum Command {
     Golden(golden::GoldenArgs),
     /// Play logs into a live pipeline, as the robots would send them.
     Play(live::PlayArgs),
-    /// Record links of a run that is going on.
+    /// Record links of a run in progress.
     Record(live::RecordArgs),
-    /// Print the messages of a link of a run that is going on, as they pass.
+    /// Print the messages of a link of a run in progress.
     Tap(live::TapArgs),
-    /// Show what the stages of a run that is going on do.
+    /// Show rates, queues and latencies of the stages of a run in progress.
     Top(live::TopArgs),
-    /// Show in a browser what a run that is going on has found so far.
+    /// Show the merge of a run in progress in a browser.
     View(live::ViewArgs),
-    /// Carry links of a run that is going on to a run on another machine (with `gridweave-ros`).
+    /// Carry links of a run in progress to a run on another machine (with `gridweave-ros`).
     Bridge(live::BridgeArgs),
-    /// Remove what killed runs have left in shared memory and in temporary folders. Runs that live are not touched.
+    /// Remove what killed runs have left in shared memory and in temporary folders. Runs in progress are not touched.
     Clean,
     /// Print the completions of a shell, or write the manual pages.
     Shell(shell::ShellArgs),
     /// Run one process of a pipeline on the engine `processes`, which starts it.
     #[command(hide = true)]
     Stage(processes::StageArgs),
-    /// Run one run of a comparison, which starts it, and tell what that takes.
+    /// Run one run of a comparison, which starts it, and measure its time and memory.
     #[command(hide = true)]
     Measure(compare::measure::MeasureArgs),
 }
 
 impl Command {
-    /// Whether it writes or sends something that must be brought to an end.
-    fn has_something_to_put_in_order(&self) -> bool {
+    /// Whether the command has outputs that must be closed when it is interrupted.
+    fn must_end_in_order(&self) -> bool {
         matches!(
             self,
             Self::Run(_)
@@ -107,10 +107,10 @@ impl Command {
 }
 
 impl Cli {
-    /// Does what the command line says, with the given stage kinds. `hear` hears what is warned of.
-    pub(crate) fn execute(self, registry: &Registry, hear: fn(&str, &str)) -> Result<Status> {
-        let _trace = self.telling.start(hear)?;
-        if self.command.has_something_to_put_in_order() {
+    /// Runs the command with the given stage kinds. `on_warning` is called for each warning.
+    pub(crate) fn execute(self, registry: &Registry, on_warning: fn(&str, &str)) -> Result<Status> {
+        let _trace = self.logging.start(on_warning)?;
+        if self.command.must_end_in_order() {
             interrupt::hold_back();
         }
         match self.command {

@@ -1,4 +1,4 @@
-//! How well a merge lays places on each other that two robots both have seen, as the truth of a bent log knows them.
+//! Distances between common places, which two robots have both seen, in a merge; the truth of a log with deformed maps lists them.
 
 use gridweave_logs::summary::{Bend, Frame, Summary};
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
@@ -8,64 +8,66 @@ use nalgebra::{Isometry2, Matrix3, Point2, Vector2, Vector3};
 use serde::Serialize;
 use std::fmt;
 
-/// A place as two maps show it: x and y in the map frame of the second robot by name, and then in that of the first, metres.
+/// A place in two maps: x and y in the map frame of the second robot by name, and then in that of the first, metres.
 pub(crate) type CommonPlace = [f64; 4];
 
-/// How far the same places lie apart in the merge of two robots.
+/// Distances between common places in the merge of two robots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CommonPlaces {
-    /// How many places there are.
+    /// Number of places.
     pub places: usize,
-    /// As the rigid frames lay them.
+    /// Distances by the rigid frames.
     pub rigid: Distances,
-    /// As the bent maps lie in these frames; none if no map is bent.
-    pub bent: Option<Distances>,
-    /// How far the rigid frames lie from those that lay the places on each other best; none if the places lie all in one.
+    /// Distances with the deformations of the maps; none if no map is deformed.
+    #[serde(rename = "bent")]
+    pub deformed: Option<Distances>,
+    /// Error of the rigid frames against the best rigid fit of the places; none if all places are at one point.
     pub from_best: Option<FromBest>,
 }
 
-/// How far the frames of two robots lie from those that lay places on each other best. Where maps are bent, no rigid frame lays
-/// all of them rightly, and this one is what a merge can be measured against.
+/// Error of the frames of two robots against the best rigid fit of their common places. Deformed maps have no exact rigid frames,
+/// so this fit is what a merge can be measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FromBest {
-    /// At the middle of the places, metres.
+    /// Error at the middle of the places, metres.
     pub metres: f64,
-    /// Of the direction, degrees, 0 to 180.
+    /// Error of the direction, degrees, 0 to 180.
     pub degrees: f64,
-    /// The squared error in x, y and yaw by the covariance that the run tells; none if the first robot is not the reference, or
-    /// there is no covariance. Of frames whose covariance is right 95 % are below 7.81, and the mean is 3.
+    /// Normalised squared error in x, y and yaw by the covariance in the summary; none if the first robot is not the reference, or
+    /// there is no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
     pub normalised_error_squared: Option<f64>,
-    /// How far apart the places lie by those best frames.
+    /// Distances by the best rigid fit.
     pub best: Distances,
 }
 
-/// Distances between places that should be one.
+/// Statistics of the distances between common places.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Distances {
-    /// Metres.
+    /// The median, metres.
     pub median_m: f64,
-    /// Nine of ten are no greater, metres.
+    /// The 90 % quantile, metres.
     pub p90_m: f64,
-    /// Metres.
+    /// The maximum, metres.
     pub most_m: f64,
 }
 
 /// Measures a merge of the robots `first` and `second`. `None` if they are not merged with each other, or there are no
 /// places.
 pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) -> Option<CommonPlaces> {
-    let one = Placed { frame: pose(run.frames.get(first)?), bend: run.bends.get(first).and_then(deformation) };
-    let other = Placed { frame: pose(run.frames.get(second)?), bend: run.bends.get(second).and_then(deformation) };
-    let distances = |is_bent: bool| {
+    let one = Placed { frame: pose(run.frames.get(first)?), deformation: run.bends.get(first).and_then(deformation) };
+    let other =
+        Placed { frame: pose(run.frames.get(second)?), deformation: run.bends.get(second).and_then(deformation) };
+    let distances = |is_deformed: bool| {
         let apart = |&[x2, y2, x1, y1]: &CommonPlace| {
-            (one.in_world(Point2::new(x1, y1), is_bent) - other.in_world(Point2::new(x2, y2), is_bent)).norm()
+            (one.in_world(Point2::new(x1, y1), is_deformed) - other.in_world(Point2::new(x2, y2), is_deformed)).norm()
         };
         Distances::of(places.iter().map(apart).collect())
     };
-    let is_bent = one.bend.is_some() || other.bend.is_some();
+    let is_deformed = one.deformation.is_some() || other.deformation.is_some();
     Some(CommonPlaces {
         places: places.len(),
         rigid: distances(false)?,
-        bent: if is_bent { distances(true) } else { None },
+        deformed: if is_deformed { distances(true) } else { None },
         from_best: from_best(run, [first, second], places),
     })
 }
@@ -87,7 +89,7 @@ fn from_best(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) 
     })
 }
 
-/// The squared error of a frame by its covariance. `None` if it has none.
+/// Normalised squared error of a frame by its covariance. `None` if it has none.
 pub(crate) fn normalised_error_squared(found: &Frame, expected: &Isometry2<f64>) -> Option<f64> {
     let turned = (expected.rotation.inverse() * pose(found).rotation).angle();
     let moved = pose(found).translation.vector - expected.translation.vector;
@@ -96,16 +98,16 @@ pub(crate) fn normalised_error_squared(found: &Frame, expected: &Isometry2<f64>)
     Some(error.dot(&covariance.solve(&error)))
 }
 
-/// A map in the world.
+/// The pose of a map in the world, and its deformation.
 struct Placed {
     frame: Isometry2<f64>,
-    bend: Option<Deformation>,
+    deformation: Option<Deformation>,
 }
 
 impl Placed {
-    fn in_world(&self, point: Point2<f64>, is_bent: bool) -> Point2<f64> {
-        match &self.bend {
-            Some(bend) if is_bent => self.frame * bend.apply(&point),
+    fn in_world(&self, point: Point2<f64>, is_deformed: bool) -> Point2<f64> {
+        match &self.deformation {
+            Some(deformation) if is_deformed => self.frame * deformation.apply(&point),
             _ => self.frame * point,
         }
     }
@@ -122,12 +124,11 @@ impl Distances {
 
 impl fmt::Display for CommonPlaces {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = |Distances { median_m, p90_m, .. }: &Distances| {
-            format!("{median_m:.3} m in the median, {p90_m:.3} m at 90 %")
-        };
-        write!(f, "{} common places: {} apart as the rigid frames lay them", self.places, text(&self.rigid))?;
-        match &self.bent {
-            Some(bent) => write!(f, "; {} as the maps are bent", text(bent)),
+        let text =
+            |Distances { median_m, p90_m, .. }: &Distances| format!("median {median_m:.3} m, 90 % below {p90_m:.3} m");
+        write!(f, "distances of {} common places: {} by the rigid frames", self.places, text(&self.rigid))?;
+        match &self.deformed {
+            Some(deformed) => write!(f, "; {} with the deformations", text(deformed)),
             None => Ok(()),
         }
     }
@@ -163,23 +164,23 @@ mod tests {
     }
 
     #[test]
-    fn places_are_measured_as_the_frames_lay_them_and_as_the_maps_are_bent() {
+    fn distances_are_measured_by_the_frames_and_with_the_deformations() {
         let places: Vec<CommonPlace> = (0..=10).map(|i| [1.0, 1.0, 11.0 + 0.1 * f64::from(i), 1.0]).collect();
         let measured = measure(&summary(&[("robot2", 0.5)]), ["robot1", "robot2"], &places).unwrap();
         let near = |one: f64, other: f64| (one - other).abs() < 1e-9;
         assert!(
             near(measured.rigid.median_m, 0.5) && near(measured.rigid.p90_m, 0.9) && near(measured.rigid.most_m, 1.0)
         );
-        assert!(near(measured.bent.unwrap().most_m, 0.5), "{measured}");
-        assert!(measured.from_best.is_none(), "all places of the second are one");
-        assert_eq!(measure(&summary(&[]), ["robot1", "robot2"], &places).unwrap().bent, None);
+        assert!(near(measured.deformed.unwrap().most_m, 0.5), "{measured}");
+        assert!(measured.from_best.is_none(), "all places of the first are at one point");
+        assert_eq!(measure(&summary(&[]), ["robot1", "robot2"], &places).unwrap().deformed, None);
         assert_eq!(measure(&summary(&[]), ["robot1", "robot3"], &places), None);
         assert_eq!(measure(&summary(&[]), ["robot1", "robot2"], &[]), None);
     }
 
     #[test]
-    fn frames_are_measured_against_those_that_lay_the_places_best() {
-        // The second map shows all 0.2 m farther along x, and half of it 0.1 m up, half down.
+    fn frames_are_measured_against_the_best_rigid_fit() {
+        // The second map is shifted by 0.2 m along x, and half of its places by 0.1 m up, half down.
         let place = |i: i32| {
             let (x, y) = (f64::from(i % 5), f64::from(i / 5));
             [x + 0.2, y + if i % 2 == 0 { 0.1 } else { -0.1 }, x + 10.0, y]

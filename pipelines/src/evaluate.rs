@@ -1,17 +1,16 @@
-//! The summary of a run against the truth.
+//! Errors of a merge against the truth.
 //!
-//! A robot counts as **right** if its map lies within 0.5 m and 1 degree of the truth, the distance taken at the middle
-//! of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. In a log of robots
-//! that have nothing to do with each other (the truth has no frames) to refuse is right, and every merged
-//! robot is wrong. The reference robot is not counted.
+//! A robot counts as **right** if the pose of its map is within 0.5 m and 1 degree of the truth, the distance taken at the middle of
+//! its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. For unrelated robots (the truth has
+//! no frames) refusal is right, and every merged robot is wrong. The reference robot is not counted.
 //!
-//! Where the truth knows places that two robots have both seen (`common`), it is measured how far apart the merge has them,
-//! as the rigid frames lay them and as the maps are bent, and how far the frames lie from those that lay these places best.
+//! Where the truth lists places that two robots have both seen (`common`), their distances in the merge are measured, by the rigid
+//! frames and with the deformations, and the error of the frames against the best rigid fit of these places.
 
 use crate::common_places::{self, CommonPlace, CommonPlaces, normalised_error_squared, pose};
 use crate::merge_text::short;
-use crate::prose::broken;
 use crate::table::Table;
+use crate::text_wrapping::wrap;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::input_file;
@@ -26,107 +25,106 @@ pub const RIGHT_METRES: f64 = 0.5;
 /// Degrees. A robot is right below this error of its direction.
 pub const RIGHT_DEGREES: f64 = 1.0;
 
-/// What became of one robot.
+/// Outcome of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RobotOutcome {
-    /// It is merged, and where it belongs.
+    /// The robot is merged with the right pose.
     Right,
-    /// It is merged, and not where it belongs.
+    /// The robot is merged with a wrong pose.
     Wrong,
-    /// It is not merged, though it belongs to the others.
+    /// The robot is not merged, though it could be.
     Refused,
-    /// It is not merged, and does not belong to the others.
+    /// The robot is not merged, and is unrelated to the others.
     RightlyRefused,
-    /// The truth says nothing of it.
+    /// The truth does not contain the robot.
     NoTruth,
 }
 
-/// One robot of the summary, measured.
+/// Outcome and errors of a robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RobotResult {
     /// The robot.
     pub robot: String,
-    /// What became of it.
+    /// The outcome.
     pub outcome: RobotOutcome,
     /// Error at the middle of its map, metres; none if there is nothing to compare.
     pub error_m: Option<f64>,
     /// Error of its direction, degrees, 0 to 180; none if there is nothing to compare.
     pub error_deg: Option<f64>,
-    /// Squared error of its frame in x, y and yaw by the covariance that the run tells; none if there is nothing to compare,
-    /// or no covariance. Of frames whose covariance is right 95 % are below 7.81, and the mean is 3.
+    /// Normalised squared error of its frame in x, y and yaw by the covariance in the summary; none if there is nothing to compare, or
+    /// no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
     pub normalised_error_squared: Option<f64>,
     /// Why it is not merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// `T_true_found`: where its map frame was found to be, in the frame where it is in truth; none if there is nothing
-    /// to compare. It takes a point of the map from its true place to its found one.
+    /// `T_true_found`: the estimated pose of its map frame in the true frame; none if there is nothing to compare.
     #[serde(skip)]
     pub transform_true_found: Option<Isometry2<f64>>,
 }
 
-/// A run, measured.
+/// Outcomes and errors of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// The robot that the others are placed by; none if the run had no robots.
+    /// The reference robot; none if the run had no robots.
     pub reference: Option<String>,
-    /// Whether the truth says that the robots belong together.
+    /// Whether the robots are related by the truth.
     pub related: bool,
     /// All other robots, by name.
     pub robots: Vec<RobotResult>,
-    /// How many robots are right.
+    /// Number of robots that are right.
     pub right: usize,
-    /// How many are wrong.
+    /// Number of robots that are wrong.
     pub wrong: usize,
-    /// How many are not merged, rightly or not.
+    /// Number of robots that are not merged, rightly or not.
     pub refused: usize,
-    /// How far apart the same places lie, if the truth knows such and the robots are merged.
+    /// Distances of common places, if the truth lists such and the robots are merged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub common: Option<CommonPlaces>,
 }
 
 #[derive(Deserialize)]
 struct Truth {
-    /// None if the robots have nothing to do with each other.
+    /// Poses of the map frames; empty if the robots are unrelated.
     frames: BTreeMap<String, Frame>,
     /// The middle of each robot's last map, in its map frame.
     #[serde(default)]
     centres: BTreeMap<String, [f64; 2]>,
-    /// Places that the first two robots by name both have seen.
+    /// Places that the first two robots by name have both seen.
     #[serde(default)]
     common: Vec<CommonPlace>,
 }
 
-/// Measures the summary that `gridweave run --summary` wrote against a truth file. Where the truth has no frames, the
-/// robots are taken as unrelated. A robot for which the truth gives no middle is measured at its map's origin.
+/// Compares the summary of `gridweave run --summary` with a truth file. Where the truth has no frames, the
+/// robots are taken as unrelated. A robot without a middle in the truth is measured at the origin of its map.
 ///
 /// # Errors
-/// A file cannot be read or is not what it should be; or the truth knows robots, but not the summary's reference.
+/// A file cannot be read or has the wrong contents; or the truth has robots, but not the reference of the summary.
 pub fn evaluate(summary: &Path, truth: &Path) -> Result<Evaluation> {
     let merge = read_summary(summary)?;
     evaluate_summary(&merge, truth)
         .with_context(|| format!("cannot compare {} with {}", summary.display(), truth.display()))
 }
 
-/// Measures what a merge has found against a truth file, as [`evaluate`] does.
+/// Compares a summary with a truth file, as [`evaluate`] does.
 ///
 /// # Errors
-/// The truth cannot be read or is not what it should be; or it knows robots, but not the summary's reference.
+/// The truth cannot be read or has the wrong contents; or it has robots, but not the reference of the summary.
 pub fn evaluate_summary(summary: &Summary, truth: &Path) -> Result<Evaluation> {
     measure(summary, &read(truth, "a truth file")?)
 }
 
-/// What `--summary` has written.
+/// Reads a summary that `--summary` has written.
 pub(crate) fn read_summary(path: &Path) -> Result<Summary> {
     read(path, "the summary of a run")
 }
 
-/// Whether there is a truth that [`evaluate`] can read.
+/// Checks that [`evaluate`] can read a truth file.
 pub(crate) fn check_truth(path: &Path) -> Result<()> {
     read::<Truth>(path, "a truth file").map(|_| ())
 }
 
-/// A JSON file.
+/// Reads a JSON file.
 fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
     let text = input_file::read(path, input_file::LONGEST_TEXT)
         .with_context(|| format!("cannot read {what}: {}", path.display()))?;
@@ -199,7 +197,7 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
 }
 
 impl RobotOutcome {
-    /// For people.
+    /// The outcome as text.
     pub fn words(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -212,7 +210,7 @@ impl RobotOutcome {
 }
 
 impl Evaluation {
-    /// A table for people in lines of at most `width` characters: every robot, and the counts.
+    /// Formats a table of all robots, and the counts, in lines of at most `width` columns.
     pub fn to_text(&self, width: Option<usize>) -> String {
         let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
         let mut table = Table::new(["robot", "outcome", "error m", "error deg", ""]);
@@ -225,14 +223,13 @@ impl Evaluation {
                 robot.reason.as_deref().map(|reason| short(reason).replace('\n', " ")).unwrap_or_default(),
             ]);
         }
-        let unrelated = if self.related { "" } else { "; the truth has no frames: the robots are taken as unrelated" };
+        let unrelated = if self.related { "" } else { "; the truth has no frames: the robots count as unrelated" };
         let reference = self.reference.as_deref().unwrap_or("none");
         let Self { right, wrong, refused, .. } = self;
-        let common =
-            self.common.as_ref().map(|common| broken(&common.to_string(), 2, width) + "\n").unwrap_or_default();
+        let common = self.common.as_ref().map(|common| wrap(&common.to_string(), 2, width) + "\n").unwrap_or_default();
         let table = table.fit(width);
         let counts = format!("right {right}, wrong {wrong}, refused {refused} (reference {reference}{unrelated})");
-        format!("{table}{}\n{common}", broken(&counts, 2, width))
+        format!("{table}{}\n{common}", wrap(&counts, 2, width))
     }
 }
 

@@ -1,6 +1,6 @@
-//! The command `gridweave`, and the library behind it: the place where all stages and pipelines of Gridweave come together.
+//! The command `gridweave` and its library: the stage kinds of all crates, the shipped pipelines, and the commands.
 //!
-//! A program with stages of its own is the same command with more kinds:
+//! A program with other stages is the same command with more kinds:
 //!
 //! ```no_run
 //! # use gridweave_runtime::stage::StageKind;
@@ -17,15 +17,16 @@ pub mod common_places;
 pub mod evaluate;
 mod interrupt;
 mod job;
+mod logging;
 mod merge_log;
 mod merge_text;
-mod prose;
+
 pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
-mod telling;
 mod terminal;
+mod text_wrapping;
 
 use clap::Parser;
 use gridweave_runtime::pipeline::PipelineErrors;
@@ -34,25 +35,24 @@ use status::{BadUse, Status};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-/// Does what the command line says, with the stage kinds of Gridweave and the given ones; of two kinds with one name the
-/// given one counts. The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be
-/// merged.
+/// Runs the command line with the stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
+/// The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be merged.
 pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
     command_with(kinds, |_, _| {})
 }
 
-/// The same, with somebody who hears what is warned of in this process: the module that does, and its words.
-pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, hear: fn(&str, &str)) -> ExitCode {
+/// Runs the command line as [`command`] does, and calls `on_warning` for each warning of this process, with its module and its text.
+pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, on_warning: fn(&str, &str)) -> ExitCode {
     let registry = shipped::registry(kinds);
-    match cli::Cli::parse().execute(&registry, hear) {
+    match cli::Cli::parse().execute(&registry, on_warning) {
         Ok(Status::Done) => ExitCode::SUCCESS,
         Ok(Status::BadUse) => ExitCode::from(2),
         Ok(Status::Failed) => ExitCode::from(1),
         Ok(Status::NotAllMerged) => ExitCode::from(3),
         Err(error) => {
             match error.downcast_ref::<PipelineErrors>() {
-                Some(errors) => terminal::say(errors.render(std::io::stderr().is_terminal())),
-                None => terminal::say(format_args!("error: {error:#}")),
+                Some(errors) => terminal::eprint_line(errors.render(std::io::stderr().is_terminal())),
+                None => terminal::eprint_line(format_args!("error: {error:#}")),
             }
             ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })
         }

@@ -1,15 +1,15 @@
-//! What a merge has found, for people.
+//! The result of a merge as text.
 
-use crate::prose::{broken, cut};
 use crate::table::Table;
+use crate::text_wrapping::{wrap, wrap_up_to};
 use gridweave_logs::summary::{Bend, Frame, Summary};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Of the reason for what became of a pair so many lines are shown; `--explain` tells the whole of it.
+/// Maximum number of lines of the reason for a pair; `--explain` prints all.
 const REASON_LINES: usize = 3;
 
-/// Where the maps lie, which are not merged and why, and what became of each pair, in lines of at most `width` characters.
+/// Writes the poses of the maps, the robots that are not merged with reasons, and the decision on each pair, in lines of at most `width` columns.
 pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize>) -> std::fmt::Result {
     if let Some(reference) = &merge.reference {
         let merged = merge.frames.len();
@@ -21,26 +21,25 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize
         }
         out.push_str(&frames_table(&merge.frames).fit(width));
         if !merge.bends.is_empty() {
-            let head =
-                "how the maps are bent, and how well walls that several show come out as one (before, and bent):";
-            writeln!(out, "{}", broken(head, 2, width))?;
-            out.push_str(&bends_table(&merge.bends).fit(width));
+            let head = "deformation of bent maps, and sharpness of walls that several maps show (before and after):";
+            writeln!(out, "{}", wrap(head, 2, width))?;
+            out.push_str(&deformations_table(&merge.bends).fit(width));
         }
     }
     for (robot, reason) in &merge.unmerged {
         match short(reason) {
             line if !line.contains('\n') => {
-                writeln!(out, "{}", broken(&format!("not merged: {robot}: {line}"), 2, width))?
+                writeln!(out, "{}", wrap(&format!("not merged: {robot}: {line}"), 2, width))?
             }
             lines => {
                 writeln!(out, "not merged: {robot}:")?;
-                lines.lines().try_for_each(|line| writeln!(out, "{}", broken(&format!("  {line}"), 4, width)))?;
+                lines.lines().try_for_each(|line| writeln!(out, "{}", wrap(&format!("  {line}"), 4, width)))?;
             }
         }
     }
     for group in &merge.groups {
         let (count, reference) = (group.frames.len(), &group.reference);
-        writeln!(out, "{count} of these are tied to each other; map frames in the frame of {reference}:")?;
+        writeln!(out, "{count} of these are merged with each other; map frames in the frame of {reference}:")?;
         out.push_str(&frames_table(&group.frames).fit(width));
     }
     if merge.alignments.is_empty() {
@@ -58,13 +57,13 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize
     for (row, pair) in rows.zip(&merge.alignments) {
         write!(out, "{row}")?;
         if let Some(headline) = pair.reason.lines().next() {
-            writeln!(out, "{}", cut(&format!("    {headline}"), 4, width, REASON_LINES))?;
+            writeln!(out, "{}", wrap_up_to(&format!("    {headline}"), 4, width, REASON_LINES))?;
         }
     }
     Ok(())
 }
 
-/// All that is known of a robot and each other: the whole of every reason, in lines of at most `width` characters.
+/// Writes the full reasons for each pair of a robot, in lines of at most `width` columns.
 pub(crate) fn write_explanation(
     out: &mut String,
     merge: &Summary,
@@ -74,24 +73,24 @@ pub(crate) fn write_explanation(
     let pairs: Vec<_> = merge.alignments.iter().filter(|pair| pair.a == robot || pair.b == robot).collect();
     if let Some(reason) = merge.unmerged.get(robot).filter(|_| pairs.is_empty()) {
         writeln!(out)?;
-        let whole = format!("{robot} is not merged: {reason}");
-        whole.lines().try_for_each(|line| writeln!(out, "{}", broken(line, 2, width)))?;
+        let text = format!("{robot} is not merged: {reason}");
+        text.lines().try_for_each(|line| writeln!(out, "{}", wrap(line, 2, width)))?;
     }
     for pair in pairs {
         let outcome = if pair.accepted { "accepted" } else { "refused" };
         let head = format!("{} and {}, {outcome} with {:.3} by {}:", pair.a, pair.b, pair.score, pair.method);
-        writeln!(out, "\n{}", broken(&head, 4, width))?;
-        pair.reason.lines().try_for_each(|line| writeln!(out, "{}", broken(&format!("  {line}"), 4, width)))?;
+        writeln!(out, "\n{}", wrap(&head, 4, width))?;
+        pair.reason.lines().try_for_each(|line| writeln!(out, "{}", wrap(&format!("  {line}"), 4, width)))?;
     }
     Ok(())
 }
 
-/// The first paragraph of a reason: what everybody is shown.
+/// The first paragraph of a reason, which is shown without `--explain`.
 pub(crate) fn short(reason: &str) -> &str {
     reason.split("\n\n").next().unwrap_or(reason).trim_end()
 }
 
-/// Poses of map frames with their standard deviations.
+/// Makes the table of map frames with their standard deviations.
 fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
     let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
     for (robot, Frame { x, y, yaw, covariance }) in frames {
@@ -103,9 +102,10 @@ fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
     table
 }
 
-/// The most that each map is bent, and how far apart the drawings of its walls lie before and after.
-fn bends_table(bends: &BTreeMap<String, Bend>) -> Table {
-    let mut table = Table::new(["robot", "by m", "by deg", "over m", "walls apart m", "doubled walls"]);
+/// Makes the table of the largest displacement and rotation of each map, its size, and the thickness spread and share of double walls
+/// before and after.
+fn deformations_table(bends: &BTreeMap<String, Bend>) -> Table {
+    let mut table = Table::new(["robot", "max m", "max deg", "size m", "wall spread m", "double walls"]);
     for (robot, bend) in bends {
         let (before, after) = (&bend.sharpness_rigid, &bend.sharpness);
         table.row([
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_tied_to_each_other_only_are_shown_in_their_own_frame() {
+    fn robots_merged_only_with_each_other_are_shown_in_their_own_frame() {
         let frame = |x: f64| json!({"x": x, "y": 0.0, "yaw": 0.5, "covariance": vec![0.01; 9]});
         let merge = json!({
             "reference": "robot1",
@@ -143,14 +143,14 @@ mod tests {
         let text = text(merge);
         let lines: Vec<&str> = text.lines().collect();
         let start = lines.iter().position(|line| line.starts_with("2 of these")).unwrap();
-        assert_eq!(lines[start], "2 of these are tied to each other; map frames in the frame of robot2:");
+        assert_eq!(lines[start], "2 of these are merged with each other; map frames in the frame of robot2:");
         assert!(lines[start - 1].starts_with("not merged: robot3"), "{text}");
         assert!(lines[start + 3].contains("robot3") && lines[start + 3].contains("4.250"), "{text}");
     }
 
     #[test]
     fn no_line_is_wider_than_the_terminal_and_a_long_reason_is_cut() {
-        let reason = "walls of one map lie on free space of the other ".repeat(9);
+        let reason = "walls of one map are on free space of the other ".repeat(9);
         let pair = json!({
             "a": "robot1", "b": "robot2", "method": "tags+directions+icp; maps+maps+icp+walls", "x": 0.0, "y": 0.0, "yaw": 0.0,
             "score": 0.25, "accepted": false, "checked": false, "reason": reason,
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn bends_are_shown_with_what_they_do_to_the_walls() {
+    fn deformations_are_shown_with_their_effect_on_walls() {
         let sharpness = |apart_m: f64, doubled: f64| json!({"apart_m": apart_m, "doubled": doubled});
         let bend = json!({
             "largest_m": 0.25, "largest_deg": 1.5, "over_m": 40.0, "wall_matched_m": 90.0, "spacing": 3.0, "nodes": [],
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reason_is_shown_up_to_the_empty_line_and_explained_to_its_end() {
+    fn a_reason_is_shown_to_the_empty_line_and_explained_in_full() {
         let reason = "the maps fit at 2 places\ntry: one tag\n\nthe whole of it";
         let merge = json!({
             "reference": "robot1",

@@ -1,19 +1,19 @@
-//! What ships: the stage kinds of all crates, and the pipeline files.
+//! The shipped stage kinds and pipelines.
 
 use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::Path;
 
-/// The stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
+/// Makes the registry of the stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
 pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
     Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()).chain(kinds))
 }
 
-/// A pipeline that ships.
+/// A shipped pipeline.
 pub struct Shipped {
     /// Its name.
     pub name: &'static str,
-    /// What it does, in a line.
+    /// A description in one line.
     pub what: &'static str,
     /// Its file.
     pub text: &'static str,
@@ -25,57 +25,57 @@ macro_rules! shipped {
     };
 }
 
-/// The pipelines that ship, by name.
+/// The shipped pipelines, by name.
 pub const PIPELINES: &[Shipped] = &[
     shipped!(
         "auto_merge",
-        "merge by tags and by the maps: whatever the maps confirm (what `gridweave merge` runs on logs)"
+        "merge by tags and maps; the maps must confirm each result (run by `gridweave merge` on logs)"
     ),
-    shipped!("cut", "cut a piece out of logs: a stretch of time, some topics, or both"),
+    shipped!("cut", "cut a time range or some topics out of logs"),
     shipped!(
         "group_mapping",
         "merge as Saeedi et al. 2014: Radon transforms, Voronoi edges, entropy filter (to compare)"
     ),
     shipped!("hough_spectrum", "merge as Carpin 2008: Hough spectra (to compare)"),
     shipped!("live", "merge by tags while the robots explore"),
-    shipped!("live_merge", "merge by tags and by the maps while the robots explore"),
-    shipped!("map_file_merge", "merge map files (what `gridweave merge` runs on these)"),
+    shipped!("live_merge", "merge by tags and maps while the robots explore"),
+    shipped!("map_file_merge", "merge map files (run by `gridweave merge` on map files)"),
     shipped!("map_files_to_log", "write map files as a log that the other pipelines read"),
-    shipped!("map_merge", "merge by the maps alone"),
+    shipped!("map_merge", "map-only merge"),
     shipped!("random_walk", "merge as Birk and Carpin 2006: random walks (to compare)"),
     shipped!(
         "scan_merge",
-        "merge where maps must be drawn from scans first (what `gridweave merge` runs where robots have scans and no map)"
+        "build maps from scans, then merge (run by `gridweave merge` where robots have scans and no map)"
     ),
-    shipped!("simulate", "simulate robots in a building (what `gridweave simulate` runs)"),
+    shipped!("simulate", "simulate robots in a building (run by `gridweave simulate`)"),
     shipped!("tag_direction", "merge as Tsardoulias et al., method 2: tags and the direction of walls (to compare)"),
     shipped!(
         "tag_frames",
-        "place the frames of robots by tags, without maps (what `gridweave merge` runs where there are none)"
+        "estimate the frames of robots by tags, without maps (run by `gridweave merge` where there are none)"
     ),
     shipped!("tag_merge", "merge by tags, directions and ICP, confirmed by the maps: Tsardoulias et al., method 3"),
-    shipped!("tag_only", "merge as Tsardoulias et al., method 1: tags alone (to compare)"),
+    shipped!("tag_only", "merge as Tsardoulias et al., method 1: only tags (to compare)"),
     shipped!("topological", "merge as Wang et al.: topological maps (to compare)"),
-    shipped!("topology_file_merge", "lay topological maps that were drawn by hand on each other (JSON)"),
+    shipped!("topology_file_merge", "merge topological maps that were drawn by hand (JSON)"),
 ];
 
-/// The pipeline that ships under a name.
+/// Finds a shipped pipeline by name.
 ///
 /// # Errors
-/// There is none: a text that says so, and which was probably meant.
+/// There is none; the text suggests a similar name.
 pub fn find(name: &str) -> Result<&'static Shipped, String> {
     let names: Vec<&str> = PIPELINES.iter().map(|shipped| shipped.name).collect();
     let meant = || suggest(name, &names, "there are").unwrap_or_default();
     let found = PIPELINES.iter().find(|shipped| shipped.name == name);
-    found.ok_or_else(|| format!("no pipeline `{name}` ships: {}", meant()))
+    found.ok_or_else(|| format!("no shipped pipeline `{name}`: {}", meant()))
 }
 
 /// Loads a pipeline file, or the shipped pipeline of that name.
 ///
 /// # Errors
-/// The file cannot be read, or the pipeline is wrong: the error shows everything that is.
+/// The file cannot be read, or the pipeline is wrong: the error shows everything that is wrong.
 pub fn load(pipeline: &Path, overrides: &Overrides, registry: &Registry) -> Result<Pipeline, PipelineErrors> {
-    // A file that is there comes before a pipeline of that name.
+    // A file takes precedence over a shipped pipeline of the same name.
     let name = pipeline.to_str().filter(|name| is_name(name) && !pipeline.exists());
     match name.map(find) {
         Some(Ok(Shipped { name, text, .. })) => {
@@ -89,7 +89,7 @@ pub fn load(pipeline: &Path, overrides: &Overrides, registry: &Registry) -> Resu
     }
 }
 
-/// Whether this can be the name of a pipeline that ships, and not only the path of a file.
+/// Whether a text can be the name of a shipped pipeline, and not only the path of a file.
 fn is_name(text: &str) -> bool {
     !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
 }

@@ -1,19 +1,19 @@
-//! How a command ends.
+//! Outcomes of a command.
 
-/// The command line asks for something that cannot be.
+/// An error in the command line: exit status 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct BadUse(pub(crate) String);
 
-/// How a command ended, as its exit status says it.
+/// Outcome of a command, which decides its exit status.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Status {
     /// All is done.
     Done,
-    /// It was used wrongly; what is wrong has been said.
+    /// The command line was wrong; the error has been printed.
     BadUse,
-    /// Something is not as it should be; what that is has been said.
+    /// The command failed; the error has been printed.
     Failed,
-    /// It is done, but some robots could not be merged.
+    /// All is done, but some robots could not be merged.
     NotAllMerged,
 }

@@ -1,8 +1,8 @@
-//! What a run has found, as JSON and as text.
+//! The summary of a run as JSON and as text.
 
 use crate::merge_text::{write_explanation, write_merge};
-use crate::prose::broken;
 use crate::table::Table;
+use crate::text_wrapping::wrap;
 use anyhow::{Result, bail};
 use gridweave_logs::summary::{Areas, Summary};
 use gridweave_runtime::engine::{RunReport, StageReport};
@@ -11,44 +11,44 @@ use serde::ser::{SerializeMap, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What a run has found and done: the form that `--summary` writes.
+/// The summary of a run, as `--summary` writes it.
 #[derive(Debug, serde::Serialize)]
 pub struct RunSummary {
     /// The version of Gridweave.
     pub version: &'static str,
-    /// What was merged; none if the pipeline merges nothing.
+    /// The result of the merge; none if the pipeline merges nothing.
     #[serde(flatten)]
     pub merge: Option<Summary>,
-    /// What every stage has done, in the order of the pipeline.
+    /// Statistics of every stage, in the order of the pipeline.
     #[serde(serialize_with = "by_name")]
     pub stages: Vec<StageSummary>,
 }
 
-/// What a stage has done.
+/// Statistics of a stage.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct StageSummary {
     /// Its name.
     #[serde(skip)]
     pub name: String,
-    /// Messages it was given.
+    /// Number of messages received.
     pub messages_in: u64,
-    /// Messages it has sent.
+    /// Number of messages sent.
     pub messages_out: u64,
-    /// How long it worked, milliseconds.
+    /// Time of its work, milliseconds.
     pub busy_ms: f64,
-    /// What was wrong with its input, and how often.
+    /// Warnings about its input, with their counts.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub warnings: BTreeMap<String, u64>,
-    /// What it has counted of its work.
+    /// Counts of its work by name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub counts: BTreeMap<String, u64>,
-    /// How far the maps agree that it has fused.
+    /// Areas of agreement and conflict of the maps that it has fused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<Areas>,
-    /// Messages that a live run has dropped on their way to it.
+    /// Number of messages to it that a live run has dropped.
     #[serde(skip_serializing_if = "is_zero")]
     pub dropped: u64,
-    /// How often a live run has started it again.
+    /// Number of restarts in a live run.
     #[serde(skip_serializing_if = "is_zero")]
     pub restarts: u64,
 }
@@ -80,37 +80,36 @@ impl StageSummary {
 }
 
 impl RunSummary {
-    /// The summary of a run that has merged what `merge` says, if it was to merge anything.
+    /// Makes the summary of a run from the result of the merge, if there is one, and the report of the engine.
     pub fn new(mut merge: Option<Summary>, report: &RunReport) -> Self {
         let mut areas = merge.as_mut().map(|merge| std::mem::take(&mut merge.areas)).unwrap_or_default();
         let stages = report.stages.iter().map(|stage| StageSummary::new(stage, areas.remove(&stage.name))).collect();
         Self { version: env!("CARGO_PKG_VERSION"), merge, stages }
     }
 
-    /// The JSON text.
+    /// Formats the summary as JSON.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// Whether some robot could not be merged.
+    /// Whether a robot could not be merged.
     pub fn has_unmerged(&self) -> bool {
         self.merge.as_ref().is_some_and(|merge| !merge.unmerged.is_empty())
     }
 
-    /// An error if the run was to merge maps, and there were none.
+    /// Checks that a run that merges maps had any.
     pub(crate) fn check_for_maps(&self) -> Result<()> {
         if self.merge.as_ref().is_some_and(|merge| merge.frames.is_empty() && merge.unmerged.is_empty()) {
             bail!(
-                "the input holds no map that can be used: a nav_msgs/msg/OccupancyGrid is needed for each robot, by \
-                 default on /ROBOT/map; `gridweave info LOG` shows what there is, and [robots] in the pipeline file \
-                 says what the topics are called{}",
+                "the input has no usable map: a nav_msgs/msg/OccupancyGrid is needed for each robot, by default on /ROBOT/map; \
+                 `gridweave info LOG` lists the topics, and [robots] in the pipeline file names those that are read{}",
                 self.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>()
             );
         }
         Ok(())
     }
 
-    /// The summary for people in lines of at most `width` characters, with the whole of what is known of some robots.
+    /// Formats the summary in lines of at most `width` columns, with the full reasons for some robots.
     pub fn to_text(&self, explained: &[String], width: Option<usize>) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -121,7 +120,7 @@ impl RunSummary {
         text
     }
 
-    /// An error if there is no robot of one of these names.
+    /// Checks that there are robots of these names.
     pub(crate) fn check_robots(&self, names: &[String]) -> Result<()> {
         let Some(merge) = &self.merge else { return Ok(()) };
         let known: Vec<&str> = merge.frames.keys().chain(merge.unmerged.keys()).map(String::as_str).collect();
@@ -141,11 +140,14 @@ impl RunSummary {
         for (stage, area) in self.stages.iter().filter_map(|stage| Some((&stage.name, stage.area?))) {
             write_areas(out, stage, &area, width)?;
         }
-        self.warning_lines().try_for_each(|line| writeln!(out, "{}", broken(&line, 2, width)))?;
-        // Only a live run has any of these.
+        self.warning_lines().try_for_each(|line| writeln!(out, "{}", wrap(&line, 2, width)))?;
+        // Only live runs have dropped messages and restarts.
         for StageSummary { name, dropped, restarts, .. } in &self.stages {
             if *dropped > 0 {
-                writeln!(out, "dropped: {name}: {dropped} messages, for which it had no room or while it was away")?;
+                writeln!(
+                    out,
+                    "dropped: {name}: {dropped} messages, because its queue was full or it was being restarted"
+                )?;
             }
             if *restarts > 0 {
                 writeln!(out, "restarted: {name}: {restarts} times after a failure")?;
@@ -158,7 +160,7 @@ impl RunSummary {
         write!(out, "\n{}", table.fit(width))
     }
 
-    /// The warnings for people, a line each.
+    /// Formats the warnings, a line each.
     pub(crate) fn warning_lines(&self) -> impl Iterator<Item = String> {
         self.warnings().map(|(stage, what, count)| {
             let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
@@ -166,7 +168,7 @@ impl RunSummary {
         })
     }
 
-    /// All warnings: stage, text, count.
+    /// Iterates over all warnings: stage, text, count.
     fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
         self.stages
             .iter()
@@ -174,7 +176,7 @@ impl RunSummary {
     }
 }
 
-/// How much of a fused map is known, and how much of it is in conflict.
+/// Writes the known area of a fused map and the area in conflict.
 fn write_areas(out: &mut String, stage: &str, area: &Areas, width: Option<usize>) -> std::fmt::Result {
     let Areas { known_to_one_m2, known_to_several_m2, in_conflict_m2, conflict_share } = *area;
     let mut line = format!("{stage}: {known_to_one_m2:.1} m2 known to one map, {known_to_several_m2:.1} m2 to several");
@@ -182,5 +184,5 @@ fn write_areas(out: &mut String, stage: &str, area: &Areas, width: Option<usize>
         let percent = 100.0 * conflict_share;
         write!(line, ", which contradict each other on {in_conflict_m2:.1} m2 of it ({percent:.1} %)")?;
     }
-    writeln!(out, "\n{}", broken(&line, 2, width))
+    writeln!(out, "\n{}", wrap(&line, 2, width))
 }

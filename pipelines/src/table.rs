@@ -1,17 +1,21 @@
 //! Tables in plain text.
+//!
+//! `comfy-table` does not fit: it would break type and topic names within narrow columns, where here columns that do not fit stand
+//! below the others, and it gives no lines by row, between which reasons are printed.
 
 mod layout;
 
 use crate::terminal;
 use layout::Layout;
+use textwrap::core::display_width;
 
-/// Lines up columns: those of numbers, with their units or without, to the right, all others to the left.
+/// A table whose columns of numbers, with or without units, are aligned to the right and all others to the left.
 pub struct Table {
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// A table with the given heads.
+    /// Creates a table with the given column heads.
     pub fn new<'a>(heads: impl IntoIterator<Item = &'a str>) -> Self {
         Self { rows: vec![heads.into_iter().map(str::to_owned).collect()] }
     }
@@ -20,10 +24,8 @@ impl Table {
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
-}
 
-impl Table {
-    /// The table in Markdown.
+    /// Formats the table in Markdown.
     pub fn to_markdown(&self) -> String {
         let line = |row: &Vec<String>| {
             let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
@@ -34,7 +36,7 @@ impl Table {
         heads.iter().map(|row| line(row) + &rule(row)).chain(rows.iter().map(line)).collect()
     }
 
-    /// The table as comma-separated values (RFC 4180).
+    /// Formats the table as comma-separated values (RFC 4180).
     pub fn to_csv(&self) -> String {
         let quoted = |cell: &String| match cell.contains([',', '"', '\n', '\r']) {
             true => format!("\"{}\"", cell.replace('"', "\"\"")),
@@ -43,27 +45,27 @@ impl Table {
         self.rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
     }
 
-    /// The table in lines of at most `width` characters, as wide as it is if there is none. Texts are broken within their
-    /// columns; columns that do not fit beside the others stand below them, in lines that are indented.
+    /// Formats the table in lines of at most `width` columns of the terminal, or of any width if there is none. Texts are wrapped
+    /// within their columns; columns that do not fit beside the others stand below them, indented.
     pub fn fit(&self, width: Option<usize>) -> String {
         self.fit_rows(width).concat()
     }
 
-    /// The same, the lines of each row apart from those of others; the heads are the first.
+    /// Formats each row as [`fit`](Self::fit) does; the first are the heads.
     pub fn fit_rows(&self, width: Option<usize>) -> Vec<String> {
         let layout = Layout::new(self, width.unwrap_or(usize::MAX));
         self.rows.iter().map(|row| layout.row(row)).collect()
     }
 
-    /// The table as wide as the terminal that it is printed to; none where standard output is no terminal.
+    /// Formats the table for the terminal on standard output; `None` if that is no terminal.
     pub fn to_terminal(&self) -> Option<String> {
         terminal::width().map(|width| self.fit(Some(width)))
     }
 
-    /// Takes out columns with these heads, the first of them first, until the table is no wider than `width`.
+    /// Removes columns with these heads, in their order, until the table is no wider than `width`.
     pub fn narrow_to(&mut self, width: usize, heads: &[&str]) {
         for head in heads {
-            if self.fit(None).lines().all(|line| line.chars().count() <= width) {
+            if self.fit(None).lines().all(|line| display_width(line) <= width) {
                 return;
             }
             if let Some(column) = self.rows[0].iter().position(|own| own == head) {
@@ -91,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stand_to_the_right_and_text_to_the_left() {
+    fn numbers_are_aligned_right_and_texts_left() {
         let mut table = Table::new(["robot", "x", "why"]);
         table.row(["robot1".into(), "0.1".into(), "a".into()]);
         table.row(["r".into(), "-10.1".into(), "bcd".into()]);
@@ -120,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn no_line_is_wider_than_was_asked_for_and_no_word_is_lost() {
+    fn no_line_is_wider_than_the_width_and_no_word_is_lost() {
         let mut table = topics();
         table.row(["/a".into(), "t".repeat(70), "1".into(), String::new(), "a long sentence ".repeat(20)]);
         let letters = |text: &str| text.chars().filter(|c| !c.is_whitespace()).count();
@@ -132,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sentence_is_broken_within_its_column() {
+    fn a_sentence_is_wrapped_within_its_column() {
         let mut table = Table::new(["robot", "error m", "why"]);
         table.row([
             "robot2".into(),
@@ -148,10 +150,18 @@ mod tests {
     }
 
     #[test]
-    fn the_columns_that_matter_least_are_taken_out_of_a_table_that_is_too_wide() {
+    fn a_table_that_is_too_wide_loses_the_columns_that_are_named_first() {
         let mut table = topics();
         table.narrow_to(51, &["frame", "Hz", "type"]);
         assert_eq!(table.to_string().lines().next(), Some("  topic        type                        messages"));
+    }
+
+    #[test]
+    fn wide_characters_are_aligned() {
+        let mut table = Table::new(["robot", "x", "why"]);
+        table.row(["地図".into(), "1".into(), "a".into()]);
+        table.row(["robot1".into(), "10".into(), "b".into()]);
+        assert_eq!(table.to_string(), "  robot    x  why\n  地図     1  a\n  robot1  10  b\n");
     }
 
     #[test]

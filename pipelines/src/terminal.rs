@@ -1,44 +1,44 @@
-//! What the command prints: results to standard output, and all that is said beside them to standard error.
+//! Printing of results to standard output and of messages to standard error, and the width of the terminal.
 //!
-//! Either may be closed, or may lead to a full disk. A program that has read enough of the results is no failure; results that
-//! cannot be written are one, and what cannot be said is left unsaid.
+//! Either may be closed, or may lead to a full disk. A reader of the results that has closed its end is no failure; results that
+//! cannot be written are one; messages that cannot be written are dropped.
 
 use anyhow::{Context, Result};
 use gridweave_runtime::pipeline::TEXT_WIDTH;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
-/// On a narrower terminal lines are broken as on one of this width.
-const LEAST_WIDTH: usize = 40;
+/// Lines are not wrapped narrower than this, columns.
+const MIN_WIDTH: usize = 40;
 
-/// Prints a result, without a line end behind it. Gives whether anybody reads on.
+/// Prints a result without a line end. Returns whether the reader is still there.
 ///
 /// # Errors
-/// It cannot be written, for another reason than that nobody reads it.
+/// The result cannot be written, for another reason than a closed pipe.
 pub(crate) fn print(text: impl Display) -> Result<bool> {
     write_to(&mut io::stdout().lock(), text)
 }
 
-/// The same, and a line end.
+/// Prints a result and a line end, as [`print`] does.
 pub(crate) fn print_line(text: impl Display) -> Result<bool> {
     print(format_args!("{text}\n"))
 }
 
-/// Says a line on standard error.
-pub(crate) fn say(text: impl Display) {
-    // There is nobody else to be told.
+/// Prints a line to standard error.
+pub(crate) fn eprint_line(text: impl Display) {
+    // There is no other place to report this error to.
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// How many characters a line of the results may have: what `COLUMNS` says or, on a terminal, its width. None where nobody says:
-/// programs that read on get their lines whole.
+/// The greatest width of a line of the results, columns: `COLUMNS` or else the width of the terminal. `None` for a pipe or a file, so
+/// that programs read whole lines.
 pub(crate) fn width() -> Option<usize> {
-    let said = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
+    let given = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let measured = || terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));
-    said.or_else(measured).filter(|width| *width > 0).map(|width: usize| width.max(LEAST_WIDTH))
+    given.or_else(measured).filter(|width| *width > 0).map(|width: usize| width.max(MIN_WIDTH))
 }
 
-/// The width that prose is filled to.
+/// The width that paragraphs are wrapped to, columns.
 pub(crate) fn text_width() -> usize {
     width().unwrap_or(TEXT_WIDTH).min(TEXT_WIDTH)
 }
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_that_has_gone_is_no_failure_and_a_full_disk_is_one() {
+    fn a_closed_pipe_is_no_failure_and_a_full_disk_is_one() {
         assert!(write_to(&mut Vec::new(), "a").unwrap());
         assert!(!write_to(&mut Failing(ErrorKind::BrokenPipe), "a").unwrap());
         assert!(write_to(&mut Failing(ErrorKind::StorageFull), "a").is_err());

@@ -23,7 +23,7 @@ fn a_port_that_is_taken_ends_the_run_and_is_told() {
     let run = gridweave(folder.path(), &["run", "live_merge", "-o", "out.mcap", &view]);
     run.assert(1, &[&format!("serve Foxglove on 127.0.0.1:{port}"), "in use", "choose another"]);
     let wrong = gridweave(folder.path(), &["run", "live_merge", "-o", "out.mcap", "--view=nowhere"]);
-    wrong.assert(2, &["`--view=nowhere` is no address"]);
+    wrong.assert(2, &["`--view=nowhere` is not an address"]);
 }
 
 #[test]

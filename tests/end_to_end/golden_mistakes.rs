@@ -12,9 +12,9 @@ fn a_mistake_in_stage_toml_is_shown_with_the_right_name() {
         ("[inputs]", "certainty = 7.0\n[inputs]", "`certainty` is out of range"),
         ("[inputs]", "[input]", "did you mean `inputs`?"),
         ("estimates =", "estimate =", "has no input `estimate`; did you mean `estimates`?"),
-        ("estimates = \"/{robot}/tags\"", "", "no topic feeds the input `estimates`"),
-        ("/{robot}/tags", "{robot}/tags", "is no pattern of topics"),
-        ("/{robot}/tags", "/{robot}/tag", "fits `/{robot}/tag`, the input `estimates`; it has `/robot1/tags`"),
+        ("estimates = \"/{robot}/tags\"", "", "the input `estimates` of `tag_filter` has no topic"),
+        ("/{robot}/tags", "{robot}/tags", "is not a topic pattern"),
+        ("/{robot}/tags", "/{robot}/tag", "matches `/{robot}/tag` of the input `estimates`; it has `/robot1/tags`"),
         ("\"/{robot}/tags\"", "7", "expected a topic in quotes"),
         ("[inputs]", "[compare]\ntolerance = 1\n[inputs]", "expected `float_tolerance`"),
         ("[inputs]", "[compare]\nfloat_tolerance = -1\n[inputs]", "must be 0 or more"),
@@ -22,8 +22,8 @@ fn a_mistake_in_stage_toml_is_shown_with_the_right_name() {
         ("[inputs]", "[[expect]]\nports = \"common\"\n[inputs]", "unknown field `ports`"),
         ("[inputs]", "[[expect]]\nport = \"common\"\n[inputs]", "neither `field` nor `messages`"),
         ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a[\"\nlength = 1\n[inputs]", "is no path to a field"),
-        ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a\"\n[inputs]", "goes with one of"),
-        ("[inputs]", "[[expect]]\nwarning = \"a\"\n[inputs]", "`warning` goes with `count`"),
+        ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a\"\n[inputs]", "`field` needs one of"),
+        ("[inputs]", "[[expect]]\nwarning = \"a\"\n[inputs]", "`warning` needs `count`"),
         ("[inputs]", "[pipeline]\nseeds = 1\n[inputs]", "did you mean `seed`?"),
         ("[stage]", "[stage", "stage.toml"),
     ] {
@@ -38,7 +38,7 @@ fn a_folder_without_cases_is_bad_use() {
     cases.folder("tag_filter");
     cases.golden(&["--partial"]).assert(2, &["there is no case in cases", "KIND/CASE with stage.toml"]);
     cases.stage("tag_filter", TAGS);
-    cases.golden(&["--partial"]).assert(2, &["cases/tag_filter/stage.toml lies among the cases of a kind"]);
+    cases.golden(&["--partial"]).assert(2, &["cases/tag_filter/stage.toml is not in the folder of a case"]);
     fs::remove_dir_all(cases.0.path().join("cases")).unwrap();
     cases.golden(&[]).assert(2, &["there is no folder cases", "--cases FOLDER"]);
 }
@@ -50,7 +50,7 @@ fn an_input_that_cannot_be_used_fails_its_case() {
     cases.input("tag_filter/four_tags", |log| {
         log.pose(1.0, "robot1", 0.0, 0.0).pose(1.0, "a", 0.0, 0.0);
     });
-    cases.assert_fails(&["no topic of input.mcap fits `/{robot}/tags`", "it has `/robot1/pose`, `/a/pose`"]);
+    cases.assert_fails(&["no topic of input.mcap matches `/{robot}/tags`", "it has `/robot1/pose`, `/a/pose`"]);
     cases.input("tag_filter/four_tags", |log| {
         log.raw(1.0, "/robot1/tags", "geometry_msgs/msg/PoseStamped", &[]);
     });
@@ -67,7 +67,7 @@ fn an_input_that_cannot_be_used_fails_its_case() {
     cases.assert_fails(&["there is no cases/tag_filter/four_tags/input.mcap"]);
     cases.stage("simulator/one", "[stage]\nkind = \"simulator\"\nrobots = 1\nduration = 1\n");
     cases.input("simulator/one", |_| {});
-    cases.assert_fails(&["nothing takes input.mcap"]);
+    cases.assert_fails(&["input.mcap is not used"]);
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn a_field_that_differs_is_told_with_topic_time_and_values() {
         "/tag_filter/common at 1700000002.000000000",
         "tags: expected 4 elements, got 3 elements",
         "reason: expected \"",
-        "what the stage has sent: golden-differences/tag_filter/four_tags/got.mcap",
+        "the messages of the stage: golden-differences/tag_filter/four_tags/got.mcap",
     ]);
     assert!(cases.differences().join("tag_filter/four_tags/got.mcap").exists());
     let ended = cases.golden(&["--partial", "--limit", "1", "--differences", "elsewhere"]);
@@ -143,21 +143,21 @@ fn what_must_hold_is_checked_even_when_blessing() {
         ("port = \"common\"\nmessages = 2", "`common` is to send 2 messages, and has sent 1"),
         (
             "port = \"common\"\nfield = \"tags[3].tag_id\"\nequals = \"9\"",
-            "tags[3].tag_id of message 0 of `common` is to be \"9\", and is \"tag3\"",
+            "tags[3].tag_id of message 0 of `common` must be \"9\", and is \"tag3\"",
         ),
         ("port = \"common\"\nmessage = 5\nfield = \"tags\"\nlength = 4", "none with the number 5"),
-        ("port = \"common\"\nfield = \"tags\"\nlength = 3", "is to have 3 elements, and has 4"),
+        ("port = \"common\"\nfield = \"tags\"\nlength = 3", "must have 3 elements, and has 4"),
         ("port = \"common\"\nfield = \"tag\"\nlength = 3", "has no field `tag`; it has header"),
         ("port = \"common\"\nfield = \"tags[1].a\"\nequals = [5, 1.2]\nwithin = 0.1", "within 0.1, and is [5.0, 1.0]"),
         (
             "port = \"common\"\nfield = \"tags[0].covariance_a\"\nvalue = 0\ncount = 3",
-            "is to have 3 elements with the value 0, and has 2",
+            "must have 3 elements of the value 0, and has 2",
         ),
-        ("warning = \"nothing\"\ncount = 1", "the warning \"nothing\" is to be given 1 times, and was 0 times"),
+        ("warning = \"nothing\"\ncount = 1", "the warning \"nothing\" must be given 1 times, and was given 0 times"),
     ] {
         let cases = Cases::four_tags(&expect(wrong));
         cases.assert_fails(&[says]);
-        cases.bless().assert(1, &[says, "not blessed, since what must hold does not"]);
+        cases.bless().assert(1, &[says, "not blessed, since a condition of [[expect]] does not hold"]);
         assert!(!cases.expected("tag_filter/four_tags").exists());
     }
 }

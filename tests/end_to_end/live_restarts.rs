@@ -28,7 +28,7 @@ fn comes_back(stage: &str) {
         0,
         &[
             &format!("stage `{stage}` lost its process, which was ended by signal 9 (SIGKILL)"),
-            "started again in 1.0 s",
+            "restarting in 1.0 s",
         ],
     );
     done.assert_right(&truth);
@@ -85,7 +85,7 @@ fn a_stage_that_hangs_is_started_again() {
     wait_until("more output", || run.number("output", "messages_in") > 49);
     let ended = run.interrupt().ended;
     assert!(
-        ended.stderr.contains("stage `middle` hangs") && ended.stderr.contains("started again in 0.5 s"),
+        ended.stderr.contains("stage `middle` hangs") && ended.stderr.contains("restarting in 0.5 s"),
         "{ended:#?}"
     );
 }
@@ -166,7 +166,7 @@ fn a_stage_that_fills_the_memory_is_started_again() {
     wait_until("restart", || run.number("middle", "restarts") >= 1);
     wait_until("more output", || run.number("output", "messages_in") > 49);
     let ended = run.interrupt().ended;
-    assert!(ended.stderr.contains("memory_limit") && ended.stderr.contains("started again in 0.5 s"), "{ended:#?}");
+    assert!(ended.stderr.contains("memory_limit") && ended.stderr.contains("restarting in 0.5 s"), "{ended:#?}");
 }
 
 #[test]

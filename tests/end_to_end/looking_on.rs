@@ -74,7 +74,7 @@ fn of_several_runs_of_one_name_one_must_be_chosen() {
     let args = ["tap", "source", "--run", "twins"];
     let tap = start(runs[0].folder.path(), &args, &[]).wait();
     let names = runs.each_ref().map(|run| format!("twins ({}", run_name(run.id())));
-    tap.assert(2, &["several runs are going on", &names[0], &names[1], "choose one with --run"]);
+    tap.assert(2, &["several runs are in progress", &names[0], &names[1], "choose one with --run"]);
     runs.into_iter().for_each(|run| run.interrupt().assert_done());
 }
 
@@ -230,10 +230,10 @@ fn without_a_run_the_commands_say_what_to_do() {
     for args in [&["tap", "a.b"][..], &["top"], &["record", "-o", "x.mcap"], &["play", LOG]] {
         let args = [args, &["--wait", "0", "--run", "nowhere"]].concat();
         let ended = start(folder.path(), &args, &[]).wait();
-        ended.assert(1, &["going on"]);
+        ended.assert(1, &["in progress"]);
         assert!(
             ended.stderr.contains("start one with `gridweave run")
-                || ended.stderr.contains("no run called nowhere is going on; there are"),
+                || ended.stderr.contains("no run nowhere is in progress; there are"),
             "{ended:#?}"
         );
     }

@@ -306,7 +306,7 @@ fn neither_a_map_nor_its_image_is_overwritten_and_no_file_is_written_twice() {
         (&["-o", "merged.yaml", "--summary", "a.yaml"], "a.yaml is an input"),
         (&["-o", "merged.yaml", "--picture", "merged.pgm"], "merged.pgm would be written twice"),
         (&["-o", "out.mcap", "--summary", "./out.mcap"], "would be written twice"),
-        (&["-o", "merged.yaml", "--map", "other.yaml"], "leave --map out"),
+        (&["-o", "merged.yaml", "--map", "other.yaml"], "omit --map"),
         (&["-o", "merged.yaml", "--results-only"], "--results-only"),
     ] {
         merge(folder.path(), &[&["a.yaml", "b.yaml"], args].concat()).assert(2, &[word]);

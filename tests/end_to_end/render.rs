@@ -16,7 +16,7 @@ fn a_picture_is_written_in_the_format_of_its_name_and_is_the_same_every_time() {
     let folder = folder();
     for (name, magic) in [("a.png", &b"\x89PNG"[..]), ("a.SVG", b"<svg"), ("a.pdf", b"%PDF")] {
         let args = ["render", "merged.mcap", "-o", name, "--show", "all", "--grid", "1"];
-        let says = "robot1, robot2 as they were merged, and <script>alert(1)<&'\" beside them";
+        let says = "robot1, robot2 aligned, and <script>alert(1)<&'\" beside them";
         gridweave(folder.path(), &args).assert(0, &[says]);
         let first = fs::read(folder.path().join(name)).unwrap();
         assert!(first.starts_with(magic), "{name}");
@@ -55,7 +55,7 @@ fn what_cannot_be_drawn_is_told() {
     refused(&["-o", "a.jpg"], "a.jpg ends on none of .png, .svg and .pdf");
     refused(&["-o", "a.png", "--robot", "robot3"], "there is no map of a robot `robot3`");
     refused(&["-o", "a.png", "--grid", "0"], "--grid: a line every 0 m cannot be drawn");
-    refused(&["-o", "a.png", "--at=-1"], "--at must be 0 seconds or above");
+    refused(&["-o", "a.png", "--at=-1"], "--at must be 0 s or more");
     refused(&["-o", "a.png", "--show", "everything"], "invalid value 'everything'");
     assert!(!folder.path().join("a.png").exists());
     gridweave(folder.path(), &["render", "nothing.mcap", "-o", "a.png"]).assert(1, &["nothing.mcap"]);

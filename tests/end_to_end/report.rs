@@ -75,6 +75,6 @@ fn what_cannot_be_reported_is_told() {
     refused(&["a.yaml"], 2, "`report` reads logs");
     refused(&["report.html"], 2, "would be overwritten");
     fs::write(folder.path().join("wrong.json"), "{}").unwrap();
-    refused(&["merged.mcap", "--summary", "wrong.json"], 1, "wrong.json is no summary");
+    refused(&["merged.mcap", "--summary", "wrong.json"], 1, "wrong.json is not a summary");
     refused(&["merged.mcap", "--topics", "/icp/alignment"], 1, "there is nothing to report");
 }

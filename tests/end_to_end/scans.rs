@@ -35,7 +35,7 @@ fn robots_with_scans_and_poses_and_without_maps_are_merged() {
     logs_with(folder, "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges");
     gridweave(folder, &["info", "scans.mcap"])
         .assert(0, &["there is no map of robot1: `merge` draws one from its", "at the poses of /robot1/pose"]);
-    merge(folder).assert(0, &["no map of robot1, robot2 was logged: drawn from scans", "merged 2 of 2"]);
+    merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
     // What was drawn is in the output, as is what it was drawn from.
     let info = gridweave(folder, &["info", "out.mcap", "--json"]);
@@ -55,7 +55,7 @@ fn poses_of_scans_may_come_from_tf_and_a_robot_may_have_its_map() {
     gridweave(folder, &["info", "scans.mcap"])
         .assert(0, &["`merge` draws one from its", "at the poses of tf (robot1/map to robot1/base_link)"]);
     let ended = merge(folder);
-    ended.assert(0, &["no map of robot1 was logged: drawn from scans", "merged 2 of 2"]);
+    ended.assert(0, &["no map of robot1: maps are built from scans", "merged 2 of 2"]);
     assert!(!ended.text().contains("were left out: a result"), "{ended:?}");
     gridweave(folder, &["render", "out.mcap", "-o", "out.png"]).assert(0, &["wrote out.png"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
@@ -124,7 +124,7 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
         with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf);
         let told = format!("each matched with those before it along {along}");
         gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&told]);
-        merge(folder).assert(0, &["no map of robot1, robot2 was logged: drawn from scans", "merged 2 of 2"]);
+        merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
         assert_eq!(judged(folder), [1, 0].map(Value::from));
     }
 }

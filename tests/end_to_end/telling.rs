@@ -21,7 +21,7 @@ fn a_name_that_is_mistyped_gets_a_suggestion() {
 fn every_pipeline_that_ships_is_listed_and_its_file_passes_the_check() {
     let folder = TempDir::new().unwrap();
     let list = gridweave(folder.path(), &["pipelines"]);
-    list.assert(0, &["auto_merge", "merge by the maps alone"]);
+    list.assert(0, &["auto_merge", "map-only merge"]);
     let names: Vec<&str> = list.stdout.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     for name in &names {
         let file = format!("{name}.toml");

@@ -70,8 +70,8 @@ fn topological_maps_are_told_from_what_else_there_is() {
         gridweave(folder, &[&["run", pipeline, "--output", "out.mcap"][..], &inputs].concat())
     };
     run("topology_file_merge", &["a.json", "b.json"]).assert(1, &["b.json is no topological map"]);
-    run("topology_file_merge", &["a.json", "b.mcap"]).assert(2, &["a.json is a topological map, and b.mcap is none"]);
+    run("topology_file_merge", &["a.json", "b.mcap"]).assert(2, &["a.json is a topological map, and b.mcap is not"]);
     run("auto_merge", &["a.json"]).assert(2, &["there is no stage of kind `topology_file_source`"]);
     run("topology_file_merge", &["a.mcap"]).assert(2, &["there is no stage of kind `mcap_source`"]);
-    gridweave(folder, &["info", "a.json"]).assert(2, &["reads no topological maps"]);
+    gridweave(folder, &["info", "a.json"]).assert(2, &["does not read topological maps"]);
 }

@@ -209,8 +209,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         let common_parts: [fn(&CommonPlaces) -> f64; 4] = [
             |places| places.rigid.median_m,
             |places| places.rigid.p90_m,
-            |places| places.bent.unwrap_or(places.rigid).median_m,
-            |places| places.bent.unwrap_or(places.rigid).p90_m,
+            |places| places.deformed.unwrap_or(places.rigid).median_m,
+            |places| places.deformed.unwrap_or(places.rigid).p90_m,
         ];
         let common = common_parts.map(|part| {
             median(&trials.iter().filter_map(|trial| trial.common.as_ref().map(part)).collect::<Vec<f64>>())

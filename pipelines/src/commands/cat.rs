@@ -1,8 +1,8 @@
-//! `gridweave cat`: messages of logs as lines of JSON.
+//! `gridweave cat`: prints messages of logs as lines of JSON.
 
 use crate::job::ReadingOptions;
 use crate::status::Status;
-use crate::terminal::{print, say};
+use crate::terminal::{eprint_line, print};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::dynamic::{JsonOptions, Schema};
@@ -14,24 +14,24 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// What `gridweave cat` is told.
+/// Arguments of `gridweave cat`.
 #[derive(Debug, Args)]
 pub(crate) struct CatArgs {
     /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), by log time. ROBOT=LOG puts the topics and frames of a log
-    /// under the name of its robot; otherwise all is called as it was logged.
+    /// under the name of its robot; otherwise all names are those of the log.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,
-    /// End after so many messages.
+    /// End after N messages.
     #[arg(long, value_name = "N")]
     pub(crate) count: Option<u64>,
-    /// Of a longer array print so many elements only, and how many more there are.
+    /// Print at most N elements of an array, and how many more there are.
     #[arg(long, value_name = "N")]
     pub(crate) max_array: Option<usize>,
 }
 
-/// So much is printed at a time.
+/// Output is printed in parts of about this size, bytes.
 const PART: usize = 1 << 16;
 
 /// Prints messages.
@@ -63,7 +63,10 @@ pub(crate) fn cat(args: &CatArgs) -> Result<Status> {
         let data = names.named(&message, &mut renamed);
         let decoded = schema.as_ref().and_then(|schema| Some(schema.decode(data).ok()?.to_json(options)));
         if decoded.is_none() && unreadable.insert(channel.topic.clone()) {
-            say(format_args!("messages on {} cannot be read by their definition, and are null here", channel.topic));
+            eprint_line(format_args!(
+                "warning: messages on {} cannot be decoded by their definition and are printed as null",
+                channel.topic
+            ));
         }
         let line = json!({
             "log_time": message.log_time.0,
@@ -84,10 +87,10 @@ pub(crate) fn cat(args: &CatArgs) -> Result<Status> {
     print(text)?;
     for (file, damage) in reader.take_damage() {
         let path = files.get(file).map(LogFile::path).unwrap_or(std::path::Path::new(""));
-        say(format_args!("{}: {damage}", path.display()));
+        eprint_line(format_args!("{}: {damage}", path.display()));
     }
     for file in files.iter() {
-        file.damage().iter().for_each(|damage| say(format_args!("{}: {damage}", file.path().display())));
+        file.damage().iter().for_each(|damage| eprint_line(format_args!("{}: {damage}", file.path().display())));
     }
     Ok(Status::Done)
 }

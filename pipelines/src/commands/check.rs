@@ -1,8 +1,8 @@
-//! `gridweave check`: everything that is wrong with pipeline files.
+//! `gridweave check`: shows all errors in pipeline files.
 
 use crate::shipped;
 use crate::status::Status;
-use crate::terminal::{print_line, say};
+use crate::terminal::{eprint_line, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::Overrides;
@@ -10,7 +10,7 @@ use gridweave_runtime::stage::Registry;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 
-/// What `gridweave check` is told.
+/// Arguments of `gridweave check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     /// Pipeline files, or names of shipped pipelines.
@@ -27,7 +27,7 @@ pub(crate) fn check(args: &CheckArgs, registry: &Registry) -> Result<Status> {
                 print_line(format_args!("{}: {} stages, no errors", path.display(), pipeline.stages.len()))?;
             }
             Err(errors) => {
-                say(errors.render(std::io::stderr().is_terminal()));
+                eprint_line(errors.render(std::io::stderr().is_terminal()));
                 status = Status::BadUse;
             }
         }

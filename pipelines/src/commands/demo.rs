@@ -1,4 +1,4 @@
-//! `gridweave demo`: three simulated robots, from their logs to one map and its errors.
+//! `gridweave demo`: simulates three robots, merges their maps, and evaluates the merge.
 
 use crate::commands::simulate;
 use crate::evaluate::evaluate;
@@ -12,21 +12,21 @@ use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 
-/// What `gridweave demo` is told.
+/// Arguments of `gridweave demo`.
 #[derive(Debug, Args)]
 pub(crate) struct DemoArgs {
     /// The folder to write to.
     #[arg(long, default_value = "demo", value_name = "FOLDER")]
     pub(crate) out: PathBuf,
-    /// Another seed makes another building and other drives.
+    /// Seed of the building and of the drives.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// What runs the stages: single, threads, threads-ipc, or processes.
+    /// The engine that runs the stages: single, threads, threads-ipc, or processes.
     #[arg(long, default_value_t = EngineKind::default())]
     pub(crate) engine: EngineKind,
 }
 
-/// Simulates, merges, evaluates, and leaves all files in one folder.
+/// Simulates, merges and evaluates; all files are in one folder.
 pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
     let folder = &args.out;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -58,7 +58,7 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
 
     let evaluation = evaluate(&folder.join("summary.json"), &truth)?;
     print_line(format_args!("\nerrors against the truth:\n{}", evaluation.to_text(width())))?;
-    print_line(format_args!("look at {0}/merged.png, or open {0}/merged.mcap in Foxglove", folder.display()))?;
+    print_line(format_args!("see {0}/merged.png, or open {0}/merged.mcap in Foxglove", folder.display()))?;
     Ok(match summary.has_unmerged() {
         true => Status::NotAllMerged,
         false => Status::Done,

@@ -1,4 +1,4 @@
-//! `gridweave evaluate`: how far a merge is from the truth.
+//! `gridweave evaluate`: errors of a merge against the truth.
 
 use crate::evaluate::evaluate;
 use crate::status::Status;
@@ -7,10 +7,10 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
-/// What `gridweave evaluate` is told.
+/// Arguments of `gridweave evaluate`.
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
-    /// What `--summary` has written.
+    /// The summary of a run, as `--summary` writes it.
     pub(crate) summary: PathBuf,
     /// The true frames, as `gridweave simulate` writes them.
     #[arg(long)]
@@ -20,7 +20,7 @@ pub(crate) struct EvaluateArgs {
     pub(crate) json: bool,
 }
 
-/// Compares a summary with the truth, and prints how they differ.
+/// Compares a summary with the truth, and prints the errors.
 pub(crate) fn command(args: &EvaluateArgs) -> Result<Status> {
     let evaluation = evaluate(&args.summary, &args.truth)?;
     match args.json {

@@ -1,4 +1,4 @@
-//! `gridweave graph`: the stages of a pipeline and its wires.
+//! `gridweave graph`: shows the stages of a pipeline and their wires.
 
 use crate::shipped;
 use crate::status::Status;
@@ -9,25 +9,25 @@ use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use std::path::PathBuf;
 
-/// What `gridweave graph` is told.
+/// Arguments of `gridweave graph`.
 #[derive(Debug, Args)]
 pub(crate) struct GraphArgs {
     /// A pipeline file, or the name of a shipped pipeline.
     pub(crate) pipeline: PathBuf,
-    /// How to show it.
+    /// The format.
     #[arg(long, value_enum, default_value_t = GraphFormat::Text)]
     pub(crate) format: GraphFormat,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum GraphFormat {
-    /// A list for people.
+    /// A list.
     Text,
-    /// A Mermaid flowchart, as GitHub draws it.
+    /// A Mermaid flowchart.
     Mermaid,
     /// A Graphviz graph.
     Dot,
-    /// A pipeline file in which nothing is left to defaults.
+    /// A pipeline file with all defaults filled in.
     Toml,
 }
 

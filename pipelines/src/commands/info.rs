@@ -1,12 +1,12 @@
-//! `gridweave info`: what is in logs, or in map files.
+//! `gridweave info`: shows the contents of logs or of map files.
 
 use super::map_file_info;
 use crate::job::{Inputs, NamingOptions};
-use crate::prose::broken;
 use crate::shipped;
 use crate::status::Status;
 use crate::table::Table;
 use crate::terminal::{print, print_line, width};
+use crate::text_wrapping::wrap;
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info::{self, FileInfo, LogInfo, TopicInfo};
@@ -18,18 +18,18 @@ use gridweave_runtime::stage::RobotTopics;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// What `gridweave info` is told.
+/// Arguments of `gridweave info`.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
     /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), each as LOG or ROBOT=LOG, or map files (map_server YAML).
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// Take the topic patterns of this pipeline to tell robots apart.
+    /// Find the robots by the topic patterns of this pipeline.
     #[arg(long)]
     pub(crate) pipeline: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) names: NamingOptions,
-    /// Read large logs through, where otherwise their index and a few messages are enough.
+    /// Read large logs in full, of which by default only the index and a few messages are read.
     #[arg(long)]
     pub(crate) all: bool,
     /// Print JSON.
@@ -37,7 +37,7 @@ pub(crate) struct InfoArgs {
     pub(crate) json: bool,
 }
 
-/// Shows what is in logs, or in map files.
+/// Shows the contents of logs or of map files.
 pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
     if Inputs::of_maps_or_logs(&args.inputs, "info")? == Inputs::MapFiles {
         let maps = map_file_info::inspect(&args.inputs)?;
@@ -79,14 +79,14 @@ fn write_text(found: &LogInfo, text: &mut String, width: Option<usize>) -> std::
         write_beside(file, text)?;
     }
     if let Some(remark) = &found.remark {
-        writeln!(text, "{}", broken(remark, 2, width))?;
+        writeln!(text, "{}", wrap(remark, 2, width))?;
     }
     let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
     writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;
     if found.is_sampled {
-        let how =
-            "by the index and a few messages: sizes are estimates, and frames, clocks and tags those of these (--all)";
-        writeln!(text, "{}", broken(how, 2, width))?;
+        let note = "from the index and a few messages: sizes are estimates, and frames, clocks and tags may be missing \
+                    (--all reads everything)";
+        writeln!(text, "{}", wrap(note, 2, width))?;
     }
     if !found.topics.is_empty() {
         write!(text, "\n{}", topic_table(&found.topics, found.start.unwrap_or(0.0)).fit(width))?;
@@ -107,16 +107,16 @@ fn write_text(found: &LogInfo, text: &mut String, width: Option<usize>) -> std::
     if !found.problems.is_empty() {
         writeln!(text, "\nproblems")?;
     }
-    let mut problems = found.problems.iter().map(|problem| broken(&format!("  - {problem}"), 4, width));
+    let mut problems = found.problems.iter().map(|problem| wrap(&format!("  - {problem}"), 4, width));
     problems.try_for_each(|problem| writeln!(text, "{problem}"))
 }
 
-/// What a file holds beside messages: what is said of the run that wrote it, metadata records and attachments.
+/// Writes what a file contains beside messages: the run that wrote it, metadata records and attachments.
 fn write_beside(file: &FileInfo, text: &mut String) -> std::fmt::Result {
     if let Some(run) = &file.run {
         let pipeline: toml::Table = run.pipeline.parse().unwrap_or_default();
         let of_pipeline = |key: &str| pipeline.get("pipeline").and_then(|section| section.get(key));
-        let name = of_pipeline("name").and_then(|name| name.as_str()).unwrap_or("of no name");
+        let name = of_pipeline("name").and_then(|name| name.as_str()).unwrap_or("without a name");
         let seed = of_pipeline("seed").map_or_else(String::new, |seed| format!(", seed {seed}"));
         write!(text, "  written by gridweave {}, pipeline {name}{seed} (--json shows its parameters)", run.version)?;
         writeln!(text, "{}", if run.inputs.is_empty() { "" } else { ", from" })?;
@@ -134,8 +134,8 @@ fn write_beside(file: &FileInfo, text: &mut String) -> std::fmt::Result {
     }
 }
 
-/// The topics; their times are seconds from `origin` on. Of each: how many messages in a second, the longest time between two,
-/// what the log says of their quality of service, and the frames that they name.
+/// Makes the table of topics, with times in seconds from `origin`: for each topic its rate, the longest gap between two messages,
+/// the quality of service that the log records, and the frames in its messages.
 fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
     let mut table =
         Table::new(["topic", "type", "messages", "size", "first s", "last s", "Hz", "gap s", "QoS", "frame"]);
@@ -156,12 +156,12 @@ fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
     table
 }
 
-/// A rate, with enough digits for one of a map in a minute.
+/// Formats a rate, with more digits for rates such as one map a minute.
 fn rate_text(rate: f64) -> String {
     if rate < 1.0 { format!("{rate:.3}") } else { format!("{rate:.1}") }
 }
 
-/// The topic, and what the logs call it if that is something else.
+/// Formats a topic, with its names in the logs if these differ.
 fn topic_text(topic: &TopicInfo) -> String {
     let others: Vec<&str> = topic.logged.iter().map(String::as_str).filter(|logged| *logged != topic.topic).collect();
     match others.is_empty() {
@@ -170,7 +170,7 @@ fn topic_text(topic: &TopicInfo) -> String {
     }
 }
 
-/// A number of bytes with a fitting unit.
+/// Formats a number of bytes with a suitable unit.
 fn size(bytes: u64) -> String {
     match bytes {
         0..1_000 => format!("{bytes} B"),
@@ -186,7 +186,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     #[test]
-    fn the_text_names_topics_robots_and_problems() {
+    fn the_text_lists_topics_robots_and_problems() {
         let topic = TopicInfo {
             topic: "/robot1/map".into(),
             messages: 3,

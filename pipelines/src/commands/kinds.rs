@@ -1,4 +1,4 @@
-//! `gridweave kinds`: the stage kinds with their ports and parameters.
+//! `gridweave kinds`: lists the stage kinds with their ports and parameters.
 
 use crate::status::{BadUse, Status};
 use crate::terminal::{print, print_line, text_width};
@@ -8,7 +8,7 @@ use gridweave_runtime::pipeline::{kind_text, kinds_json, kinds_text, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::Path;
 
-/// What `gridweave kinds` is told.
+/// Arguments of `gridweave kinds`.
 #[derive(Debug, Args)]
 pub(crate) struct KindsArgs {
     /// Only this kind; or FILE.py or FILE.py:NAME, a stage in Python.
@@ -18,12 +18,12 @@ pub(crate) struct KindsArgs {
     pub(crate) json: bool,
 }
 
-/// What the stage in a file of Python is, if that is what is named.
+/// The kind of a stage in Python, if `name` is such a file.
 fn stage_in_python(name: &str, registry: &Registry) -> Result<Option<StageKind>> {
     let is_file = name.ends_with(".py") || name.contains(".py:");
     let Some(kind) = registry.get("python").filter(|_| is_file) else { return Ok(None) };
     let module = toml::Table::from_iter([("module".to_owned(), name.into())]);
-    let asked = kind.ask(&module, Path::new("")).transpose();
+    let asked = kind.resolve(&module, Path::new("")).transpose();
     Ok(asked.map_err(|error| BadUse(error.to_string()))?.map(|asked| asked.kind.clone()))
 }
 

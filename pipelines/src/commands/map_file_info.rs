@@ -1,35 +1,35 @@
-//! `gridweave info` on map files: what is in them, as a merge reads them.
+//! `gridweave info` for map files: shows their contents as a merge reads them.
 
-use crate::prose::broken;
 use crate::table::Table;
+use crate::text_wrapping::wrap;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
-use gridweave_logs::source::map_file::robot_names;
+use gridweave_logs::names::robot_names;
 use gridweave_runtime::ros::cell::{is_free, is_known, is_occupied};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// What is in a map file.
+/// Contents of a map file.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct MapFileInfo {
-    /// The robot that a merge takes it to be of.
+    /// The robot that a merge assigns it to.
     robot: String,
     /// The YAML file.
     file: PathBuf,
-    /// Columns.
+    /// Number of columns.
     width: u32,
-    /// Rows.
+    /// Number of rows.
     height: u32,
     /// The side of a cell, metres.
     resolution: f32,
     /// The pose of the lower left corner: metres and radians.
     origin: [f64; 3],
-    /// Free cells, square metres.
+    /// Area of free cells, square metres.
     free_m2: f64,
-    /// Occupied cells, square metres.
+    /// Area of occupied cells, square metres.
     occupied_m2: f64,
-    /// Cells that are known, but neither free nor occupied, square metres.
+    /// Area of cells that are known, but neither free nor occupied, square metres.
     undecided_m2: f64,
     /// What was read otherwise than the thresholds of the file have it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,7 +39,7 @@ pub(super) struct MapFileInfo {
 /// Reads map files.
 ///
 /// # Errors
-/// A file cannot be read, is no map, or two are of one name.
+/// A file cannot be read or is not a map, or two have the same name.
 pub(super) fn inspect(files: &[PathBuf]) -> Result<Vec<MapFileInfo>> {
     let robots = robot_names(files)?;
     robots.into_iter().zip(files).map(|(robot, file)| inspect_one(robot, file)).collect()
@@ -65,7 +65,7 @@ fn inspect_one(robot: String, file: &Path) -> Result<MapFileInfo> {
     })
 }
 
-/// What is in map files, for people, in lines of at most `width` characters.
+/// Formats a table of map files in lines of at most `width` columns.
 pub(super) fn to_text(maps: &[MapFileInfo], width: Option<usize>) -> String {
     let heads = ["robot", "cells", "cell m", "origin x m", "y m", "yaw deg", "free m2", "occupied m2", "undecided m2"];
     let mut table = Table::new(heads);
@@ -87,7 +87,7 @@ pub(super) fn to_text(maps: &[MapFileInfo], width: Option<usize>) -> String {
     for MapFileInfo { file, remark, .. } in maps {
         if let Some(remark) = remark {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", broken(&format!("{}: {remark}", file.display()), 2, width));
+            let _ = writeln!(text, "{}", wrap(&format!("{}: {remark}", file.display()), 2, width));
         }
     }
     text

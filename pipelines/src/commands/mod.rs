@@ -1,4 +1,4 @@
-//! The commands of `gridweave`: a file or a folder each, with what it is told and what it does.
+//! The commands of `gridweave`, each with its arguments in a file or a folder.
 
 pub(crate) mod cat;
 pub(crate) mod check;

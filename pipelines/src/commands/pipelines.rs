@@ -1,4 +1,4 @@
-//! `gridweave pipelines`: the pipelines that ship.
+//! `gridweave pipelines`: lists the shipped pipelines.
 
 use crate::shipped;
 use crate::status::{BadUse, Status};
@@ -7,14 +7,14 @@ use crate::terminal::{print, width};
 use anyhow::Result;
 use clap::Args;
 
-/// What `gridweave pipelines` is told.
+/// Arguments of `gridweave pipelines`.
 #[derive(Debug, Args)]
 pub(crate) struct PipelinesArgs {
-    /// Print the file of this pipeline, to be changed: `gridweave pipelines auto_merge > my_merge.toml`.
+    /// Print the file of this pipeline, as a start for another: `gridweave pipelines auto_merge > my_merge.toml`.
     name: Option<String>,
 }
 
-/// Lists the pipelines that ship with a line each, or prints one.
+/// Lists the shipped pipelines, or prints one.
 pub(crate) fn pipelines(args: &PipelinesArgs) -> Result<Status> {
     match &args.name {
         Some(name) => print(shipped::find(name).map_err(BadUse)?.text)?,

@@ -1,4 +1,4 @@
-//! Runs of several processes: the process that a supervisor starts, and what killed runs leave behind.
+//! `gridweave stage` and `gridweave clean`: a process of a run, and the removal of what killed runs have left.
 
 use crate::shipped;
 use crate::status::Status;
@@ -10,12 +10,12 @@ use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
 use std::path::PathBuf;
 
-/// What `gridweave stage` is told.
+/// Arguments of `gridweave stage`.
 #[derive(Debug, Args)]
 pub(crate) struct StageArgs {
     /// The folder of the run.
     pub(crate) folder: PathBuf,
-    /// The process: a name that stages of the pipeline have in `process`, or a stage's name.
+    /// The process: a name that stages of the pipeline have in `process`, or the name of a stage.
     pub(crate) process: String,
 }
 

@@ -1,4 +1,4 @@
-//! `gridweave recover`: what can be read of a damaged log, written anew.
+//! `gridweave recover`: writes what can be read of a damaged log.
 
 use crate::job::is_input;
 use crate::status::{BadUse, Status};
@@ -10,14 +10,14 @@ use gridweave_logs::sink;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// What `gridweave recover` is told.
+/// Arguments of `gridweave recover`.
 #[derive(Debug, Args)]
 pub(crate) struct RecoverArgs {
-    /// A log that is cut or damaged: MCAP, SQLite of rosbag2, a rosbag2 folder, a ROS 1 bag, or the NAME.part of a run that was
-    /// killed. It is not changed.
+    /// A cut or damaged log: MCAP, SQLite of rosbag2, a rosbag2 folder, a ROS 1 bag, or the NAME.part of a killed run. It is not
+    /// changed.
     #[arg(value_name = "LOG")]
     pub(crate) input: PathBuf,
-    /// What to write: an MCAP file, or FOLDER/, with a slash behind it, for a rosbag2 folder.
+    /// The output: an MCAP file, or FOLDER/, with a slash at the end, for a rosbag2 folder.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 }
@@ -40,9 +40,9 @@ pub(crate) fn recover(args: &RecoverArgs) -> Result<Status> {
     let mut text =
         format!("wrote {messages} messages on {topics} topics over {seconds:.1} s to {}\n", output.display());
     text.push_str(if recovery.losses.is_empty() {
-        "nothing was lost: the log is whole\n"
+        "nothing was lost: the log is complete\n"
     } else {
-        "what is wrong with the log:\n"
+        "damage of the log:\n"
     });
     for (loss, times) in &recovery.losses {
         // Writing to a string cannot fail.

@@ -1,4 +1,4 @@
-//! `gridweave simulate`.
+//! `gridweave simulate`: simulates robots in a building, and writes a log and its truth.
 
 use crate::job::progress::Progress;
 use crate::job::{RunOptions, check_outputs};
@@ -13,7 +13,7 @@ use gridweave_runtime::pipeline::{Mode, Overrides};
 use gridweave_runtime::stage::Registry;
 use std::path::{Path, PathBuf};
 
-/// What `gridweave simulate` is told.
+/// Arguments of `gridweave simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
     /// The log to write.
@@ -22,10 +22,10 @@ pub(crate) struct SimulateArgs {
     /// Write the truth here; by default beside the log, as LOG.truth.json.
     #[arg(long, value_name = "FILE")]
     pub(crate) truth: Option<PathBuf>,
-    /// How many robots.
+    /// Number of robots.
     #[arg(long)]
     pub(crate) robots: Option<u32>,
-    /// Another seed makes another building and other drives.
+    /// Seed of the building and of the drives.
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     /// Set a parameter of the simulation; `gridweave kinds simulator` lists them.

@@ -42,20 +42,20 @@ fn errors_are_taken_at_the_middle_of_the_map() {
 }
 
 #[test]
-fn errors_are_weighed_by_the_covariance_that_the_run_tells() {
+fn errors_are_normalised_by_the_covariance_in_the_summary() {
     let with = |covariance: [f64; 9]| {
         let found = json!({"x": 10.2, "y": 5.0, "yaw": 1.0 + 0.02, "covariance": covariance});
         let frames = json!({"robot1": frame(0.0, 0.0, 0.0), "robot2": found});
         let evaluation = run(&json!({"reference": "robot1", "frames": frames}), &truth()).unwrap();
         evaluation.robots[0].normalised_error_squared
     };
-    let weighed = with([0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0001]).unwrap();
-    assert!((weighed - 8.0).abs() < 1e-9, "{weighed}");
+    let normalised = with([0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0001]).unwrap();
+    assert!((normalised - 8.0).abs() < 1e-9, "{normalised}");
     assert_eq!((with([0.0; 9]), with([-1.0; 9])), (None, None));
 }
 
 #[test]
-fn too_far_or_too_much_turned_is_wrong_and_unmerged_is_refused() {
+fn a_large_error_is_wrong_and_an_unmerged_robot_is_refused() {
     for wrong in [frame(10.5, 5.0, 1.0), frame(10.0, 5.0, 1.02), frame(10.0, 5.0, -2.0)] {
         let summary = json!({
             "reference": "robot1",
@@ -70,7 +70,7 @@ fn too_far_or_too_much_turned_is_wrong_and_unmerged_is_refused() {
 }
 
 #[test]
-fn the_truth_is_turned_to_the_reference_of_the_run() {
+fn the_truth_is_transformed_to_the_reference_of_the_run() {
     let place = |x, y, yaw| Isometry2::new(nalgebra::Vector2::new(x, y), yaw);
     let (robot2, robot3) = (place(10.0, 5.0, 1.0), place(-4.0, 2.0, -2.0));
     let seen = |pose: Isometry2<f64>| frame(pose.translation.x, pose.translation.y, pose.rotation.angle());
@@ -101,7 +101,7 @@ fn unrelated_robots_are_rightly_refused_and_wrongly_merged() {
 }
 
 #[test]
-fn robots_that_only_one_of_the_files_knows_are_listed() {
+fn robots_that_are_in_only_one_of_the_files_are_listed() {
     let summary = json!({
         "reference": "robot1",
         "frames": {"robot1": frame(0.0, 0.0, 0.0), "robot7": frame(1.0, 0.0, 0.0)},
@@ -119,14 +119,14 @@ fn robots_that_only_one_of_the_files_knows_are_listed() {
 }
 
 #[test]
-fn a_reference_that_the_truth_does_not_know_is_an_error() {
+fn a_reference_that_is_not_in_the_truth_is_an_error() {
     let summary = json!({"reference": "robot9", "frames": {"robot9": frame(0.0, 0.0, 0.0)}});
     let error = format!("{:#}", run(&summary, &truth()).unwrap_err());
     assert!(error.contains("`robot9` is not in the truth, which has robot1, robot2, robot3"), "{error}");
 }
 
 #[test]
-fn files_that_are_none_are_clear_errors() {
+fn wrong_files_are_errors_that_name_them() {
     let folder = tempfile::tempdir().unwrap();
     let (good, bad) = (folder.path().join("good.json"), folder.path().join("bad.json"));
     std::fs::write(&good, r#"{"reference": null, "frames": {}}"#).unwrap();

@@ -1,13 +1,13 @@
-//! What the files on a command line are: logs, map files, or topological maps.
+//! Kinds of input files on the command line: logs, map files, or topological maps.
 
 use crate::status::BadUse;
 use gridweave_logs::names::Input;
 use std::path::{Path, PathBuf};
 
-/// What the inputs of a run are.
+/// Kind of the inputs of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Inputs {
-    /// Logs of all kinds, and maps of robots that have none.
+    /// Logs of all formats, and map files of robots without a log.
     Logs,
     /// YAML files of nav2's map server.
     MapFiles,
@@ -16,25 +16,25 @@ pub(crate) enum Inputs {
 }
 
 impl Inputs {
-    /// Tells by the names of the files. An error if there are images of maps, or JSON files beside others.
+    /// Finds the kind by the names of the files. Images of maps, and JSON files beside others, are errors.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
         if let Some(image) =
             paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm", "bmp", "jpg", "jpeg"]))
         {
-            let text = format!("{} is an image: give the YAML file that describes the map", image.display());
+            let text = format!("{} is an image: give the YAML file of the map instead", image.display());
             return Err(BadUse(text));
         }
         if let Some(topology) = paths.iter().find(|path| is_topology(path)) {
             return match paths.iter().find(|path| !is_topology(path)) {
                 None => Ok(Self::TopologyFiles),
                 Some(other) => Err(BadUse(format!(
-                    "{} is a topological map, and {} is none: what reads the one does not read the other",
+                    "{} is a topological map, and {} is not: no pipeline reads both",
                     topology.display(),
                     other.display()
                 ))),
             };
         }
-        // A rosbag2 folder may have any name; and a map that is said to be a robot's is read as a log of it.
+        // A rosbag2 folder may have any name; and a map file of the form ROBOT=FILE is read as a log of the robot.
         let is_map_file = |typed: &PathBuf| {
             let Input { robot, path } = Input::new(typed);
             robot.is_none() && is_yaml(&path) && !path.is_dir()
@@ -45,7 +45,7 @@ impl Inputs {
         }
     }
 
-    /// The kind of the stage that reads them.
+    /// The kind of stage that reads the inputs.
     pub(crate) fn source_kind(self) -> &'static str {
         match self {
             Self::Logs => "mcap_source",
@@ -54,26 +54,26 @@ impl Inputs {
         }
     }
 
-    /// The same for a command that does nothing with topological maps.
+    /// Finds the kind for a command that does not read topological maps.
     ///
     /// # Errors
-    /// That is what the files are.
+    /// The files are topological maps, or [`of`](Self::of) fails.
     pub(crate) fn of_maps_or_logs(paths: &[PathBuf], command: &str) -> Result<Self, BadUse> {
         match Self::of(paths)? {
             Self::TopologyFiles => Err(BadUse(format!(
-                "`{command}` reads no topological maps: `gridweave run topology_file_merge` lays those of JSON files on each other"
+                "`{command}` does not read topological maps (JSON): `gridweave run topology_file_merge` merges them"
             ))),
             inputs => Ok(inputs),
         }
     }
 }
 
-/// Whether a file is called as the YAML file of a map.
+/// Whether the name of a file is that of a map (YAML).
 pub(crate) fn is_yaml(path: &Path) -> bool {
     has_ending(path, &["yaml", "yml"])
 }
 
-/// Whether a file is called as a topological map. A rosbag2 folder may have any name.
+/// Whether the name of a file is that of a topological map (JSON). A rosbag2 folder may have any name.
 fn is_topology(path: &Path) -> bool {
     has_ending(path, &["json"]) && !path.is_dir()
 }
@@ -91,11 +91,11 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_told_by_their_names() {
+    fn the_kind_of_inputs_follows_from_their_names() {
         assert_eq!(of(&["a.mcap", "bag"]), Ok(Inputs::Logs));
         assert_eq!(of(&["a.yaml", "b.YML"]), Ok(Inputs::MapFiles));
         assert_eq!(of(&["a.json", "b.JSON"]), Ok(Inputs::TopologyFiles));
-        assert!(of(&["a.json", "b.mcap"]).unwrap_err().contains("a.json is a topological map, and b.mcap is none"));
+        assert!(of(&["a.json", "b.mcap"]).unwrap_err().contains("a.json is a topological map, and b.mcap is not"));
         let folder = tempfile::tempdir().unwrap();
         let bag = folder.path().join("bag.yaml");
         std::fs::create_dir(&bag).unwrap();
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_beside_a_log_or_said_to_be_a_robots_is_read_as_a_log() {
+    fn a_map_file_beside_a_log_or_with_a_robot_is_read_as_a_log() {
         assert_eq!(of(&["a.yaml", "b.mcap"]), Ok(Inputs::Logs));
         assert_eq!(of(&["robot1=a.yaml", "robot2=b.yaml"]), Ok(Inputs::Logs));
         assert!(of(&["a.yaml", "b.pgm"]).unwrap_err().contains("b.pgm is an image"));

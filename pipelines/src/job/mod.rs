@@ -1,4 +1,4 @@
-//! One run of a pipeline, as the commands put it together from what the user says.
+//! A run of a pipeline by the options of a command.
 
 mod inputs;
 mod options;
@@ -16,16 +16,16 @@ pub(crate) use outputs::is_or_holds as is_input;
 pub(crate) use reading::{NamingOptions, ReadingOptions};
 pub(crate) use view::STANDARD_VIEW;
 
+use crate::logging;
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
-use crate::telling;
-use crate::terminal::{print, print_line, say, width};
+use crate::terminal::{eprint_line, print, print_line, width};
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
+use gridweave_logs::names::robot_names;
 use gridweave_logs::sink::close_log;
-use gridweave_logs::source::map_file::robot_names;
 use gridweave_runtime::engine::{self, EngineKind, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
@@ -38,12 +38,12 @@ const LOG_SINK: &str = "mcap_sink";
 /// The kind of stage that decides between hypotheses.
 const VERIFIER: &str = "merge_verifier";
 
-/// What a run writes beside what its options ask for.
+/// The output of a run beside the files of its options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output<'a> {
-    /// What the pipeline says.
+    /// The outputs of the pipeline.
     OfPipeline,
-    /// A log, by the only sink of logs.
+    /// A log, written by the only log sink of the pipeline.
     Log(&'a Path),
     /// No log.
     MapOnly,
@@ -55,13 +55,13 @@ impl<'a> From<Option<&'a Path>> for Output<'a> {
     }
 }
 
-/// One run of a pipeline, put together from what the command line says.
+/// A run of a pipeline by the options of the command line.
 pub(crate) struct Job<'a> {
     /// A pipeline file, or the name of a shipped pipeline.
     pub(crate) pipeline: &'a Path,
-    /// What the only source of logs, or of map files, reads; if none, what the pipeline says.
+    /// Files for the only source of logs or map files; if empty, those of the pipeline.
     pub(crate) inputs: &'a [PathBuf],
-    /// What is written beside what the options ask for.
+    /// The output beside the files of the options.
     pub(crate) output: Output<'a>,
     pub(crate) options: &'a RunOptions,
     /// The stage kinds that the pipeline may name.
@@ -69,7 +69,7 @@ pub(crate) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Runs the pipeline, writes all that was asked for, and prints the summary.
+    /// Runs the pipeline, writes all outputs, and prints the summary.
     pub(crate) fn run_and_print(&self) -> Result<Status> {
         let summary = self.run()?;
         let explained: Vec<String> = self.options.explain.iter().map(|typed| self.robot(typed)).collect();
@@ -84,7 +84,7 @@ impl Job<'_> {
         })
     }
 
-    /// Runs the pipeline and writes all that was asked for.
+    /// Runs the pipeline and writes all outputs.
     pub(crate) fn run(&self) -> Result<RunSummary> {
         let bag = self.bag()?;
         let mut pipeline = shipped::load(self.pipeline, &self.overrides(bag.as_ref())?, self.registry)?;
@@ -96,7 +96,9 @@ impl Job<'_> {
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         if let Some(address) = &self.options.view {
             let address = view::attach(&mut pipeline, self.registry, address)?;
-            say(format_args!("Foxglove shows this run: open the connection \"Foxglove WebSocket\" {address}"));
+            eprint_line(format_args!(
+                "to see this run in Foxglove, open the connection \"Foxglove WebSocket\" {address}"
+            ));
         }
         let progress = Progress::new(pipeline.mode);
         let by_mode = match pipeline.mode {
@@ -104,7 +106,7 @@ impl Job<'_> {
             Mode::Live => EngineKind::Processes,
         };
         let report = match self.options.engine.unwrap_or(by_mode) {
-            EngineKind::Processes => processes::run(&pipeline, &telling::launch()?, &progress),
+            EngineKind::Processes => processes::run(&pipeline, &logging::launch()?, &progress),
             engine => engine::run(&pipeline, engine, &progress),
         };
         progress.finish();
@@ -126,7 +128,7 @@ impl Job<'_> {
         Ok(summary)
     }
 
-    /// The bag that the log is to lie in, if a folder was named.
+    /// Creates the rosbag2 folder for the log, if the output is one.
     fn bag(&self) -> Result<Option<Bag>> {
         match self.output {
             Output::Log(path) if Bag::is_meant(path) => Ok(Some(Bag::create(path)?)),
@@ -134,14 +136,14 @@ impl Job<'_> {
         }
     }
 
-    /// A robot: its name, or its map file as it was typed among the inputs.
+    /// The name of a robot, which may be given by its map file among the inputs.
     fn robot(&self, typed: &str) -> String {
         let file = self.inputs.iter().position(|input| input.as_os_str() == typed);
         let name = file.and_then(|file| robot_names(self.inputs).ok()?.into_iter().nth(file));
         name.unwrap_or_else(|| typed.to_owned())
     }
 
-    /// `ROBOT=...` with the robot's name.
+    /// Replaces a map file in `ROBOT=...` by the name of the robot.
     fn robot_first(&self, typed: &str) -> String {
         match typed.rsplit_once('=') {
             Some((robot, value)) => format!("{}={value}", self.robot(robot)),
@@ -149,7 +151,7 @@ impl Job<'_> {
         }
     }
 
-    /// The hypotheses that the user accepts, as the verifier takes them.
+    /// The hypotheses that the user accepts, as a parameter of the verifier.
     fn accepted(&self) -> Result<toml::Table, BadUse> {
         let read = |typed: &String| {
             let (robot, number) = typed.rsplit_once('=')?;
@@ -158,14 +160,14 @@ impl Job<'_> {
         };
         let wrong = |typed: &String| {
             BadUse(format!(
-                "`--accept {typed}` accepts nothing: write ROBOT=N for a place that a refusal has listed, from 1, or \
-                 ROBOT=initial for its initial pose as it is"
+                "`--accept {typed}` is wrong: write ROBOT=N for a hypothesis that a refusal has listed, from 1, or ROBOT=initial \
+                 for its initial pose as it is"
             ))
         };
         self.options.accept.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
     }
 
-    /// What the pipeline is told, whose log lies in a bag if there is one.
+    /// The settings of the pipeline; its log is in the bag, if there is one.
     fn overrides(&self, bag: Option<&Bag>) -> Result<Overrides> {
         let mut overrides = Overrides::default();
         overrides.reference = self.options.reference.as_deref().map(|typed| self.robot(typed));
@@ -202,14 +204,14 @@ fn text_of(path: &Path) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// A sink whose process was killed has not closed its log: it is closed here, and says why it is not complete. What another
-/// run writes is locked, and what one had left that was killed before was taken away when this run began.
+/// Closes the logs of sinks whose processes were killed, with the reason why they are not complete. Logs of other runs are locked, and
+/// what an earlier killed run had left was removed when this run began.
 fn close_outputs(pipeline: &Pipeline, reason: &str) {
     for log in outputs::logs(pipeline) {
         match close_log(&log, reason) {
-            Ok(Some(closed)) => tracing::info!("what there is of {} is in {}", log.display(), closed.display()),
+            Ok(Some(closed)) => tracing::info!("the incomplete log {} is in {}", log.display(), closed.display()),
             Ok(None) => {}
-            Err(error) => tracing::warn!("{} could not be closed: {error}", log.display()),
+            Err(error) => tracing::warn!("cannot close the log {}: {error}", log.display()),
         }
     }
 }

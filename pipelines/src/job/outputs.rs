@@ -1,5 +1,4 @@
-//! What a run would write, checked before it begins: no input is overwritten, no file is written twice, none is another
-//! run's, and all can be written.
+//! Check of the outputs before a run: no input is overwritten, no file is written twice or by another run, and all are writable.
 
 use super::options::RunOptions;
 use crate::status::BadUse;
@@ -14,8 +13,8 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 ///
-/// One of them is an input, under whatever name, or lies in one; two are the same; one cannot be written, or is being
-/// written by another run.
+/// An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being written
+/// by another run.
 pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let inputs = inputs(pipeline);
     let outputs = outputs(pipeline, options);
@@ -33,17 +32,17 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
             bail!("cannot write {}: there is no folder {}; make it first", output.display(), folder.display());
         }
     }
-    // Only once nothing else is wrong, as it takes away what killed runs have left.
+    // The last check, as it removes what killed runs have left.
     outputs.iter().try_for_each(|output| check_writable(output))?;
     Ok(())
 }
 
-/// The logs that a pipeline writes.
+/// Lists the logs that a pipeline writes.
 pub(crate) fn logs(pipeline: &Pipeline) -> Vec<PathBuf> {
     files_of(pipeline, "mcap_sink", "file")
 }
 
-/// All that the sources read.
+/// Lists the files that the sources read.
 pub(super) fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     let logs = files_of(pipeline, "mcap_source", "files");
     let mut inputs: Vec<PathBuf> = logs.iter().map(|log| Input::new(log).path).collect();
@@ -56,7 +55,7 @@ pub(super) fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     inputs
 }
 
-/// All that the sinks and the command write.
+/// Lists the files that the sinks and the command write.
 fn outputs(pipeline: &Pipeline, options: &RunOptions) -> Vec<PathBuf> {
     let mut outputs = logs(pipeline);
     for kind in ["picture_sink", "summary_sink", "truth_sink"] {
@@ -70,7 +69,7 @@ fn outputs(pipeline: &Pipeline, options: &RunOptions) -> Vec<PathBuf> {
     outputs
 }
 
-/// The files that the stages of a kind have in a parameter: one, or a list.
+/// Lists the files in a parameter of the stages of a kind: one, or a list.
 fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
     let stages = pipeline.stages.iter().filter(|stage| stage.kind.name == kind);
     let values = stages.filter_map(|stage| stage.parameters.get(parameter));
@@ -81,13 +80,13 @@ fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
     texts.filter(|text| !text.is_empty()).map(PathBuf::from).collect()
 }
 
-/// Whether two paths lead to the same file, or the first to a folder that holds the second, through links as well.
+/// Whether two paths lead to the same file, or the first to a folder that contains the second, also through links.
 pub(crate) fn is_or_holds(input: &Path, output: &Path) -> bool {
     let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
     output.starts_with(&input) || same_file(&input, &output)
 }
 
-/// Whether two paths name the same file, which may not be there.
+/// Whether two paths name the same file, which may not exist.
 fn is_same_name(one: &Path, other: &Path) -> bool {
     matches!((resolve(one), resolve(other)), (Ok(one), Ok(other)) if one == other || same_file(&one, &other))
 }

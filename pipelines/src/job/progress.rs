@@ -1,7 +1,7 @@
-//! How far a run is: a bar on a terminal, plain lines elsewhere.
+//! Progress of a run: a bar on a terminal, plain lines elsewhere.
 
 use crate::interrupt::{OUTPUT_IS_CLOSED, stop_on_interrupt};
-use crate::terminal::say;
+use crate::terminal::eprint_line;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::Mode;
@@ -12,17 +12,17 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// The bar has so many steps.
+/// Number of steps of the bar.
 const STEPS: f64 = 1000.0;
-/// Without a terminal, a line is written at most this often.
+/// Minimum interval between lines without a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);
 
-/// On a terminal the time that has passed is shown anew so often.
+/// Interval at which the elapsed time is updated on a terminal.
 const TICK: Duration = Duration::from_secs(1);
-/// Before so much time has passed nothing is said of what is to come, nor of how fast it goes.
-const FIRST_GUESS: Duration = Duration::from_secs(1);
+/// The rate and the remaining time are shown after this time.
+const MIN_ELAPSED: Duration = Duration::from_secs(1);
 
-/// Shows a share, what stands beside it, and how long the rest will take if it goes on so.
+/// Display of the share that is done, a text, and the remaining time.
 pub(crate) struct Gauge {
     begin: Instant,
     bar: Option<ProgressBar>,
@@ -30,26 +30,26 @@ pub(crate) struct Gauge {
 }
 
 impl Gauge {
-    /// At its beginning. On a terminal it is a bar, if that is wanted.
+    /// Starts the display. With `with_bar` it is a bar on a terminal.
     pub(crate) fn new(with_bar: bool) -> Self {
         let bar = (with_bar && std::io::stderr().is_terminal()).then(|| {
             let style = ProgressStyle::with_template("{bar:20} {percent:>3} %, {elapsed}  {wide_msg}");
             let bar = ProgressBar::new(STEPS as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            // A small log is read before there is anything to show, and the work on it takes longer.
-            bar.set_message("at work");
+            // The work on a small log goes on after it has been read, without further progress.
+            bar.set_message("working");
             bar.enable_steady_tick(TICK);
             bar
         });
         Self { begin: Instant::now(), bar, last_line: Mutex::new(Instant::now()) }
     }
 
-    /// How often something has happened in a second, so far.
+    /// The rate of a count, per second.
     pub(crate) fn rate(&self, count: f64) -> Option<f64> {
         let elapsed = self.begin.elapsed();
-        (elapsed >= FIRST_GUESS).then(|| count / elapsed.as_secs_f64())
+        (elapsed >= MIN_ELAPSED).then(|| count / elapsed.as_secs_f64())
     }
 
-    /// Shows a share, 0 to 1.
+    /// Shows a share, 0 to 1, and a text.
     pub(crate) fn show(&self, share: f64, at: impl Display) {
         let left = time_left(self.begin.elapsed(), share).map_or_else(String::new, |left| format!(", {left} left"));
         if let Some(bar) = &self.bar {
@@ -60,11 +60,11 @@ impl Gauge {
         let Ok(mut last_line) = self.last_line.lock() else { return };
         if last_line.elapsed() >= LINE_INTERVAL {
             *last_line = Instant::now();
-            say(format_args!("{:.0} %, {at}{left}", share * 100.0));
+            eprint_line(format_args!("{:.0} %, {at}{left}", share * 100.0));
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -72,9 +72,9 @@ impl Gauge {
     }
 }
 
-/// How long the rest takes if it goes on as it did; nothing as long as too little is done to tell.
+/// Estimates the remaining time; `None` while too little is done.
 fn time_left(elapsed: Duration, share: f64) -> Option<String> {
-    if elapsed < FIRST_GUESS || !(0.01..1.0).contains(&share) {
+    if elapsed < MIN_ELAPSED || !(0.01..1.0).contains(&share) {
         return None;
     }
     let seconds = (elapsed.as_secs_f64() * (1.0 - share) / share).ceil() as u64;
@@ -85,7 +85,7 @@ fn time_left(elapsed: Duration, share: f64) -> Option<String> {
     })
 }
 
-/// Shows how far a run is.
+/// Observer that shows the progress of a run.
 pub(crate) struct Progress {
     gauge: Gauge,
     start: AtomicU64,
@@ -94,17 +94,17 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Nothing is done yet. The run ends when the user interrupts it.
+    /// Starts the display. An interrupt of the user ends the run.
     pub(crate) fn new(mode: Mode) -> Self {
         let stop = stop_on_interrupt(match mode {
             Mode::Replay => OUTPUT_IS_CLOSED,
-            Mode::Live => "what is on its way is handled to its end",
+            Mode::Live => "messages in the queues are handled first",
         });
-        // A live run has no end that it could come nearer to.
+        // The end of a live run is not known.
         Self { gauge: Gauge::new(mode == Mode::Replay), start: AtomicU64::new(u64::MAX), mode, stop }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(crate) fn finish(&self) {
         self.gauge.finish();
     }
@@ -120,12 +120,12 @@ impl Observer for Progress {
 
     fn started(&self, prefix: &str) {
         if self.mode == Mode::Live {
-            say(format_args!("the live run {prefix} has started; an interrupt (ctrl-c) ends it"));
+            eprint_line(format_args!("the live run {prefix} has started; an interrupt (ctrl-c) ends it"));
         }
     }
 
     fn restarting(&self, stage: &str, failure: &str, after: Duration) {
-        say(format_args!("stage `{stage}` {failure}; it is started again in {:.1} s", after.as_secs_f64()));
+        eprint_line(format_args!("stage `{stage}` {failure}; restarting in {:.1} s", after.as_secs_f64()));
     }
 
     fn should_stop(&self) -> bool {
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_time_left_is_told_once_there_is_something_to_tell_it_by() {
+    fn the_remaining_time_is_estimated_after_some_progress() {
         let left = |seconds: f64, share: f64| time_left(Duration::from_secs_f64(seconds), share);
         assert_eq!(left(0.5, 0.5), None);
         assert_eq!((left(5.0, 0.0), left(5.0, 1.0), left(5.0, f64::NAN)), (None, None, None));

@@ -1,4 +1,4 @@
-//! What a log records of the run that writes it, so that its results explain themselves.
+//! Record in a log of the run that has written it, so that its results can be reproduced.
 
 use super::LOG_SINK;
 use super::outputs::inputs;
@@ -7,11 +7,11 @@ use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use std::path::Path;
 use toml::Value;
 
-/// Tells the sinks of logs by what pipeline and from what files they write. Neither the place of a file nor anything of the
-/// machine is told: the same run elsewhere gives the same log.
+/// Passes the pipeline and the names of the input files to the log sinks. Paths and properties of the machine are left out, so that
+/// the same run elsewhere gives the same log.
 pub(super) fn record(pipeline: &mut Pipeline) {
     let mut recorded = pipeline.clone();
-    recorded.stages.iter_mut().for_each(leave_places_out);
+    recorded.stages.iter_mut().for_each(remove_paths);
     let text = recorded.to_toml();
     let files: Vec<Value> = inputs(pipeline).iter().filter_map(|file| file.to_str()).map(Value::from).collect();
     for stage in pipeline.stages.iter_mut().filter(|stage| stage.kind.name == LOG_SINK) {
@@ -20,8 +20,8 @@ pub(super) fn record(pipeline: &mut Pipeline) {
     }
 }
 
-/// Of the files that a stage reads the names alone are kept, and of those that it writes nothing.
-fn leave_places_out(stage: &mut StageSpec) {
+/// Removes the output file of a stage and the folders of its input files.
+fn remove_paths(stage: &mut StageSpec) {
     stage.parameters.remove("file");
     if let Some(Value::Array(files)) = stage.parameters.get_mut("files") {
         for file in files {

@@ -1,4 +1,4 @@
-//! What is read of logs, and under which names.
+//! Options of commands that read logs: names, topics, robots, and times.
 
 use crate::status::BadUse;
 use clap::Args;
@@ -8,30 +8,30 @@ use gridweave_runtime::pipeline::Overrides;
 /// The kind of stage that reads logs.
 const LOG_SOURCE: &str = "mcap_source";
 
-/// Under which names logs are read, and which of their topics.
+/// Options for the names in logs, and for the topics and robots that are read.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct NamingOptions {
-    /// Give a topic of the logs another name, before or behind that of its robot; `{robot}` stands for one part of both.
+    /// Rename a topic of the logs; `{robot}` matches one part of both names.
     #[arg(long, value_name = "OLD=NEW")]
     pub(crate) rename: Vec<String>,
-    /// Read these robots alone, and what is no robot's.
+    /// Read only these robots, and topics without a robot.
     #[arg(long, value_name = "ROBOT", value_delimiter = ',')]
     pub(crate) robots: Vec<String>,
-    /// Read these topics alone; `{robot}` stands for any one part.
+    /// Read only these topics; `{robot}` matches any one part.
     #[arg(long, visible_alias = "topic", value_name = "TOPIC", value_delimiter = ',')]
     pub(crate) topics: Vec<String>,
-    /// Set the clocks of all logs, and the stamps in their messages, so that they begin together, when the first one does: for
-    /// robots whose clocks have nothing in common.
+    /// Shift the times of all logs, and the stamps in their messages, so that they begin together with the first one: for robots
+    /// with unsynchronised clocks.
     #[arg(long)]
     pub(crate) align_start: bool,
 }
 
-/// What is read of logs, and under which names.
+/// Options for the names and times of logs.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct ReadingOptions {
     #[command(flatten)]
     pub(crate) names: NamingOptions,
-    /// Seconds from the first message at which to begin. The last maps, and other latched messages, are taken from before.
+    /// Seconds from the first message at which to begin. The last maps, and other latched messages, from before are included.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) start: Option<f64>,
     /// Seconds from the first message at which to end.
@@ -40,7 +40,7 @@ pub(crate) struct ReadingOptions {
 }
 
 impl ReadingOptions {
-    /// Tells the source of a pipeline.
+    /// Sets the parameters of the log source.
     pub(crate) fn set(&self, overrides: &mut Overrides) {
         let NamingOptions { rename, robots, topics, align_start } = &self.names;
         if *align_start {
@@ -60,10 +60,10 @@ impl ReadingOptions {
 }
 
 impl NamingOptions {
-    /// The same for a command that reads logs itself.
+    /// Makes the rules for a command that reads logs itself.
     ///
     /// # Errors
-    /// An entry of `--rename` is none.
+    /// An entry of `--rename` is not of the form OLD=NEW.
     pub(crate) fn rules(&self, convention: Convention) -> Result<NameRules, BadUse> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>().map_err(BadUse)?;
         let (robots, topics) = (self.robots.clone(), self.topics.clone());

@@ -1,5 +1,5 @@
-//! The sinks that a run gets for what the user asks of it: the summary, the merged map as a file, and its picture. They read
-//! messages by their types, whatever stages send them.
+//! Sinks that are added to a run for its options: the summary, the merged map as a file, and its picture. They read messages by their
+//! types, whatever stages send them.
 
 use super::options::RunOptions;
 use crate::status::BadUse;
@@ -15,16 +15,16 @@ use tempfile::TempDir;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
-/// The topic of a robot's map as it lies in the merged one.
+/// The topic of a robot's map in the merged frame.
 const PLACED: &str = "/{robot}/merged_map";
 /// The process that the sinks share where stages have processes.
 const PROCESS: &str = "results";
 
-/// The sinks of a run.
+/// The added sinks of a run.
 pub(super) struct ResultSinks {
-    /// Where the summary is left for the command, which adds what the stages have done. None if nothing is merged.
+    /// The file of the summary, to which the command adds the statistics of the stages. `None` if nothing is merged.
     summary: Option<PathBuf>,
-    /// How many files the other sinks are to write.
+    /// Number of files of the other sinks.
     files: u64,
     _folder: TempDir,
 }
@@ -41,7 +41,7 @@ impl ResultSinks {
         let mut files = 0;
         if let Some(picture) = &options.picture {
             picture::check_format(picture).map_err(|error| BadUse(error.to_string()))?;
-            // A picture shows what came from each robot, which nothing else of the run needs.
+            // Only a picture needs the map of each robot in the merged frame.
             pipeline.attach(&map_placer::kind(), toml::Table::new(), PROCESS, |input, from, _| {
                 input.name != "map" || from.kind.inputs.is_empty()
             });
@@ -63,24 +63,26 @@ impl ResultSinks {
         Ok(Self { summary: is_attached.then_some(file), files, _folder: folder })
     }
 
-    /// What was merged; none if the pipeline merges nothing.
+    /// Reads the summary; `None` if the pipeline merges nothing.
     pub(super) fn summary(&self) -> Result<Option<Summary>> {
         let Some(file) = &self.summary else { return Ok(None) };
         let text = std::fs::read(file).context("cannot read the summary of the run")?;
         Ok(Some(serde_json::from_slice(&text).context("cannot read the summary of the run")?))
     }
 
-    /// An error if there was no map to write or to draw.
+    /// Checks that the merged map was written and drawn.
     pub(super) fn check_written(&self, report: &RunReport) -> Result<()> {
         let counts = report.stages.iter().filter_map(|stage| stage.counts.get("files"));
         if counts.sum::<u64>() < self.files {
-            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}, as no map says anything");
+            bail!(
+                "there is no merged map to write or to draw: nothing was sent on {MERGED}, as all cells of the maps are unknown"
+            );
         }
         Ok(())
     }
 }
 
-/// Whether any stage sends a merged map.
+/// Whether a stage sends a merged map.
 fn is_merged(pipeline: &Pipeline) -> bool {
     let mut outputs = pipeline.stages.iter().flat_map(|stage| &stage.kind.outputs);
     outputs.any(|output| output.topic == Some(MERGED))

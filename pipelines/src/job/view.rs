@@ -1,4 +1,4 @@
-//! The live view of a run for Foxglove, as `--view` asks for it.
+//! The live view of a run for Foxglove (`--view`).
 
 use super::LOG_SINK;
 use crate::status::BadUse;
@@ -7,21 +7,21 @@ use gridweave_runtime::stage::Registry;
 use std::collections::BTreeSet;
 use std::net::TcpListener;
 
-/// The kind of stage that serves it.
+/// The kind of stage that serves the view.
 const VIEW: &str = "foxglove_sink";
-/// The address that is served on unless another is named, as the stage has it.
+/// The default address, which is that of the stage.
 pub(crate) const STANDARD_VIEW: &str = "127.0.0.1:8765";
 
-/// Adds the view to a pipeline: of what its logs hold or, without any, of all that its stages send to each other. Gives the
-/// address to open.
+/// Adds the view to a pipeline: it shows the messages that its logs contain or, without logs, all messages between its stages.
+/// Returns the address to open.
 ///
 /// # Errors
-/// The address is none, or this program has no such stage.
+/// The address is wrong, or this program has no such stage.
 pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str) -> Result<String, BadUse> {
     let (host, port) = parse(address)?;
     let port = if port == 0 { free_port(host) } else { port };
     let kind = registry.get(VIEW).ok_or_else(|| {
-        BadUse("this program was built without its view for Foxglove: build it with the feature `foxglove`".to_owned())
+        BadUse("this program was built without the view for Foxglove: build it with the feature `foxglove`".to_owned())
     })?;
     let read = |by_logs: bool| -> BTreeSet<(String, &'static str)> {
         let stages = pipeline.stages.iter().filter(|stage| !by_logs || stage.kind.name == LOG_SINK);
@@ -41,20 +41,22 @@ pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str
     Ok(format!("ws://{host}:{port}"))
 }
 
-/// A port of the host that is free: the stage, which may be in a process of its own, takes the one that is told here. 0 if there
-/// is none, or no such host, which the stage tells of.
+/// Finds a free port of the host, since the stage may be in another process and could not report the one it has chosen. 0 if there is
+/// none, or no such host, which the stage reports.
 fn free_port(host: &str) -> u16 {
     let host = host.trim_start_matches('[').trim_end_matches(']');
     TcpListener::bind((host, 0)).and_then(|listener| listener.local_addr()).map_or(0, |address| address.port())
 }
 
-/// HOST:PORT, or PORT on this machine.
+/// Parses HOST:PORT, or PORT on this machine.
 fn parse(address: &str) -> Result<(&str, u16), BadUse> {
     let standard_host = STANDARD_VIEW.split(':').next().unwrap_or_default();
     let (host, port) = address.rsplit_once(':').unwrap_or((standard_host, address));
     match port.parse() {
         Ok(port) if !host.is_empty() => Ok((host, port)),
-        _ => Err(BadUse(format!("`--view={address}` is no address: write PORT or HOST:PORT, as in {STANDARD_VIEW}"))),
+        _ => Err(BadUse(format!(
+            "`--view={address}` is not an address: write PORT or HOST:PORT, such as {STANDARD_VIEW}"
+        ))),
     }
 }
 

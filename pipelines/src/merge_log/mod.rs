@@ -1,5 +1,5 @@
-//! What a log knows of a merge at one moment: the last map of each robot, where they lie, and what was found in them. Pictures
-//! and reports are drawn from it.
+//! The state of a merge at one moment of a log: the last map of each robot, its pose, and what was found in it. Pictures and reports
+//! are made from it.
 
 mod placing;
 mod reading;
@@ -19,39 +19,39 @@ use std::collections::BTreeMap;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
-/// The topic of a robot's map that was drawn from its scans.
-const DRAWN: &str = "/{robot}/drawn_map";
-/// The topic of where maps contradict each other.
+/// The topic of a robot's map that was built from its scans.
+const BUILT_FROM_SCANS: &str = "/{robot}/drawn_map";
+/// The topic of the conflicts between maps.
 const CONFLICTS: &str = "/map_conflicts";
-/// The topic of a robot's drive in the merged frame.
+/// The topic of a robot's path in the merged frame.
 const PATH: &str = "/{robot}/merged_path";
 /// Poses nearer than this to the last one are left out of a trail, metres.
 const TRAIL_SPACING: f64 = 0.1;
 
-/// What a log knows of a merge at one moment.
+/// The state of a merge at one moment.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MergeState {
-    /// The robots that have a map, or of which something else is known.
+    /// Robots with a map or other messages.
     pub(crate) robots: BTreeMap<String, RobotState>,
     /// The merged map, encoded.
     merged: Option<Vec<u8>>,
-    /// Where maps contradict each other, encoded.
+    /// The conflicts between maps, encoded.
     conflicts: Option<Vec<u8>>,
-    /// Where the maps lie.
+    /// Poses of the map frames.
     pub(crate) frames: Option<RobotFrames>,
-    /// What became of each pair.
+    /// The decision on each pair.
     pub(crate) verdicts: Option<Verdicts>,
-    /// How far the maps agree.
+    /// Areas of agreement and conflict.
     pub(crate) agreement: Option<MapAgreement>,
-    /// The hypotheses of each pair, by the topic that they were sent on, by rank.
+    /// Hypotheses by topic and pair, each list by rank.
     pub(crate) hypotheses: BTreeMap<(String, String, String), Vec<Alignment>>,
-    /// How the error of ICP fell, by pair, by what the first guess was found from, and by its rank.
+    /// Errors of ICP by pair, source of the initial guess, and rank.
     pub(crate) icp_errors: BTreeMap<(String, String, String, u32), IcpErrors>,
-    /// The tags that pairs have in common.
+    /// Common tags by pair.
     pub(crate) common_tags: BTreeMap<(String, String), CommonTags>,
 }
 
-/// What a log knows of a robot.
+/// The state of a robot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RobotState {
     /// The last map, encoded.
@@ -60,42 +60,42 @@ pub(crate) struct RobotState {
     pub(crate) segments: Option<Segments>,
     /// The direction of the walls.
     pub(crate) direction: Option<MapDirection>,
-    /// Where tags are.
+    /// Estimated positions of tags.
     pub(crate) tags: Option<TagEstimates>,
-    /// How the map is bent.
-    pub(crate) bend: Option<MapDeformation>,
-    /// Places and ways.
+    /// The deformation of the map.
+    pub(crate) deformation: Option<MapDeformation>,
+    /// The topological map.
     pub(crate) topology: Option<TopologicalMap>,
-    /// The drive in the merged frame.
+    /// The path in the merged frame.
     pub(crate) path: Option<Path>,
-    /// The drive in the robot's map.
+    /// The logged positions in the robot's map frame.
     pub(crate) trail: Vec<Point2<f64>>,
 }
 
 impl RobotState {
-    /// The last map.
+    /// Decodes the last map.
     pub(crate) fn map(&self) -> Option<OccupancyGrid<'_>> {
         decode(self.map.as_deref()?).ok()
     }
 }
 
 impl MergeState {
-    /// The merged map.
+    /// Decodes the merged map.
     pub(crate) fn merged(&self) -> Option<OccupancyGrid<'_>> {
         decode(self.merged.as_deref()?).ok()
     }
 
-    /// Where maps contradict each other: 0 nowhere to 100 wholly.
+    /// Decodes the conflicts between maps: 0 for agreement to 100 for full conflict.
     pub(crate) fn conflicts(&self) -> Option<OccupancyGrid<'_>> {
         decode(self.conflicts.as_deref()?).ok()
     }
 
-    /// The robots that have a map, by name.
+    /// Iterates over the robots that have a map, by name.
     pub(crate) fn robots_with_maps(&self) -> impl Iterator<Item = (&str, OccupancyGrid<'_>)> {
         self.robots.iter().filter_map(|(robot, state)| Some((robot.as_str(), state.map()?)))
     }
 
-    /// Takes up a message, if it is about a merge.
+    /// Ingests a message, if it is about a merge.
     pub(crate) fn take(&mut self, channel: &Channel, topics: &RobotTopics, data: &[u8]) -> Result<(), DecodeError> {
         if channel.message_encoding != "cdr" {
             return Ok(());
@@ -132,9 +132,9 @@ impl MergeState {
                 state.tags = Some(tags);
             }
             MapDeformation::NAME => {
-                let bend: MapDeformation = decode(data)?;
-                let state = self.robot(&bend.robot);
-                state.bend = Some(bend);
+                let deformation: MapDeformation = decode(data)?;
+                let state = self.robot(&deformation.robot);
+                state.deformation = Some(deformation);
             }
             TopologicalMap::NAME => {
                 let topology: TopologicalMap = decode(data)?;
@@ -149,7 +149,7 @@ impl MergeState {
             PoseStamped::NAME => {
                 if let Some(robot) = match_robot(&topics.pose, topic) {
                     let PoseStamped { pose, .. } = decode(data)?;
-                    self.robot(robot).drive_to(Point2::new(pose.position.x, pose.position.y));
+                    self.robot(robot).add_to_trail(Point2::new(pose.position.x, pose.position.y));
                 }
             }
             _ => {}
@@ -161,7 +161,7 @@ impl MergeState {
         let slot = match topic {
             MERGED => &mut self.merged,
             CONFLICTS => &mut self.conflicts,
-            _ => match match_robot(&topics.map, topic).or_else(|| match_robot(DRAWN, topic)) {
+            _ => match match_robot(&topics.map, topic).or_else(|| match_robot(BUILT_FROM_SCANS, topic)) {
                 Some(robot) => &mut self.robot(robot).map,
                 None => return Ok(()),
             },
@@ -171,7 +171,7 @@ impl MergeState {
         Ok(())
     }
 
-    /// Hypotheses of a pair come by rank, and those that come with the first take the place of all before.
+    /// Adds a hypothesis. Those of a pair arrive by rank, and the first of a list replaces the list before.
     fn take_hypothesis(&mut self, topic: &str, alignment: Alignment) {
         let key = (topic.to_owned(), alignment.a.clone(), alignment.b.clone());
         let hypotheses = self.hypotheses.entry(key).or_default();
@@ -185,10 +185,10 @@ impl MergeState {
 }
 
 impl RobotState {
-    fn drive_to(&mut self, place: Point2<f64>) {
-        let is_far = self.trail.last().is_none_or(|last| (place - last).norm() >= TRAIL_SPACING);
-        if is_far && place.coords.iter().all(|value| value.is_finite()) {
-            self.trail.push(place);
+    fn add_to_trail(&mut self, position: Point2<f64>) {
+        let is_far = self.trail.last().is_none_or(|last| (position - last).norm() >= TRAIL_SPACING);
+        if is_far && position.coords.iter().all(|value| value.is_finite()) {
+            self.trail.push(position);
         }
     }
 }

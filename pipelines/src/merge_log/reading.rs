@@ -1,30 +1,30 @@
-//! Reads what is known of a merge out of logs and map files.
+//! Reads the state of a merge from logs and map files.
 
 use super::MergeState;
 use crate::job::NamingOptions;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
+use gridweave_logs::names::robot_names;
 use gridweave_logs::names::{self, Convention, Input, Names};
 use gridweave_logs::reader::{LogMessage, LogReader};
-use gridweave_logs::source::map_file::robot_names;
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::ros::{Header, OccupancyGrid, encode};
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Logs that are open, and what is known of the merge as far as they were read.
+/// Open logs, and the state of the merge as far as they were read.
 pub(crate) struct Opened {
     reader: LogReader,
     names: Names,
     topics: RobotTopics,
-    /// When the first message was logged.
+    /// The log time of the first message.
     start: Option<LogTime>,
-    /// What was read and is not taken up yet.
-    early: Option<Early>,
-    /// What is known.
+    /// A message that was read but is later than the moment.
+    pending: Option<Pending>,
+    /// The state of the merge.
     pub(crate) state: MergeState,
-    /// What was wrong with the logs.
+    /// Problems of the logs.
     pub(crate) problems: BTreeSet<String>,
 }
 
@@ -32,17 +32,17 @@ impl Opened {
     /// Opens logs.
     ///
     /// # Errors
-    /// One cannot be read, or their names do not fit.
+    /// A log cannot be read, or the names do not match.
     pub(crate) fn new(logs: &[PathBuf], naming: &NamingOptions) -> Result<Self> {
         let inputs: Vec<Input> = logs.iter().map(|input| Input::new(input)).collect();
         let topics = RobotTopics::default();
         let (reader, names) = names::open(&inputs, &naming.rules(Convention::ByRobot)?, &topics)?;
         let problems = reader.files().iter().flat_map(|file| file.damage()).map(ToString::to_string).collect();
         let state = MergeState::default();
-        Ok(Self { reader, names, topics, start: None, early: None, state, problems })
+        Ok(Self { reader, names, topics, start: None, pending: None, state, problems })
     }
 
-    /// What the logs tell of how they were made: the name of a record and of an entry, and its text.
+    /// Lists the metadata of the logs: the name of the record and of the entry, and the text.
     pub(crate) fn metadata(&self) -> Vec<(String, String)> {
         let mut found = Vec::new();
         for file in self.reader.files().iter() {
@@ -54,16 +54,16 @@ impl Opened {
         found
     }
 
-    /// Reads on up to a moment, in seconds from the first message on, or to the end. `each` is told of every message that was
-    /// taken up: when it was logged, in seconds, and its channel.
+    /// Reads on up to a moment, in seconds from the first message, or to the end. `each` is called for every ingested message with
+    /// its log time in seconds and its channel.
     pub(crate) fn read_until(&mut self, end: Option<f64>, mut each: impl FnMut(f64, &Channel)) {
         let is_later = |seconds: f64| end.is_some_and(|end| seconds > end);
-        if let Some(early) = self.early.take() {
-            if is_later(early.seconds) {
-                self.early = Some(early);
+        if let Some(pending) = self.pending.take() {
+            if is_later(pending.seconds) {
+                self.pending = Some(pending);
                 return;
             }
-            let Early { seconds, file, channel, data } = early;
+            let Pending { seconds, file, channel, data } = pending;
             take(&self.names, &self.topics, &mut self.state, &mut self.problems, (file, channel), &data, |channel| {
                 each(seconds, channel);
             });
@@ -73,7 +73,7 @@ impl Opened {
             let seconds = message.log_time.0.saturating_sub(start.0) as f64 / 1e9;
             let LogMessage { file, channel, data, .. } = message;
             if is_later(seconds) {
-                self.early = Some(Early { seconds, file, channel, data: data.to_vec() });
+                self.pending = Some(Pending { seconds, file, channel, data: data.to_vec() });
                 return;
             }
             take(&self.names, &self.topics, &mut self.state, &mut self.problems, (file, channel), data, |channel| {
@@ -85,15 +85,15 @@ impl Opened {
     }
 }
 
-/// A message that was read before its time.
-struct Early {
+/// A message that was read and is not ingested yet.
+struct Pending {
     seconds: f64,
     file: usize,
     channel: u16,
     data: Vec<u8>,
 }
 
-/// Takes up a message of a channel, which is told if it was.
+/// Ingests a message, and calls `each` with its channel if that has worked.
 fn take(
     names: &Names,
     topics: &RobotTopics,
@@ -112,10 +112,10 @@ fn take(
     }
 }
 
-/// The maps of map files, each of a robot that is called as the file.
+/// Reads map files, each as the map of a robot with the name of the file.
 ///
 /// # Errors
-/// A file cannot be read, is no map, or two are of one name.
+/// A file cannot be read or is not a map, or two have the same name.
 pub(crate) fn map_files(files: &[PathBuf]) -> Result<MergeState> {
     let mut state = MergeState::default();
     for (robot, file) in robot_names(files)?.iter().zip(files) {

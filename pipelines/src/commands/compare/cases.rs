@@ -1,11 +1,11 @@
-//! What is merged: logs with their truth, and pairs of map files.
+//! The inputs of a comparison: logs with their truth, and pairs of map files.
 
 use super::score::{PairTruth, Truth};
 use crate::evaluate::check_truth;
 use crate::shipped;
 use crate::status::BadUse;
 use anyhow::{Context, Result, bail};
-use gridweave_logs::source::map_file::robot_names;
+use gridweave_logs::names::robot_names;
 use gridweave_runtime::engine::{self, EngineKind};
 use gridweave_runtime::input_file;
 use gridweave_runtime::pipeline::Overrides;
@@ -17,26 +17,26 @@ use std::path::{Path, PathBuf};
 
 /// The list of pairs in a folder of map files.
 const PAIRS: &str = "pairs.json";
-/// What makes a folder a rosbag2.
+/// The file that marks a folder as a rosbag2.
 const BAG: &str = "metadata.yaml";
 /// The pipeline that writes map files as a log.
 const MAPS_AS_LOG: &str = "map_files_to_log";
 
-/// A log, and what is true of it.
+/// A log and its truth.
 #[derive(Debug)]
 pub(super) struct Case {
-    /// What the table calls it.
+    /// Its name in the table.
     pub(super) name: String,
-    /// The input that it came with, as it was given.
+    /// The input on the command line that it belongs to.
     pub(super) input: String,
-    /// What is read.
+    /// The log that is read.
     pub(super) log: PathBuf,
-    /// The robot whose frame is the world, if that is not for the pipeline to say.
+    /// The robot whose frame is the world; `None` leaves the choice to the pipeline.
     pub(super) reference: Option<String>,
     pub(super) truth: Truth,
 }
 
-/// A pair of map files, as a folder lists it.
+/// An entry of `pairs.json`.
 #[derive(Debug, Deserialize)]
 struct ListedPair {
     pair: String,
@@ -47,10 +47,10 @@ struct ListedPair {
     truth: PairTruth,
 }
 
-/// The cases of all inputs, in their order. What is made for them is put into `folder`.
+/// Finds the cases of all inputs, in their order. Logs that are made of map files are written to `folder`.
 ///
 /// # Errors
-/// There is no such input, nothing in it, or a truth is missing or cannot be read.
+/// An input does not exist or is empty, or a truth is missing or cannot be read.
 pub(super) fn of(inputs: &[PathBuf], unrelated: bool, folder: &Path, registry: &Registry) -> Result<Vec<Case>> {
     let finder = Finder { unrelated, folder, registry };
     let mut cases: Vec<Case> = Vec::new();
@@ -61,12 +61,12 @@ pub(super) fn of(inputs: &[PathBuf], unrelated: bool, folder: &Path, registry: &
         let found = finder.find(input, cases.len())?;
         cases.extend(found);
     }
-    tell_apart(&mut cases);
+    make_names_unique(&mut cases);
     Ok(cases)
 }
 
-/// Cases of one name are called by their input, too.
-fn tell_apart(cases: &mut [Case]) {
+/// Puts the input before names that several cases have.
+fn make_names_unique(cases: &mut [Case]) {
     let names: Vec<String> = cases.iter().map(|case| case.name.clone()).collect();
     for case in cases {
         if names.iter().filter(|name| **name == case.name).count() > 1 && case.input != case.name {
@@ -82,7 +82,7 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    /// The cases of an input; there are so many already.
+    /// Finds the cases of an input; `before` is the number of cases so far.
     fn find(&self, input: &Path, before: usize) -> Result<Vec<Case>> {
         let here = || input.display().to_string();
         if !input.exists() {
@@ -96,7 +96,9 @@ impl Finder<'_> {
         }
         let logs = logs_in(input)?;
         if logs.is_empty() {
-            return Err(BadUse(format!("the folder {} holds no log (*.mcap) and no {PAIRS}", input.display())).into());
+            return Err(
+                BadUse(format!("the folder {} contains no log (*.mcap) and no {PAIRS}", input.display())).into()
+            );
         }
         logs.iter().map(|log| self.log(log, here())).collect()
     }
@@ -115,7 +117,7 @@ impl Finder<'_> {
                 path
             }
             (false, false) => bail!(
-                "the log {} has no truth: there is no {}; give --unrelated if its robots have nothing to do with each other",
+                "the log {} has no truth: {} does not exist; give --unrelated if its robots must not be merged",
                 log.display(),
                 truth.display()
             ),
@@ -125,7 +127,7 @@ impl Finder<'_> {
         Ok(Case { name, input, log: log.to_owned(), reference: None, truth: Truth::Frames(truth) })
     }
 
-    /// The pairs that a folder lists, each written as a log.
+    /// Writes each pair of map files that a folder lists as a log.
     fn pairs(&self, input: &Path, before: usize) -> Result<Vec<Case>> {
         let path = input.join(PAIRS);
         let text = input_file::read(&path, input_file::LONGEST_TEXT)
@@ -147,7 +149,7 @@ impl Finder<'_> {
         listed.into_iter().enumerate().map(case).collect()
     }
 
-    /// Writes map files as a log. The names of their robots.
+    /// Writes map files as a log. Returns the names of their robots.
     fn write_log(&self, files: &[PathBuf; 2], log: &Path) -> Result<[String; 2]> {
         let names = robot_names(files)?;
         let text = |path: &Path| {
@@ -159,11 +161,11 @@ impl Finder<'_> {
         overrides.set_for_kind("mcap_sink", "file", text(log)?);
         let pipeline = shipped::load(Path::new(MAPS_AS_LOG), &overrides, self.registry)?;
         engine::run(&pipeline, EngineKind::Single, &())?;
-        names.try_into().map_err(|_| anyhow::anyhow!("two files have not two names"))
+        names.try_into().map_err(|_| anyhow::anyhow!("two map files do not give two robot names"))
     }
 }
 
-/// The logs of a folder, by name.
+/// Lists the logs of a folder, by name.
 fn logs_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let doing = || format!("cannot look for logs in {}", folder.display());
     let mut logs = Vec::new();

@@ -1,7 +1,7 @@
-//! A process that runs one program, and tells what that has taken.
+//! `gridweave measure`: runs one command, and measures its time and memory.
 //!
-//! The system tells the peak of memory of the largest of all processes that a process has waited for; so each run has
-//! somebody of its own who waits for it.
+//! The system reports the peak memory of the largest of all processes that a process has waited for; so each run is started by a
+//! separate process.
 
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
@@ -16,31 +16,31 @@ use std::path::PathBuf;
 use std::process::{Command, ExitStatus};
 use std::time::Instant;
 
-/// What `gridweave measure` is told.
+/// Arguments of `gridweave measure`.
 #[derive(Debug, Args)]
 pub(crate) struct MeasureArgs {
-    /// Where to write what it has taken, as JSON.
+    /// The file for the measurements, as JSON.
     #[arg(long, value_name = "FILE")]
     usage: PathBuf,
-    /// What `gridweave` is told.
+    /// Arguments of `gridweave`.
     #[arg(last = true, required = true)]
     command: Vec<OsString>,
 }
 
-/// What a run has taken.
+/// Time and memory of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Usage {
-    /// Seconds on the clock.
+    /// Wall-clock time, seconds.
     pub(super) time_s: f64,
-    /// Seconds of all processors.
+    /// Processor time of all processes, seconds.
     pub(super) cpu_s: f64,
-    /// The most memory that its largest process has held, bytes.
+    /// Peak memory of the largest process, bytes.
     pub(super) memory_bytes: u64,
-    /// How it ended: its exit status, as `Ok`, or what ended it.
+    /// The exit status, or what ended the run.
     pub(super) end: Result<i32, String>,
 }
 
-/// Runs `gridweave` as it is told, and writes what that has taken.
+/// Runs `gridweave` with the given arguments, and writes its time and memory.
 pub(crate) fn measure(args: &MeasureArgs) -> Result<Status> {
     // A run that is interrupted ends in order, and this waits for it.
     stop_on_interrupt("the run is ended");
@@ -49,7 +49,7 @@ pub(crate) fn measure(args: &MeasureArgs) -> Result<Status> {
     let ended = Command::new(&program).args(&args.command).status();
     let ended = ended.with_context(|| format!("cannot start {}", program.display()))?;
     let time_s = start.elapsed().as_secs_f64();
-    let used = getrusage(UsageWho::RUSAGE_CHILDREN).context("cannot tell what the run has taken")?;
+    let used = getrusage(UsageWho::RUSAGE_CHILDREN).context("cannot measure the time and memory of the run")?;
     let usage = Usage {
         time_s,
         cpu_s: (used.user_time() + used.system_time()).num_microseconds() as f64 * 1e-6,
@@ -64,6 +64,6 @@ pub(crate) fn measure(args: &MeasureArgs) -> Result<Status> {
 fn end(status: ExitStatus) -> Result<i32, String> {
     status.code().ok_or_else(|| match status.signal() {
         Some(signal) => format!("it was ended by signal {signal}"),
-        None => "it has ended in no known way".to_owned(),
+        None => "it has ended with no exit status".to_owned(),
     })
 }

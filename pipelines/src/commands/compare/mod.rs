@@ -1,8 +1,8 @@
 //! `gridweave compare`: pipelines side by side on the same inputs.
 //!
-//! The inputs become [`cases`], logs with their truth. Every pipeline merges every one of them in a process of its own
-//! ([`merge_case`]), under another one that [`measure`]s what it takes; so a run that crashes is a result as others are. What
-//! came out is held against the truth ([`score`]), gathered in rows ([`rows`]) and printed ([`report`]).
+//! The inputs become [`cases`], logs with their truth. Every pipeline merges each of them in a separate process ([`merge_case`]),
+//! under another one that measures its time and memory ([`measure`]); so a run that crashes is a result like any other. The
+//! results are compared with the truth ([`score`]), gathered in rows ([`rows`]) and printed ([`report`]).
 
 mod cases;
 pub(crate) mod measure;
@@ -30,19 +30,18 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What `gridweave compare` is told.
+/// Arguments of `gridweave compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   gridweave compare --pipelines map_merge hough_spectrum --inputs logs/ one.mcap --csv table.csv
 
-A robot is right if it is merged less than 0.5 m, at the middle of its map, and 1 degree off the truth, as `evaluate` has it; \
-of a pair of map files, the places in common must lie on each other. Success is right, or rightly refused; refused are only \
-those that belong to the others. Errors are those of all robots that were merged, right or wrong. Times are medians over runs, \
-on the clock (several at once lengthen it) and of all processors; memory is the peak of the largest process.
+A robot is right if its pose is less than 0.5 m, at the middle of its map, and 1 degree from the truth, as in `evaluate`; for a \
+pair of map files, the distances between common places decide. Success counts robots that are right or rightly refused; refused \
+counts only robots that could be merged. Errors are those of all merged robots, right or wrong. Times are medians over runs: \
+wall-clock time, which concurrent runs lengthen, and processor time; memory is the peak of the largest process.
 
-Exit status: 0 if all runs came to an end, whether they merged or not; 1 if a run failed, or the truth cannot be read; 2 for \
-bad use.")]
+Exit status: 0 if all runs were completed, merged or not; 1 if a run failed or the truth cannot be read; 2 for bad use.")]
 pub(crate) struct CompareArgs {
     /// Pipeline files, or names of shipped pipelines such as `map_merge`.
     #[arg(long, required = true, num_args = 1.., value_name = "PIPELINE")]
@@ -54,16 +53,16 @@ pub(crate) struct CompareArgs {
     /// Run each pipeline on each log with the seeds 1 to N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: u64,
-    /// How many runs go on at once; as many as there are processors unless given. Times are best taken with 1.
+    /// How many runs are done concurrently; by default one for each processor. Times are best measured with 1.
     #[arg(long, value_name = "COUNT")]
     jobs: Option<NonZeroUsize>,
-    /// Take logs without a truth as those of robots that have nothing to do with each other, which must not be merged.
+    /// Take logs without a truth as those of unrelated robots, which must not be merged.
     #[arg(long)]
     unrelated: bool,
-    /// A row for each log, for each input as it was given (a folder is one), or for each pipeline only.
+    /// A row for each log, for each input on the command line (a folder is one), or for each pipeline only.
     #[arg(long, value_enum, default_value_t = RowsBy::Log)]
     by: RowsBy,
-    /// Write the table as comma-separated values, too.
+    /// Also write the table as comma-separated values.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Print the table in Markdown.
@@ -74,7 +73,7 @@ pub(crate) struct CompareArgs {
     json: bool,
 }
 
-/// Runs the pipelines and prints how they came out.
+/// Runs the pipelines and prints the results.
 pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status> {
     let pipelines = names(&args.pipelines)?;
     let folder = tempfile::tempdir().context("cannot make a folder for the outputs of the runs")?;
@@ -95,7 +94,7 @@ pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status>
     Ok(if report.has_failed() { Status::Failed } else { Status::Done })
 }
 
-/// What the table calls the pipelines: by their file names, where these differ.
+/// Names of the pipelines in the table: their file names, where these differ.
 fn names(pipelines: &[PathBuf]) -> Result<Vec<String>, BadUse> {
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let stems: Vec<String> = pipelines.iter().map(stem).collect();
@@ -112,7 +111,7 @@ fn names(pipelines: &[PathBuf]) -> Result<Vec<String>, BadUse> {
     Ok(pipelines.iter().zip(&stems).map(name).collect())
 }
 
-/// Whether a pipeline can be run on logs: what is wrong with it is told before anything runs.
+/// Checks that a pipeline can be run on logs, so that its errors are reported before anything runs.
 fn check(pipeline: &Path, log: &Path, registry: &Registry) -> Result<()> {
     let overrides = merge_case::overrides(log, Path::new("out.mcap"))?;
     let loaded = shipped::load(pipeline, &overrides, registry)?;
@@ -123,7 +122,7 @@ fn check(pipeline: &Path, log: &Path, registry: &Registry) -> Result<()> {
     Ok(())
 }
 
-/// Every pipeline on every case with every seed, in this order, however they end.
+/// Runs every pipeline on every case with every seed. The results are in this order.
 fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<MergeResult>> {
     let merges: Vec<Merge<'_>> = (0..args.pipelines.len())
         .flat_map(|pipeline| (0..cases.len()).map(move |case| (pipeline, case)))
@@ -133,7 +132,7 @@ fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<Merg
     let threads = args.jobs.map_or(0, NonZeroUsize::get);
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads for the runs")?;
-    let stop = stop_on_interrupt("no more runs are begun, and those that go on come to their end");
+    let stop = stop_on_interrupt("no more runs are started, and those in progress are completed");
     let (gauge, done) = (Gauge::new(true), AtomicUsize::new(0));
     let run = |(number, merge): (usize, &Merge<'_>)| -> Result<MergeResult> {
         if stop.load(Ordering::Relaxed) {
@@ -142,7 +141,7 @@ fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<Merg
         let result = merge.run(&cases[merge.case], &folder.join(format!("run{number}")))?;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         let share = count as f64 / merges.len() as f64;
-        let rate = gauge.rate(60.0 * count as f64).map_or_else(String::new, |rate| format!(", {rate:.1} in a minute"));
+        let rate = gauge.rate(60.0 * count as f64).map_or_else(String::new, |rate| format!(", {rate:.1} per minute"));
         gauge.show(share, format_args!("{count} of {} runs{rate}", merges.len()));
         Ok(result)
     };

@@ -1,14 +1,14 @@
-//! What a comparison prints.
+//! The report of a comparison as text, Markdown, CSV and JSON.
 
 use super::cases::Case;
 use super::merge_case::MergeResult;
 use super::rows::{Row, RowsBy, rows};
-use crate::prose::broken;
 use crate::table::Table;
+use crate::text_wrapping::wrap;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// A comparison that is done.
+/// Results of a comparison.
 pub(super) struct Report<'a> {
     pipelines: &'a [String],
     cases: &'a [Case],
@@ -21,24 +21,24 @@ impl<'a> Report<'a> {
         Self { rows: rows(pipelines, cases, &results, by), pipelines, cases, results }
     }
 
-    /// Whether a run did not come to its end.
+    /// Whether a run has failed.
     pub(super) fn has_failed(&self) -> bool {
         self.results.iter().any(|result| result.robots.is_err())
     }
 
-    /// For people, in lines of at most `width` characters: the table, and why runs have failed.
+    /// Formats the table and the failures in lines of at most `width` columns.
     pub(super) fn to_text(&self, width: Option<usize>) -> String {
         let failures = self.failures("");
-        let failures = failures.lines().map(|line| broken(line, 2, width) + "\n");
+        let failures = failures.lines().map(|line| wrap(line, 2, width) + "\n");
         self.table().fit(width) + &failures.collect::<String>()
     }
 
-    /// The same in Markdown.
+    /// Formats the table and the failures in Markdown.
     pub(super) fn to_markdown(&self) -> String {
         format!("{}{}", self.table().to_markdown(), self.failures("\n"))
     }
 
-    /// Every number, in the units that the heads say.
+    /// Formats every number, in the units of the heads, as comma-separated values.
     pub(super) fn to_csv(&self) -> String {
         let heads = [
             "pipeline",
@@ -70,7 +70,7 @@ impl<'a> Report<'a> {
         table.to_csv()
     }
 
-    /// The rows, and every run.
+    /// Formats the rows and every run as JSON.
     pub(super) fn to_json(&self) -> String {
         let run = |result: &MergeResult| {
             let (robots, failure) = match &result.robots {
@@ -132,13 +132,13 @@ impl<'a> Report<'a> {
         table
     }
 
-    /// A line for each run that has failed, behind one that sets them off.
+    /// A line for each run that has failed, each after the text `before`.
     fn failures(&self, before: &str) -> String {
         let mut text = String::new();
         for result in &self.results {
             let Err(failure) = &result.robots else { continue };
             let (pipeline, log) = (&self.pipelines[result.pipeline], &self.cases[result.case].name);
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "{before}failed: {pipeline} on {log}, seed {}: {failure}", result.seed);
         }
         text

@@ -1,4 +1,4 @@
-//! The rows of the table: what several runs of a pipeline come to.
+//! Rows of the table: counts, errors and times over several runs of a pipeline.
 
 use super::cases::Case;
 use super::merge_case::MergeResult;
@@ -6,46 +6,46 @@ use crate::evaluate::RobotOutcome;
 use clap::ValueEnum;
 use serde::Serialize;
 
-/// What has a row of its own.
+/// Grouping of runs in rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum RowsBy {
-    /// Each log.
+    /// A row for each log.
     Log,
-    /// Each input, as it was given.
+    /// A row for each input on the command line.
     Input,
-    /// Each pipeline.
+    /// A row for each pipeline.
     Pipeline,
 }
 
-/// What runs of one pipeline come to.
+/// Statistics of several runs of one pipeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Row {
     pub(super) pipeline: String,
     /// The log or input; none for all.
     pub(super) log: Option<String>,
     pub(super) runs: usize,
-    /// Runs that did not come to their end.
+    /// Runs that have failed.
     pub(super) failed: usize,
-    /// Robots beside the reference, of which there is a truth, in runs that came to their end.
+    /// Robots with a truth, without the reference, in complete runs.
     pub(super) robots: usize,
-    /// Robots that are where they belong, and those rightly refused.
+    /// Robots that are right or rightly refused.
     pub(super) success: usize,
-    /// Robots that are not where they belong.
+    /// Robots that are merged with a wrong pose.
     pub(super) wrong: usize,
-    /// Robots that belong to the others, and were refused.
+    /// Robots that could be merged and were refused.
     pub(super) refused: usize,
     pub(super) median_m: Option<f64>,
     pub(super) p90_m: Option<f64>,
     pub(super) median_deg: Option<f64>,
     pub(super) p90_deg: Option<f64>,
-    /// The median over the runs.
+    /// Median over the runs.
     pub(super) time_s: Option<f64>,
     pub(super) cpu_s: Option<f64>,
-    /// The most of all runs.
+    /// Maximum over the runs.
     pub(super) memory_bytes: Option<u64>,
 }
 
-/// The rows of all pipelines, each with one of all its runs at the end.
+/// Makes the rows of all pipelines; the last of each is for all its runs.
 pub(super) fn rows(pipelines: &[String], cases: &[Case], results: &[MergeResult], by: RowsBy) -> Vec<Row> {
     let group = |case: &Case| match by {
         RowsBy::Log => Some(case.name.clone()),
@@ -100,7 +100,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-/// The value below which this share of sorted values lies.
+/// Quantile of sorted values: `share` of them are no greater.
 fn at(sorted: &[f64], share: f64) -> Option<f64> {
     sorted.get((share * sorted.len().checked_sub(1)? as f64).round() as usize).copied()
 }

@@ -1,4 +1,4 @@
-//! What a run has found, held against the truth.
+//! Comparison of the summary of a run with the truth.
 
 use crate::common_places::{self, CommonPlace};
 use crate::evaluate::{RobotOutcome, evaluate, read_summary};
@@ -7,15 +7,15 @@ use gridweave_logs::summary::Summary;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Metres. The places in common may lie farther apart than the best rigid transform leaves them by this in the median.
+/// Metres. The median distance of common places may exceed that of the best rigid transform by this.
 const RIGHT_MEDIAN: f64 = 0.5;
-/// Metres. The same for nine of ten.
+/// Metres. The 90 % quantile may exceed that of the best rigid transform by this.
 const RIGHT_P90: f64 = 1.0;
 
-/// What is true of a log.
+/// The truth of a log.
 #[derive(Debug)]
 pub(super) enum Truth {
-    /// What `evaluate` reads.
+    /// A truth file, as `evaluate` reads it.
     Frames(PathBuf),
     /// Places that two maps have in common.
     Places {
@@ -25,30 +25,31 @@ pub(super) enum Truth {
     },
 }
 
-/// What is true of a pair of map files.
+/// The truth of a pair of map files.
 #[derive(Debug, Deserialize)]
 pub(super) struct PairTruth {
-    /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. None if the maps have nothing in common.
+    /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. Empty if the maps have nothing in common.
     common: Vec<CommonPlace>,
-    /// How far apart the best rigid transform leaves them, as the maps are bent, metres: in the median, and nine of ten.
+    /// Median distance of the places under the best rigid transform, which the deformation of the maps causes, metres.
     #[serde(default)]
     rigid_median: f64,
+    /// The 90 % quantile of these distances, metres.
     #[serde(default)]
     rigid_p90: f64,
 }
 
-/// What became of a robot beside the reference.
+/// Outcome and errors of a robot other than the reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Scored {
     pub(super) robot: String,
     pub(super) outcome: RobotOutcome,
-    /// Metres, at the middle of its map; for a pair of map files, the median over the places in common.
+    /// Metres, at the middle of its map; for a pair of map files, the median over the common places.
     pub(super) error_m: Option<f64>,
     pub(super) error_deg: Option<f64>,
 }
 
 impl Truth {
-    /// Scores what a summary says.
+    /// Scores the summary of a run.
     pub(super) fn score(&self, summary: &Path) -> Result<Vec<Scored>> {
         match self {
             Self::Frames(truth) => {
@@ -71,7 +72,7 @@ impl Truth {
 }
 
 impl PairTruth {
-    /// What became of map b, and its error in metres and degrees.
+    /// Outcome of map b, and its error in metres and degrees.
     fn score(&self, run: &Summary, a: &str, b: &str) -> (RobotOutcome, Option<(f64, f64)>) {
         if !(run.frames.contains_key(a) && run.frames.contains_key(b)) {
             let refused = if self.common.is_empty() { RobotOutcome::RightlyRefused } else { RobotOutcome::Refused };
@@ -98,14 +99,14 @@ mod tests {
         Summary { frames: frames.iter().map(frame).collect(), ..Default::default() }
     }
 
-    /// Map b lies at (10, 0) in map a, and is turned by a quarter.
+    /// The pose `T_a_b` is (10, 0) with a quarter turn.
     fn truth() -> PairTruth {
         let common = [[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [2.0, 2.0]].map(|[x, y]| [x, y, 10.0 - y, x]).to_vec();
         PairTruth { common, rigid_median: 0.1, rigid_p90: 0.2 }
     }
 
     #[test]
-    fn places_in_common_say_whether_a_pair_is_right() {
+    fn common_places_decide_whether_a_pair_is_right() {
         let quarter = std::f64::consts::FRAC_PI_2;
         for (frame_b, expected, metres) in [
             ([10.0, 0.0, quarter], RobotOutcome::Right, 0.0),

@@ -1,4 +1,4 @@
-//! `stage.toml`: what a case says.
+//! The file `stage.toml` of a case.
 
 use super::expect::Expect;
 use super::find::CaseFolder;
@@ -14,18 +14,18 @@ use std::path::PathBuf;
 /// The sections that are not those of a pipeline.
 const OWN_SECTIONS: [&str; 3] = ["inputs", "compare", "expect"];
 
-/// One case, checked.
+/// A case, checked against the stage kind.
 #[derive(Debug)]
 pub(super) struct Case {
     /// The stage and its parameters.
     pub(super) stage: SingleStage,
-    /// For every input port that is fed: its index, and the patterns of the topics that feed it.
+    /// For every connected input port: its index, and the patterns of its topics.
     pub(super) inputs: Vec<(usize, Vec<String>)>,
     /// How far apart two equal numbers with a fraction may be.
     pub(super) float_tolerance: f64,
-    /// What must hold whatever is expected.
+    /// Conditions that must hold for every expected log.
     pub(super) expects: Vec<Expect>,
-    /// Where it lies.
+    /// The folder of the case.
     pub(super) folder: PathBuf,
     /// `input.mcap`.
     pub(super) input: PathBuf,
@@ -33,7 +33,7 @@ pub(super) struct Case {
     pub(super) expected: PathBuf,
 }
 
-/// The file as it stands. The sections of a pipeline are read, and checked, by [`SingleStage`].
+/// The contents of the file. The sections of a pipeline are read, and checked, by [`SingleStage`].
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CaseFile {
@@ -79,7 +79,7 @@ impl Case {
         let stage = SingleStage::parse(&name, &text, registry, &OWN_SECTIONS)?;
         if stage.kind.name != folder.kind {
             bail!(
-                "{name}: the stage is of kind `{}`, and the case lies in the folder of the kind `{}`",
+                "{name}: the stage is of kind `{}`, but the case is in the folder of the kind `{}`",
                 stage.kind.name,
                 folder.kind
             );
@@ -87,7 +87,7 @@ impl Case {
         let file: CaseFile = toml::from_str(&text).map_err(|error| anyhow::anyhow!("{name}: {error}"))?;
         let tolerance = file.compare.float_tolerance;
         if !(tolerance.is_finite() && tolerance >= 0.0) {
-            bail!("{name}: `float_tolerance` is {tolerance}, and must be 0 or more");
+            bail!("{name}: `float_tolerance` must be 0 or more, not {tolerance}");
         }
         let inputs = inputs(&stage.kind, file.inputs).with_context(|| name.clone())?;
         let expects = file.expect.into_iter().enumerate().map(|(at, entry)| {
@@ -104,22 +104,22 @@ impl Case {
         })
     }
 
-    /// Whether a parameter of the stage holds this text.
+    /// Whether a parameter of the stage contains this placeholder.
     pub(super) fn has_placeholder(&self, placeholder: &str) -> bool {
-        self.stage.parameters.values().any(|value| mentions(value, placeholder))
+        self.stage.parameters.values().any(|value| contains(value, placeholder))
     }
 }
 
-fn mentions(value: &toml::Value, text: &str) -> bool {
+fn contains(value: &toml::Value, text: &str) -> bool {
     match value {
         toml::Value::String(value) => value.contains(text),
-        toml::Value::Array(values) => values.iter().any(|value| mentions(value, text)),
-        toml::Value::Table(table) => table.values().any(|value| mentions(value, text)),
+        toml::Value::Array(values) => values.iter().any(|value| contains(value, text)),
+        toml::Value::Table(table) => table.values().any(|value| contains(value, text)),
         _ => false,
     }
 }
 
-/// The section `[inputs]`, by input port.
+/// Reads the section `[inputs]`, by input port.
 fn inputs(kind: &StageKind, given: BTreeMap<String, Patterns>) -> Result<Vec<(usize, Vec<String>)>> {
     let names: Vec<&str> = kind.inputs.iter().map(|port| port.name).collect();
     if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
@@ -134,7 +134,7 @@ fn inputs(kind: &StageKind, given: BTreeMap<String, Patterns>) -> Result<Vec<(us
             Some(Patterns::Several(patterns)) if !patterns.is_empty() => patterns,
             None if port.optional => continue,
             _ => bail!(
-                "no topic feeds the input `{}` of `{}`; write `{} = \"/TOPIC\"` below [inputs], with {{robot}} for the \
+                "the input `{}` of `{}` has no topic; write `{} = \"/TOPIC\"` below [inputs], with {{robot}} for the \
                  robot's name",
                 port.name,
                 kind.name,
@@ -151,7 +151,7 @@ fn check_pattern(pattern: &str) -> Result<()> {
     let rest = pattern.replacen("{robot}", "", 1);
     if !pattern.starts_with('/') || rest.contains(['{', '}']) {
         let example = quoted_list(&["/{robot}/map", "/map"]);
-        bail!("`{pattern}` is no pattern of topics: write one such as {example}, with {{robot}} once at most");
+        bail!("`{pattern}` is not a topic pattern: write one such as {example}, with {{robot}} at most once");
     }
     Ok(())
 }

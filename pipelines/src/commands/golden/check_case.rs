@@ -1,4 +1,4 @@
-//! One case from its folder to its outcome.
+//! The check of one case.
 
 use super::GoldenArgs;
 use super::case_file::Case;
@@ -11,32 +11,32 @@ use anyhow::Result;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::stage::Registry;
 
-/// How a case came out.
+/// Result of a case.
 #[derive(Debug)]
 pub(super) struct CaseOutcome {
     /// `KIND/CASE`.
     pub(super) name: String,
     pub(super) status: Status,
-    /// Why it fails, besides the differences.
+    /// Why the case fails, besides the differences.
     pub(super) problems: Vec<String>,
-    /// What differs from the expected log, if there is one that can be read.
+    /// Differences from the expected log, if there is one that can be read.
     pub(super) comparison: Option<Comparison>,
-    /// What was written to the folder of differences.
+    /// Files that were written to the folder of differences.
     pub(super) written: Option<Written>,
 }
 
-/// How a case came out, in short.
+/// Status of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Status {
     /// All is as expected.
     Passed,
-    /// Something is not.
+    /// Something is not as expected.
     Failed,
     /// The expected log was rewritten, for this reason.
     Blessed(String),
 }
 
-/// Runs a case and compares what comes out, or blesses it.
+/// Runs a case and compares its messages with the expected ones, or blesses them.
 pub(super) fn check_case(
     folder: &CaseFolder,
     args: &GoldenArgs,
@@ -69,7 +69,7 @@ fn check(folder: &CaseFolder, args: &GoldenArgs, registry: &Registry, observer: 
         }
         Some(wrong) => {
             if args.bless {
-                problems.push("not blessed, since what must hold does not".to_owned());
+                problems.push("not blessed, since a condition of [[expect]] does not hold".to_owned());
             }
             problems.extend(wrong.problem);
             Status::Failed
@@ -83,17 +83,17 @@ fn check(folder: &CaseFolder, args: &GoldenArgs, registry: &Registry, observer: 
     Ok(CaseOutcome { name: folder.name(), status, problems, comparison, written })
 }
 
-/// What the expected log says of what was sent.
+/// Result of the comparison with the expected log.
 struct CaseVerdict {
-    /// What differs, if there is an expected log that can be read.
+    /// Differences, if there is an expected log that can be read.
     comparison: Option<Comparison>,
     /// `None` if nothing differs.
     wrong: Option<Wrong>,
 }
 
-/// What was sent is not as expected.
+/// A mismatch with the expected log.
 struct Wrong {
-    /// Why, where it is not because of differences.
+    /// Why the messages cannot be compared; `None` if they differ.
     problem: Option<String>,
     /// Why the expected log is rewritten, if it is.
     blessing: String,

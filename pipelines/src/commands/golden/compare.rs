@@ -1,4 +1,4 @@
-//! What a stage has sent, held against what is expected: message by message and field by field.
+//! Comparison of the messages that a stage has sent with the expected ones: message by message and field by field.
 
 use super::recording::{Recorded, Recording};
 use gridweave_logs::dynamic::{self, Schema};
@@ -7,36 +7,36 @@ use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// So many grids of a case are kept to be drawn.
-const GRIDS_KEPT: usize = 12;
+/// Maximum number of grids of a case that are drawn.
+const MAX_GRIDS: usize = 12;
 
-/// How a recording differs from the expected one.
+/// Differences between a recording and the expected one.
 #[derive(Debug, Default)]
 pub(super) struct Comparison {
     /// The first differences, by topic and log time.
     pub(super) differences: Vec<Difference>,
-    /// How many there are in all.
+    /// Number of all differences.
     pub(super) count: usize,
-    /// How many messages differ from the expected ones.
+    /// Number of messages that differ from the expected ones.
     pub(super) differing: usize,
-    /// How many messages are expected and were not sent.
+    /// Number of messages that are expected and were not sent.
     pub(super) missing: usize,
-    /// How many messages were sent and are not expected.
+    /// Number of messages that were sent and are not expected.
     pub(super) surplus: usize,
-    /// How many warnings differ in their text or count.
+    /// Number of warnings that differ in their text or count.
     pub(super) warnings: usize,
     /// Grids of equal size whose cells differ.
     pub(super) grids: Vec<GridDifference>,
 }
 
-/// One thing that differs.
+/// A difference in a message or a warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Difference {
     /// The topic; none for a warning.
     pub(super) topic: Option<String>,
-    /// The message.
+    /// The log time of the message.
     pub(super) log_time: Option<LogTime>,
-    /// The path of the field; none if it is about the message as a whole.
+    /// The path of the field; none for the message as a whole.
     pub(super) field: Option<String>,
     pub(super) expected: String,
     pub(super) got: String,
@@ -47,18 +47,19 @@ pub(super) struct Difference {
 pub(super) struct GridDifference {
     pub(super) topic: String,
     pub(super) log_time: LogTime,
-    /// How many cells differ.
+    /// Number of cells that differ.
     pub(super) cells: usize,
-    /// Columns.
+    /// Number of columns.
     pub(super) width: usize,
-    /// The cells that are expected, and those that were sent, row by row.
+    /// Expected cells, row by row.
     pub(super) expected: Vec<i8>,
+    /// Cells that were sent, row by row.
     pub(super) got: Vec<i8>,
 }
 
 impl Comparison {
     /// Compares recordings. Numbers with a fraction may differ by `tolerance`, see
-    /// [`nearly_equal`](dynamic::nearly_equal). At most `limit` differences are told.
+    /// [`nearly_equal`](dynamic::nearly_equal). At most `limit` differences are kept.
     pub(super) fn new<'a>(expected: &'a Recording, got: &'a Recording, tolerance: f64, limit: usize) -> Self {
         let mut comparison = Self::default();
         let (expected_topics, got_topics) = (expected.by_topic(), got.by_topic());
@@ -77,7 +78,7 @@ impl Comparison {
         self.count == 0
     }
 
-    /// What differs, in a few words.
+    /// Counts of the differences as text.
     pub(super) fn summary(&self) -> String {
         let parts = [
             (self.differing, "message differs", "messages differ"),
@@ -97,7 +98,7 @@ impl Comparison {
         }
     }
 
-    /// Compares the messages of one topic: those of one log time with each other, in the order that they were sent.
+    /// Compares the messages of one topic: those of equal log time with each other, in the order in which they were sent.
     fn topic(&mut self, expected: &[&Recorded], got: &[&Recorded], tolerance: f64, limit: usize) {
         let whole = |message: &Recorded, expected: &str, got: &str| Difference {
             topic: Some(message.channel.topic.clone()),
@@ -149,13 +150,13 @@ impl Comparison {
             match field_differences(expected, got, tolerance, limit.saturating_sub(self.differences.len())) {
                 Ok(found) => {
                     self.count += found.count;
-                    let told = found.told.into_iter();
-                    let told = told.map(|field| difference(Some(&field.path), field.expected, field.got));
-                    self.differences.extend(told);
+                    let fields = found.told.into_iter();
+                    let fields = fields.map(|field| difference(Some(&field.path), field.expected, field.got));
+                    self.differences.extend(fields);
                 }
                 Err(reason) => self.add(|| difference(None, bytes_text(&expected.bytes), reason), limit),
             }
-            self.grids.extend(grid.filter(|_| self.grids.len() < GRIDS_KEPT));
+            self.grids.extend(grid.filter(|_| self.grids.len() < MAX_GRIDS));
         }
         if expected.publish_time != got.publish_time {
             let times = [expected.publish_time, got.publish_time].map(|time| LogTime(time).to_string());
@@ -190,7 +191,7 @@ fn bytes_text(bytes: &[u8]) -> String {
     format!("{} bytes", bytes.len())
 }
 
-/// The fields that differ. Where one of the messages cannot be read, how the bytes differ.
+/// Finds the fields that differ. Where one of the messages cannot be decoded, the error describes how the bytes differ.
 fn field_differences(
     expected: &Recorded,
     got: &Recorded,
@@ -212,7 +213,7 @@ fn field_differences(
     Ok(dynamic::compare(&a, &b, tolerance, limit))
 }
 
-/// How the cells differ, if both messages are grids of one size.
+/// Compares the cells, if both messages are grids of one size.
 fn grid_difference(expected: &Recorded, got: &Recorded) -> Option<GridDifference> {
     let is_grid = |message: &Recorded| full_type_name(&message.channel.schema_name) == OccupancyGrid::NAME;
     if !(is_grid(expected) && is_grid(got)) {

@@ -1,4 +1,4 @@
-//! The folder of differences: what a case has sent, and pictures of where grids differ.
+//! The folder of differences: the messages that a stage has sent, and pictures of grids that differ.
 
 use super::compare::{Comparison, GridDifference};
 use super::find::CaseFolder;
@@ -7,17 +7,16 @@ use anyhow::{Context, Result};
 use gridweave_logs::picture::render_difference;
 use std::path::{Path, PathBuf};
 
-/// What was written of a case.
+/// Files that were written for a case.
 #[derive(Debug, Default)]
 pub(super) struct Written {
-    /// The log of what the stage has sent.
+    /// The log of the messages that the stage has sent.
     pub(super) got: PathBuf,
     /// For every grid of the comparison its picture, or why it could not be drawn.
     pub(super) pictures: Vec<Result<PathBuf, String>>,
 }
 
-/// Writes what a case has sent, and its pictures, to KIND/CASE in `folder`. What was there of an earlier run is taken
-/// away.
+/// Writes the messages of a case, and its pictures, to KIND/CASE in `folder`. Pictures of an earlier run are removed.
 pub(super) fn write(
     folder: &Path,
     case: &CaseFolder,

@@ -1,4 +1,4 @@
-//! `[[expect]]`: what must hold whatever has been blessed.
+//! `[[expect]]`: conditions that must hold, also for an expected log that was blessed.
 
 use super::recording::{Recorded, Recording};
 use anyhow::{Context, Result, bail};
@@ -7,7 +7,7 @@ use gridweave_runtime::pipeline::suggest;
 use gridweave_runtime::stage::StageKind;
 use serde::Deserialize;
 
-/// An entry as it stands in the file.
+/// An entry of the file, not checked.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct ExpectEntry {
@@ -23,47 +23,47 @@ pub(super) struct ExpectEntry {
     count: Option<u64>,
 }
 
-/// What must hold.
+/// A condition.
 #[derive(Debug)]
 pub(super) enum Expect {
-    /// A warning was given so often.
+    /// A warning was given `count` times.
     Warning { text: String, count: u64 },
-    /// A port has sent so many messages.
+    /// A port has sent `count` messages.
     Messages { port: usize, name: String, count: u64 },
-    /// A field of a message is as the check says.
+    /// A field of a message passes the check.
     Field { port: usize, name: String, message: i64, path: FieldPath, check: FieldCheck },
 }
 
-/// What must hold of a field.
+/// A condition of a field.
 #[derive(Debug)]
 pub(super) enum FieldCheck {
-    /// It has this value, or one at most so far from it.
+    /// The field has this value, or one within a distance of it.
     Equals { value: toml::Value, within: Option<f64> },
-    /// It is an array of so many elements.
+    /// The field is an array of this length.
     Length(u64),
-    /// It is an array with so many elements of this value.
+    /// The field is an array with `count` elements of this value.
     Count { value: toml::Value, count: u64 },
 }
 
 impl Expect {
-    /// Checks an entry: that it says one thing, and of a port that the kind has.
+    /// Checks an entry: it must have one condition, for a port of the kind.
     pub(super) fn new(entry: ExpectEntry, kind: &StageKind) -> Result<Self> {
         let ExpectEntry { port, message, field, equals, within, length, value, messages, warning, count } = entry;
         if within.is_some_and(|within| !(within.is_finite() && within >= 0.0)) {
             bail!("`within` must be 0 or more");
         }
         if within.is_some() && equals.is_none() {
-            bail!("`within` goes with `equals`");
+            bail!("`within` needs `equals`");
         }
         if let Some(text) = warning {
             let alone = port.is_none() && message.is_none() && field.is_none() && messages.is_none();
             let alone = alone && equals.is_none() && length.is_none() && value.is_none();
             return match count.filter(|_| alone) {
                 Some(count) => Ok(Self::Warning { text, count }),
-                None => bail!("`warning` goes with `count`, and with nothing else"),
+                None => bail!("`warning` needs `count`, and no other key"),
             };
         }
-        let name = port.context("it names no `port`, and no `warning`")?;
+        let name = port.context("neither `port` nor `warning` is given")?;
         let names: Vec<&str> = kind.outputs.iter().map(|port| port.name).collect();
         let port = names.iter().position(|port| *port == name).with_context(|| {
             let help = suggest(&name, &names, "its outputs").unwrap_or_else(|| "it has no outputs".to_owned());
@@ -72,35 +72,37 @@ impl Expect {
         if let Some(expected) = messages {
             let of_message = field.is_some() || message.is_some() || equals.is_some();
             if of_message || length.is_some() || value.is_some() || count.is_some() {
-                bail!("`messages` goes with `port`, and with nothing else");
+                bail!("`messages` needs `port`, and no other key");
             }
             return Ok(Self::Messages { port, name, count: expected });
         }
-        let path = field.context("it says neither `field` nor `messages`")?.parse()?;
+        let path = field.context("neither `field` nor `messages` is given")?.parse()?;
         let check = match (equals, length, value, count) {
             (Some(value), None, None, None) => FieldCheck::Equals { value, within },
             (None, Some(length), None, None) => FieldCheck::Length(length),
             (None, None, Some(value), Some(count)) => FieldCheck::Count { value, count },
-            _ => bail!("a `field` goes with one of: `equals`; `length`; `value` and `count`"),
+            _ => bail!("`field` needs one of: `equals`; `length`; `value` and `count`"),
         };
         Ok(Self::Field { port, name, message: message.unwrap_or_default(), path, check })
     }
 
-    /// What is wrong if it does not hold. Numbers with a fraction may be `tolerance` off where nothing else is said.
+    /// Checks the condition; the error says what does not hold. Numbers with a fraction may differ by `tolerance` unless `within` is given.
     pub(super) fn check(&self, got: &Recording, tolerance: f64) -> Result<(), String> {
         match self {
             Self::Warning { text, count } => {
                 let given = got.warnings.get(text).copied().unwrap_or_default();
                 match given == *count {
                     true => Ok(()),
-                    false => Err(format!("the warning {text:?} is to be given {count} times, and was {given} times")),
+                    false => {
+                        Err(format!("the warning {text:?} must be given {count} times, and was given {given} times"))
+                    }
                 }
             }
             Self::Messages { port, name, count } => {
                 let sent = of_port(got, *port).count() as u64;
                 match sent == *count {
                     true => Ok(()),
-                    false => Err(format!("`{name}` is to send {count} messages, and has sent {sent}")),
+                    false => Err(format!("`{name}` must send {count} messages, and has sent {sent}")),
                 }
             }
             Self::Field { port, name, message, path, check } => {
@@ -108,7 +110,7 @@ impl Expect {
                 let index = if *message < 0 { messages.len() as i64 + message } else { *message };
                 let found = usize::try_from(index).ok().and_then(|index| messages.get(index));
                 let found = found.ok_or_else(|| {
-                    format!("`{name}` has sent {} messages, and none with the number {message}", messages.len())
+                    format!("`{name}` has sent {} messages, and none has the number {message}", messages.len())
                 })?;
                 let what = format!("{path} of message {message} of `{name}`");
                 let schema = Schema::of_channel(&found.channel).map_err(|error| format!("{what}: {error}"))?;
@@ -131,21 +133,21 @@ impl FieldCheck {
                 true => Ok(()),
                 false => {
                     let within = within.map(|within| format!(" within {within}")).unwrap_or_default();
-                    Err(format!("is to be {value}{within}, and is {got}"))
+                    Err(format!("must be {value}{within}, and is {got}"))
                 }
             },
             Self::Length(length) => match got {
                 Value::Array(array) if array.len() as u64 == *length => Ok(()),
-                Value::Array(array) => Err(format!("is to have {length} elements, and has {}", array.len())),
-                other => Err(format!("is to be an array, and is {other}")),
+                Value::Array(array) => Err(format!("must have {length} elements, and has {}", array.len())),
+                other => Err(format!("must be an array, and is {other}")),
             },
             Self::Count { value, count } => {
-                let Value::Array(array) = got else { return Err(format!("is to be an array, and is {got}")) };
+                let Value::Array(array) = got else { return Err(format!("must be an array, and is {got}")) };
                 let scalars = (0..array.len()).filter_map(|at| array.scalar(at));
                 let found = scalars.filter(|scalar| scalar_equals(scalar, value, None, tolerance)).count() as u64;
                 match found == *count {
                     true => Ok(()),
-                    false => Err(format!("is to have {count} elements with the value {value}, and has {found}")),
+                    false => Err(format!("must have {count} elements of the value {value}, and has {found}")),
                 }
             }
         }
@@ -178,7 +180,7 @@ fn scalar_equals(got: &Scalar<'_>, expected: &toml::Value, within: Option<f64>, 
         _ => return false,
     };
     match (got, within) {
-        // A float32 is as near to the number as it can be.
+        // The expected number is rounded to a float32, too.
         (Scalar::F32(got), None) => *got == number as f32 || nearly_equal((*got).into(), number, tolerance),
         (got, None) => got.as_f64().is_some_and(|got| nearly_equal(got, number, tolerance)),
         (got, Some(within)) => got.as_f64().is_some_and(|got| (got - number).abs() <= within),

@@ -1,4 +1,4 @@
-//! Which cases there are: the folders KIND/CASE.
+//! Search for cases: the folders KIND/CASE.
 
 use crate::status::BadUse;
 use anyhow::{Context, Result};
@@ -6,13 +6,13 @@ use gridweave_runtime::stage::Registry;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Where a case lies.
+/// Explanation of the folders for errors.
 const FORM: &str = "a case is a folder KIND/CASE with stage.toml, such as line_extractor/room";
 
 /// The folder of one case.
 #[derive(Clone, Debug)]
 pub(super) struct CaseFolder {
-    /// The kind of the stage, as its folder says.
+    /// The kind of the stage: the name of its folder.
     pub(super) kind: String,
     /// The name of the case.
     pub(super) case: String,
@@ -27,17 +27,17 @@ impl CaseFolder {
     }
 }
 
-/// All cases in `folder`, by kind and then by name.
+/// Finds all cases in `folder`, by kind and then by name.
 ///
 /// # Errors
 ///
-/// There is no case, or what looks like one lies elsewhere.
+/// There is no case, or a `stage.toml` is in the wrong folder.
 pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
     let mut cases = Vec::new();
     for (kind, path) in folders_in(folder)? {
         let misplaced = path.join("stage.toml");
         if misplaced.exists() {
-            let text = format!("{} lies among the cases of a kind: {FORM}", misplaced.display());
+            let text = format!("{} is not in the folder of a case: {FORM}", misplaced.display());
             return Err(BadUse(text).into());
         }
         for (case, path) in folders_in(&path)? {
@@ -50,15 +50,15 @@ pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
     }
 }
 
-/// The kinds of the registry of which there is no case, but for those that only let messages in from outside of a live
-/// run, and those of which each stage has ports of its own.
+/// Finds the kinds of the registry without a case, except for kinds that only take messages from outside of a live run, and kinds
+/// whose ports depend on the stage.
 pub(super) fn kinds_without_a_case(registry: &Registry, cases: &[CaseFolder]) -> Vec<String> {
     let with: BTreeSet<&str> = cases.iter().map(|case| case.kind.as_str()).collect();
-    let kinds = registry.kinds().filter(|kind| !kind.is_external() && !kind.is_asked());
+    let kinds = registry.kinds().filter(|kind| !kind.is_external() && !kind.is_dynamic());
     kinds.map(|kind| kind.name).filter(|kind| !with.contains(kind)).map(str::to_owned).collect()
 }
 
-/// The folders in a folder, by name. Files, and what is hidden, do not count.
+/// Lists the folders in a folder, by name, without hidden ones.
 fn folders_in(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
     let doing = || format!("cannot look for cases in {}", folder.display());
     let mut folders = Vec::new();

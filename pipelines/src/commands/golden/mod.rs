@@ -1,9 +1,9 @@
-//! `gridweave golden`: every stage run alone on stored input, and what it sends held against what was stored.
+//! `gridweave golden`: runs every stage alone on stored input, and compares its messages with stored ones.
 //!
-//! A case is a folder KIND/CASE with `stage.toml` ([`case_file`]), `input.mcap` and `expected.mcap`. Its stage runs
-//! between a source that sends the input ([`source`]) and a sink that keeps what comes ([`sink`]), over the same
-//! shared-memory links as in a pipeline ([`run_case`]); what it has sent is a [`recording`], which is compared with the
-//! expected one ([`compare`]) or takes its place (`--bless`).
+//! A case is a folder KIND/CASE with `stage.toml` ([`case_file`]), `input.mcap` and `expected.mcap`. Its stage runs between a
+//! source that sends the input ([`source`]) and a sink that keeps the output ([`sink`]), over the same shared-memory links as in a
+//! pipeline ([`run_case`]); the [`recording`] of its messages is compared with the expected one ([`compare`]) or replaces it
+//! (`--bless`).
 
 mod case_file;
 mod check_case;
@@ -31,25 +31,25 @@ use report::Report;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
-/// What `gridweave golden` is told.
+/// Arguments of `gridweave golden`.
 #[derive(Debug, Args)]
 pub(crate) struct GoldenArgs {
     /// Only cases with one of these texts in KIND/CASE.
     #[arg(value_name = "FILTER")]
     filters: Vec<String>,
-    /// Rewrite what is expected where a stage sends something else, and say what was rewritten.
+    /// Replace expected messages that differ by those that the stage sends, and report which.
     #[arg(long)]
     bless: bool,
     /// The folder with the cases, as KIND/CASE.
     #[arg(long, value_name = "FOLDER", default_value = "tests/golden")]
     cases: PathBuf,
-    /// Where to put what stages sent that is not as expected, and pictures of grids that differ.
+    /// The folder for messages that are not as expected, and for pictures of grids that differ.
     #[arg(long, value_name = "FOLDER", default_value = "golden-differences")]
     differences: PathBuf,
-    /// Let stage kinds be without a case.
+    /// Allow stage kinds without a case.
     #[arg(long)]
     partial: bool,
-    /// Show at most so many differences of a case.
+    /// Show at most COUNT differences of a case.
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
     limit: usize,
     /// Print JSON.
@@ -57,10 +57,10 @@ pub(crate) struct GoldenArgs {
     json: bool,
 }
 
-/// Runs the cases and prints how they came out.
+/// Runs the cases and prints their results.
 pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Status> {
     if !args.cases.is_dir() {
-        let help = "give the one with the cases with --cases FOLDER";
+        let help = "give the folder of the cases with --cases FOLDER";
         return Err(BadUse(format!("there is no folder {}: {help}", args.cases.display())).into());
     }
     let all = find::find(&args.cases)?;
@@ -83,9 +83,9 @@ pub(crate) fn golden(args: &GoldenArgs, registry: &Registry) -> Result<Status> {
     Ok(if report.has_failed() { Status::Failed } else { Status::Done })
 }
 
-/// Checks the cases, several at a time; the outcomes are in the order of the cases.
+/// Checks the cases concurrently; the results are in the order of the cases.
 fn check_all(cases: &[CaseFolder], args: &GoldenArgs, registry: &Registry) -> Result<Vec<CaseOutcome>> {
-    // A pool of its own: a case waits for its stages, and they may need the threads of the common pool.
+    // A separate pool: a case waits for its stages, which may need the threads of the global pool.
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads for the cases")?;
     let stop = stop_on_interrupt(OUTPUT_IS_CLOSED);
     let check = |case: &CaseFolder| check_case(case, args, registry, stop);

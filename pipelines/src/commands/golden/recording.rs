@@ -1,4 +1,4 @@
-//! What a stage has sent, or is expected to send, and the log that holds it.
+//! The messages that a stage has sent, or is expected to send, and their log.
 
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader;
@@ -10,15 +10,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The metadata record that holds the stage's warnings, each with its count.
+/// The metadata record of the stage's warnings, each with its count.
 const WARNINGS: &str = "gridweave_warnings";
 
-/// One message.
+/// A recorded message.
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
     /// Its topic and type.
     pub(super) channel: Arc<Channel>,
-    /// The output port that it came from; `None` if it was read from a log.
+    /// The output port that has sent it; `None` if it was read from a log.
     pub(super) port: Option<usize>,
     pub(super) log_time: LogTime,
     /// Nanoseconds.
@@ -26,7 +26,7 @@ pub(super) struct Recorded {
     pub(super) bytes: Vec<u8>,
 }
 
-/// All that a stage has sent, by log time, and what it has warned of.
+/// All messages of a stage, by log time, and its warnings.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recording {
     pub(super) messages: Vec<Recorded>,
@@ -35,7 +35,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Reads a log. One that is damaged is an error.
+    /// Reads a log. A damaged log is an error.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let mut reader = reader::open(&[path.to_owned()])?;
         let files = Arc::clone(reader.files());
@@ -73,7 +73,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Reads a file that a stage has written: the messages of a log, or the bytes of any other file as one message.
+    /// Reads a file that a stage has written: the messages of a log, or any other file as one message.
     pub(super) fn read_file(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
         if bytes.starts_with(mcap::MAGIC) {
@@ -114,7 +114,7 @@ impl Recording {
         Ok(())
     }
 
-    /// The messages of every topic, by log time.
+    /// Groups the messages by topic, each by log time.
     pub(super) fn by_topic(&self) -> BTreeMap<&str, Vec<&Recorded>> {
         let mut topics: BTreeMap<&str, Vec<&Recorded>> = BTreeMap::new();
         for message in &self.messages {

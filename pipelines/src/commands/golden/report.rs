@@ -1,4 +1,4 @@
-//! How the cases came out, for people and for programs.
+//! The report on all cases as text and JSON.
 
 use super::check_case::{CaseOutcome, Status};
 use super::compare::{Comparison, Difference, GridDifference};
@@ -6,17 +6,17 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// How all cases came out.
+/// Results of all cases.
 #[derive(Debug)]
 pub(super) struct Report {
-    /// By kind and then by name.
+    /// Cases by kind and then by name.
     pub(super) cases: Vec<CaseOutcome>,
     /// Stage kinds that should have a case and have none.
     pub(super) kinds_without_a_case: Vec<String>,
 }
 
 impl Report {
-    /// Whether anything is not as it should be.
+    /// Whether a case has failed or is missing.
     pub(super) fn has_failed(&self) -> bool {
         self.count(|status| *status == Status::Failed) > 0 || !self.kinds_without_a_case.is_empty()
     }
@@ -25,7 +25,7 @@ impl Report {
         self.cases.iter().filter(|case| of(&case.status)).count()
     }
 
-    /// The report for people: a line for every case, and below it what is wrong.
+    /// Formats a line for every case, and below it what is wrong.
     pub(super) fn to_text(&self, folder: &Path) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
@@ -57,7 +57,7 @@ impl Report {
         }
     }
 
-    /// The report for programs.
+    /// Formats the report as JSON.
     pub(super) fn to_json(&self) -> Value {
         json!({
             "cases": self.cases.iter().map(case_json).collect::<Vec<_>>(),
@@ -86,12 +86,12 @@ fn write_case(case: &CaseOutcome, text: &mut String) -> std::fmt::Result {
         }
     }
     if let Some(written) = &case.written {
-        writeln!(text, "    what the stage has sent: {}", written.got.display())?;
+        writeln!(text, "    the messages of the stage: {}", written.got.display())?;
     }
     Ok(())
 }
 
-/// The differences, each message named once.
+/// Writes the differences; each message is named once.
 fn write_differences(comparison: &Comparison, text: &mut String) -> std::fmt::Result {
     let mut last = None;
     for difference in &comparison.differences {

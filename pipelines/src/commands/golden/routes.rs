@@ -1,4 +1,4 @@
-//! Which topics of `input.mcap` feed which inputs.
+//! Routes from the topics of `input.mcap` to the inputs of the stage.
 
 use super::case_file::Case;
 use anyhow::{Result, bail};
@@ -9,47 +9,50 @@ use gridweave_runtime::pipeline::quoted_list;
 use gridweave_runtime::stage::{InputPort, PortType, match_robot};
 use std::collections::BTreeMap;
 
-/// One wire from the log to an input of the stage.
+/// A wire from the log to an input of the stage.
 #[derive(Clone, Debug)]
-pub(super) struct Feed {
+pub(super) struct InputStream {
     /// The input port, as an index among the kind's.
     pub(super) port: usize,
     /// Whether the port takes any type, so that channels are to be announced.
     pub(super) announces: bool,
     /// The channels of the log that it carries, by number.
-    pub(super) channels: BTreeMap<u16, FedChannel>,
+    pub(super) channels: BTreeMap<u16, RoutedChannel>,
 }
 
-/// A channel of the log that feeds an input.
+/// A channel of the log that is sent to an input.
 #[derive(Clone, Debug)]
-pub(super) struct FedChannel {
+pub(super) struct RoutedChannel {
     /// The robot that its messages are about.
     pub(super) robot: FixedText<64>,
     pub(super) topic: FixedText<128>,
     pub(super) channel: Channel,
 }
 
-/// The wires of a case, in the order of the stage's inputs.
-pub(super) fn feeds(case: &Case, log: &LogFile) -> Result<Vec<Feed>> {
+/// Makes the wires of a case, in the order of the stage's inputs.
+pub(super) fn input_streams(case: &Case, log: &LogFile) -> Result<Vec<InputStream>> {
     let channels: Vec<(u16, Channel)> = log.channels().collect();
-    let mut feeds = Vec::new();
+    let mut streams = Vec::new();
     for (index, patterns) in &case.inputs {
         let Some(port) = case.stage.kind.inputs.get(*index) else { continue };
         let announces = port.port_type == PortType::Any;
         let found = patterns.iter().map(|pattern| matches(pattern, port, &channels));
         let found = found.collect::<Result<Vec<_>>>()?;
         match port.many {
-            // As in a pipeline, where each output that is wired to such a port has a wire of its own.
-            true => feeds.extend(found.into_iter().map(|channels| Feed { port: *index, announces, channels })),
-            false => feeds.push(Feed { port: *index, announces, channels: found.into_iter().flatten().collect() }),
+            // As in a pipeline, where each output is connected to such a port by a separate wire.
+            true => streams.extend(found.into_iter().map(|channels| InputStream { port: *index, announces, channels })),
+            false => {
+                let channels = found.into_iter().flatten().collect();
+                streams.push(InputStream { port: *index, announces, channels });
+            }
         }
     }
-    Ok(feeds)
+    Ok(streams)
 }
 
-/// The channels whose topics fit a pattern.
-fn matches(pattern: &str, port: &InputPort, channels: &[(u16, Channel)]) -> Result<BTreeMap<u16, FedChannel>> {
-    let mut fitting = BTreeMap::new();
+/// Finds the channels whose topics match a pattern.
+fn matches(pattern: &str, port: &InputPort, channels: &[(u16, Channel)]) -> Result<BTreeMap<u16, RoutedChannel>> {
+    let mut matching = BTreeMap::new();
     for (number, channel) in channels {
         let Some(robot) = robot_of(pattern, &channel.topic) else { continue };
         let found = full_type_name(&channel.schema_name);
@@ -67,20 +70,20 @@ fn matches(pattern: &str, port: &InputPort, channels: &[(u16, Channel)]) -> Resu
             _ => {}
         }
         let (robot, topic) = (FixedText::new(robot)?, FixedText::new(&channel.topic)?);
-        fitting.insert(*number, FedChannel { robot, topic, channel: channel.clone() });
+        matching.insert(*number, RoutedChannel { robot, topic, channel: channel.clone() });
     }
-    if fitting.is_empty() {
+    if matching.is_empty() {
         let topics: Vec<&str> = channels.iter().map(|(_, channel)| channel.topic.as_str()).collect();
         let there = match topics.is_empty() {
             true => "it has no topics".to_owned(),
             false => format!("it has {}", quoted_list(&topics)),
         };
-        bail!("no topic of input.mcap fits `{pattern}`, the input `{}`; {there}", port.name);
+        bail!("no topic of input.mcap matches `{pattern}` of the input `{}`; {there}", port.name);
     }
-    Ok(fitting)
+    Ok(matching)
 }
 
-/// The robot that a topic is about if it fits the pattern: an empty name where the pattern has none.
+/// The robot of a topic that matches the pattern: an empty name if the pattern has no `{robot}`.
 fn robot_of<'a>(pattern: &str, topic: &'a str) -> Option<&'a str> {
     match pattern.contains("{robot}") {
         true => match_robot(pattern, topic),

@@ -1,8 +1,8 @@
-//! Runs the stage of a case alone, over the links that it has in a pipeline.
+//! Runs the stage of a case alone, over the same links as in a pipeline.
 
 use super::case_file::Case;
 use super::recording::Recording;
-use super::routes::feeds;
+use super::routes::{InputStream, input_streams};
 use super::{sink, source};
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader::LogFile;
@@ -14,22 +14,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// The names of the stages that a run has beside the one of the case, whose name has no capital letters.
+/// Names of the source and the sink, in capital letters, which the name of the tested stage cannot have.
 const SOURCE: &str = "INPUT";
 const SINK: &str = "OUTPUT";
 
-/// What stands in a parameter for the path of `input.mcap`, for that of a file that the stage is to write, and for that of
-/// the folder of the case, where other files for the stage to read lie.
+/// Placeholders in parameters for the path of `input.mcap`, of the file that the stage writes, and of the folder of the case with
+/// other files that the stage reads.
 const INPUT: &str = "{input}";
 const OUTPUT: &str = "{output}";
 const CASE: &str = "{case}";
 
-/// Runs the stage of a case; gives all that it has sent, or written.
+/// Runs the stage of a case; returns all messages that it has sent or written.
 pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording> {
     let has_input = case.input.exists();
     let reads_file = case.has_placeholder(INPUT);
     if has_input && case.inputs.is_empty() && !reads_file {
-        bail!("nothing takes input.mcap: name its topics below [inputs], or write {INPUT} in a parameter");
+        bail!("input.mcap is not used: name its topics below [inputs], or write {INPUT} in a parameter");
     }
     if !has_input && (!case.inputs.is_empty() || reads_file) {
         bail!("there is no {}", case.input.display());
@@ -46,7 +46,7 @@ pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording
         }
         written.sort();
         for path in written {
-            let read = Recording::read_file(&path).context("what the stage has written cannot be read")?;
+            let read = Recording::read_file(&path).context("cannot read the output of the stage")?;
             recording.messages.extend(read.messages);
         }
     }
@@ -57,21 +57,20 @@ fn text_of(path: &Path) -> Result<String> {
     Ok(path.to_str().with_context(|| format!("the path {} is not UTF-8", path.display()))?.to_owned())
 }
 
-/// Runs source, stage and sink, of which the first and the last are left out where the stage has no use for them.
+/// Runs source, stage and sink; a stage without inputs has no source, and one without outputs no sink.
 fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> Result<Recording> {
     let kind = &case.stage.kind;
     let received = sink::Received::default();
     let mut stages = Vec::new();
     let mut inputs = Vec::new();
     if !case.inputs.is_empty() {
-        let feeds = feeds(case, &LogFile::open(&case.input)?)?;
-        if feeds.len() > source::MOST_FEEDS {
-            bail!("{} topic patterns are too many: at most {} can be given", feeds.len(), source::MOST_FEEDS);
+        let streams = input_streams(case, &LogFile::open(&case.input)?)?;
+        if streams.len() > source::MAX_STREAMS {
+            bail!("{} topic patterns are too many: at most {} can be given", streams.len(), source::MAX_STREAMS);
         }
-        let wire =
-            |(from_port, feed): (usize, &super::routes::Feed)| Wire { port: feed.port, from_stage: 0, from_port };
-        inputs = feeds.iter().enumerate().map(wire).collect();
-        stages.push(helper(SOURCE, source::kind(SOURCE, kind, &case.input, feeds), Vec::new()));
+        let wire = |(from_port, stream): (usize, &InputStream)| Wire { port: stream.port, from_stage: 0, from_port };
+        inputs = streams.iter().enumerate().map(wire).collect();
+        stages.push(helper(SOURCE, source::kind(SOURCE, kind, &case.input, streams), Vec::new()));
     }
     let place = stages.len();
     stages.push(StageSpec {
@@ -124,7 +123,7 @@ fn helper(name: &str, kind: StageKind, inputs: Vec<Wire>) -> StageSpec {
     }
 }
 
-/// Parameters with the paths of files in the place of their placeholders.
+/// Replaces placeholders in parameters by the paths of files.
 fn filled_in(parameters: &toml::Table, files: &[(&str, String)]) -> toml::Table {
     fn fill(value: &toml::Value, files: &[(&str, String)]) -> toml::Value {
         match value {
@@ -139,7 +138,7 @@ fn filled_in(parameters: &toml::Table, files: &[(&str, String)]) -> toml::Table 
     parameters.iter().map(|(key, value)| (key.clone(), fill(value, files))).collect()
 }
 
-/// Warnings that name a file of the case by its placeholder: its path differs from machine to machine.
+/// Replaces paths in warnings by their placeholders, since paths differ from machine to machine.
 fn portable(warnings: BTreeMap<String, u64>, files: &[(&str, String)]) -> BTreeMap<String, u64> {
     let mut portable: BTreeMap<String, u64> = BTreeMap::new();
     for (warning, count) in warnings {

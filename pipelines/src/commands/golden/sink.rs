@@ -1,4 +1,4 @@
-//! The sink of a case: keeps what the stage sends.
+//! The sink of a case: keeps the messages of the stage.
 
 use super::recording::Recorded;
 use gridweave_logs::sink::result_channel;
@@ -7,17 +7,17 @@ use gridweave_runtime::stage::{Context, InputWire, Output, StageError, StageKind
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-/// What came in, in the order of log time.
+/// Received messages, by log time.
 pub(super) type Received = Arc<Mutex<Vec<Recorded>>>;
 
-/// The kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
+/// Makes the kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
 pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
     let make = move |(): (), context: &Context| {
         let inputs = context.inputs.clone();
         Ok(CaseSink { received: Arc::clone(&received), inputs, channels: BTreeMap::new() })
     };
-    StageKind::stage(name, "Keeps what a stage sends.", make)
-        .any_inputs("messages", "what the stage sends", CaseSink::receive)
+    StageKind::stage(name, "Keeps the messages of a stage.", make)
+        .any_inputs("messages", "the messages of the stage", CaseSink::receive)
         .announce(CaseSink::announce)
         .build()
 }
@@ -25,7 +25,7 @@ pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
 struct CaseSink {
     received: Received,
     inputs: Vec<InputWire>,
-    /// By wire, number and topic; results of the stage have the number 0.
+    /// Channels by wire, number and topic; results of the stage have the number 0.
     channels: BTreeMap<(usize, u32, String), Arc<Channel>>,
 }
 
@@ -44,7 +44,7 @@ impl CaseSink {
             None => {
                 let input = self.inputs.get(wire).filter(|input| !input.ros_type.is_empty() && header.channel == 0);
                 let input = input.ok_or_else(|| {
-                    StageError::new(format!("keep a message on {topic}"), "nothing says what type it has")
+                    StageError::new(format!("keep a message on {topic}"), "its type is not known")
                         .with_help("announce a channel before the message, or give the output port a type")
                 })?;
                 let channel = Arc::new(result_channel(topic, &input.ros_type, &input.definition));

@@ -1,6 +1,6 @@
 //! The source of a case: `input.mcap`, with a port for every wire to the stage.
 
-use super::routes::Feed;
+use super::routes::InputStream;
 use gridweave_logs::reader::{self, LogReader};
 use gridweave_runtime::message::MessageHeader;
 use gridweave_runtime::stage::{AnyMessage, Context, Out, Output, OutputPorts, Outputs, Source, StageError, StageKind};
@@ -8,28 +8,28 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
-/// A stage can be fed by so many wires.
-pub(super) const MOST_FEEDS: usize = 256;
+/// Maximum number of input streams of a stage.
+pub(super) const MAX_STREAMS: usize = 256;
 
-/// The names of the ports, which must differ from each other.
-static PORT_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| (0..MOST_FEEDS).map(|at| format!("feed{at}")).collect());
+/// Names of the ports, which must be unique.
+static PORT_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| (0..MAX_STREAMS).map(|at| format!("stream{at}")).collect());
 
-/// The kind of a source that sends the messages of the log at `path`. Its ports are the `feeds`, of which there are at
-/// most [`MOST_FEEDS`], each with the type of the input of `stage` that it leads to.
-pub(super) fn kind(name: &'static str, stage: &StageKind, path: &Path, feeds: Vec<Feed>) -> StageKind {
-    let ports = feeds.iter().filter_map(|feed| stage.inputs.get(feed.port)).zip(PORT_NAMES.iter());
+/// Makes the kind of a source that sends the messages of the log at `path`. It has a port for each of the `streams`, at most
+/// [`MAX_STREAMS`], with the type of the input of `stage` that it is connected to.
+pub(super) fn kind(name: &'static str, stage: &StageKind, path: &Path, streams: Vec<InputStream>) -> StageKind {
+    let ports = streams.iter().filter_map(|stream| stage.inputs.get(stream.port)).zip(PORT_NAMES.iter());
     let ports: Vec<_> = ports.map(|(port, name)| (name.as_str(), port.port_type, port.summary)).collect();
     let declare = move |outputs: &mut OutputPorts| {
         let declared = ports.iter().map(|(name, port_type, summary)| outputs.encoded_output(*port_type, name, summary));
-        Feeds(declared.collect())
+        StreamOutputs(declared.collect())
     };
-    let (path, feeds): (PathBuf, Arc<[Feed]>) = (path.to_owned(), feeds.into());
+    let (path, streams): (PathBuf, Arc<[InputStream]>) = (path.to_owned(), streams.into());
     StageKind::source_with(name, "Sends the input of a golden case.", declare, move |(): (), _: &Context| {
         let reader = reader::open(std::slice::from_ref(&path)).map_err(failure)?;
         if let Some(damage) = reader.files().iter().flat_map(|file| file.damage()).next() {
             return Err(failure(damage));
         }
-        Ok(CaseSource { reader, feeds: Arc::clone(&feeds), announced: BTreeSet::new() })
+        Ok(CaseSource { reader, streams: Arc::clone(&streams), announced: BTreeSet::new() })
     })
 }
 
@@ -37,11 +37,10 @@ fn failure(error: impl std::fmt::Display) -> StageError {
     StageError::new("read input.mcap", error)
 }
 
-/// An output for each of the feeds.
-struct Feeds(Vec<Out<AnyMessage>>);
+/// An output for each input stream. [`kind`] declares the ports.
+struct StreamOutputs(Vec<Out<AnyMessage>>);
 
-/// The ports are those of a case; see [`kind`].
-impl Outputs for Feeds {
+impl Outputs for StreamOutputs {
     fn declare(_: &mut OutputPorts) -> Self {
         Self(Vec::new())
     }
@@ -49,15 +48,15 @@ impl Outputs for Feeds {
 
 struct CaseSource {
     reader: LogReader,
-    feeds: Arc<[Feed]>,
-    /// By feed and number.
+    streams: Arc<[InputStream]>,
+    /// Announced channels by stream and number.
     announced: BTreeSet<(usize, u16)>,
 }
 
 impl Source for CaseSource {
-    type Outputs = Feeds;
+    type Outputs = StreamOutputs;
 
-    fn next(&mut self, output: &Output<Feeds>) -> Result<bool, StageError> {
+    fn next(&mut self, output: &Output<StreamOutputs>) -> Result<bool, StageError> {
         let Some(message) = self.reader.next_message() else {
             return match self.reader.take_damage().first() {
                 Some((_, damage)) => Err(failure(damage)),
@@ -65,20 +64,20 @@ impl Source for CaseSource {
             };
         };
         output.set_log_time(message.log_time);
-        for (port, (feed, out)) in self.feeds.iter().zip(&output.0).enumerate() {
-            let Some(fed) = feed.channels.get(&message.channel) else { continue };
-            // 0 stands for messages that no log has described.
-            let number = if feed.announces { u32::from(message.channel) + 1 } else { 0 };
-            if feed.announces && self.announced.insert((port, message.channel)) {
-                out.announce(number, &fed.channel)?;
+        for (port, (stream, out)) in self.streams.iter().zip(&output.0).enumerate() {
+            let Some(routed) = stream.channels.get(&message.channel) else { continue };
+            // 0 marks messages without an announced channel.
+            let number = if stream.announces { u32::from(message.channel) + 1 } else { 0 };
+            if stream.announces && self.announced.insert((port, message.channel)) {
+                out.announce(number, &routed.channel)?;
             }
             let header = MessageHeader {
                 log_time: message.log_time,
                 publish_time: message.publish_time,
                 log_sequence: message.sequence,
                 channel: number,
-                robot: fed.robot,
-                topic: fed.topic,
+                robot: routed.robot,
+                topic: routed.topic,
                 ..Default::default()
             };
             out.send_encoded(header, message.data)?;

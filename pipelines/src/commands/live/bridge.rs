@@ -1,12 +1,12 @@
-//! `gridweave bridge`: carries links of a run to a run on another machine.
+//! `gridweave bridge`: forwards links of a run to a run on another machine.
 
-use super::bridge_settings::{bridge_kind, check, connecting_to, settings};
+use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
 use super::link_choice::named_links;
 use super::running::{RunChoice, find_run};
 use super::tap::LOOK_INTERVAL;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
-use crate::terminal::{print_line, say};
+use crate::terminal::{eprint_line, print_line};
 use anyhow::{Result, bail};
 use clap::Args;
 use gridweave_runtime::engine::{WatchedLink, watch_links, watch_statistics};
@@ -15,13 +15,13 @@ use gridweave_runtime::stage::{Context, InputWire, Registry};
 use std::sync::atomic::Ordering;
 use std::thread;
 
-/// What `gridweave bridge` is told.
+/// Arguments of `gridweave bridge`.
 #[derive(Debug, Args)]
 pub(crate) struct BridgeArgs {
-    /// Which links: STAGE.PORT, or STAGE for all its outputs.
+    /// The links: STAGE.PORT, or STAGE for all its outputs.
     #[arg(required = true, value_name = "LINK")]
     pub(crate) links: Vec<String>,
-    /// Where the other machine listens, as tcp/HOST:PORT; its run has a `bridge_source`.
+    /// The endpoint of the other machine, as tcp/HOST:PORT; its run has a `bridge_source`.
     #[arg(long, value_name = "ENDPOINT")]
     pub(crate) to: Vec<String>,
     /// Set a parameter of the bridge; `kinds bridge_sink` lists them.
@@ -31,13 +31,13 @@ pub(crate) struct BridgeArgs {
     pub(crate) run: RunChoice,
 }
 
-/// The kind of stage that is the near end of a bridge.
+/// The kind of stage that sends to the other machine.
 const SINK: &str = "bridge_sink";
 
-/// Carries links.
+/// Forwards links until the run ends or the user interrupts it.
 pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     let kind = bridge_kind(SINK, registry)?;
-    let mut parameters = connecting_to(&args.to);
+    let mut parameters = connect_parameters(&args.to);
     parameters.extend(settings(&args.set)?);
     check(kind, &parameters)?;
     let running = find_run(&args.run, registry)?;
@@ -62,15 +62,19 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         links: Some(watch_links(&running.run, &running.pipeline)),
         ..Default::default()
     };
-    let stop = stop_on_interrupt("what is on its way is sent");
-    let mut near = kind.make(parameters, &context, Vec::new())?;
+    let stop = stop_on_interrupt("messages in the queues are sent");
+    let mut sink = kind.make(parameters, &context, Vec::new())?;
     let open =
         |link: &super::link_choice::Link| WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port);
     let mut watched = links.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-    say(format_args!("carries {} links of {}; ctrl-c ends that, and not the run", links.len(), running.name()));
+    eprint_line(format_args!(
+        "carries {} links of {}; ctrl-c ends the bridge, not the run",
+        links.len(),
+        running.name()
+    ));
     let mut messages = 0u64;
     loop {
-        // What has passed before the run ended is still there after it.
+        // Messages that were sent before the end of the run can be read after it.
         let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
         for (wire, link) in watched.iter_mut().enumerate() {
             let mut passed: Vec<Message> = Vec::new();
@@ -78,10 +82,10 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
             for message in passed {
                 let flags = message.header().flags;
                 if flags.contains(MessageFlags::CHANNEL) {
-                    near.announce(wire, message.header().channel, &Channel::decode(message.bytes())?)?;
+                    sink.announce(wire, message.header().channel, &Channel::decode(message.bytes())?)?;
                 } else if flags.contains(MessageFlags::DATA) {
-                    near.set_log_time(message.header().log_time);
-                    near.receive(0, &message.on_wire(wire))?;
+                    sink.set_log_time(message.header().log_time);
+                    sink.receive(0, &message.on_wire(wire))?;
                     messages += 1;
                 }
             }
@@ -91,13 +95,13 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         }
         thread::sleep(LOOK_INTERVAL);
     }
-    near.finish()?;
-    for (warning, count) in near.warnings() {
-        say(format_args!("warning: {warning} ({count} times)"));
+    sink.finish()?;
+    for (warning, count) in sink.warnings() {
+        eprint_line(format_args!("warning: {warning} ({count} times)"));
     }
-    let counts = near.counts();
+    let counts = sink.counts();
     let count = |what: &str| counts.get(what).copied().unwrap_or_default();
-    // A receiver that began anew was told the last messages again: what was taken says nothing of what was not.
+    // Messages taken do not count: a receiver that was restarted takes the retained messages once more.
     let lost = count("messages that were not taken before the end")
         + count("messages dropped because the bridge does not keep up")
         + count("messages left out for the last of their topic");
@@ -105,7 +109,7 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     print_line(format_args!("carried {carried} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
     let missed: u64 = watched.iter().map(WatchedLink::missed).sum();
     if missed > 0 {
-        bail!("{missed} messages were missed, as the bridge was too slow for them");
+        bail!("{missed} messages were missed: the bridge was too slow");
     }
     Ok(if lost > 0 { Status::Failed } else { Status::Done })
 }
@@ -115,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_program_without_a_bridge_says_which_has_one() {
+    fn the_error_of_a_program_without_a_bridge_names_the_one_that_has_it() {
         let args = BridgeArgs { links: Vec::new(), to: Vec::new(), set: Vec::new(), run: RunChoice::default() };
         let error = bridge(&args, &Registry::default()).unwrap_err().to_string();
         assert!(error.contains("gridweave-ros"), "{error}");

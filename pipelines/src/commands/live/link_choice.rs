@@ -1,10 +1,10 @@
-//! The links that a command names.
+//! Choice of links by name.
 
 use crate::status::BadUse;
 use anyhow::Result;
 use gridweave_runtime::pipeline::{self, Pipeline};
 
-/// What to call the run whose links are named.
+/// Name of the run in errors.
 const THE_RUN: &str = "the run";
 
 /// An output port of a stage that other stages read, by index.
@@ -14,7 +14,7 @@ pub(super) struct Link {
     pub(super) port: usize,
 }
 
-/// All links of a pipeline, in its order.
+/// Lists all links of a pipeline, in its order.
 pub(super) fn all_links(pipeline: &Pipeline) -> Vec<Link> {
     let is_read = |link: &Link| {
         let mut wires = pipeline.stages.iter().flat_map(|stage| &stage.inputs);
@@ -25,14 +25,14 @@ pub(super) fn all_links(pipeline: &Pipeline) -> Vec<Link> {
     links.filter(is_read).collect()
 }
 
-/// The links that a text names: `STAGE.PORT`, or `STAGE` for all that the stage has.
+/// Finds the links that a text names: `STAGE.PORT`, or `STAGE` for all links of the stage.
 pub(super) fn named_links(name: &str, pipeline: &Pipeline) -> Result<Vec<Link>> {
     let links = all_links(pipeline);
     let named = pipeline::named_links(name, THE_RUN, &names(&links, pipeline)).map_err(BadUse)?;
     Ok(named.into_iter().map(|link| links[link]).collect())
 }
 
-/// The same where one is meant.
+/// Finds the one link that a text names: `STAGE.PORT`, or `STAGE` if it has only one.
 pub(super) fn named_link(name: &str, pipeline: &Pipeline) -> Result<Link> {
     let links = all_links(pipeline);
     let named = pipeline::named_link(name, THE_RUN, &names(&links, pipeline)).map_err(BadUse)?;

@@ -1,4 +1,4 @@
-//! Commands that meet a run that is going on: play into it, record, print and carry elsewhere what passes, show what it does.
+//! Commands that connect to a run in progress: play logs into it, and record, print, forward or show its messages.
 
 mod bridge;
 mod bridge_settings;
@@ -8,7 +8,7 @@ mod play;
 mod record;
 mod running;
 mod tap;
-mod tap_elsewhere;
+mod tap_remote;
 mod top;
 mod view;
 

@@ -1,4 +1,4 @@
-//! `gridweave play`: sends the messages of logs into a live pipeline at their own pace.
+//! `gridweave play`: sends the messages of logs to a live pipeline at the pace at which they were logged.
 
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
@@ -24,10 +24,10 @@ pub(crate) struct PlayArgs {
     /// The logs: MCAP files, and folders of ROS 2 bags. Several are merged by log time.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) logs: Vec<PathBuf>,
-    /// How much faster than they were recorded; 0 is as fast as the pipeline takes them.
+    /// The rate relative to the recording; 0 is as fast as the pipeline takes the messages.
     #[arg(long, default_value_t = 1.0)]
     pub(crate) rate: f64,
-    /// Begin again at the end, with later log times, until interrupted.
+    /// Repeat the logs with later log times until interrupted.
     #[arg(long = "loop")]
     pub(crate) repeat: bool,
     /// Seconds from the first message at which to begin. The last map of each robot before that is sent first.
@@ -36,7 +36,7 @@ pub(crate) struct PlayArgs {
     /// Seconds from the first message at which to end.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) end: Option<f64>,
-    /// The stage of the pipeline to send as, if it has several whose messages come from outside.
+    /// The stage to send as, if several stages of the pipeline take messages from outside.
     #[arg(long, value_name = "NAME")]
     pub(crate) stage: Option<String>,
     #[command(flatten)]
@@ -45,12 +45,12 @@ pub(crate) struct PlayArgs {
 
 /// The kind of source that reads logs.
 const SOURCE: &str = "mcap_source";
-/// So long the stages of the run may take to connect, and to take what was sent last.
+/// Timeout for the stages of the run to connect, and to take the last messages.
 const READY_TIMEOUT: Duration = Duration::from_secs(10);
-/// While it waits for its time, the player looks so often whether it is to end.
+/// While it waits, the player checks for an interrupt at this interval.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
-/// Between the last message and the first of the next turn of a loop, nanoseconds.
-const TURN_GAP: u64 = 100_000_000;
+/// Between the last message and the first of the next repetition, nanoseconds.
+const REPEAT_GAP: u64 = 100_000_000;
 
 /// Plays logs.
 pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
@@ -58,12 +58,12 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
         return Err(BadUse("--rate must be 0 or more".to_owned()).into());
     }
     let player = Player { args, registry, context: Context { stage: "play".to_owned(), ..Default::default() } };
-    // Logs that cannot be read are known before there is a run to play into.
+    // Errors in the logs are reported before the search for a run.
     player.source(Vec::new())?;
     let running = find_run(&args.run, registry)?;
     let stage = external_stage(&running, args.stage.as_deref())?;
     let player = Player { context: running.pipeline.context(stage), ..player };
-    let stop = stop_on_interrupt("no more is sent");
+    let stop = stop_on_interrupt("no more messages are sent");
     let stopped = Arc::new(AtomicBool::new(false));
     let feed = ExternalSender::join(&running.run, &running.pipeline, stage)?;
     if !feed.wait_for_readers(READY_TIMEOUT) {
@@ -84,12 +84,12 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
         bail!("the run ended before the log did");
     }
     if !is_taken {
-        bail!("the run has not taken the last of them within {} s", READY_TIMEOUT.as_secs());
+        bail!("the run has not taken the last messages within {} s", READY_TIMEOUT.as_secs());
     }
     Ok(Status::Done)
 }
 
-/// The stage of a run whose messages come from outside.
+/// Finds the stage of a run that takes messages from outside.
 fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
     let stages = running.pipeline.stages.iter().enumerate();
     let external: Vec<(usize, &str)> = stages
@@ -108,7 +108,7 @@ fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
     }
 }
 
-/// Does some work while another thread sets `stopped`, and stops the feed, once `is_over` says so.
+/// Does some work while another thread waits for `is_over`, and then sets `stopped` and stops the input stream.
 fn watch_while<T>(
     is_over: &(impl Fn() -> bool + Sync),
     stopped: &AtomicBool,
@@ -135,12 +135,12 @@ fn watch_while<T>(
 struct Player<'a> {
     args: &'a PlayArgs,
     registry: &'a Registry,
-    /// What the pipeline says of robots and topics.
+    /// Robots and topics of the pipeline.
     context: Context,
 }
 
 impl Player<'_> {
-    /// A source that reads the logs from their beginning, and sends on these links.
+    /// Makes a source that reads the logs from their beginning, and sends on these links.
     fn source(&self, links: Vec<OutputEnd>) -> Result<Node> {
         let mut parameters = toml::Table::new();
         let files = self.args.logs.iter().map(|path| {
@@ -156,8 +156,14 @@ impl Player<'_> {
         Ok(kind.make(parameters, &self.context, links)?)
     }
 
-    /// Where the outputs of the source lead: each to that of the same name of the stage that it plays for.
-    fn links(&self, running: &Running, stage: usize, feed: &ExternalSender, pace: &Rc<RefCell<Pace>>) -> Result<Vec<OutputEnd>> {
+    /// Makes the links of the source: each output leads to that of the same name of the stage that it sends as.
+    fn links(
+        &self,
+        running: &Running,
+        stage: usize,
+        feed: &ExternalSender,
+        pace: &Rc<RefCell<Pace>>,
+    ) -> Result<Vec<OutputEnd>> {
         let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
         let spec = &running.pipeline.stages[stage];
         let links = kind.outputs.iter().map(|output| {
@@ -181,28 +187,28 @@ impl Player<'_> {
         loop {
             let mut source = self.source(links()?)?;
             while source.advance()? && !stopped.load(Ordering::Relaxed) {}
-            // Another turn has the same to warn of.
+            // The warnings of a repetition are the same.
             for (warning, count) in source.warnings().iter().filter(|_| !pace.borrow().is_repeated()) {
                 tracing::warn!("{count} times: {warning}");
             }
-            if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_next_turn() {
+            if !self.args.repeat || stopped.load(Ordering::Relaxed) || !pace.borrow_mut().begin_repetition() {
                 return Ok(());
             }
         }
     }
 }
 
-/// When each message is to be sent.
+/// The time at which each message is sent.
 struct Pace {
     rate: f64,
     start: Option<(Instant, LogTime)>,
     /// The first and the last log time of the logs.
     span: Option<(LogTime, LogTime)>,
-    /// How much later than in the logs the messages of this turn of a loop are, nanoseconds.
+    /// By how much the messages of this repetition are later than in the logs, nanoseconds.
     later: u64,
-    /// Numbers of channels begin here, so that those of several players are not the same.
+    /// The first channel number, so that those of several players differ.
     first_channel: u32,
-    /// How many messages were sent.
+    /// Number of messages sent.
     messages: u64,
     stopped: Arc<AtomicBool>,
 }
@@ -237,25 +243,24 @@ impl Pace {
         }
     }
 
-    /// Whether the logs have been played before.
+    /// Whether the logs are being repeated.
     fn is_repeated(&self) -> bool {
         self.later > 0
     }
 
-    /// The logs are to be played again, later. `false` if there was nothing to play, or no more than
-    /// one moment.
-    fn begin_next_turn(&mut self) -> bool {
+    /// Starts a repetition. Returns `false` if the logs have no duration.
+    fn begin_repetition(&mut self) -> bool {
         let Some((first, last)) = self.span.filter(|(first, last)| last > first) else { return false };
-        self.later += last.0 - first.0 + TURN_GAP;
+        self.later += last.0 - first.0 + REPEAT_GAP;
         true
     }
 }
 
-/// An output that sends each message when its time has come.
+/// An output that sends each message at its time.
 struct Paced {
     pace: Rc<RefCell<Pace>>,
     link: Box<dyn OutputSink>,
-    /// Whether its messages begin with a header, whose stamp is made later with them. What is of any type stays as it is.
+    /// Whether its messages begin with a header, whose stamp is shifted with them. Messages on a port of any type keep theirs.
     has_stamp: bool,
 }
 
@@ -307,8 +312,8 @@ fn begins_with_header(type_name: &str) -> bool {
     text.lines().map(str::trim).find(is_field).is_some_and(|field| field.starts_with("std_msgs/Header "))
 }
 
-/// Makes the stamp of a message with a header later, so that the stages do not see time go back. The header is the first
-/// thing in CDR after four bytes that tell the encoding, and the stamp (seconds, nanoseconds) the first thing in it.
+/// Shifts the stamp of a message with a header, so that time does not go back for the stages. In CDR, the header follows the four
+/// bytes of the encapsulation and begins with the stamp (seconds, nanoseconds).
 fn make_later(bytes: &mut [u8], nanoseconds: u64) {
     let Some((seconds, nanos)) = bytes.get_mut(4..12).and_then(|stamp| stamp.split_first_chunk_mut::<4>()) else {
         return;
@@ -326,7 +331,7 @@ mod tests {
     use gridweave_runtime::ros::{Header, PoseStamped, decode, encode};
 
     #[test]
-    fn a_stamp_becomes_later_and_nothing_else_changes() {
+    fn the_stamp_is_shifted_and_nothing_else_changes() {
         let message = |time| PoseStamped { header: Header::new(LogTime(time), "robot1/map"), ..Default::default() };
         let mut bytes = encode(&message(1_999_999_999)).unwrap();
         make_later(&mut bytes, 1_000_000_002);
@@ -335,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn the_messages_of_every_channel_of_a_loop_become_later() {
+    fn the_messages_of_every_channel_are_shifted_in_a_repetition() {
         use gridweave_runtime::message::MessageHeader;
         use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, TagRange};
 
@@ -359,7 +364,7 @@ mod tests {
         let sent = Rc::default();
         let pace = Rc::new(RefCell::new(Pace { later: 7, ..Pace::new(0.0) }));
         let mut link = Paced { pace, link: Box::new(Sent(Rc::clone(&sent))), has_stamp: true };
-        // Messages of a log are on channels of their own, and those that the source makes are not.
+        // Messages of a log have announced channels, and those that the source makes do not.
         for channel in [0, 3] {
             let flags = MessageFlags::DATA;
             let header = MessageHeader { channel, flags, log_time: LogTime(5), ..Default::default() };
@@ -372,14 +377,14 @@ mod tests {
     }
 
     #[test]
-    fn without_a_rate_nothing_waits_and_turns_come_one_after_the_other() {
+    fn rate_0_does_not_wait_and_repetitions_follow_each_other() {
         let mut pace = Pace::new(0.0);
-        assert!(!pace.begin_next_turn());
+        assert!(!pace.begin_repetition());
         for time in [5_000_000_000, 1_000_000_000, 9_000_000_000] {
             pace.wait(LogTime(time)).unwrap();
         }
-        assert!(pace.begin_next_turn());
-        assert_eq!(pace.later, 8_000_000_000 + TURN_GAP);
+        assert!(pace.begin_repetition());
+        assert_eq!(pace.later, 8_000_000_000 + REPEAT_GAP);
         pace.stopped.store(true, Ordering::Relaxed);
         assert!(pace.wait(LogTime(1)).is_err());
     }

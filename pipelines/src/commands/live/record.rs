@@ -1,4 +1,4 @@
-//! `gridweave record`: writes what passes on links of a run to a log.
+//! `gridweave record`: writes the messages of links of a run to a log.
 
 use super::link_choice::{Link, all_links, named_links};
 use super::running::{RunChoice, Running, find_run};
@@ -21,23 +21,23 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What `gridweave record` is told.
+/// Arguments of `gridweave record`.
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
     /// The MCAP file to write.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// Which links: STAGE.PORT, or STAGE for all its outputs; all links of the run if none is named.
+    /// The links: STAGE.PORT, or STAGE for all its outputs; by default all links of the run.
     #[arg(value_name = "LINK")]
     pub(crate) links: Vec<String>,
     #[command(flatten)]
     pub(crate) run: RunChoice,
 }
 
-/// What has passed is on disk after so long: more is not lost in a crash.
+/// Messages are flushed at this interval, so that a crash loses no more than these.
 const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Records links.
+/// Records links until the run ends or the user interrupts it.
 pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
     check_writable(&args.output)?;
     let running = find_run(&args.run, registry)?;
@@ -56,7 +56,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
     let mut flushed = Instant::now();
     let mut messages = 0;
     loop {
-        // What has passed before the run ended is still there after it.
+        // Messages that were sent before the end of the run can be read after it.
         let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
         for recorder in &mut recorders {
             messages += recorder.record(&mut writer)?;
@@ -71,10 +71,10 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
         thread::sleep(LOOK_INTERVAL);
     }
     let missed: u64 = recorders.iter().map(|recorder| recorder.link.missed()).sum();
-    let untyped: u64 = recorders.iter().map(|recorder| recorder.lanes.untyped).sum();
+    let untyped: u64 = recorders.iter().map(|recorder| recorder.channels.untyped).sum();
     let reason = match (missed, untyped) {
         (0, 0) => None,
-        (missed, 0) => Some(format!("{missed} messages were missed, as the recorder was too slow for them")),
+        (missed, 0) => Some(format!("{missed} messages were missed: the recorder was too slow")),
         (_, untyped) => Some(format!("{missed} messages were missed, and {untyped} were of an unknown type")),
     };
     let written = writer.finish(reason.as_deref().map_or(Outcome::Complete, Outcome::Incomplete))?;
@@ -88,7 +88,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
 /// One link that is recorded.
 struct Recorder {
     link: WatchedLink,
-    lanes: Lanes,
+    channels: LogChannels,
 }
 
 impl Recorder {
@@ -100,37 +100,37 @@ impl Recorder {
         };
         let definition = port_type.and_then(|name| kind.definition(name)).unwrap_or_default().to_owned();
         let link = WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port)?;
-        Ok(Self { link, lanes: Lanes { port_type, definition, ..Lanes::default() } })
+        Ok(Self { link, channels: LogChannels { port_type, definition, ..LogChannels::default() } })
     }
 
-    /// Writes what has passed. Gives how many messages these were.
+    /// Writes the messages since the last call. Returns their number.
     fn record(&mut self, writer: &mut LogWriter) -> Result<u64> {
         let mut passed = Vec::new();
         self.link.take(|_, message| passed.push(message))?;
         let mut count = 0;
         for message in &passed {
-            count += u64::from(self.lanes.write(message, writer)?);
+            count += u64::from(self.channels.write(message, writer)?);
         }
         Ok(count)
     }
 }
 
-/// On which channels of the log the messages of a link go.
+/// Channels of the log for the messages of a link.
 #[derive(Default)]
-struct Lanes {
-    /// The type of its messages, but for those that come on channels of their own.
+struct LogChannels {
+    /// The type of messages without an announced channel.
     port_type: Option<&'static str>,
-    /// The definition of that type, if the stage brings it.
+    /// The definition of that type, if the stage has one.
     definition: String,
     announced: BTreeMap<u32, Channel>,
-    /// The channels of the log: by the number that was announced, and the topic.
-    channels: BTreeMap<(u32, String), u16>,
-    /// Messages on channels that were announced before it began, which it cannot write.
+    /// Channels of the log by announced number and topic.
+    ids: BTreeMap<(u32, String), u16>,
+    /// Number of messages on channels that were announced before the recording began, which cannot be written.
     untyped: u64,
 }
 
-impl Lanes {
-    /// `false` if it is the announcement of a channel, an attachment or a metadata record, or of no known type.
+impl LogChannels {
+    /// Writes a message. Returns `false` for the announcement of a channel, an attachment, a metadata record, or an unknown type.
     fn write(&mut self, message: &Message, writer: &mut LogWriter) -> Result<bool> {
         let header = message.header();
         if header.flags.contains(MessageFlags::CHANNEL) {
@@ -138,13 +138,13 @@ impl Lanes {
             return Ok(false);
         }
         if let Some(kind) = self.announced.get(&header.channel).and_then(SupplementKind::of_channel) {
-            // One that is damaged was told of where it was read.
+            // Damage was reported where the record was read.
             write_supplement(writer, kind, message.bytes())?;
             return Ok(false);
         }
         let topic = header.topic.as_str();
         let key = (header.channel, topic.to_owned());
-        let channel_id = match self.channels.get(&key) {
+        let channel_id = match self.ids.get(&key) {
             Some(id) => *id,
             None => {
                 let Some(channel) = self.channel(header.channel, topic) else {
@@ -152,7 +152,7 @@ impl Lanes {
                     return Ok(false);
                 };
                 let id = writer.channel(&channel)?;
-                self.channels.insert(key, id);
+                self.ids.insert(key, id);
                 id
             }
         };
@@ -167,7 +167,7 @@ impl Lanes {
             return Some(channel.clone());
         }
         let channel = result_channel(topic, self.port_type?, &self.definition);
-        // A type that nobody knows could not be read from the log.
+        // Messages of a type without a definition could not be decoded from the log.
         (!channel.schema.is_empty()).then_some(channel)
     }
 }
@@ -183,7 +183,7 @@ mod tests {
         Message::from_vec(Header { flags, channel, topic, log_time: LogTime(5), ..Default::default() }, bytes)
     }
 
-    /// The body of a metadata record, as the MCAP specification has it.
+    /// The body of a metadata record by the MCAP specification.
     fn metadata() -> Vec<u8> {
         let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
         let pairs = [text("weather"), text("rain")].concat();
@@ -191,15 +191,16 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_beside_the_messages_of_the_input_is_recorded_as_that_and_not_as_messages() {
+    fn metadata_records_of_the_input_are_recorded_as_such_and_not_as_messages() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.mcap");
         let mut writer = LogWriter::create(&path, LogOptions::default()).unwrap();
-        let mut lanes = Lanes::default();
-        let beside = Channel { topic: "metadata".into(), message_encoding: "mcap_record".into(), ..Default::default() };
+        let mut channels = LogChannels::default();
+        let metadata_channel =
+            Channel { topic: "metadata".into(), message_encoding: "mcap_record".into(), ..Default::default() };
         let scan = Channel { topic: "/robot1/scan".into(), message_encoding: "cdr".into(), ..Default::default() };
-        let mut write = |message: Message| lanes.write(&message, &mut writer).unwrap();
-        for (number, channel) in [(1, &beside), (2, &scan)] {
+        let mut write = |message: Message| channels.write(&message, &mut writer).unwrap();
+        for (number, channel) in [(1, &metadata_channel), (2, &scan)] {
             assert!(!write(message(MessageFlags::CHANNEL, number, "", channel.encode().unwrap())));
         }
         assert!(!write(message(MessageFlags::DATA, 1, "metadata", metadata())));
@@ -208,16 +209,16 @@ mod tests {
         let file = LogFile::open(&path).unwrap();
         assert_eq!(file.metadata("drive").unwrap()["weather"], "rain");
         assert_eq!(file.statistics().unwrap().messages, 1);
-        assert_eq!(lanes.untyped, 0);
+        assert_eq!(channels.untyped, 0);
     }
 
     #[test]
     fn a_type_that_its_stage_defines_is_recorded_with_its_definition() {
         let channel = |definition: &str| {
             let definition = definition.to_owned();
-            Lanes { port_type: Some("rooms/msg/Room"), definition, ..Lanes::default() }.channel(0, "/rooms")
+            LogChannels { port_type: Some("rooms/msg/Room"), definition, ..LogChannels::default() }.channel(0, "/rooms")
         };
-        assert!(channel("").is_none(), "nobody knows it");
+        assert!(channel("").is_none(), "no definition");
         assert_eq!(channel("string name\n").unwrap().schema, b"string name\n");
     }
 }

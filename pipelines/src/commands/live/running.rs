@@ -1,4 +1,4 @@
-//! The run that a command means.
+//! Choice of the run in progress that a command connects to.
 
 use crate::status::BadUse;
 use anyhow::{Result, bail};
@@ -9,47 +9,46 @@ use gridweave_runtime::stage::Registry;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Which of the runs that are going on is meant.
+/// Choice among the runs in progress.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct RunChoice {
-    /// Which run, if there are several: the name of its pipeline, or what its own begins with, as `top` shows
-    /// it.
+    /// The run, if there are several: the name of its pipeline, or the beginning of the run's name, as `top` shows it.
     #[arg(long, value_name = "NAME")]
     pub(crate) run: Option<String>,
-    /// Wait for so many seconds until there is such a run.
+    /// Wait at most so many seconds for such a run.
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
     pub(crate) wait: f64,
 }
 
-/// So often it is looked for a run that is not there yet.
+/// Interval of the search for a run.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// A run that is going on, and its pipeline.
+/// A run in progress and its pipeline.
 pub(super) struct Running {
     pub(super) run: RunningRun,
     pub(super) pipeline: Pipeline,
 }
 
 impl Running {
-    /// What to call it.
+    /// Name for messages: that of the pipeline and that of the run.
     pub(super) fn name(&self) -> String {
         format!("{} ({})", self.pipeline.name, self.run.prefix)
     }
 }
 
 impl Drop for Running {
-    /// A program that is still there when the run ends must not leave anything after it.
+    /// Removes what is left of a run that ended while this program was connected.
     fn drop(&mut self) {
         self.run.remove_traces();
     }
 }
 
-/// The run that is meant, of those of this user that are going on.
+/// Finds the run among those of this user.
 pub(super) fn find_run(choice: &RunChoice, registry: &Registry) -> Result<Running> {
     find_run_with(choice, registry, |_| true)
 }
 
-/// The same; where several may be meant, it is one with this pipeline.
+/// Finds the run as [`find_run`] does; among several, one whose pipeline is likely.
 pub(super) fn find_run_with(
     choice: &RunChoice,
     registry: &Registry,
@@ -62,7 +61,7 @@ pub(super) fn find_run_with(
     loop {
         let mut runs = all_runs(registry)?;
         let names = |runs: &[Running]| runs.iter().map(Running::name).collect::<Vec<_>>().join(", ");
-        let going_on = names(&runs);
+        let in_progress = names(&runs);
         if let Some(name) = &choice.run {
             runs.retain(|running| running.pipeline.name == *name || running.run.prefix.starts_with(name));
         }
@@ -72,16 +71,18 @@ pub(super) fn find_run_with(
         match (runs.len(), runs.pop()) {
             (1, Some(running)) => return Ok(running),
             (0, _) if start.elapsed().as_secs_f64() < choice.wait => thread::sleep(LOOK_INTERVAL),
-            (0, _) => match (&choice.run, going_on.is_empty()) {
-                (Some(name), false) => bail!("no run called {name} is going on; there are {going_on}"),
-                _ => bail!("no run of processes is going on: start one with `gridweave run live`"),
+            (0, _) => match (&choice.run, in_progress.is_empty()) {
+                (Some(name), false) => bail!("no run {name} is in progress; there are {in_progress}"),
+                _ => bail!("no run of processes is in progress: start one with `gridweave run live`"),
             },
-            _ => return Err(BadUse(format!("several runs are going on: {going_on}; choose one with --run")).into()),
+            _ => {
+                return Err(BadUse(format!("several runs are in progress: {in_progress}; choose one with --run")).into());
+            }
         }
     }
 }
 
-/// A run whose pipeline cannot be read has just ended, or has been started by another program.
+/// Lists the runs in progress. A run whose pipeline cannot be read is left out: it has just ended, or is one of another program.
 fn all_runs(registry: &Registry) -> Result<Vec<Running>> {
     let load = |run: RunningRun| {
         let pipeline = Pipeline::load(&run.pipeline(), registry, &Overrides::default()).ok()?;

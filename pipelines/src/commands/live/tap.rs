@@ -1,11 +1,11 @@
-//! `gridweave tap`: prints the messages of a link as they pass.
+//! `gridweave tap`: prints the messages of a link.
 
 use super::link_choice::named_link;
 use super::running::{RunChoice, find_run};
-use super::tap_elsewhere::tap_elsewhere;
+use super::tap_remote::tap_remote;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
-use crate::terminal::{print, say};
+use crate::terminal::{eprint_line, print};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::dynamic::{JsonOptions, Schema};
@@ -19,38 +19,38 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
 
-/// What `gridweave tap` is told.
+/// Arguments of `gridweave tap`.
 #[derive(Debug, Args)]
 pub(crate) struct TapArgs {
-    /// The link: STAGE.PORT, or STAGE if it has one output only; MACHINE:STAGE.PORT for that of a run on another machine, as its
-    /// bridge is called there (with `gridweave-ros`).
+    /// The link: STAGE.PORT, or STAGE if it has only one output; MACHINE:STAGE.PORT for a run on another machine, where MACHINE is
+    /// the name of its bridge (with `gridweave-ros`).
     #[arg(value_name = "[MACHINE:]STAGE.PORT")]
     pub(crate) link: String,
     /// Print each message as a line of JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// End after so many messages.
+    /// End after N messages.
     #[arg(long, value_name = "N")]
     pub(crate) count: Option<u64>,
-    /// Where the other machine's bridge connects to, as tcp/HOST:PORT, if that is no `bridge_source` of a run here.
+    /// The endpoint that the bridge of the other machine connects to, as tcp/HOST:PORT; by default that of a `bridge_source` here.
     #[arg(long, value_name = "ENDPOINT")]
     pub(crate) at: Vec<String>,
-    /// Set a parameter of the way to the other machine; `kinds bridge_tap` lists them.
+    /// Set a parameter of the connection to the other machine; `kinds bridge_tap` lists them.
     #[arg(long, value_name = "PARAMETER=VALUE")]
     pub(crate) set: Vec<String>,
     #[command(flatten)]
     pub(crate) run: RunChoice,
 }
 
-/// So often it is looked for messages.
+/// Interval at which messages are read.
 pub(super) const LOOK_INTERVAL: Duration = Duration::from_millis(5);
-/// Of a longer array only so many elements are printed.
+/// Maximum number of elements of an array that are printed.
 const LONGEST_ARRAY: usize = 16;
 
-/// Prints what passes.
+/// Prints messages until the run ends, the count is reached, or the user interrupts it.
 pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
     if let Some((machine, link)) = args.link.split_once(':') {
-        return tap_elsewhere(args, machine, link, registry);
+        return tap_remote(args, machine, link, registry);
     }
     if !(args.at.is_empty() && args.set.is_empty()) {
         let text = "--at and --set are for links of other machines: name the link as MACHINE:STAGE.PORT";
@@ -63,7 +63,7 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
     let kind = &running.pipeline.stages[link.stage].kind;
     let mut printer = Printer::new(args, Types::new(kind, kind.outputs[link.port].port_type));
     loop {
-        // What has passed before the run ended is still there after it.
+        // Messages that were sent before the end of the run can be read after it.
         let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
         watched.take(|_, message| printer.add(&message))?;
         if !printer.print()? || is_last_look {
@@ -72,12 +72,12 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
         thread::sleep(LOOK_INTERVAL);
     }
     if watched.missed() > 0 {
-        say(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
+        eprint_line(format_args!("{} messages were missed: this program was too slow", watched.missed()));
     }
     Ok(Status::Done)
 }
 
-/// Prints messages, up to so many.
+/// Printer of messages up to a count.
 pub(super) struct Printer {
     types: Types,
     as_json: bool,
@@ -99,7 +99,7 @@ impl Printer {
         }
     }
 
-    /// Prints what it has taken. Gives whether more is wanted.
+    /// Prints the collected lines. Returns whether more are wanted.
     pub(super) fn print(&mut self) -> Result<bool> {
         Ok(print(std::mem::take(&mut self.lines))? && self.left > 0)
     }
@@ -108,7 +108,7 @@ impl Printer {
 /// The types of the messages of a link.
 #[derive(Default)]
 pub(super) struct Types {
-    /// That of the port, for messages that come on no channel of their own.
+    /// The type of the port, for messages without an announced channel.
     port: Option<(String, Option<Schema>)>,
     channels: BTreeMap<u32, (String, Option<Schema>)>,
 }
@@ -124,7 +124,7 @@ impl Types {
         Self { port, channels: BTreeMap::new() }
     }
 
-    /// What is printed of a message; nothing of the announcement of a channel.
+    /// Formats a message; `None` for the announcement of a channel.
     fn line(&mut self, message: &Message, as_json: bool) -> Option<String> {
         let header = message.header();
         if header.flags.contains(MessageFlags::CHANNEL) {
@@ -135,7 +135,7 @@ impl Types {
             return None;
         }
         let of_type = self.channels.get(&header.channel).or(self.port.as_ref());
-        let name = of_type.map_or("of a type that was announced before", |(name, _)| name.as_str());
+        let name = of_type.map_or("of unknown type (announced earlier)", |(name, _)| name.as_str());
         let time = header.log_time;
         if !as_json {
             return Some(format!("{time}  {}  {name}  {} bytes", header.topic, header.length));

@@ -1,16 +1,16 @@
-//! `gridweave top`: what the stages of a run do, redrawn in place.
+//! `gridweave top`: shows rates, queues and latencies of the stages of a run, redrawn in place.
 
 use super::other_machines::{Machine, OtherMachines};
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::table::Table;
-use crate::terminal::{print, print_line, eprint_line, width};
+use crate::terminal::{eprint_line, print, print_line, width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
 use gridweave_runtime::link::Histogram;
-use gridweave_runtime::link::{StageCounters, StageCounter, StageState, WireCounter};
+use gridweave_runtime::link::{StageCounter, StageCounters, StageState, WireCounter};
 use gridweave_runtime::pipeline::{Mode, Pipeline, Wire};
 use gridweave_runtime::ros::StageProgress;
 use gridweave_runtime::stage::Registry;
@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 /// Arguments of `gridweave top`.
 #[derive(Debug, Args)]
 pub(crate) struct TopArgs {
-    /// Measure for one interval, print that, and end.
+    /// Measure and print one interval, and end.
     #[arg(long)]
     pub(crate) once: bool,
     /// Print JSON, an object for each interval.
@@ -36,12 +36,12 @@ pub(crate) struct TopArgs {
     pub(crate) run: RunChoice,
 }
 
-/// So often it is looked whether the user has had enough.
+/// Interval at which interrupts are checked.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
-/// To the upper left corner, and away with what is there.
+/// Escape sequence: move to the upper left corner, and clear the screen.
 const CLEAR: &str = "\x1b[H\x1b[J";
 
-/// Shows what the stages do.
+/// Shows the stages until the run ends or the user interrupts it.
 pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let interval = Duration::try_from_secs_f64(args.interval).ok().filter(|interval| !interval.is_zero());
     let Some(interval) = interval else { return Err(BadUse("--interval must be above 0 s".to_owned()).into()) };
@@ -81,7 +81,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     }
 }
 
-/// The numbers of a stage at one moment.
+/// Counters of a stage at one moment.
 #[derive(Clone, Debug)]
 struct Snapshot {
     state: StageState,
@@ -91,7 +91,7 @@ struct Snapshot {
     busy: u64,
     restarts: u64,
     warnings: u64,
-    /// For each wire: taken, dropped, waiting in the stage.
+    /// For each wire: messages taken, dropped, and waiting in the stage.
     wires: Vec<[u64; 3]>,
     latency: Histogram,
 }
@@ -99,7 +99,8 @@ struct Snapshot {
 impl Snapshot {
     fn new(counters: &StageCounters) -> Self {
         let wire = |wire: usize| {
-            [WireCounter::Taken, WireCounter::Dropped, WireCounter::Waiting].map(|number| counters.get_wire(wire, number))
+            [WireCounter::Taken, WireCounter::Dropped, WireCounter::Waiting]
+                .map(|number| counters.get_wire(wire, number))
         };
         Self {
             state: counters.state(),
@@ -115,7 +116,7 @@ impl Snapshot {
     }
 }
 
-/// What a stage has done in an interval.
+/// Rates of a stage in an interval.
 #[derive(Clone, Debug)]
 struct StageRates {
     name: String,
@@ -127,9 +128,9 @@ struct StageRates {
     rate_out: f64,
     queue: u64,
     dropped: u64,
-    /// Seconds from when a message was sent to when it was handled, that 50, 95 and 99 % do not exceed.
+    /// Latencies from the sending of a message to its handling: percentiles 50, 95 and 99, seconds.
     latency: [Option<f64>; 3],
-    /// 0 to 1.
+    /// Share of the time in which the stage works, 0 to 1.
     busy: f64,
     /// Bytes.
     memory: Option<u64>,
@@ -200,27 +201,27 @@ fn to_json(running: &Running, stages: &[StageRates], others: &OtherMachines) -> 
 
 fn machine_to_json(machine: &Machine<'_>) -> Value {
     json!({
-        "machine": machine.told.machine,
+        "machine": machine.report.machine,
         "silent_s": machine.silent.map(|silent| silent.as_secs_f64()),
-        "stages": machine.told.stages,
+        "stages": machine.report.stages,
     })
 }
 
-/// The columns of the display, and what of them a narrow terminal is not shown: what matters least comes first.
+/// Columns of the display, and those that a narrow terminal is not shown, the least important first.
 const HEADS: [&str; 14] = [
     "MACHINE", "STAGE", "STATE", "IN/S", "OUT/S", "QUEUE", "DROPPED", "P50 MS", "P95 MS", "P99 MS", "BUSY", "MB",
     "STARTS", "WARNINGS",
 ];
 const LEFT_OUT_FIRST: [&str; 8] = ["P50 MS", "P99 MS", "MB", "OUT/S", "STATE", "STARTS", "WARNINGS", "P95 MS"];
 
-/// What the machine is called that this program is on, where there are others.
+/// Name of this machine, where there are others.
 const HERE: &str = "(here)";
-/// What is not known.
+/// An unknown value.
 const UNKNOWN: &str = "-";
 
-/// The page: on a terminal that it is redrawn on each stage has one line, and columns that do not fit are left out.
+/// Formats the display. On a terminal where it is redrawn each stage has one line, and columns that do not fit are left out.
 fn to_text(running: &Running, stages: &[StageRates], others: &OtherMachines, is_redrawn: bool) -> String {
-    // Without others, the column of machines says nothing.
+    // Without other machines, the column of machines is left out.
     let hidden = usize::from(others.machines().next().is_none());
     let mut table = Table::new(HEADS.into_iter().skip(hidden));
     for stage in stages {
@@ -246,7 +247,7 @@ fn to_text(running: &Running, stages: &[StageRates], others: &OtherMachines, is_
         table.row(cells.into_iter().skip(hidden));
     }
     for machine in others.machines() {
-        machine.told.stages.iter().for_each(|stage| table.row(of_other_machine(&machine, stage)));
+        machine.report.stages.iter().for_each(|stage| table.row(of_other_machine(&machine, stage)));
     }
     let width = width();
     if let Some(width) = width.filter(|_| is_redrawn) {
@@ -255,7 +256,7 @@ fn to_text(running: &Running, stages: &[StageRates], others: &OtherMachines, is_
     format!("{}\n{}", running.name(), table.fit(width))
 }
 
-/// The row of a stage on another machine, in the columns of [`HEADS`].
+/// Makes the row of a stage on another machine, in the columns of [`HEADS`].
 fn of_other_machine(machine: &Machine<'_>, stage: &StageProgress) -> [String; 14] {
     let state = match machine.silent {
         Some(silent) => format!("silent {} s", silent.as_secs()),
@@ -263,7 +264,7 @@ fn of_other_machine(machine: &Machine<'_>, stage: &StageProgress) -> [String; 14
     };
     let unknown = || UNKNOWN.to_owned();
     [
-        machine.told.machine.clone(),
+        machine.report.machine.clone(),
         stage.name.clone(),
         state,
         format!("{:.1}", stage.in_per_s),

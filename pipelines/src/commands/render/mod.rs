@@ -1,11 +1,11 @@
-//! `gridweave render`: pictures of what a log or map files hold.
+//! `gridweave render`: draws the maps of logs, or map files.
 
 mod overlays;
 
 use crate::job::{Inputs, NamingOptions};
 use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, map_files};
 use crate::status::{BadUse, Status};
-use crate::terminal::{print_line, say};
+use crate::terminal::{eprint_line, print_line};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use gridweave_logs::map_file::GridMap;
@@ -15,56 +15,57 @@ use nalgebra::Isometry2;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// What `gridweave render` is told.
+/// Arguments of `gridweave render`.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// Logs, each as LOG or ROBOT=LOG, or map files (map_server YAML). Of a log that a merge has written, the maps lie as they
-    /// were merged; otherwise they lie beside each other.
+    /// Logs, each as LOG or ROBOT=LOG, or map files (map_server YAML). The maps of a log that a merge has written are drawn aligned,
+    /// other maps beside each other.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
-    /// What to write; the ending says the format: .png, .svg or .pdf.
+    /// The output; its ending decides the format: .png, .svg or .pdf.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// The merged map in grey, instead of the robots' maps each in a colour of its own.
+    /// Draw the merged map in grey, instead of the robots' maps in different colours.
     #[arg(long, conflicts_with_all = ["robot", "apart"])]
     merged: bool,
     /// Draw the maps of these robots only.
     #[arg(long, value_name = "ROBOT", value_delimiter = ',')]
     robot: Vec<String>,
-    /// Lay the maps beside each other, as they came.
+    /// Draw the maps beside each other, not aligned.
     #[arg(long)]
     apart: bool,
-    /// What to draw upon the maps.
+    /// What to draw over the maps.
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     show: Vec<Overlay>,
     /// Draw a line every so many metres.
     #[arg(long, value_name = "METRES")]
     grid: Option<f64>,
-    /// Draw what was known so many seconds after the first message, and not at the end.
+    /// Draw the state so many seconds after the first message, instead of that at the end.
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
     #[command(flatten)]
     names: NamingOptions,
 }
 
-/// What can be drawn upon maps.
+/// What can be drawn over maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 enum Overlay {
-    /// Names, where the robots' map frames have their origin.
+    /// Names, at the origins of the robots' map frames.
     Names,
     /// Where the maps contradict each other.
     Conflicts,
-    /// The straight walls that were found, paler the less reliable they are.
+    /// The straight walls that were found; less reliable ones are paler.
     Segments,
     /// The direction of each map's walls.
     Directions,
-    /// Tags, with ellipses of two standard deviations, paler the less certain they are.
+    /// Tags, with ellipses of two standard deviations; less certain ones are paler.
     Tags,
     /// Where the robots drove.
     Trajectories,
-    /// How the maps are bent, as arrows that are drawn longer than they are.
-    Bends,
-    /// Places and the ways between them.
+    /// The deformations of the maps, as enlarged arrows.
+    #[value(name = "bends")]
+    Deformations,
+    /// Topological maps: places and the paths between them.
     Ways,
     /// All of these.
     All,
@@ -77,14 +78,14 @@ pub(crate) fn render(args: &RenderArgs) -> Result<Status> {
         return Err(BadUse(format!("{} is an input, and would be overwritten", input.display())).into());
     }
     if args.at.is_some_and(|at| at.is_nan() || at < 0.0) {
-        return Err(BadUse("--at must be 0 seconds or above".to_owned()).into());
+        return Err(BadUse("--at must be 0 s or more".to_owned()).into());
     }
     let state = read(args)?;
     check_robots(&args.robot, &state)?;
     let placing = Placing::of(&state, &args.robot.iter().map(String::as_str).collect(), args.apart);
     let picture = draw(args, &state, &placing).map_err(|error| explain(error, &state))?;
     picture.save(&args.output)?;
-    print_line(format_args!("wrote {}: {}", args.output.display(), what(&placing, args.merged)))?;
+    print_line(format_args!("wrote {}: {}", args.output.display(), contents(&placing, args.merged)))?;
     Ok(Status::Done)
 }
 
@@ -94,7 +95,7 @@ fn read(args: &RenderArgs) -> Result<MergeState> {
     }
     let mut opened = Opened::new(&args.inputs, &args.names)?;
     opened.read_until(args.at, |_, _| {});
-    opened.problems.iter().for_each(|problem| say(format_args!("warning: {problem}")));
+    opened.problems.iter().for_each(|problem| eprint_line(format_args!("warning: {problem}")));
     Ok(opened.state)
 }
 
@@ -136,18 +137,18 @@ fn layer<'a>(name: &'a str, colour: [u8; 3], map: &'a GridMap) -> MapLayer<'a> {
     MapLayer { name, colour, info: map.info, cells: &map.cells, transform_world_map: Isometry2::identity() }
 }
 
-/// Says what is missing, where nothing can be drawn.
+/// Explains what is missing where nothing can be drawn.
 fn explain(error: PictureError, state: &MergeState) -> anyhow::Error {
     match error {
         PictureError::Empty if state.robots_with_maps().next().is_none() && state.merged().is_none() => {
             anyhow::anyhow!(
                 "there is no map to draw: a nav_msgs/msg/OccupancyGrid is needed on /map or on /ROBOT/map; `gridweave info LOG` \
-             shows what there is, and --rename gives a topic another name"
+             lists the topics, and --rename renames one"
             )
         }
         PictureError::Empty if state.merged().is_none() => {
             anyhow::anyhow!(
-                "there is no merged map to draw, or nothing of it is known: leave --merged out for the robots' maps"
+                "there is no merged map to draw, or all its cells are unknown: omit --merged to draw the robots' maps"
             )
         }
         PictureError::Grid { .. } => BadUse(format!("--grid: {error}")).into(),
@@ -155,7 +156,8 @@ fn explain(error: PictureError, state: &MergeState) -> anyhow::Error {
     }
 }
 
-fn what(placing: &Placing, is_merged_map: bool) -> String {
+/// Describes what was drawn.
+fn contents(placing: &Placing, is_merged_map: bool) -> String {
     if is_merged_map || placing.robots.is_empty() {
         return "the merged map".to_owned();
     }
@@ -163,7 +165,7 @@ fn what(placing: &Placing, is_merged_map: bool) -> String {
     let names = |robots: &[&PlacedRobot]| robots.iter().map(|robot| robot.name.as_str()).collect::<Vec<_>>().join(", ");
     match (merged.is_empty(), others.is_empty()) {
         (true, _) => format!("{} beside each other", names(&others)),
-        (_, true) => format!("{} as they were merged", names(&merged)),
-        _ => format!("{} as they were merged, and {} beside them", names(&merged), names(&others)),
+        (_, true) => format!("{} aligned", names(&merged)),
+        _ => format!("{} aligned, and {} beside them", names(&merged), names(&others)),
     }
 }

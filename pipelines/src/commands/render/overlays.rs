@@ -1,4 +1,4 @@
-//! What was found in maps, as marks upon them.
+//! Marks of what was found in maps.
 
 use super::Overlay;
 use crate::merge_log::{MergeState, PlacedRobot, Placing, RobotState};
@@ -8,25 +8,26 @@ use gridweave_logs::picture::{Mark, Marks, Shape, robot_colour, ways};
 use gridweave_runtime::ros::OccupancyGrid;
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// The colour of what maps contradict each other in, which is no robot's.
+/// The colour of cells in conflict, which is not that of a robot.
 pub(super) const CONFLICT: Colour = [240, 228, 66];
-/// Of marks in the legend that have the colours of their robots.
+/// The colour of the legend for marks that have the colours of their robots.
 const INK: Colour = [70, 70, 70];
-/// From this share on a cell is in conflict, in hundredths.
+/// A cell is in conflict from this share on, percent.
 const CONFLICT_FROM: i8 = 50;
-/// How long the arrow of a map's direction is, metres.
+/// Length of the arrow of a map's direction, metres.
 const DIRECTION: f64 = 3.0;
+/// Size of the ellipses, standard deviations.
 const DEVIATIONS: f64 = 2.0;
 
-/// The cells in conflict as the walls of a map of which nothing else is known.
+/// Makes a map with the cells in conflict as walls and all others unknown.
 pub(super) fn conflicts(map: &OccupancyGrid<'_>) -> GridMap {
     let cells = map.cells().iter().map(|cell| if *cell >= CONFLICT_FROM { 100 } else { -1 }).collect();
     GridMap { info: map.info, cells }
 }
 
-/// The marks of an overlay, robot by robot.
+/// Makes the marks of an overlay, for each robot.
 pub(super) fn marks(overlay: Overlay, state: &MergeState, placing: &Placing) -> Vec<Marks> {
-    let longer = longer(state, placing);
+    let enlargement = enlargement(state, placing);
     let robots = placing.robots.iter().filter_map(|robot| Some((robot, state.robots.get(&robot.name)?)));
     let of_robot = |(robot, known): (&PlacedRobot, &RobotState)| {
         let on_map = OnMap { robot, known };
@@ -36,7 +37,7 @@ pub(super) fn marks(overlay: Overlay, state: &MergeState, placing: &Placing) -> 
             Overlay::Directions => ("directions of the walls".to_owned(), on_map.direction()),
             Overlay::Tags => ("tags, 2 sigma".to_owned(), on_map.tags()),
             Overlay::Trajectories => ("drives".to_owned(), on_map.trajectory()),
-            Overlay::Bends => (format!("bends, {longer} times as long"), on_map.bends(longer)),
+            Overlay::Deformations => (format!("deformation, {enlargement} x"), on_map.deformation(enlargement)),
             Overlay::Ways => return on_map.ways(),
             Overlay::Conflicts | Overlay::All => return None,
         };
@@ -46,7 +47,7 @@ pub(super) fn marks(overlay: Overlay, state: &MergeState, placing: &Placing) -> 
     robots.filter_map(of_robot).collect()
 }
 
-/// A robot's map, and what is known of it.
+/// A robot's map and its state.
 struct OnMap<'a> {
     robot: &'a PlacedRobot,
     known: &'a RobotState,
@@ -54,7 +55,7 @@ struct OnMap<'a> {
 
 impl OnMap<'_> {
     fn paint(&self, opacity: f64) -> Paint {
-        // Darker than the walls, so that marks stand out.
+        // Darker than the walls, so that marks are visible on them.
         let colour = robot_colour(self.robot.index).map(|channel| (f64::from(channel) * 0.75) as u8);
         Paint { colour, opacity: if opacity.is_finite() { opacity.clamp(0.0, 1.0) } else { 1.0 } }
     }
@@ -63,7 +64,7 @@ impl OnMap<'_> {
         self.robot.place(&Point2::new(x, y))
     }
 
-    /// A direction of the map in the picture, without the little by which bends turn it.
+    /// A direction of the map in the picture, without the small rotations of its deformation.
     fn turn(&self, x: f64, y: f64) -> Vector2<f64> {
         self.robot.transform_world_map.rotation * Vector2::new(x, y)
     }
@@ -109,10 +110,10 @@ impl OnMap<'_> {
         marks.flatten().collect()
     }
 
-    /// The drive as the merge has carried it, or else as the robot has logged it.
+    /// The path in the merged frame, or else the logged one.
     fn trajectory(&self) -> Vec<Mark> {
-        let carried = self.known.path.as_ref().filter(|_| self.robot.is_merged);
-        let places: Vec<Point2<f64>> = match carried {
+        let merged = self.known.path.as_ref().filter(|_| self.robot.is_merged);
+        let places: Vec<Point2<f64>> = match merged {
             Some(path) => path.poses.iter().map(|pose| pose.pose.planar().translation.vector.into()).collect(),
             None => self.known.trail.iter().map(|place| self.robot.place(place)).collect(),
         };
@@ -120,31 +121,31 @@ impl OnMap<'_> {
         if places.len() > 1 { vec![line(places)] } else { Vec::new() }
     }
 
-    fn bends(&self, longer: f64) -> Vec<Mark> {
-        let bent = self.robot.bend.as_ref().and(self.known.bend.as_ref());
-        let nodes = bent.iter().flat_map(|bend| &bend.nodes);
+    fn deformation(&self, enlargement: f64) -> Vec<Mark> {
+        let deformation = self.robot.deformation.as_ref().and(self.known.deformation.as_ref());
+        let nodes = deformation.iter().flat_map(|deformation| &deformation.nodes);
         let arrow = |node: &gridweave_runtime::ros::DeformationNode| {
             let from = self.robot.transform_world_map * Point2::new(node.x, node.y);
-            let to = from + self.turn(node.dx, node.dy) * longer;
+            let to = from + self.turn(node.dx, node.dy) * enlargement;
             Mark { shape: Shape::Arrow { from, to }, paint: self.paint(0.9) }
         };
         nodes.map(arrow).collect()
     }
 
-    /// Topological maps are not bent.
+    /// The topological map, which has no deformation.
     fn ways(&self) -> Option<Marks> {
         Some(ways(self.known.topology.as_ref()?, &self.robot.transform_world_map))
     }
 }
 
-/// How much longer than they are bends are drawn: the longest a little shorter than its nodes lie apart, by a round number.
-fn longer(state: &MergeState, placing: &Placing) -> f64 {
-    let bends = placing.robots.iter().filter_map(|robot| state.robots.get(&robot.name)?.bend.as_ref());
-    let of_bend = |bend: &gridweave_runtime::ros::MapDeformation| {
-        let longest = bend.nodes.iter().map(|node| node.dx.hypot(node.dy)).fold(0.0, f64::max);
-        bend.spacing / longest.max(1e-9)
+/// Factor by which deformations are enlarged: a round number for which the longest arrow is no longer than the spacing of the nodes.
+fn enlargement(state: &MergeState, placing: &Placing) -> f64 {
+    let deformations = placing.robots.iter().filter_map(|robot| state.robots.get(&robot.name)?.deformation.as_ref());
+    let max_factor = |deformation: &gridweave_runtime::ros::MapDeformation| {
+        let longest = deformation.nodes.iter().map(|node| node.dx.hypot(node.dy)).fold(0.0, f64::max);
+        deformation.spacing / longest.max(1e-9)
     };
-    let most = bends.map(of_bend).fold(f64::INFINITY, f64::min);
+    let most = deformations.map(max_factor).fold(f64::INFINITY, f64::min);
     let round = [100.0, 50.0, 20.0, 10.0, 5.0, 2.0];
     round.into_iter().find(|round| *round <= most).unwrap_or(1.0)
 }

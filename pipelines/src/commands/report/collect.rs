@@ -1,4 +1,4 @@
-//! Reads what the page shows out of logs, moment by moment.
+//! Collects the data of the page from logs, moment by moment.
 
 use super::grids::grid;
 use super::model::{Findings, Frame, Hypothesis, Pair, Registration, Report, Robot, Tag};
@@ -12,22 +12,23 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// How large a page may become.
+/// Limits of the size of a page.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// How many moments it shows.
+    /// Maximum number of moments.
     pub(super) steps: usize,
-    /// How many cells its maps have along a side.
+    /// Maximum number of cells along a side of a map.
     pub(super) side: usize,
 }
 
-/// A drive has no more points than this.
-const MOST_POINTS: usize = 4000;
+/// Maximum number of points of a path.
+const MAX_POINTS: usize = 4000;
+/// Size of the ellipses, standard deviations.
 const DEVIATIONS: f64 = 2.0;
 /// Width and height of a curve, pixels.
 const CURVE: [f64; 2] = [160.0, 40.0];
 
-/// The moments at which something became known that a page shows: seconds from the first message on, rising.
+/// Finds the moments at which something changes on the page: seconds from the first message, in order.
 pub(super) fn moments(logs: &[PathBuf], naming: &NamingOptions) -> Result<Vec<f64>> {
     let mut times = Vec::new();
     let mut opened = Opened::new(logs, naming)?;
@@ -40,14 +41,14 @@ pub(super) fn moments(logs: &[PathBuf], naming: &NamingOptions) -> Result<Vec<f6
     Ok(times)
 }
 
-/// Some of the moments, evenly, the last among them.
+/// Picks some of the moments, evenly, including the last.
 fn some_of(times: &[f64], most: usize) -> Vec<f64> {
     let count = times.len().min(most.max(1));
     let nth = |n: usize| times[(n + 1) * times.len() / count - 1];
     (0..count).map(nth).collect()
 }
 
-/// Reads what the page shows at some of the moments.
+/// Collects the data at some of the moments.
 pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], limits: Limits) -> Result<Report> {
     let mut opened = Opened::new(logs, naming)?;
     let times = some_of(times, limits.steps);
@@ -55,29 +56,29 @@ pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], l
     report.metadata = opened.metadata();
     let mut robots: BTreeMap<String, Robot> = BTreeMap::new();
     for (step, time) in times.iter().enumerate() {
-        // What is sent at the very end belongs to the last moment.
+        // The last moment includes all messages to the end.
         let is_last = step + 1 == times.len();
         opened.read_until((!is_last).then_some(*time), |_, _| {});
         take_moment(&mut report, &mut robots, &opened.state, step, is_last, limits.side)?;
     }
     report.times = times;
     report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
-    tell_end(&mut report, &opened.state);
+    add_tables(&mut report, &opened.state);
     report.problems = opened.problems.into_iter().collect();
     Ok(report)
 }
 
-/// What is known at one moment, which is all that there is to show: of a run that goes on.
+/// Collects the data at one moment only, for a run in progress.
 pub(super) fn collect_moment(name: &str, state: &MergeState, seconds: f64, side: usize) -> Result<Report> {
     let mut report = Report { logs: vec![name.to_owned()], times: vec![round(seconds)], ..Report::default() };
     let mut robots = BTreeMap::new();
     take_moment(&mut report, &mut robots, state, 0, true, side)?;
     report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
-    tell_end(&mut report, state);
+    add_tables(&mut report, state);
     Ok(report)
 }
 
-/// Adds what is known at a moment, of the given number. At the last one each robot's own map is taken along.
+/// Adds the state at a moment of the given number; at the last one also each robot's map in its own frame.
 fn take_moment(
     report: &mut Report,
     robots: &mut BTreeMap<String, Robot>,
@@ -111,9 +112,9 @@ fn hex([red, green, blue]: [u8; 3]) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// To a tenth of a millimetre, which keeps the page small.
+/// Rounds to a tenth of a millimetre, which keeps the page small.
 fn round(value: f64) -> f64 {
-    // JSON has no other numbers.
+    // JSON cannot represent others.
     if value.is_finite() { (value * 1e4).round() / 1e4 } else { 0.0 }
 }
 
@@ -121,7 +122,7 @@ fn rounded(place: Point2<f64>) -> [f64; 2] {
     [round(place.x), round(place.y)]
 }
 
-/// What was found in a robot's map, as it lies on the page.
+/// Collects what was found in a robot's map, in the frame of the page.
 fn findings(robot: &PlacedRobot, known: &RobotState) -> Findings {
     let place = |x: f64, y: f64| rounded(robot.place(&Point2::new(x, y)));
     let rigid = |x: f64, y: f64| rounded(robot.transform_world_map * Point2::new(x, y));
@@ -139,14 +140,14 @@ fn findings(robot: &PlacedRobot, known: &RobotState) -> Findings {
         let ellipse = ellipse(&tag.covariance, turn);
         Tag { id: tag.tag_id.clone(), x, y, ellipse, certainty: round(tag.certainty), readings: tag.readings }
     });
-    let carried = known.path.as_ref().filter(|_| robot.is_merged);
-    let path: Vec<[f64; 2]> = match carried {
+    let merged = known.path.as_ref().filter(|_| robot.is_merged);
+    let path: Vec<[f64; 2]> = match merged {
         Some(path) => path.poses.iter().map(|pose| rounded(pose.pose.planar().translation.vector.into())).collect(),
         None => known.trail.iter().map(|point| place(point.x, point.y)).collect(),
     };
-    let every = path.len().div_ceil(MOST_POINTS).max(1);
-    let bent = robot.bend.as_ref().and(known.bend.as_ref());
-    let bends = bent.iter().flat_map(|bend| &bend.nodes).map(|node| {
+    let every = path.len().div_ceil(MAX_POINTS).max(1);
+    let deformation = robot.deformation.as_ref().and(known.deformation.as_ref());
+    let bends = deformation.iter().flat_map(|deformation| &deformation.nodes).map(|node| {
         let ([x, y], by) = (rigid(node.x, node.y), robot.transform_world_map.rotation * Vector2::new(node.dx, node.dy));
         [x, y, round(by.x), round(by.y), round(node.dyaw)]
     });
@@ -167,7 +168,7 @@ fn findings(robot: &PlacedRobot, known: &RobotState) -> Findings {
     }
 }
 
-/// The half axes of two standard deviations and the direction of the first, in a map that is turned.
+/// Half axes of two standard deviations and the direction of the first, for a rotated map.
 fn ellipse(covariance: &[f64; 4], turn: f64) -> [f64; 3] {
     let ellipse = CovarianceEllipse::new(&Matrix2::from_row_slice(covariance), DEVIATIONS);
     ellipse.map_or([0.0; 3], |CovarianceEllipse { half_axes: [first, second], direction }| {
@@ -175,8 +176,8 @@ fn ellipse(covariance: &[f64; 4], turn: f64) -> [f64; 3] {
     })
 }
 
-/// Tables of how it ended.
-fn tell_end(report: &mut Report, state: &MergeState) {
+/// Adds the tables of the final state.
+fn add_tables(report: &mut Report, state: &MergeState) {
     if let Some(frames) = &state.frames {
         let of = |reference: &str, frames: &[RobotFrame]| -> Vec<Frame> {
             frames.iter().map(|frame| frame_row(frame, reference)).collect()
@@ -190,10 +191,10 @@ fn tell_end(report: &mut Report, state: &MergeState) {
         .agreement
         .as_ref()
         .map(|agreement| [agreement.known_to_one, agreement.known_to_several, agreement.in_conflict]);
-    let with_place = state.hypotheses.iter().flat_map(|((topic, ..), hypotheses)| {
+    let with_pose = state.hypotheses.iter().flat_map(|((topic, ..), hypotheses)| {
         hypotheses.iter().filter(|hypothesis| hypothesis.has_transform).map(move |hypothesis| (topic, hypothesis))
     });
-    let rows = with_place.map(|(topic, hypothesis)| Hypothesis {
+    let rows = with_pose.map(|(topic, hypothesis)| Hypothesis {
         topic: topic.clone(),
         a: hypothesis.a.clone(),
         b: hypothesis.b.clone(),
@@ -211,32 +212,32 @@ fn tell_end(report: &mut Report, state: &MergeState) {
     report.registrations = registrations(state.icp_errors.values());
 }
 
-/// Curves of errors, all to one scale.
-fn registrations<'a>(told: impl Iterator<Item = &'a IcpErrors> + Clone) -> Vec<Registration> {
-    let sound =
-        |told: &IcpErrors| -> Vec<f64> { told.errors.iter().copied().filter(|error| error.is_finite()).collect() };
-    let top = told.clone().flat_map(sound).fold(f64::MIN_POSITIVE, f64::max);
-    let longest = told.clone().map(|told| sound(told).len()).max().unwrap_or_default();
-    let row = |told: &IcpErrors| {
-        let errors = sound(told);
+/// Makes the curves of ICP errors, all to one scale.
+fn registrations<'a>(registrations: impl Iterator<Item = &'a IcpErrors> + Clone) -> Vec<Registration> {
+    let finite =
+        |icp: &IcpErrors| -> Vec<f64> { icp.errors.iter().copied().filter(|error| error.is_finite()).collect() };
+    let top = registrations.clone().flat_map(finite).fold(f64::MIN_POSITIVE, f64::max);
+    let longest = registrations.clone().map(|icp| finite(icp).len()).max().unwrap_or_default();
+    let row = |icp: &IcpErrors| {
+        let errors = finite(icp);
         let point = |(number, error): (usize, &f64)| {
             let x = CURVE[0] * number as f64 / longest.saturating_sub(1).max(1) as f64;
             format!("{}{x:.1} {:.1}", if number == 0 { 'M' } else { 'L' }, CURVE[1] * (1.0 - error / top))
         };
         let metres = |error: Option<&f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3}"));
         Registration {
-            a: told.a.clone(),
-            b: told.b.clone(),
-            source: told.source.clone(),
-            rank: told.rank,
-            accepted: told.accepted,
+            a: icp.a.clone(),
+            b: icp.b.clone(),
+            source: icp.source.clone(),
+            rank: icp.rank,
+            accepted: icp.accepted,
             iterations: errors.len(),
             first: metres(errors.first()),
             last: metres(errors.last()),
             curve: errors.iter().enumerate().map(point).collect(),
         }
     };
-    told.map(row).collect()
+    registrations.map(row).collect()
 }
 
 fn score(score: f64) -> String {
@@ -292,8 +293,8 @@ mod tests {
 
     #[test]
     fn curves_of_errors_are_drawn_to_one_scale() {
-        let told = |errors: &[f64]| IcpErrors { errors: errors.to_vec(), ..Default::default() };
-        let rows = registrations([told(&[0.4, f64::NAN, 0.1]), told(&[0.2, 0.2, 0.0]), told(&[])].iter());
+        let icp = |errors: &[f64]| IcpErrors { errors: errors.to_vec(), ..Default::default() };
+        let rows = registrations([icp(&[0.4, f64::NAN, 0.1]), icp(&[0.2, 0.2, 0.0]), icp(&[])].iter());
         let drawn: Vec<(usize, &str, &str)> =
             rows.iter().map(|row| (row.iterations, row.last.as_str(), row.curve.as_str())).collect();
         let expected =
@@ -302,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ellipse_has_two_standard_deviations_and_turns_with_its_map() {
+    fn an_ellipse_has_two_standard_deviations_and_rotates_with_its_map() {
         let [first, second, angle] = ellipse(&[0.04, 0.0, 0.0, 0.01], 0.5);
         let (long, along) = if first > second { (first, angle) } else { (second, angle + std::f64::consts::FRAC_PI_2) };
         assert!((long - 0.4).abs() < 1e-9 && ((along - 0.5) % std::f64::consts::PI).abs() < 1e-3, "{along}");

@@ -1,4 +1,4 @@
-//! A pipeline as a drawing: stages in columns, each to the right of all that feeds it.
+//! Layout of a pipeline as a drawing: stages in columns, each to the right of its inputs.
 
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +16,7 @@ pub(super) struct Graph {
     box_width: usize,
     box_height: usize,
     boxes: Vec<Stage>,
-    /// Paths of SVG.
+    /// SVG paths.
     wires: Vec<String>,
 }
 
@@ -28,13 +28,13 @@ struct Stage {
     y: usize,
 }
 
-/// Draws the text of a pipeline file; none if it is no pipeline.
+/// Lays out the text of a pipeline file; `None` if it is not a pipeline.
 pub(super) fn graph(pipeline: &str) -> Option<Graph> {
     let pipeline: Table = pipeline.parse().ok()?;
     let stages = pipeline.get("stages")?.as_table()?;
-    let feeds: BTreeMap<&str, BTreeSet<&str>> =
-        stages.iter().map(|(name, stage)| (name.as_str(), feeds_of(stage.get("inputs"), stages))).collect();
-    let columns = columns(&feeds);
+    let inputs: BTreeMap<&str, BTreeSet<&str>> =
+        stages.iter().map(|(name, stage)| (name.as_str(), stages_of(stage.get("inputs"), stages))).collect();
+    let columns = columns(&inputs);
     let mut rows: BTreeMap<usize, usize> = BTreeMap::new();
     let mut places: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
     for (name, column) in &columns {
@@ -52,10 +52,10 @@ pub(super) fn graph(pipeline: &str) -> Option<Graph> {
     let wire = |from: &str, to: &str| {
         let ([x, y], [end_x, end_y]) = (*places.get(from)?, *places.get(to)?);
         let (x, y, end_y) = (x + BOX[0], y + BOX[1] / 2, end_y + BOX[1] / 2);
-        let bend = GAP[0] / 2;
-        Some(format!("M{x} {y}C{} {y} {} {end_y} {end_x} {end_y}", x + bend, end_x.saturating_sub(bend)))
+        let control = GAP[0] / 2;
+        Some(format!("M{x} {y}C{} {y} {} {end_y} {end_x} {end_y}", x + control, end_x.saturating_sub(control)))
     };
-    let wires = feeds.iter().flat_map(|(to, from)| from.iter().map(move |from| (*from, *to)));
+    let wires = inputs.iter().flat_map(|(to, from)| from.iter().map(move |from| (*from, *to)));
     let side = |part: usize| places.values().map(|place| place[part] + BOX[part] + MARGIN).max().unwrap_or_default();
     Some(Graph {
         width: side(0),
@@ -67,27 +67,27 @@ pub(super) fn graph(pipeline: &str) -> Option<Graph> {
     })
 }
 
-/// The stages that inputs name, however these are written down.
-fn feeds_of<'a>(inputs: Option<&'a Value>, stages: &Table) -> BTreeSet<&'a str> {
+/// Finds the stages that inputs name: a text, a list, or a table of these.
+fn stages_of<'a>(inputs: Option<&'a Value>, stages: &Table) -> BTreeSet<&'a str> {
     match inputs {
         Some(Value::String(text)) => {
             let stage = text.split_once('.').map_or(text.as_str(), |(stage, _)| stage);
             stages.contains_key(stage).then_some(stage).into_iter().collect()
         }
-        Some(Value::Array(values)) => values.iter().flat_map(|value| feeds_of(Some(value), stages)).collect(),
-        Some(Value::Table(table)) => table.values().flat_map(|value| feeds_of(Some(value), stages)).collect(),
+        Some(Value::Array(values)) => values.iter().flat_map(|value| stages_of(Some(value), stages)).collect(),
+        Some(Value::Table(table)) => table.values().flat_map(|value| stages_of(Some(value), stages)).collect(),
         _ => BTreeSet::new(),
     }
 }
 
-/// The column of each stage: one more than that of any that feeds it. In a ring, which only a delay can close, it is as far as
-/// there are stages.
-fn columns<'a>(feeds: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> BTreeMap<&'a str, usize> {
-    let mut columns: BTreeMap<&str, usize> = feeds.keys().map(|name| (*name, 0)).collect();
-    for _ in 0..feeds.len() {
-        for (name, from) in feeds {
-            let behind = from.iter().map(|from| columns[from] + 1).max().unwrap_or_default();
-            columns.insert(name, behind.min(feeds.len()));
+/// Column of each stage: one more than those of its inputs. In a cycle, which only a delay can close, it is at most the number of
+/// stages.
+fn columns<'a>(inputs: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> BTreeMap<&'a str, usize> {
+    let mut columns: BTreeMap<&str, usize> = inputs.keys().map(|name| (*name, 0)).collect();
+    for _ in 0..inputs.len() {
+        for (name, from) in inputs {
+            let column = from.iter().map(|from| columns[from] + 1).max().unwrap_or_default();
+            columns.insert(name, column.min(inputs.len()));
         }
     }
     columns
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stage_stands_to_the_right_of_all_that_feeds_it() {
+    fn a_stage_is_to_the_right_of_its_inputs() {
         let text = r#"
             [stages.log]
             kind = "mcap_source"
@@ -116,15 +116,15 @@ mod tests {
     }
 
     #[test]
-    fn rings_and_texts_that_are_no_pipelines_do_no_harm() {
-        let ring = "[stages.a]\ninputs = [\"b\"]\n[stages.b]\ninputs = { map = \"a.x\" }";
-        assert_eq!(graph(ring).unwrap().wires.len(), 2);
+    fn cycles_and_texts_that_are_not_pipelines_are_handled() {
+        let cycle = "[stages.a]\ninputs = [\"b\"]\n[stages.b]\ninputs = { map = \"a.x\" }";
+        assert_eq!(graph(cycle).unwrap().wires.len(), 2);
         assert_eq!((graph("no toml"), graph("a = 1")), (None, None));
         assert!(graph("[stages]").unwrap().boxes.is_empty());
     }
 
     #[test]
-    fn every_pipeline_that_ships_can_be_drawn() {
+    fn a_shipped_pipeline_can_be_drawn() {
         let drawn = graph(include_str!("../../../auto_merge.toml")).unwrap();
         assert!(drawn.boxes.len() > 10 && drawn.wires.len() > drawn.boxes.len());
     }

@@ -1,4 +1,4 @@
-//! Maps as the page takes them: small, and as PNG.
+//! Maps for the page: reduced in size, as PNG.
 
 use super::model::Grid;
 use anyhow::{Context, Result};
@@ -11,7 +11,7 @@ use image::{ExtendedColorType, ImageEncoder};
 /// The shade of an unknown cell.
 const UNKNOWN: u8 = 255;
 
-/// A map whose sides have at most `side` cells; a larger one is made of larger cells.
+/// Encodes a map with at most `side` cells along a side; a larger map gets larger cells.
 pub(super) fn grid(info: &MapMetaData, cells: &[i8], side: usize) -> Result<Option<Grid>> {
     let (width, height) = (info.width as usize, info.height as usize);
     let resolution = f64::from(info.resolution);
@@ -28,7 +28,7 @@ pub(super) fn grid(info: &MapMetaData, cells: &[i8], side: usize) -> Result<Opti
         let line = &mut shades[(rows - 1 - row / factor) * columns..][..columns];
         for (column, &cell) in cells.iter().enumerate() {
             let shade = &mut line[column / factor];
-            // Of many cells a wall counts, then what is known.
+            // An occupied cell takes precedence, then a known one.
             if is_known(cell) && (*shade == UNKNOWN || is_occupied(cell) && cell.cast_unsigned() > *shade) {
                 *shade = cell.cast_unsigned();
             }
@@ -67,12 +67,12 @@ mod tests {
     }
 
     #[test]
-    fn a_large_map_is_made_of_larger_cells_that_keep_its_walls() {
+    fn a_large_map_gets_larger_cells_that_keep_its_walls() {
         assert_eq!(shades(4, &[0, 100, -1, -1, 3, 0, -1, 0], 2), (vec![100, 0], 1.0));
     }
 
     #[test]
-    fn what_is_no_map_is_left_out() {
+    fn an_invalid_map_is_left_out() {
         let info = MapMetaData { width: 2, height: 2, resolution: 0.5, ..Default::default() };
         assert!(grid(&info, &[0], 10).unwrap().is_none());
         assert!(grid(&MapMetaData { resolution: f32::NAN, ..info }, &[0; 4], 10).unwrap().is_none());

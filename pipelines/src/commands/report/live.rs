@@ -1,38 +1,38 @@
-//! The page of a run that goes on.
+//! The page of a run in progress.
 
 use super::{collect, page};
 use crate::merge_log::MergeState;
 use anyhow::Result;
 use serde_json::{Value, json};
 
-/// The maps of the page have so many cells along a side at most: they are sent whenever one has changed.
+/// Maximum number of cells along a side of a map, since a map is sent whenever it has changed.
 const SIDE: usize = 1000;
 
-/// The page of a run that goes on: as it is opened, and what changes on it.
+/// The page of a run in progress, and its changes.
 pub(crate) struct LivePage {
     name: String,
 }
 
 impl LivePage {
-    /// The page of a run of this name.
+    /// Makes the page of a run with this name.
     pub(crate) fn new(name: String) -> Self {
         Self { name }
     }
 
-    /// The page before anything is known, in HTML.
+    /// Renders the page without data, in HTML.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// The page cannot be rendered.
     pub(crate) fn empty(&self) -> Result<String> {
         let report = collect::collect_moment(&self.name, &MergeState::default(), 0.0, SIDE)?;
         page::render_live(&report, &json!({}))
     }
 
-    /// All that is known: what takes the place of what the page shows, as JSON in one line. `seconds` have passed of the log time,
-    /// and the stages have done what `summary` says, as the summary of a run does.
+    /// Renders the contents that replace those of the page, as one line of JSON: the state of the merge after `seconds` of log time,
+    /// and the statistics of the stages in the form of the summary of a run.
     ///
     /// # Errors
-    /// It cannot be put together.
+    /// The contents cannot be rendered.
     pub(crate) fn change(&self, state: &MergeState, seconds: f64, summary: &Value) -> Result<String> {
         page::render_change(&collect::collect_moment(&self.name, state, seconds, SIDE)?, summary)
     }
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_is_whole_before_anything_is_known_and_a_change_is_one_line() {
+    fn the_page_is_complete_without_data_and_a_change_is_one_line() {
         let live = LivePage::new("live_merge </script>".to_owned());
         let page = live.empty().unwrap();
         assert!(page.contains("connect-src 'self'") && page.contains("new EventSource"), "{page}");

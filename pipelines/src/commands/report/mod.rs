@@ -1,4 +1,4 @@
-//! `gridweave report`: what a merge has found and how, as one page for a browser.
+//! `gridweave report`: writes a report on a merge as one page for a browser.
 
 mod collect;
 mod graph;
@@ -11,7 +11,7 @@ pub(crate) use live::LivePage;
 
 use crate::job::{Inputs, NamingOptions};
 use crate::status::{BadUse, Status};
-use crate::terminal::{print_line, say};
+use crate::terminal::{eprint_line, print_line};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use collect::Limits;
@@ -19,27 +19,25 @@ use gridweave_logs::file::replace;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// What `gridweave report` is told.
+/// Arguments of `gridweave report`.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
-    /// The log that a merge has written; several are read as one. Of the logs of robots, the report shows the maps beside each
-    /// other.
+    /// The log that a merge has written; several are read as one. Maps in logs of robots are shown beside each other.
     #[arg(required = true, value_name = "LOG")]
     inputs: Vec<PathBuf>,
     /// The page to write.
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
-    /// The summary of the run (`--summary` of `merge` and `run`): what each stage has done, its time and its warnings.
+    /// The summary of the run (`--summary` of `merge` and `run`), with the messages, time and warnings of each stage.
     #[arg(long, value_name = "FILE.json")]
     summary: Option<PathBuf>,
     #[command(flatten)]
     names: NamingOptions,
 }
 
-/// A page of more bytes is made of fewer and coarser pictures.
-const LARGEST_PAGE: usize = 9_500_000;
-/// How many moments a page shows, and how many cells its maps have along a side, at most: from the best that is tried to what
-/// is always taken.
+/// Maximum size of the page, bytes. A larger one is made again with fewer moments and coarser maps.
+const MAX_PAGE_SIZE: usize = 9_500_000;
+/// Limits that are tried in turn; the last are used whatever the size.
 const LIMITS: [Limits; 5] = [
     Limits { steps: 24, side: 2000 },
     Limits { steps: 12, side: 2000 },
@@ -51,8 +49,8 @@ const LIMITS: [Limits; 5] = [
 /// Writes the page.
 pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
     if Inputs::of_maps_or_logs(&args.inputs, "report")? == Inputs::MapFiles {
-        let text = "`report` reads logs: `gridweave merge A.yaml B.yaml -o OUT.mcap` makes one of map files, and `gridweave render` \
-                    draws them";
+        let text = "`report` reads logs: merge map files to one by `gridweave merge A.yaml B.yaml -o OUT.mcap`, or draw them by \
+                    `gridweave render`";
         return Err(BadUse(text.to_owned()).into());
     }
     let files = args.inputs.iter().chain(&args.summary);
@@ -63,16 +61,16 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
     let times = collect::moments(&args.inputs, &args.names)?;
     if times.is_empty() {
         bail!(
-            "there is nothing to report: no map is on /map or /ROBOT/map, and nothing of a merge; `gridweave info LOG` shows what \
-             there is, and --rename gives a topic another name"
+            "there is nothing to report: the log has neither maps on /map or /ROBOT/map nor results of a merge; `gridweave info LOG` \
+             lists its topics, and --rename renames one"
         );
     }
     let mut page = String::new();
     for limits in LIMITS {
         let report = collect::collect(&args.inputs, &args.names, &times, limits)?;
         page = page::render(&report, summary.as_ref())?;
-        if page.len() <= LARGEST_PAGE {
-            report.problems.iter().for_each(|problem| say(format_args!("warning: {problem}")));
+        if page.len() <= MAX_PAGE_SIZE {
+            report.problems.iter().for_each(|problem| eprint_line(format_args!("warning: {problem}")));
             break;
         }
     }
@@ -85,9 +83,9 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
 fn read_summary(path: &Path) -> Result<Value> {
     let text = std::fs::read(path).with_context(|| format!("cannot read the summary {}", path.display()))?;
     let summary: Value = serde_json::from_slice(&text)
-        .with_context(|| format!("{} is no summary, as `merge --summary` writes it", path.display()))?;
+        .with_context(|| format!("{} is not a summary that `merge --summary` has written", path.display()))?;
     if !summary["stages"].is_object() {
-        bail!("{} is no summary, as `merge --summary` writes it: it has no `stages`", path.display());
+        bail!("{} is not a summary that `merge --summary` has written: it has no `stages`", path.display());
     }
     Ok(summary)
 }

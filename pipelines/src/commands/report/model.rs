@@ -1,8 +1,8 @@
-//! What the page is told: the data of its script.
+//! Data of the page for its script.
 
 use serde::Serialize;
 
-/// What is known at several moments: each version counts from a moment on until the next does.
+/// Versions of a value over time: each is valid from its moment to that of the next.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct Versions<T>(Vec<Version<T>>);
 
@@ -14,45 +14,45 @@ impl<T> Default for Versions<T> {
 
 #[derive(Debug, PartialEq, Serialize)]
 struct Version<T> {
-    /// The moment, as its place among the moments of the page.
+    /// Index of the moment among those of the page.
     from: usize,
     what: T,
 }
 
 impl<T: PartialEq> Versions<T> {
-    /// Adds what is known from a moment on, if that is anything new.
+    /// Adds the value from a moment on, if it has changed.
     pub(super) fn add(&mut self, from: usize, what: T) {
         if self.0.last().is_none_or(|last| last.what != what) {
             self.0.push(Version { from, what });
         }
     }
 
-    /// What is known at the end.
+    /// The value at the end.
     pub(super) fn last(&self) -> Option<&T> {
         self.0.last().map(|version| &version.what)
     }
 }
 
-/// All that the page shows.
+/// All data of the page.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Report {
     /// The names of the logs.
     pub(super) logs: Vec<String>,
-    /// The moments: seconds from the first message on.
+    /// The moments: seconds from the first message.
     pub(super) times: Vec<f64>,
     pub(super) robots: Vec<Robot>,
     pub(super) merged: Versions<Option<Grid>>,
     pub(super) conflicts: Versions<Option<Grid>>,
     pub(super) hypotheses: Vec<Hypothesis>,
     pub(super) registrations: Vec<Registration>,
-    /// Of the last moment.
+    /// Frames at the last moment.
     pub(super) frames: Vec<Frame>,
     pub(super) unmerged: Vec<(String, String)>,
     pub(super) pairs: Vec<Pair>,
     pub(super) agreement: Option<[f64; 3]>,
-    /// What the log says of how it was made: name and text.
+    /// Metadata of the log: name and text.
     pub(super) metadata: Vec<(String, String)>,
-    /// What was wrong with the log.
+    /// Problems of the log.
     pub(super) problems: Vec<String>,
 }
 
@@ -61,9 +61,9 @@ pub(super) struct Report {
 pub(super) struct Grid {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// Metres a cell.
+    /// Side of a cell, metres.
     pub(super) resolution: f64,
-    /// Of the outer corner of the first cell.
+    /// Pose of the outer corner of the first cell, metres and radians.
     pub(super) x: f64,
     pub(super) y: f64,
     pub(super) yaw: f64,
@@ -71,11 +71,11 @@ pub(super) struct Grid {
     pub(super) png: String,
 }
 
-/// A robot; what was found lies where the page shows its map, in metres and radians.
+/// A robot, with its findings in the frame of the page, metres and radians.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Robot {
     pub(super) name: String,
-    /// As in `#0072b2`.
+    /// Colour such as `#0072b2`.
     pub(super) colour: String,
     /// Its last map in its own frame.
     pub(super) own: Option<Grid>,
@@ -90,14 +90,14 @@ pub(super) struct Robot {
 pub(super) struct Findings {
     /// Walls: both ends, reliability, inliers.
     pub(super) segments: Vec<[f64; 6]>,
-    /// Where the map frame lies, the direction of the walls, its deviation, the agreement.
+    /// Origin of the map frame, direction of the walls, its standard deviation, the agreement.
     pub(super) direction: Option<[f64; 5]>,
     pub(super) tags: Vec<Tag>,
-    /// The drive.
+    /// The path of the robot.
     pub(super) path: Vec<[f64; 2]>,
-    /// Where nodes stand, and by how much each is displaced and turned.
+    /// Nodes of the deformation: position, displacement and rotation of each.
     pub(super) bends: Vec<[f64; 5]>,
-    /// Places: where, and what they are.
+    /// Places of the topological map: position and kind.
     pub(super) places: Vec<(f64, f64, String)>,
     pub(super) ways: Vec<Vec<[f64; 2]>>,
 }
@@ -113,7 +113,7 @@ pub(super) struct Tag {
     pub(super) readings: u32,
 }
 
-/// A place that was proposed for a pair: `T_a_b`.
+/// A hypothesis for a pair, with its pose `T_a_b`.
 #[derive(Debug, Serialize)]
 pub(super) struct Hypothesis {
     /// The topic that it was sent on.
@@ -131,7 +131,7 @@ pub(super) struct Hypothesis {
     pub(super) reason: String,
 }
 
-/// How the error of ICP fell from a first guess.
+/// Errors of ICP over its iterations, from one initial guess.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct Registration {
     pub(super) a: String,
@@ -140,18 +140,19 @@ pub(super) struct Registration {
     pub(super) rank: u32,
     pub(super) accepted: bool,
     pub(super) iterations: usize,
-    /// Metres, of the first iteration and of the last.
+    /// Error of the first iteration, metres.
     pub(super) first: String,
+    /// Error of the last iteration, metres.
     pub(super) last: String,
-    /// A curve over the iterations, as a path of SVG in a box of 160 by 40 pixels.
+    /// The curve over the iterations, as an SVG path in a box of 160 by 40 pixels.
     pub(super) curve: String,
 }
 
-/// Where a robot's map lies, as text for a table.
+/// The pose of a robot's map frame, as text for a table.
 #[derive(Debug, Serialize)]
 pub(super) struct Frame {
     pub(super) robot: String,
-    /// The robot in whose map frame it is.
+    /// The robot whose map frame the pose is in.
     pub(super) reference: String,
     pub(super) x: String,
     pub(super) y: String,
@@ -162,7 +163,7 @@ pub(super) struct Frame {
     pub(super) covariance: Vec<Vec<String>>,
 }
 
-/// What became of a pair.
+/// The decision on a pair.
 #[derive(Debug, Serialize)]
 pub(super) struct Pair {
     pub(super) a: String,

@@ -1,4 +1,4 @@
-//! The page: a template, its style, its script, and its data.
+//! Rendering of the page from templates, a style, a script, and data.
 
 use super::model::Report;
 use anyhow::{Context, Result};
@@ -13,9 +13,9 @@ const TEMPLATES: [(&str, &str); 3] = [
     ("findings", include_str!("page/findings.html")),
 ];
 const STYLE: &str = include_str!("page/page.css");
-/// What the entry of a log's metadata is called that is the text of its pipeline.
+/// Name of the entry in a log's metadata with the text of its pipeline.
 const PIPELINE: &str = "gridweave_run: pipeline";
-/// The parts of the script, in one scope each after the other.
+/// Parts of the script, in one scope.
 const SCRIPT: [&str; 4] = [
     include_str!("page/data.js"),
     include_str!("page/drawing.js"),
@@ -23,50 +23,50 @@ const SCRIPT: [&str; 4] = [
     include_str!("page/page.js"),
 ];
 
-/// What makes the page of a live run take up what it sends. It stands before the last part, which begins.
+/// The part of the script that receives the changes of a live run. It precedes the last part, which starts the page.
 const LIVE_SCRIPT: &str = include_str!("page/live.js");
 
-/// What a stage has done, as a row with bars.
+/// Statistics of a stage, as a row with bars.
 #[derive(Debug, PartialEq, Serialize)]
 struct Stage {
     name: String,
     messages_in: u64,
     messages_out: u64,
     busy_ms: String,
-    /// Its time as a share of the longest of all stages, percent.
+    /// Its time relative to the longest of all stages, percent.
     share: u64,
     counts: Vec<(String, u64)>,
     dropped: u64,
     restarts: u64,
 }
 
-/// Makes the page.
+/// Renders the page.
 ///
 /// # Errors
-/// What was collected cannot be written as JSON, or the template is wrong.
+/// The data cannot be encoded as JSON, or a template is wrong.
 pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String> {
     render_part("page", report, summary, false)
 }
 
-/// Makes the page of a live run.
+/// Renders the page of a live run.
 ///
 /// # Errors
-/// As of [`render`].
+/// As for [`render`].
 pub(super) fn render_live(report: &Report, summary: &Value) -> Result<String> {
     render_part("page", report, Some(summary), true)
 }
 
-/// What takes the place of parts of that page when something has changed, as JSON in one line.
+/// Renders the parts of that page that change, as one line of JSON.
 ///
 /// # Errors
-/// As of [`render`].
+/// As for [`render`].
 pub(super) fn render_change(report: &Report, summary: &Value) -> Result<String> {
     let part = |name: &str| Ok::<_, anyhow::Error>(Value::from(render_part(name, report, Some(summary), true)?));
     let (headline, findings) = (part("headline")?, part("findings")?);
     Ok(format!(r#"{{"headline":{headline},"findings":{findings},"data":{}}}"#, data(report)?))
 }
 
-/// One of the templates with all that it is told.
+/// Renders one of the templates.
 fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bool) -> Result<String> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
@@ -74,7 +74,7 @@ fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bo
         environment.add_template(name, text).context("a template of the page is wrong")?;
     }
     let template = environment.get_template(name).context("a template of the page is wrong")?;
-    let told_page = match name {
+    let page_values = match name {
         "page" => context! {
             headline => Html::from_safe_string(render_part("headline", report, summary, is_live)?),
             findings => Html::from_safe_string(render_part("findings", report, summary, is_live)?),
@@ -87,18 +87,18 @@ fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bo
     let stages = summary.map(stages).unwrap_or_default();
     let page = template.render(context! {
         is_live => is_live,
-        report => told(report),
-        stages => told(&stages),
-        warnings => told(summary.map(warnings).unwrap_or_default()),
-        graph => told(pipeline(report).and_then(super::graph::graph)),
+        report => value(report),
+        stages => value(&stages),
+        warnings => value(summary.map(warnings).unwrap_or_default()),
+        graph => value(pipeline(report).and_then(super::graph::graph)),
         has_summary => summary.is_some(),
         last => report.times.last().map(|seconds| format!("{seconds:.1}")),
-        agreement => told(report.agreement.map(|areas| areas.map(|area| format!("{area:.1}")))),
-        robots => told(report.robots.iter().map(finding_row).collect::<Vec<_>>()),
+        agreement => value(report.agreement.map(|areas| areas.map(|area| format!("{area:.1}")))),
+        robots => value(report.robots.iter().map(finding_row).collect::<Vec<_>>()),
         version => env!("CARGO_PKG_VERSION"),
-        ..told_page
+        ..page_values
     });
-    page.context("the page cannot be made")
+    page.context("cannot render the page")
 }
 
 fn script(is_live: bool) -> String {
@@ -106,24 +106,24 @@ fn script(is_live: bool) -> String {
     [before.concat().as_str(), if is_live { LIVE_SCRIPT } else { "" }, last].concat()
 }
 
-/// The pipeline that has written the log, as the log tells it.
+/// The text of the pipeline that has written the log, from its metadata.
 fn pipeline(report: &Report) -> Option<&str> {
     let found = report.metadata.iter().find(|(name, _)| name == PIPELINE);
     found.map(|(_, text)| text.as_str())
 }
 
-/// What the template is told.
-fn told(what: impl Serialize) -> Html {
-    Html::from(Serde(what))
+/// Makes a value for a template.
+fn value(value: impl Serialize) -> Html {
+    Html::from(Serde(value))
 }
 
-/// The data as JSON that can stand within a script element: no text in it ends that.
+/// Encodes the data as JSON for a script element: no text in it can end the element.
 fn data(report: &Report) -> Result<String> {
-    let text = serde_json::to_string(report).context("what was collected cannot be written as JSON")?;
+    let text = serde_json::to_string(report).context("cannot encode the data of the page as JSON")?;
     Ok(text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
 }
 
-/// How much was found in a robot's map: its name, and how many walls, tags, and nodes of its bend.
+/// Counts what was found in a robot's map: name, colour, and numbers of walls, tags, nodes of its deformation, and places.
 fn finding_row(robot: &super::model::Robot) -> (String, String, [usize; 4]) {
     let counts = robot
         .findings
@@ -150,7 +150,7 @@ fn stages(summary: &Value) -> Vec<Stage> {
     stages.iter().flat_map(|stages| stages.iter()).map(row).collect()
 }
 
-/// Stage, text and how often.
+/// Lists the warnings: stage, text and count.
 fn warnings(summary: &Value) -> Vec<(String, String, u64)> {
     let stages = summary["stages"].as_object();
     let of_stage = |(name, stage): (&String, &Value)| {
@@ -173,7 +173,7 @@ mod tests {
     const MARKUP: &str = "</script><script>alert(1)</script>&\"'<!--";
 
     #[test]
-    fn no_text_of_a_log_or_a_summary_is_markup_on_the_page() {
+    fn texts_of_a_log_or_a_summary_are_never_markup() {
         let mut report = Report { logs: vec![MARKUP.into()], times: vec![1.0], ..Report::default() };
         report.unmerged = vec![(MARKUP.into(), MARKUP.into())];
         report.metadata = vec![(MARKUP.into(), MARKUP.into())];
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_asks_for_nothing_from_elsewhere() {
+    fn the_page_loads_nothing_from_elsewhere() {
         let page = render(&Report::default(), None).unwrap();
         for text in ["http://", "https://", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
             assert!(!page.contains(text), "{text}");
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn stages_are_told_with_their_share_of_the_longest_time() {
+    fn stages_have_their_share_of_the_longest_time() {
         let summary = json!({"stages": {
             "log": {"messages_in": 0, "messages_out": 9, "busy_ms": 50.0},
             "icp": {"messages_in": 9, "messages_out": 3, "busy_ms": 200.0, "counts": {"pairs": 2}, "dropped": 4},

@@ -1,6 +1,6 @@
-//! `gridweave view`: what a run that is going on has found so far, as a page for a browser.
+//! `gridweave view`: shows the merge of a run in progress as a page for a browser.
 //!
-//! The links of the run are watched as `tap` watches one ([`watched`]), and what they tell is served to browsers ([`server`]).
+//! The links of the run are watched ([`watched`]), and the state of the merge is served to browsers ([`server`]).
 
 mod server;
 mod watched;
@@ -10,7 +10,7 @@ use super::tap::LOOK_INTERVAL;
 use crate::commands::report::LivePage;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
-use crate::terminal::{print_line, eprint_line};
+use crate::terminal::{eprint_line, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{stage_statistics, watch_stages};
@@ -27,20 +27,20 @@ use watched::WatchedRun;
 /// Arguments of `gridweave view`.
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// The address to serve the page on. Anybody who can reach it can look on: 0.0.0.0:PORT lets other machines in. Port 0 is one
-    /// that is free.
+    /// The address to serve the page on. Every program that can connect to it can see the page: 0.0.0.0:PORT lets other machines in.
+    /// Port 0 is any free port.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8766")]
     address: SocketAddr,
     #[command(flatten)]
     run: RunChoice,
 }
 
-/// The page changes no more often than this.
+/// Minimum interval between two changes of the page.
 const SHORTEST_INTERVAL: Duration = Duration::from_millis(300);
-/// To put a change together takes time from the run: after it so many times as long nothing is done.
-const REST: u32 = 4;
-/// At the end of the run browsers get so long to take what was found last.
-const LAST_CALL: Duration = Duration::from_secs(3);
+/// Making a change takes time from the run: after it the view pauses for so many times its duration.
+const PAUSE_FACTOR: u32 = 4;
+/// Timeout for browsers to take the last change at the end of the run.
+const END_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Serves the page until the run ends.
 pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
@@ -53,17 +53,17 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
     print_line(format_args!("open http://{} in a browser; ctrl-c ends the view, not the run", server.address()))?;
     let (mut next, mut is_new) = (Instant::now(), true);
     loop {
-        // What has passed before the run ended is still there after it.
+        // Messages that were sent before the end of the run can be read after it.
         let is_last_look = !running.run.is_running();
         is_new |= watched.take()?;
         if is_new && (is_last_look || server.is_watched() && Instant::now() >= next) {
             let start = Instant::now();
             server.show(&page.change(&watched.state, watched.seconds(), &summary(&running, &counters))?);
             is_new = false;
-            next = Instant::now() + SHORTEST_INTERVAL.max(REST * start.elapsed());
+            next = Instant::now() + SHORTEST_INTERVAL.max(PAUSE_FACTOR * start.elapsed());
         }
         if is_last_look {
-            server.end(LAST_CALL);
+            server.end(END_TIMEOUT);
             eprint_line("the run has ended");
             break;
         }
@@ -73,12 +73,12 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
         thread::sleep(LOOK_INTERVAL);
     }
     if watched.missed() > 0 {
-        eprint_line(format_args!("{} messages were missed, as this program was too slow for them", watched.missed()));
+        eprint_line(format_args!("{} messages were missed: this program was too slow", watched.missed()));
     }
     Ok(Status::Done)
 }
 
-/// What the stages have done so far, in the form of the summary of a run.
+/// Statistics of the stages so far, in the form of the summary of a run.
 fn summary(running: &Running, counters: &[StageCounters]) -> Value {
     let stage = |done: StageStatistics| {
         let mut stage = json!({
@@ -89,7 +89,7 @@ fn summary(running: &Running, counters: &[StageCounters]) -> Value {
             "restarts": done.restarts,
         });
         if done.warnings > 0 {
-            stage["warnings"] = json!({ "the run tells of it when it ends": done.warnings });
+            stage["warnings"] = json!({ "the text is printed at the end of the run": done.warnings });
         }
         (done.name, stage)
     };

@@ -1,7 +1,7 @@
-//! Serves the page, and what changes on it, to browsers.
+//! Server of the page and of its changes for browsers.
 //!
-//! Changes go as server-sent events: each browser has a thread, which sends it the last change and then, whenever it has taken
-//! that, the last again. So one that is slow gets fewer, and nobody waits for it.
+//! Changes are server-sent events. Each browser has a thread, which sends it the last change, and the next one once it has taken
+//! that. So a slow browser gets fewer changes, and does not delay the others.
 
 use anyhow::{Result, anyhow};
 use std::io::{self, Write};
@@ -11,16 +11,16 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tiny_http::{Header, Request, Response, Server};
 
-/// So often a browser that gets nothing new is sent an empty line: so it is known whether it is still there.
+/// Without changes a browser is sent an empty line at this interval, which detects that it has gone.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 
-/// Serves one page.
+/// Server of one page.
 pub(super) struct PageServer {
     address: SocketAddr,
     shared: Arc<Shared>,
 }
 
-/// What all threads know.
+/// State that all threads share.
 struct Shared {
     page: String,
     latest: Mutex<Latest>,
@@ -30,43 +30,43 @@ struct Shared {
 /// The last change.
 #[derive(Default)]
 struct Latest {
-    /// How many there were.
+    /// Number of changes so far.
     number: u64,
     change: Arc<str>,
     has_ended: bool,
-    /// How many browsers are there.
+    /// Number of connected browsers.
     browsers: usize,
 }
 
 impl PageServer {
-    /// Serves a page on an address.
+    /// Starts to serve a page on an address.
     ///
     /// # Errors
-    /// The address cannot be had.
+    /// The address cannot be bound.
     pub(super) fn start(address: SocketAddr, page: String) -> Result<Self> {
         let failed = |error: &dyn std::fmt::Display| {
             anyhow!("cannot serve the page on {address}: {error}; choose another address with --address HOST:PORT")
         };
         let server = Server::http(address).map_err(|error| failed(&error))?;
-        let address = server.server_addr().to_ip().ok_or_else(|| failed(&"it is no address of this machine"))?;
+        let address = server.server_addr().to_ip().ok_or_else(|| failed(&"it is not an address of this machine"))?;
         let shared = Arc::new(Shared { page, latest: Mutex::default(), changed: Condvar::new() });
         let serving = Arc::clone(&shared);
         thread::spawn(move || {
             for request in server.incoming_requests() {
                 let shared = Arc::clone(&serving);
-                // What goes wrong with a browser is no matter of the others.
+                // An error of one browser does not affect the others.
                 thread::spawn(move || drop(shared.answer(request, address)));
             }
         });
         Ok(Self { address, shared })
     }
 
-    /// Where the page is.
+    /// The address of the page.
     pub(super) fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Whether any browser is there.
+    /// Whether a browser is connected.
     pub(super) fn is_watched(&self) -> bool {
         self.shared.lock().browsers > 0
     }
@@ -80,7 +80,7 @@ impl PageServer {
         self.shared.changed.notify_all();
     }
 
-    /// Tells all browsers that there is no more to come, and waits until they have taken it, but for no longer than `timeout`.
+    /// Sends the end to all browsers, and waits until they have taken it, at most for `timeout`.
     pub(super) fn end(&mut self, timeout: Duration) {
         let mut latest = self.shared.lock();
         latest.has_ended = true;
@@ -100,14 +100,14 @@ impl PageServer {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Latest> {
-        // Each change of it is whole.
+        // A panic cannot leave it half changed.
         self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn answer(&self, request: Request, address: SocketAddr) -> io::Result<()> {
-        // A page of elsewhere whose name leads here by its own name server must not read what this machine shows itself.
+        // Guards against DNS rebinding: a foreign page must not read a server that is bound to this machine only.
         if !is_own_host(&request, address) {
-            return request.respond(Response::from_string("this is not its host\n").with_status_code(403));
+            return request.respond(Response::from_string("wrong host\n").with_status_code(403));
         }
         match request.url() {
             "/" => {
@@ -120,11 +120,11 @@ impl Shared {
                 request.respond(response)
             }
             "/live" => self.send_changes(&mut request.into_writer()),
-            _ => request.respond(Response::from_string("there is only the page /\n").with_status_code(404)),
+            _ => request.respond(Response::from_string("not found: only / is served\n").with_status_code(404)),
         }
     }
 
-    /// Sends a browser changes until there are no more, or it has gone.
+    /// Sends changes to a browser until the end, or until it has gone.
     fn send_changes(&self, browser: &mut dyn Write) -> io::Result<()> {
         self.lock().browsers += 1;
         let sent = self.send_each_change(browser);
@@ -154,7 +154,7 @@ impl Shared {
         }
     }
 
-    /// The last change, once there is one after the given, or the end, or some time has passed.
+    /// Waits for a change after the given one, the end, or the time of a heartbeat. Returns the last change.
     fn wait_for_change(&self, sent: u64) -> (u64, Arc<str>, bool) {
         let nothing_new = |latest: &mut Latest| latest.number <= sent && !latest.has_ended;
         let latest = match self.changed.wait_timeout_while(self.lock(), HEARTBEAT, nothing_new) {
@@ -165,7 +165,7 @@ impl Shared {
     }
 }
 
-/// Whether a request names this server by an address, or as the machine itself.
+/// Whether the host of a request is an address or a name of this machine.
 fn is_own_host(request: &Request, address: SocketAddr) -> bool {
     let host = request.headers().iter().find(|header| header.field.equiv("Host"));
     host.is_none_or(|host| is_own_name(host.value.as_str(), address))
@@ -201,7 +201,7 @@ mod tests {
         PageServer::start("127.0.0.1:0".parse().unwrap(), "<p>page</p>".to_owned()).unwrap()
     }
 
-    /// The next line that is not empty, and not to keep the connection alive.
+    /// The next line that is neither empty nor a heartbeat.
     fn line(events: &mut BufReader<TcpStream>) -> String {
         loop {
             let mut line = String::new();
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_browser_gets_the_last_change_at_once_and_then_each_and_the_end() {
+    fn a_browser_gets_the_last_change_then_each_next_one_and_the_end() {
         let mut server = server();
         server.show("one");
         server.show("two");
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_browser_that_does_not_read_holds_up_nobody() {
+    fn a_browser_that_does_not_read_does_not_delay_others() {
         let mut server = server();
         let _halted = ask(&server, "/live", "localhost");
         let large = "x".repeat(1 << 22);
@@ -253,14 +253,14 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_is_taken_is_told() {
+    fn an_address_in_use_is_an_error() {
         let first = server();
         let error = PageServer::start(first.address(), String::new()).err().unwrap().to_string();
         assert!(error.contains(&first.address().to_string()) && error.contains("--address"), "{error}");
     }
 
     #[test]
-    fn a_server_for_others_may_have_any_name() {
+    fn a_server_for_other_machines_may_have_any_name() {
         let [own, open] = ["127.0.0.1:80", "0.0.0.0:80"].map(|address| address.parse().unwrap());
         assert!(is_own_name("[::1]:80", own) && is_own_name("LocalHost:80", own) && !is_own_name("a.example", own));
         assert!(is_own_name("robot.local:80", open));

@@ -1,15 +1,15 @@
 "use strict";
-// What the log holds, moment by moment.
+// The data of the log, by moment.
 const data = JSON.parse(document.getElementById("data").textContent);
 
-/** What counts at a moment: the last version that began no later. */
+/** The version that is valid at a moment. */
 function at(versions, step) {
   let found = null;
   for (const version of versions) if (version.from <= step) found = version.what;
   return found;
 }
 
-/** All grids of what a page is told, each once. */
+/** All grids in the data of a page. */
 function grids(data) {
   const found = [];
   const add = (versions) => versions.forEach((version) => version.what && found.push(version.what));
@@ -43,7 +43,7 @@ function decode(grid) {
   });
 }
 
-/** The value of a grid at a place in the world; null where it says nothing. */
+/** The value of a grid at a point of the world; null where it is unknown. */
 function valueAt(grid, x, y, pose) {
   const place = pose ? inverse(pose, [x, y]) : [x, y];
   const [along, up] = inverse([grid.x, grid.y, grid.yaw], place);
@@ -53,13 +53,13 @@ function valueAt(grid, x, y, pose) {
   return value > 100 ? null : value;
 }
 
-/** A place in a frame, from where it is outside of the frame. */
+/** A point of the world in a frame. */
 function inverse([x, y, yaw], [px, py]) {
   const dx = px - x, dy = py - y, c = Math.cos(yaw), s = Math.sin(yaw);
   return [c * dx + s * dy, -s * dx + c * dy];
 }
 
-/** A pose within a pose. */
+/** The composition of two poses. */
 function compose([x, y, yaw], [px, py, pyaw]) {
   const c = Math.cos(yaw), s = Math.sin(yaw);
   return [x + c * px - s * py, y + s * px + c * py, yaw + pyaw];

@@ -13,7 +13,7 @@ function rgb(hex) {
   return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
 }
 
-/** A canvas with the cells of a grid: `paint` gives red, green, blue and opacity of a value. */
+/** Paints the cells of a grid on a canvas: `paint` gives red, green, blue and opacity of a value. */
 function paintGrid(grid, key, paint) {
   grid.painted = grid.painted || {};
   if (grid.painted[key]) return grid.painted[key];
@@ -55,18 +55,18 @@ function ratio() {
   return window.devicePixelRatio || 1;
 }
 
-/** From here on, lengths are metres of the world, y up. */
+/** Sets the transform so that lengths are metres of the world, y up. */
 function toWorld() {
   const scale = camera.scale * ratio();
   context.setTransform(scale, 0, 0, -scale, canvas.width / 2 - camera.x * scale, canvas.height / 2 + camera.y * scale);
 }
 
-/** A place in the world, by pixels of the page within the canvas. */
+/** The point of the world at a pixel of the canvas. */
 function worldOf(u, v) {
   return [camera.x + (u - canvas.clientWidth / 2) / camera.scale, camera.y - (v - canvas.clientHeight / 2) / camera.scale];
 }
 
-/** So many pixels of the page, in metres. */
+/** A length in pixels of the page, in metres. */
 function pixels(count) {
   return count / camera.scale;
 }
@@ -112,7 +112,7 @@ function ellipse([x, y], [first, second, angle], colour, opacity) {
   stroke(1.5, colour, opacity);
 }
 
-/** Words beside a place, on a pale edge. */
+/** Draws text beside a point, with a pale outline. */
 function words(text, [x, y]) {
   const scale = ratio();
   const u = canvas.width / 2 + (x - camera.x) * camera.scale * scale, v = canvas.height / 2 - (y - camera.y) * camera.scale * scale;
@@ -130,7 +130,7 @@ function words(text, [x, y]) {
   context.restore();
 }
 
-/** A bar of a round length with that length. */
+/** Draws a scale bar of a round length. */
 function scaleBar() {
   const limit = canvas.clientWidth / 4 / camera.scale, power = 10 ** Math.floor(Math.log10(limit));
   const metres = [5, 2, 1].find((n) => n * power <= limit) * power, scale = ratio();

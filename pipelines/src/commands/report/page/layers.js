@@ -1,4 +1,4 @@
-// What can be shown, each with its switch and how strong it is.
+// The layers, each with its switch and its opacity.
 const layers = [];
 let step = data.times.length - 1;
 let hypothesis = null;
@@ -9,7 +9,7 @@ function addLayer(id, name, colour, on, opacity, draw, has) {
 
 const anyFinding = (test) => data.robots.some((robot) => robot.findings.some((version) => test(version.what)));
 
-/** Draws what was found in every robot's map at the moment that is shown. */
+/** Draws the findings in every robot's map at the current moment. */
 function findings(draw) {
   return (opacity) => {
     for (const robot of data.robots) {
@@ -19,8 +19,8 @@ function findings(draw) {
   };
 }
 
-/** How much longer than they are bends are drawn: by a round number, so that the longest is about two metres. */
-function longer() {
+/** Factor by which deformations are enlarged: a round number for which the longest arrow is at most two metres. */
+function enlargement() {
   let most = 0;
   for (const robot of data.robots)
     for (const version of robot.findings) for (const [, , dx, dy] of version.what.bends) most = Math.max(most, Math.hypot(dx, dy));
@@ -49,12 +49,12 @@ function makeLayers() {
     const [x, y, angle] = found.direction, length = pixels(60);
     for (const turn of [0, Math.PI / 2]) arrow([x, y], [length * Math.cos(angle + turn), length * Math.sin(angle + turn)], colour, opacity);
   }), anyFinding((found) => found.direction));
-  addLayer("paths", "Drives", null, false, 1, findings((found, colour, opacity) => line(found.path, 1.5, colour, opacity)), anyFinding((found) => found.path.length > 1));
-  addLayer("bends", "Bends, " + longer() + " times as long", null, false, 1, findings((found, colour, opacity) => {
-    const times = longer();
+  addLayer("paths", "Paths", null, false, 1, findings((found, colour, opacity) => line(found.path, 1.5, colour, opacity)), anyFinding((found) => found.path.length > 1));
+  addLayer("bends", "Deformation, " + enlargement() + " ×", null, false, 1, findings((found, colour, opacity) => {
+    const times = enlargement();
     for (const [x, y, dx, dy] of found.bends) arrow([x, y], [times * dx, times * dy], colour, opacity);
   }), anyFinding((found) => found.bends.length));
-  addLayer("ways", "Places and ways", null, false, 1, findings((found, colour, opacity) => {
+  addLayer("ways", "Topological maps", null, false, 1, findings((found, colour, opacity) => {
     for (const way of found.ways) line(way, 1.5, colour, opacity);
     for (const [x, y] of found.places) dot([x, y], 7, colour, opacity);
   }), anyFinding((found) => found.places.length));
@@ -73,8 +73,8 @@ function hypothesisMaps() {
   const named = (name) => data.robots.find((robot) => robot.name === name);
   const a = named(hypothesis.a), b = named(hypothesis.b);
   const pose = a ? a.pose : [0, 0, 0];
-  const laid = [[a, pose], [b, compose(pose, [hypothesis.x, hypothesis.y, hypothesis.yaw])]];
-  return laid.filter(([robot]) => robot && robot.own);
+  const aligned = [[a, pose], [b, compose(pose, [hypothesis.x, hypothesis.y, hypothesis.yaw])]];
+  return aligned.filter(([robot]) => robot && robot.own);
 }
 
 function listLayers() {
@@ -96,7 +96,7 @@ function listLayers() {
     }
     label.append(layer.name);
     Object.assign(fade, { type: "range", min: 0, max: 100, value: 100 * layer.opacity, id: "fade-" + layer.id });
-    fade.setAttribute("aria-label", "How strong: " + layer.name);
+    fade.setAttribute("aria-label", "Opacity: " + layer.name);
     fade.addEventListener("input", () => { layer.opacity = fade.value / 100; draw(); });
     row.append(label, fade);
     list.append(row);

@@ -1,20 +1,20 @@
-// A live run: what it sends takes the place of what is shown, and the view stays as the user has set it.
+// Follows a live run: its changes replace what is shown, and the view stays as the user has set it.
 function follow() {
-  // There is one moment only: the last.
+  // A live page has only one moment, the last.
   document.getElementById("time").style.display = "none";
   const status = document.getElementById("live"), source = new EventSource("live");
   let taken = Promise.resolve();
   source.addEventListener("change", (event) => {
-    taken = taken.then(() => takeUp(JSON.parse(event.data))).then(() => { status.textContent = "The run goes on."; });
+    taken = taken.then(() => show(JSON.parse(event.data))).then(() => { status.textContent = "The run goes on."; });
   });
   source.addEventListener("end", () => {
     source.close();
-    taken.then(() => { status.textContent = "The run has ended. This is what it has found."; });
+    taken.then(() => { status.textContent = "The run has ended. This is its final state."; });
   });
-  source.onerror = () => { status.textContent = "Nothing comes from the run. It is looked for again."; };
+  source.onerror = () => { status.textContent = "The connection to the run is lost. Reconnecting."; };
 }
 
-async function takeUp({ headline, findings, data: next }) {
+async function show({ headline, findings, data: next }) {
   await Promise.all(grids(next).map(decode));
   const isFirst = !grids(data).length;
   const kept = new Map(layers.map((layer) => [layer.id, layer]));
@@ -25,7 +25,7 @@ async function takeUp({ headline, findings, data: next }) {
   makeLayers();
   for (const layer of layers) {
     const { on, opacity } = kept.get(layer.id) || layer;
-    // While no robot has a map there is nothing to choose.
+    // Before the first map the user cannot have chosen layers.
     if (!isFirst) Object.assign(layer, { on, opacity });
   }
   document.getElementById("layer-list").replaceChildren();
@@ -44,7 +44,7 @@ async function takeUp({ headline, findings, data: next }) {
 
 const written = {};
 
-/** Puts markup into an element, unless it is there. Gives whether it was put there. */
+/** Sets the markup of an element if it has changed. Returns whether it has. */
 function replace(id, markup) {
   if (written[id] === markup) return false;
   written[id] = markup;

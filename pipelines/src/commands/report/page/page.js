@@ -1,4 +1,4 @@
-// The page: moving about, the slider, hypotheses, and what lies under the pointer.
+// The page: navigation, the slider, hypotheses, and the values under the pointer.
 function draw() {
   const width = Math.round(canvas.clientWidth * ratio()), height = Math.round(canvas.clientHeight * ratio());
   if (!width || !height) return;
@@ -68,22 +68,22 @@ function showHypothesis(index) {
   document.getElementById("banner").hidden = !hypothesis;
   if (hypothesis) {
     const { a, b, rank, topic, accepted } = hypothesis;
-    document.getElementById("banner-text").textContent = a + " and " + b + " as no. " + (rank + 1) + " on " + topic + " lays them" + (accepted ? "." : ", which was refused.");
+    document.getElementById("banner-text").textContent = a + " and " + b + " by hypothesis no. " + (rank + 1) + " on " + topic + (accepted ? ", accepted." : ", refused.");
     canvas.scrollIntoView({ block: "nearest" });
   }
   fit();
 }
 
-/** What is known of the place under the pointer. */
-function tell(u, v) {
+/** Shows the values at the place under the pointer. */
+function showValues(u, v) {
   const [x, y] = worldOf(u, v), lines = [x.toFixed(2) + ", " + y.toFixed(2) + " m"];
-  const say = (name, value) => { if (value !== null) lines.push(name + ": " + value + " % occupied"); };
+  const add = (name, value) => { if (value !== null) lines.push(name + ": " + value + " % occupied"); };
   if (hypothesis) {
-    for (const [robot, pose] of hypothesisMaps()) say(robot.name, valueAt(robot.own, x, y, pose));
+    for (const [robot, pose] of hypothesisMaps()) add(robot.name, valueAt(robot.own, x, y, pose));
   } else {
     const value = (versions) => { const grid = at(versions, step); return grid ? valueAt(grid, x, y) : null; };
-    say("merged", value(data.merged));
-    for (const robot of data.robots) say(robot.name, value(robot.map));
+    add("merged", value(data.merged));
+    for (const robot of data.robots) add(robot.name, value(robot.map));
     const conflict = value(data.conflicts);
     if (conflict) lines.push("contradiction: " + conflict + " %");
     lines.push(...nearby(x, y));
@@ -109,7 +109,7 @@ function nearby(x, y) {
     }
     if (isOn("bends")) for (const [bx, by, dx, dy, turn] of found.bends) {
       if (Math.hypot(bx - x, by - y) > reach) continue;
-      lines.push(robot.name + ": bent by " + Math.hypot(dx, dy).toFixed(3) + " m and " + (turn * 180 / Math.PI).toFixed(2) + "°");
+      lines.push(robot.name + ": deformed by " + Math.hypot(dx, dy).toFixed(3) + " m and " + (turn * 180 / Math.PI).toFixed(2) + "°");
     }
   }
   return lines.slice(0, 6);
@@ -140,7 +140,7 @@ function listen() {
     pointers.set(event.pointerId, event);
   });
   canvas.addEventListener("pointermove", (event) => {
-    tell(event.offsetX, event.offsetY);
+    showValues(event.offsetX, event.offsetY);
     const before = pointers.get(event.pointerId);
     if (!before) return;
     const others = [...pointers.values()].filter((other) => other.pointerId !== event.pointerId);
@@ -165,7 +165,7 @@ function listen() {
   for (const end of ["beforeprint", "afterprint"]) addEventListener(end, repaint);
 }
 
-/** Takes up other colours. */
+/** Reads the colours again and redraws. */
 function repaint() {
   readTheme();
   for (const grid of grids(data)) grid.painted = {};

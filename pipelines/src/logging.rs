@@ -1,8 +1,7 @@
-//! What is told while a command runs, beside its results: events of the libraries as lines on standard error, and a trace of what
-//! every stage did when, for a viewer.
+//! Logging of a command: events of the libraries as lines on standard error, and a trace of the work of every stage for a viewer.
 
 use crate::status::BadUse;
-use crate::terminal::say;
+use crate::terminal::eprint_line;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use gridweave_runtime::engine::processes::Launch;
@@ -19,25 +18,25 @@ use tracing_subscriber::layer::{self, Layer};
 use tracing_subscriber::prelude::*;
 use tracing_subscriber::registry::LookupSpan;
 
-/// What all commands are told of that.
+/// Logging options of all commands.
 #[derive(Debug, Args)]
-pub(crate) struct TellingArgs {
-    /// Say on standard error what the stages do; twice: with every message. `RUST_LOG` says it in more detail.
+pub(crate) struct LoggingArgs {
+    /// Log the work of the stages to standard error; twice: with every message. `RUST_LOG` sets it in detail.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
-    /// How that is written.
+    /// The format of the log lines.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
     log_format: LogFormat,
-    /// Write what every stage did when, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not with the
+    /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not with the
     /// engine `processes`.
     #[arg(long, global = true, value_name = "FILE.json")]
     pub(crate) trace: Option<PathBuf>,
 }
 
-/// How this program writes events.
+/// The format in which this program writes events.
 static FORMAT: OnceLock<LogFormat> = OnceLock::new();
 
-/// How the processes of a run are started, so that they write events as this program does.
+/// Arguments by which the processes of a run are started, so that they write events in the format of this program.
 ///
 /// # Errors
 /// The program cannot find itself.
@@ -50,34 +49,39 @@ pub(crate) fn launch() -> Result<Launch> {
     Ok(launch)
 }
 
-/// How events are written.
+/// Format of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum LogFormat {
-    /// A line of text each.
+    /// One line of text for each event.
     Text,
-    /// A JSON object each, in a line.
+    /// One line with a JSON object for each event.
     Json,
 }
 
-impl TellingArgs {
-    /// Begins to tell. A trace is complete when what is given is dropped. `hear` hears each warning: its module, and its words.
-    pub(crate) fn start(&self, hear: fn(&str, &str)) -> Result<Option<FlushGuard>> {
+impl LoggingArgs {
+    /// Starts logging. The trace is complete when the guard is dropped. `on_warning` is called for each warning with its module and text.
+    pub(crate) fn start(&self, on_warning: fn(&str, &str)) -> Result<Option<FlushGuard>> {
         let (trace, guard) = self.trace_layer()?.unzip();
         // Set once, as the subscriber is.
         let _ = FORMAT.set(self.log_format);
-        tracing_subscriber::registry().with(self.lines()).with(StageNames).with(trace).with(warnings(hear)).init();
+        tracing_subscriber::registry()
+            .with(self.lines())
+            .with(StageNames)
+            .with(trace)
+            .with(warnings(on_warning))
+            .init();
         Ok(guard)
     }
 
-    /// Events as lines: warnings, or all that `RUST_LOG` or the user asks for.
+    /// Layer that writes events as lines: warnings, or whatever `RUST_LOG` or the user asks for.
     fn lines<S: Subscriber + for<'a> LookupSpan<'a>>(&self) -> impl Layer<S> {
-        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual_filter(self.verbose)));
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter(self.verbose)));
         let lines = tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
             .without_time()
             .with_target(false)
-            // It would say on standard error that standard error cannot be written to.
+            // It would report on standard error that standard error cannot be written to.
             .log_internal_errors(false);
         match self.log_format {
             LogFormat::Text => lines.with_filter(filter).boxed(),
@@ -85,14 +89,14 @@ impl TellingArgs {
         }
     }
 
-    /// Spans as a trace in the format of Chrome, if one is asked for.
+    /// Layer that writes spans as a trace in the format of Chrome, if one is asked for.
     fn trace_layer<S>(&self) -> Result<Option<(impl Layer<S>, FlushGuard)>>
     where
         S: Subscriber + for<'a> LookupSpan<'a> + Send + Sync,
     {
         let Some(path) = &self.trace else { return Ok(None) };
         let file = TraceFile::create(path)?;
-        let name_of = |spoken: &EventOrSpan<'_, '_, S>| match spoken {
+        let name_of = |recorded: &EventOrSpan<'_, '_, S>| match recorded {
             EventOrSpan::Span(span) => {
                 let stage = span.extensions().get::<StageName>().map(|StageName(name)| name.clone());
                 stage.unwrap_or_else(|| span.name().to_owned())
@@ -110,32 +114,32 @@ impl TellingArgs {
     }
 }
 
-/// Which events are told where `RUST_LOG` says nothing, by how often the user has asked for more.
-fn usual_filter(verbose: u8) -> &'static str {
-    // Without a router, which nobody needs, Zenoh warns of what it has waited for in vain.
+/// The filter of events where `RUST_LOG` is not set, by the number of `-v`.
+fn default_filter(verbose: u8) -> &'static str {
+    // Zenoh warns that it has found no router, which is not needed.
     ["warn,zenoh=error", "info", "debug"].get(usize::from(verbose)).copied().unwrap_or("trace")
 }
 
-/// Hands on what is warned of, as it is said: the user may not be told it in these words.
-fn warnings<S: Subscriber + for<'a> LookupSpan<'a>>(hear: fn(&str, &str)) -> impl Layer<S> {
-    // Of a filter that is a function, nobody could say that it asks for no more than warnings.
-    Listener(hear).with_filter(LevelFilter::WARN)
+/// Layer that calls `on_warning` for each warning, also for those that the filter of the log lines leaves out.
+fn warnings<S: Subscriber + for<'a> LookupSpan<'a>>(on_warning: fn(&str, &str)) -> impl Layer<S> {
+    // A `LevelFilter`, unlike a function, lets `tracing` disable all events below warnings.
+    WarningLayer(on_warning).with_filter(LevelFilter::WARN)
 }
 
-struct Listener(fn(&str, &str));
+struct WarningLayer(fn(&str, &str));
 
-impl<S: Subscriber> Layer<S> for Listener {
+impl<S: Subscriber> Layer<S> for WarningLayer {
     fn on_event(&self, event: &tracing::Event<'_>, _: layer::Context<'_, S>) {
-        let mut words = Words(String::new());
-        event.record(&mut words);
-        (self.0)(event.metadata().target(), &words.0);
+        let mut text = MessageText(String::new());
+        event.record(&mut text);
+        (self.0)(event.metadata().target(), &text.0);
     }
 }
 
 /// The message of an event.
-struct Words(String);
+struct MessageText(String);
 
-impl Visit for Words {
+impl Visit for MessageText {
     fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
         if field.name() == "message" {
             self.0 = format!("{value:?}");
@@ -143,7 +147,7 @@ impl Visit for Words {
     }
 }
 
-/// The file of a trace. What cannot be written is told once and left out: the run goes on.
+/// The file of a trace. The first error of a write is reported; after it the trace is dropped and the run goes on.
 struct TraceFile {
     path: PathBuf,
     file: File,
@@ -151,7 +155,7 @@ struct TraceFile {
 }
 
 impl TraceFile {
-    /// A new file, in the place of an earlier trace. Another kind of file is not overwritten, as a log may be meant to be read.
+    /// Creates the file, which may replace an earlier trace but no other kind of file: a log could be named in error.
     fn create(path: &Path) -> Result<Self> {
         if path.extension().is_none_or(|ending| ending != "json") {
             let text = format!("cannot write the trace {}: its name must end in .json", path.display());
@@ -164,7 +168,7 @@ impl TraceFile {
     fn note(&mut self, written: io::Result<()>) {
         if let Err(error) = written {
             self.has_failed = true;
-            say(format_args!("the trace {} is not complete: {error}", self.path.display()));
+            eprint_line(format_args!("the trace {} is not complete: {error}", self.path.display()));
         }
     }
 }
@@ -183,7 +187,7 @@ impl Write for TraceFile {
     }
 }
 
-/// Keeps with each span the name of the stage that it belongs to.
+/// Layer that keeps with each span the name of its stage.
 struct StageNames;
 
 /// The name of a stage.
@@ -199,7 +203,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for StageNames {
     }
 
     fn max_level_hint(&self) -> Option<LevelFilter> {
-        // It asks for no span by itself.
+        // It needs no span by itself.
         Some(LevelFilter::OFF)
     }
 }
@@ -235,10 +239,10 @@ mod tests {
     }
 
     #[test]
-    fn zenoh_tells_errors_alone_until_the_user_asks_for_more() {
-        let told = |verbose: u8| {
+    fn only_errors_of_zenoh_are_logged_unless_verbose() {
+        let logged = |verbose: u8| {
             let lines = Arc::new(Mutex::new(Vec::new()));
-            let (writer, filter) = (Arc::clone(&lines), EnvFilter::new(usual_filter(verbose)));
+            let (writer, filter) = (Arc::clone(&lines), EnvFilter::new(default_filter(verbose)));
             let layer = tracing_subscriber::fmt::layer().with_writer(move || Lines(Arc::clone(&writer)));
             tracing::subscriber::with_default(tracing_subscriber::registry().with(layer.with_filter(filter)), || {
                 tracing::warn!(target: "zenoh::net::runtime::orchestrator", "scouting");
@@ -248,18 +252,18 @@ mod tests {
             let text = String::from_utf8(lines.lock().unwrap().clone()).unwrap();
             ["scouting", "gone", "own"].map(|word| text.contains(word))
         };
-        assert_eq!(told(0), [false, true, true]);
-        assert_eq!(told(1), [true, true, true]);
+        assert_eq!(logged(0), [false, true, true]);
+        assert_eq!(logged(1), [true, true, true]);
     }
 
     #[test]
-    fn warnings_are_heard_in_the_words_of_their_module() {
-        static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-        let layer = warnings(|module, words| HEARD.lock().unwrap().push(format!("{module}: {words}")));
+    fn warnings_are_passed_on_with_their_module() {
+        static RECEIVED: Mutex<Vec<String>> = Mutex::new(Vec::new());
+        let layer = warnings(|module, text| RECEIVED.lock().unwrap().push(format!("{module}: {text}")));
         tracing::subscriber::with_default(tracing_subscriber::registry().with(layer), || {
             tracing::warn!(target: "zenoh_link_tls::unicast", "{} was not let in", "somebody");
             tracing::info!(target: "zenoh_link_tls::unicast", "all is well");
         });
-        assert_eq!(*HEARD.lock().unwrap(), ["zenoh_link_tls::unicast: somebody was not let in"]);
+        assert_eq!(*RECEIVED.lock().unwrap(), ["zenoh_link_tls::unicast: somebody was not let in"]);
     }
 }
