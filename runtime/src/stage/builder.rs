@@ -1,4 +1,4 @@
-//! How a kind of stage is put together: its inputs, each with what is done with a message that comes in on it.
+//! The builder of a stage kind: its inputs, each with the handler of its messages.
 
 use super::node::{Node, Role, RunningStage};
 use super::{Context, InputPort, Output, OutputPorts, Parameters, PortType, Received, StageError, StageKind};
@@ -13,7 +13,7 @@ type Announce<S> = dyn Fn(&mut S, usize, u32, &Channel) -> Result<(), StageError
 type Finish<S, O> = dyn Fn(&mut S, &Output<O>) -> Result<(), StageError> + Send + Sync;
 type Abort<S> = dyn Fn(&mut S, &str) + Send + Sync;
 
-/// A kind of stage in the making, with parameters `P`, state `S` and outputs `O`; see [`StageKind::stage`].
+/// The builder of a stage kind with parameters `P`, state `S` and outputs `O`; see [`StageKind::stage`].
 pub struct StageBuilder<P, S, O> {
     name: &'static str,
     summary: &'static str,
@@ -23,9 +23,9 @@ pub struct StageBuilder<P, S, O> {
     handlers: Handlers<S, O>,
 }
 
-/// What a stage does with what happens to it.
+/// The handlers of a stage's events.
 struct Handlers<S, O> {
-    /// By input port.
+    /// The handlers of messages, by input port.
     receive: Vec<Box<Receive<S, O>>>,
     announce: Box<Announce<S>>,
     finish: Box<Finish<S, O>>,
@@ -48,11 +48,11 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         Self { name, summary, inputs: Vec::new(), declare: Box::new(declare), make: Box::new(make), handlers }
     }
 
-    /// An input that must be wired to one output.
+    /// Adds an input that must be wired to one output.
     ///
-    /// Messages come to all inputs together by log time; at equal times in the order of the kind's input ports (within a port
-    /// that takes many in the order of the pipeline file), and within one wire as they were sent. One that cannot be decoded
-    /// is left out with a warning.
+    /// The messages of all inputs are delivered together in order of log time; at equal times in the order of the kind's input
+    /// ports (within a port with several wires in the order of the pipeline file), and within one wire as they were sent. A
+    /// message that cannot be decoded is skipped with a warning.
     #[must_use]
     pub fn input<T: RosMessage + 'static>(
         self,
@@ -64,7 +64,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self.typed(port, receive)
     }
 
-    /// The same, but it may be left unwired.
+    /// Adds an input that may be wired to one output.
     #[must_use]
     pub fn optional_input<T: RosMessage + 'static>(
         self,
@@ -76,7 +76,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self.typed(port, receive)
     }
 
-    /// An input that any number of outputs may be wired to, but at least one.
+    /// Adds an input that must be wired to one or more outputs.
     #[must_use]
     pub fn inputs<T: RosMessage + 'static>(
         self,
@@ -88,7 +88,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self.typed(port, receive)
     }
 
-    /// The same, but it may be left unwired.
+    /// Adds an input that may be wired to any number of outputs.
     #[must_use]
     pub fn optional_inputs<T: RosMessage + 'static>(
         self,
@@ -100,8 +100,8 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self.typed(port, receive)
     }
 
-    /// An input that any number of outputs of any type may be wired to, but at least one. Its messages come as they are;
-    /// [`Message::wire`] tells the outputs apart, and [`Context::inputs`] what they are.
+    /// Adds an input that must be wired to one or more outputs of any type. Its messages are delivered encoded;
+    /// [`Message::wire`] is the output that one comes from, an index into [`Context::inputs`].
     #[must_use]
     pub fn any_inputs(
         self,
@@ -113,7 +113,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self.encoded_input(port, receive)
     }
 
-    /// An input whose messages come as they are, encoded.
+    /// Adds an input whose messages are delivered encoded.
     #[must_use]
     pub fn encoded_input(
         mut self,
@@ -125,8 +125,8 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// What is done when a source announces a channel: the messages with its number that follow on the wire were logged on
-    /// it. Only a stage that passes on what it does not know needs it.
+    /// Sets the handler for a channel that a source announces: the messages with its number that follow on the wire were
+    /// logged on it. Only needed by a stage that forwards messages of unknown types.
     #[must_use]
     pub fn announce(
         mut self,
@@ -136,7 +136,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// What is done when all inputs have ended. What is sent then carries the log time that they had come to.
+    /// Sets the handler for the end of all inputs. Messages that it sends carry the log time of the end.
     #[must_use]
     pub fn finish(
         mut self,
@@ -146,7 +146,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// What is done when the run has failed elsewhere: what was made is left in a state that can be used, and says why it is
+    /// Sets the handler for a failure of the run elsewhere. It should leave output files usable, with the reason why they are
     /// not complete.
     #[must_use]
     pub fn abort(mut self, abort: impl Fn(&mut S, &str) + Send + Sync + 'static) -> Self {
@@ -154,7 +154,7 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// The kind.
+    /// Builds the kind.
     pub fn build(self) -> StageKind {
         let Self { name, summary, inputs, declare, make, handlers } = self;
         let mut declared = OutputPorts::default();
@@ -196,7 +196,7 @@ impl<S, O> RunningStage for Running<S, O> {
     fn receive(&mut self, port: usize, message: &Message) -> Result<(), StageError> {
         match self.handlers.receive.get(port) {
             Some(receive) => receive(&mut self.state, message, &self.output),
-            None => Err(StageError::new("take a message", format!("the stage has no input port {port}"))),
+            None => Err(StageError::new("receive a message", format!("the stage has no input port {port}"))),
         }
     }
 

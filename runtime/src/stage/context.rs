@@ -1,31 +1,30 @@
-//! What a stage is told when it is made.
+//! The context of a stage: information about its pipeline, given when it is created.
 
 use super::{InitialPoses, RunLinks, RunStatistics, TagFields};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Duration;
 
-/// What a stage is told of its pipeline when it is made.
+/// Information about its pipeline for a stage that is created.
 #[derive(Clone, Debug, Default)]
 pub struct Context {
     /// The stage's name in the pipeline.
     pub stage: String,
-    /// Seeds the stage's randomness: made from the pipeline's seed and the stage's name.
+    /// The seed of the stage's randomness, derived from the pipeline's seed and the stage's name.
     pub seed: u64,
-    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
     pub reference: Option<String>,
-    /// How topics are told apart.
+    /// The topic patterns of the robots.
     pub robots: RobotTopics,
-    /// Where the user knows the maps of robots to lie; where there are any, that of the reference among them.
+    /// The poses of robots' maps that the user knows; if there are any, that of the reference is among them.
     pub initial_poses: InitialPoses,
-    /// What is wired to the stage, in the order of its wires: see [`Message::wire`](crate::message::Message::wire).
+    /// The outputs wired to the stage, in the order of its wires: see [`Message::wire`](crate::message::Message::wire).
     pub inputs: Vec<InputWire>,
-    /// For how long a stage may work on one message; none for ever.
+    /// The maximum time that a stage may work on one message; none if unlimited.
     pub stall_timeout: Option<Duration>,
-    /// Tells what the stages of the run have done so far, for a stage that shows it; none where the engine does not know.
+    /// The statistics of the run, for a stage that shows them; none where the engine has none.
     pub statistics: Option<RunStatistics>,
-    /// The links of the run, for a stage that shows elsewhere what passes on them; none where the engine keeps them to itself: all but
-    /// `processes` do.
+    /// The links of the run, for a stage that forwards their messages; only on the engine `processes`.
     pub links: Option<RunLinks>,
 }
 
@@ -47,15 +46,14 @@ pub struct InputWire {
     pub output: &'static str,
     /// The ROS 2 type of its messages; empty for any.
     pub ros_type: String,
-    /// The definition of that type, a text of the form `ros2msg`; empty if the stage that it comes from brings none, as those of all
-    /// types that Gridweave knows do not.
+    /// The definition of that type in the format `ros2msg`; empty for types that Gridweave knows.
     pub definition: String,
-    /// The topic that its messages get in a log, with `{robot}` for the robot's name; empty if they bring topics of their
-    /// own, as those of a source do.
+    /// The topic of its messages in a log, with `{robot}` for the robot's name; empty if each message has its own topic, like
+    /// those of a source.
     pub topic: String,
 }
 
-/// How the topics of a log are told apart: patterns in which `{robot}` stands for any one part of a path.
+/// The topic patterns that assign the topics of a log to robots and roles. `{robot}` matches one part of a path.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotTopics {
@@ -63,19 +61,19 @@ pub struct RobotTopics {
     pub map: String,
     /// Poses of the robot's base in its map.
     pub pose: String,
-    /// Range readings of tags.
+    /// Range measurements of tags.
     pub tags: String,
-    /// Where the readings are in messages of a type that is not known to hold some.
+    /// The fields with the measurements, for message types that Gridweave does not know.
     pub tag_fields: Option<TagFields>,
     /// Topological maps.
     pub topology: String,
-    /// Scans of a lidar, which count where a robot has no maps.
+    /// Scans of a lidar, used for robots without maps.
     pub scan: String,
     /// Poses from tf instead of from a pose topic.
     pub tf: Option<TfFrames>,
 }
 
-/// The two frames between which tf gives a robot's pose; `{robot}` stands for the robot's name.
+/// The two tf frames that define a robot's pose; `{robot}` is replaced by the robot's name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TfFrames {
@@ -99,21 +97,22 @@ impl Default for RobotTopics {
     }
 }
 
-/// Matches `text` with `pattern`, in which `{robot}` stands for one part of a path. Gives the robot's name.
+/// Matches `text` against `pattern`, in which `{robot}` matches one part of a path. Returns the robot's name.
 pub fn match_robot<'a>(pattern: &str, text: &'a str) -> Option<&'a str> {
     let (before, after) = pattern.split_once("{robot}")?;
     let robot = text.strip_prefix(before)?.strip_suffix(after)?;
     (!robot.is_empty() && !robot.contains('/')).then_some(robot)
 }
 
-/// The name of a robot's frame in a tree of frames that holds all robots: the frame `map` of `robot1` is `robot1/map`. One that
-/// bears the robot's name, as `robot1/map` and `robot1_map` do, has its name. The slash that ROS 1 puts before names goes.
+/// The name of a robot's frame in the tf tree of all robots: the frame `map` of `robot1` becomes `robot1/map`. A frame that
+/// starts with the robot's name already, such as `robot1/map` or `robot1_map`, is unchanged. The leading slash of ROS 1 is
+/// removed.
 ///
-/// Without a robot, and for a frame without a name, nothing is put before it.
+/// Without a robot, and for a frame without a name, no prefix is added.
 pub fn frame_of_robot<'a>(robot: &str, frame: &'a str) -> Cow<'a, str> {
     let frame = frame.trim_start_matches('/');
-    let bears_name = frame.strip_prefix(robot).is_some_and(|rest| robot.is_empty() || rest.starts_with(['/', '_']));
-    match bears_name || frame.is_empty() {
+    let has_prefix = frame.strip_prefix(robot).is_some_and(|rest| robot.is_empty() || rest.starts_with(['/', '_']));
+    match has_prefix || frame.is_empty() {
         true => Cow::Borrowed(frame),
         false => Cow::Owned(format!("{robot}/{frame}")),
     }
@@ -124,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_bears_its_robots_name_once() {
+    fn a_frame_gets_its_robots_name_once() {
         for (robot, frame, expected) in [
             ("robot1", "map", "robot1/map"),
             ("robot1", "/map", "robot1/map"),

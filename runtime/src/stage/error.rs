@@ -1,9 +1,9 @@
-//! How a stage fails.
+//! The error of a stage.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Why a stage cannot go on: what it was doing, what went wrong, and what would mend it.
+/// The error of a stage: what it was doing, what went wrong, and what would fix it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageError {
     doing: String,
@@ -13,26 +13,26 @@ pub struct StageError {
 }
 
 impl StageError {
-    /// `doing` completes "cannot ...", such as "open /logs/a.mcap"; `cause` says what went wrong.
+    /// An error. `doing` completes "cannot ...", such as "open /logs/a.mcap"; `cause` says what went wrong.
     pub fn new(doing: impl Into<String>, cause: impl fmt::Display) -> Self {
         Self { doing: doing.into(), cause: cause.to_string(), help: None, parameter: None }
     }
 
-    /// Adds what would mend it.
+    /// Adds what would fix it.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Says that it is for the value of a parameter, of which only the running stage can see that it is wrong.
+    /// Marks the error as caused by the value of a parameter that only the running stage can check.
     #[must_use]
     pub fn of_parameter(mut self, parameter: impl Into<String>) -> Self {
         self.parameter = Some(parameter.into());
         self
     }
 
-    /// The parameter whose value is wrong, if it is for that.
+    /// The parameter with the wrong value, if the error is caused by one.
     pub fn parameter(&self) -> Option<&str> {
         self.parameter.as_deref()
     }

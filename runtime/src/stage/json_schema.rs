@@ -1,7 +1,7 @@
-//! Parameters that a program describes, checked by their JSON schema.
+//! Validation of parameters by the JSON schema of a program.
 //!
-//! Of JSON Schema it knows what a parameter needs: `type` (one of number, integer, string, boolean, array), `enum` of texts,
-//! `minimum`, `maximum`, `exclusiveMinimum` and `exclusiveMaximum`, and `items`. What else a schema says is for people to read.
+//! The supported subset of JSON Schema is `type` (one of number, integer, string, boolean, array), `enum` of strings,
+//! `minimum`, `maximum`, `exclusiveMinimum`, `exclusiveMaximum`, and `items`. Everything else is ignored.
 
 use super::ParameterError;
 use super::range::out_of_range;
@@ -9,8 +9,11 @@ use schemars::Schema;
 use serde::de::Error;
 use serde_json::Value;
 
-/// Checks parameters, any of which may be left out: an error if one has another type than its schema says, and otherwise every
-/// value that is out of its range. A parameter that the schema does not know is passed over.
+/// Checks parameters, all of which are optional, and returns every value that is out of its range. A parameter that is not in
+/// the schema is ignored.
+///
+/// # Errors
+/// A parameter does not have the type of its schema.
 pub(super) fn check(schema: &Schema, table: &toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> {
     let properties = schema.get("properties").and_then(Value::as_object);
     for (name, property) in properties.into_iter().flatten() {
@@ -22,7 +25,7 @@ pub(super) fn check(schema: &Schema, table: &toml::Table) -> Result<Vec<Paramete
     Ok(out_of_range(schema.as_value(), table))
 }
 
-/// What was expected of a value, if it is not that.
+/// The expected type or choices, if a value does not match.
 fn mismatch(schema: &Value, value: &toml::Value) -> Option<String> {
     let expected = schema.get("type").and_then(Value::as_str)?;
     if let (Some(choices), toml::Value::String(text)) = (schema.get("enum").and_then(Value::as_array), value) {
@@ -39,7 +42,7 @@ fn mismatch(schema: &Value, value: &toml::Value) -> Option<String> {
             return items.iter().find_map(of_item).map(|expected| format!("a list with {expected}"));
         }
         ("number" | "integer" | "string" | "boolean" | "array", _) => false,
-        // A type that is not known here is for the program itself to check.
+        // The program itself must check an unsupported type.
         _ => true,
     };
     (!fits).then(|| format!("a value of type {expected}"))
@@ -62,24 +65,24 @@ mod tests {
     }
 
     #[test]
-    fn values_of_the_right_type_and_in_range_pass_and_a_whole_number_is_a_number() {
+    fn values_of_the_right_type_and_in_range_are_valid_and_an_integer_is_a_number() {
         let text = "length = 1\ncount = 9\nway = \"far\"\nsizes = [0, 1.5]\nown = {}\nunknown = 1";
         assert_eq!(checked(text).unwrap(), []);
     }
 
     #[test]
-    fn another_type_is_an_error() {
+    fn a_wrong_type_is_an_error() {
         for text in ["length = \"a\"", "count = 1.5", "way = \"fra\"", "way = 1", "sizes = 1", "sizes = [\"a\"]"] {
             assert!(checked(text).is_err(), "{text}");
         }
     }
 
     #[test]
-    fn every_value_out_of_range_is_told() {
+    fn every_value_out_of_range_is_reported() {
         let errors = checked("length = 0\ncount = 10\nsizes = [1, -1]").unwrap();
-        let told: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        let reported: Vec<String> = errors.iter().map(ToString::to_string).collect();
         assert_eq!(
-            told,
+            reported,
             [
                 "`length` must be above 0, not 0",
                 "`count` must be from 1 to 9, not 10",

@@ -1,4 +1,4 @@
-//! Stage kinds: what a stage looks like from outside, and how one is made.
+//! Stage kinds: the interface of a stage, and how one is created.
 
 use super::builder::StageBuilder;
 use super::json_schema;
@@ -13,25 +13,25 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The keys of a stage's table in a pipeline that are no parameters.
+/// The keys of a stage's table in a pipeline file that are not parameters.
 pub(crate) const RESERVED_KEYS: [&str; 7] = ["kind", "inputs", "topics", "depth", "process", "overflow", "restart"];
 
 type CheckFn = dyn Fn(&toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> + Send + Sync;
 type MakeFn = dyn Fn(toml::Table, &Context, OutputPorts) -> Result<Node, StageError> + Send + Sync;
 type ResolveFn = dyn Fn(&toml::Table, &Path) -> Result<ResolvedStage, ParameterError> + Send + Sync;
 
-/// A kind of stage: its name, ports and parameters, and how to make one.
+/// A kind of stage: its name, ports and parameters, and how to create one.
 #[derive(Clone)]
 pub struct StageKind {
     /// The name in `kind = "..."`.
     pub name: &'static str,
-    /// What it does, in a sentence or a few.
+    /// What it does, in one or a few sentences.
     pub summary: &'static str,
     /// Its inputs, in the order that breaks ties between messages of one log time. Empty for a source.
     pub inputs: Vec<InputPort>,
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
-    /// The definitions of message types that nobody else knows, by their names.
+    /// The definitions of custom message types, by name.
     definitions: BTreeMap<String, String>,
     external: bool,
     live_only: bool,
@@ -41,26 +41,25 @@ pub struct StageKind {
     resolve: Option<Arc<ResolveFn>>,
 }
 
-/// What a stage is of which only its own program knows the ports and parameters.
+/// The kind and the parameters of a stage of a dynamic kind, whose ports depend on its parameters.
 #[derive(Clone, Debug)]
 pub struct ResolvedStage {
-    /// Its kind, kept for as long as this program runs, as all kinds are.
+    /// The resolved kind, which is never freed.
     pub kind: &'static StageKind,
-    /// Parameters that stand in place of those that were given, such as a path that holds from every folder.
+    /// Parameters that replace the given ones, such as a path made absolute.
     pub parameters: toml::Table,
 }
 
-/// A stage without inputs: it makes the messages that start everything else.
+/// A stage without inputs, which produces messages.
 pub trait Source: 'static {
     /// Its output ports.
     type Outputs: Outputs;
 
-    /// Sends the next message or the next few, by rising log time over all ports together. `false` when there are no
-    /// more.
+    /// Sends the next message or the next few, in order of log time over all ports. Returns `false` when there are no more.
     fn next(&mut self, output: &Output<Self::Outputs>) -> Result<bool, StageError>;
 
-    /// Waits until there is something to send, or for as long as this: for sources whose messages come from outside of the run.
-    /// In a live run it is called before each [`next`](Self::next), and does not count as work.
+    /// Waits until there is something to send, for at most `longest`; for sources whose messages come from outside of the run.
+    /// Called before each [`next`](Self::next) in a live run. It does not count as working time.
     fn wait(&mut self, _longest: Duration) {}
 
     /// Sends what the source still holds. Called once, when a live run is asked to end.
@@ -71,18 +70,18 @@ pub trait Source: 'static {
         Ok(())
     }
 
-    /// How much of its work is done, 0 to 1, if it can tell.
+    /// The share of its work that is done, 0 to 1, if known.
     fn progress(&self) -> Option<f64> {
         None
     }
 
-    /// The run has failed: what was made is left in a state that can be used.
+    /// Handles a failure of the run. It should leave output files usable.
     fn abort(&mut self, _reason: &str) {}
 }
 
 impl StageKind {
-    /// Begins a kind of stage with parameters `P`, state `S` and outputs `O`: `make` gives the state from the parameters.
-    /// What it takes, and what it does with it, is added to what this gives.
+    /// A builder of a stage kind with parameters `P`, state `S` and outputs `O`. `make` creates the state from the parameters;
+    /// inputs and their handlers are added to the builder.
     pub fn stage<P, S, O>(
         name: &'static str,
         summary: &'static str,
@@ -96,7 +95,7 @@ impl StageKind {
         StageBuilder::new(name, summary, O::declare, make)
     }
 
-    /// The same for a kind whose outputs are known only when the program runs: `declare` names them.
+    /// The same for a kind whose outputs are known only at run time: `declare` declares them.
     pub fn stage_with<P, S, O>(
         name: &'static str,
         summary: &'static str,
@@ -124,7 +123,7 @@ impl StageKind {
         Self::source_with(name, summary, S::Outputs::declare, make)
     }
 
-    /// A kind of source whose outputs are known only when the program runs: `declare` names them.
+    /// A kind of source whose outputs are known only at run time: `declare` declares them.
     pub fn source_with<P, S>(
         name: &'static str,
         summary: &'static str,
@@ -146,7 +145,7 @@ impl StageKind {
         Self::new::<P>(name, summary, Vec::new(), declared.into_declared(), make)
     }
 
-    /// A kind of source whose messages come from outside of a live run: from programs that send on its outputs `O`.
+    /// A kind of external source of a live run: programs outside of the run send on its outputs `O`.
     pub fn external<O: Outputs>(name: &'static str, summary: &'static str) -> Self {
         let mut declared = OutputPorts::default();
         drop(O::declare(&mut declared));
@@ -231,37 +230,37 @@ impl StageKind {
         self.resolve.as_ref().map(|resolve| resolve(parameters, folder))
     }
 
-    /// The same kind with parameters that a JSON schema describes, by which they are checked.
+    /// The same kind with parameters that are described and checked by a JSON schema.
     #[must_use]
     pub fn with_schema(self, schema: Schema) -> Self {
         let described = schema.clone();
         Self { schema, check: Arc::new(move |table| json_schema::check(&described, table)), ..self }
     }
 
-    /// The same kind with the definitions of message types of its ports that nobody else knows: by name, texts of the form
-    /// `ros2msg`, which log formats have for them.
+    /// The same kind with the definitions of the custom message types of its ports: texts in the format `ros2msg`, by name, as
+    /// log formats store them.
     #[must_use]
     pub fn with_definitions(self, definitions: BTreeMap<String, String>) -> Self {
         Self { definitions, ..self }
     }
 
-    /// The definition of a message type, if the kind brings one.
+    /// The definition of a message type, if the kind has one.
     pub fn definition(&self, ros_type: &str) -> Option<&str> {
         self.definitions.get(ros_type).map(String::as_str)
     }
 
-    /// The kind for live pipelines alone: of a source that waits for what comes from outside, and has no end.
+    /// The same kind for live pipelines only: a source that waits for messages from outside, and has no end.
     #[must_use]
     pub fn live_only(self) -> Self {
         Self { live_only: true, ..self }
     }
 
-    /// Whether it is for live pipelines alone.
+    /// Whether it is for live pipelines only.
     pub fn is_live_only(&self) -> bool {
         self.live_only
     }
 
-    /// Whether its messages come from outside of the run.
+    /// Whether it is an external source: programs outside of the run send its messages.
     pub fn is_external(&self) -> bool {
         self.external
     }
@@ -271,7 +270,7 @@ impl StageKind {
         &self.schema
     }
 
-    /// The parameters whose names a stage's table in a pipeline has another meaning for, by name.
+    /// The parameters whose names are reserved keys of a stage's table in a pipeline file, by name.
     pub(crate) fn shadowed_parameters(&self) -> impl Iterator<Item = &str> {
         let properties = self.schema.get("properties").and_then(serde_json::Value::as_object);
         let mut names: Vec<&str> = properties.into_iter().flat_map(|all| all.keys().map(String::as_str)).collect();
@@ -280,16 +279,18 @@ impl StageKind {
         names.into_iter()
     }
 
-    /// Checks parameters, any of which may be left out: an error if they do not have the right types, and otherwise
-    /// every value that is out of its range.
+    /// Checks parameters, all of which are optional, and returns every value that is out of its range.
+    ///
+    /// # Errors
+    /// A parameter has the wrong type.
     pub fn check_parameters(&self, table: &toml::Table) -> Result<Vec<ParameterError>, toml::de::Error> {
         (self.check)(table)
     }
 
-    /// Makes a stage of this kind whose output ports lead to `ends`, in their order; those beyond it lead nowhere.
+    /// Creates a stage of this kind. Its output ports are connected to `ends` in order; further ports are not connected.
     ///
     /// # Errors
-    /// The parameters are wrong, or the stage cannot begin.
+    /// The parameters are wrong, or the stage cannot be created.
     pub fn make(&self, parameters: toml::Table, context: &Context, ends: Vec<OutputEnd>) -> Result<Node, StageError> {
         (self.make)(parameters, context, OutputPorts::connected_to(ends))
     }

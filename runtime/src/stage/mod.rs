@@ -1,6 +1,6 @@
-//! What a stage is, what it is told, and what it may do.
+//! Stages: their definition, their context, and their inputs and outputs.
 //!
-//! A stage is a struct, its outputs, and a method for each of its inputs. This is a whole one:
+//! A stage is a struct, its outputs, and a method for each of its inputs. A complete example:
 //!
 //! ```
 //! use gridweave_runtime::ros::{OccupancyGrid, PoseStamped};
@@ -38,9 +38,9 @@
 //! # assert_eq!(sent[0].pose.position.x, 4.5);
 //! ```
 //!
-//! A stage keeps its state itself and touches nothing else: no clock, no global, no randomness but what it seeds from
-//! [`Context::seed`]. What it sends carries the log time of the message that caused it. So the same inputs give the same
-//! outputs on every engine.
+//! A stage has no state outside of its struct and uses nothing else: no clock, no global, and no randomness except what is
+//! seeded from [`Context::seed`]. A message that it sends carries the log time of the message that caused it. Therefore the
+//! same inputs give the same outputs on every engine.
 
 mod builder;
 mod context;
@@ -48,7 +48,6 @@ mod error;
 mod initial_poses;
 mod json_schema;
 mod kind;
-mod stage_harness;
 mod node;
 mod output;
 mod parameters;
@@ -57,6 +56,7 @@ pub(crate) mod range;
 mod received;
 mod registry;
 mod run_links;
+mod stage_harness;
 mod statistics;
 mod tag_fields;
 
@@ -66,7 +66,6 @@ pub use error::StageError;
 pub use initial_poses::{InitialPose, InitialPoses};
 pub(crate) use kind::RESERVED_KEYS;
 pub use kind::{ResolvedStage, Source, StageKind};
-pub use stage_harness::StageHarness;
 pub use node::Node;
 pub use output::{AnyMessage, Out, Output, OutputEnd, OutputPorts, OutputSink, Outputs};
 pub use parameters::{ParameterError, Parameters};
@@ -74,5 +73,6 @@ pub use ports::{InputPort, OutputPort, PortType};
 pub use received::Received;
 pub use registry::Registry;
 pub use run_links::{LinkView, RunLink, RunLinks};
+pub use stage_harness::StageHarness;
 pub use statistics::{RunStatistics, StageStatistics};
 pub use tag_fields::{PathLoss, TagFields};

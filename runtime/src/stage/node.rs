@@ -1,4 +1,4 @@
-//! A stage, ready to run, as the engines see it: without its types.
+//! A stage as used by the engines, with its types erased.
 
 use super::StageError;
 use super::output::SentCounts;
@@ -6,19 +6,19 @@ use crate::message::{Channel, LogTime, Message};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A stage of a pipeline, made and tied to its links.
+/// A stage that was created and connected to its links.
 pub struct Node {
     pub(super) role: Role,
     pub(super) sent: SentCounts,
 }
 
-/// What a stage is to the engine that runs it.
+/// The role of a stage for the engine.
 pub(super) enum Role {
-    /// It has inputs.
+    /// A stage with inputs.
     Stage(Box<dyn RunningStage>),
-    /// It has none.
+    /// A source.
     Source(Box<dyn RunningSource>),
-    /// It has none, and its messages come from outside of the run.
+    /// An external source: programs outside of the run send its messages.
     External,
 }
 
@@ -43,12 +43,12 @@ impl Node {
         matches!(self.role, Role::Source(_))
     }
 
-    /// Whether the messages of the stage come from outside of the run.
+    /// Whether the stage is an external source: programs outside of the run send its messages.
     pub fn is_external(&self) -> bool {
         matches!(self.role, Role::External)
     }
 
-    /// Lets a source send the next of its messages. `false` if there are no more, and for a stage that is no source.
+    /// Lets a source send its next messages. Returns `false` if there are no more, and for a stage that is no source.
     pub fn advance(&mut self) -> Result<bool, StageError> {
         match &mut self.role {
             Role::Source(source) => source.next(),
@@ -56,14 +56,14 @@ impl Node {
         }
     }
 
-    /// Lets a source wait for something to send.
+    /// Lets a source wait until there is something to send, for at most `longest`.
     pub fn wait(&mut self, longest: Duration) {
         if let Role::Source(source) = &mut self.role {
             source.wait(longest);
         }
     }
 
-    /// How much of its work a source has done, 0 to 1, if it can tell.
+    /// The share of its work that a source has done, 0 to 1, if known.
     pub fn progress(&self) -> Option<f64> {
         match &self.role {
             Role::Source(source) => source.progress(),
@@ -71,7 +71,7 @@ impl Node {
         }
     }
 
-    /// Hands a message to a stage that has come in on an input port, by its index among the kind's input ports.
+    /// Passes a message to a stage; `port` is the index among the kind's input ports.
     pub fn receive(&mut self, port: usize, message: &Message) -> Result<(), StageError> {
         match &mut self.role {
             Role::Stage(stage) => stage.receive(port, message),
@@ -79,7 +79,7 @@ impl Node {
         }
     }
 
-    /// Tells a stage that the messages of channel `number` that follow on a wire were logged on `channel`.
+    /// Announces to a stage that the messages of channel `number` that follow on a wire were logged on `channel`.
     pub fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
         match &mut self.role {
             Role::Stage(stage) => stage.announce(wire, number, channel),
@@ -96,7 +96,7 @@ impl Node {
         }
     }
 
-    /// Tells a stage that the run has failed.
+    /// Notifies a stage that the run has failed.
     pub fn abort(&mut self, reason: &str) {
         match &mut self.role {
             Role::Stage(stage) => stage.abort(reason),
@@ -105,32 +105,32 @@ impl Node {
         }
     }
 
-    /// The log time that the stage has come to.
+    /// The log time that the stage has reached.
     pub fn log_time(&self) -> LogTime {
         self.sent.log_time()
     }
 
-    /// Sets the log time that what the stage sends will carry.
+    /// Sets the log time of the messages that the stage sends.
     pub fn set_log_time(&self, log_time: LogTime) {
         self.sent.set_log_time(log_time);
     }
 
-    /// How many messages were sent on each output port.
+    /// The number of messages sent on each output port.
     pub fn messages_sent(&self) -> impl Iterator<Item = u64> {
         self.sent.messages()
     }
 
-    /// What was warned of, and how often.
+    /// The warnings, each with the number of times.
     pub fn warnings(&self) -> BTreeMap<String, u64> {
         self.sent.warnings()
     }
 
-    /// How often anything was warned of.
+    /// The number of all warnings.
     pub fn warning_count(&self) -> u64 {
         self.sent.warning_count()
     }
 
-    /// What the stage has counted of its work.
+    /// The counts of what the stage has done.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         self.sent.counts()
     }

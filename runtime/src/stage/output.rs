@@ -1,4 +1,4 @@
-//! What a stage sends through: an [`Out`] for each port, in a struct of the stage's own.
+//! The outputs of a stage: an [`Out`] for each port, in a struct that the stage defines.
 
 use super::{OutputPort, PortType, StageError};
 use crate::message::{Blank, Channel, Filled, FixedText, LogTime, MessageFlags, MessageHeader, Write};
@@ -9,12 +9,12 @@ use std::marker::PhantomData;
 use std::ops::Deref;
 use std::rc::Rc;
 
-/// Where an output port leads: a link, or a list in a test.
+/// The destination of an output port: a link, or a list in a test.
 pub trait OutputSink {
-    /// Sends a message of which the bytes are there already; they are copied once.
+    /// Sends an encoded message; its bytes are copied once.
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError>;
 
-    /// Sends a message of `header.length` bytes that `write` writes in place, each once.
+    /// Sends a message of `header.length` bytes that `write` writes in place.
     fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError>;
 }
 
@@ -39,7 +39,7 @@ pub trait OutputSink {
 /// }
 /// ```
 pub trait Outputs: 'static {
-    /// Names the ports.
+    /// Declares the ports.
     fn declare(ports: &mut OutputPorts) -> Self;
 }
 
@@ -47,7 +47,7 @@ impl Outputs for () {
     fn declare(_: &mut OutputPorts) -> Self {}
 }
 
-/// Names the output ports of a stage kind, and ties those of a stage to their links.
+/// Declares the output ports of a stage kind, and connects those of a stage to their links.
 #[derive(Default)]
 pub struct OutputPorts {
     declared: Vec<OutputPort>,
@@ -56,7 +56,7 @@ pub struct OutputPorts {
     ends: std::vec::IntoIter<OutputEnd>,
 }
 
-/// Where an output port of a stage in a pipeline leads.
+/// The connection of an output port of a stage in a pipeline.
 #[derive(Default)]
 pub struct OutputEnd {
     /// The topic of its messages in a log, with `{robot}` for the robot's name.
@@ -65,7 +65,7 @@ pub struct OutputEnd {
     pub sink: Option<Box<dyn OutputSink>>,
 }
 
-/// What all outputs of a stage have in common.
+/// The state that all outputs of a stage share.
 #[derive(Default)]
 struct OutputState {
     log_time: Cell<LogTime>,
@@ -73,7 +73,7 @@ struct OutputState {
     counts: RefCell<BTreeMap<&'static str, u64>>,
 }
 
-/// One output port of a running stage, and how much went through it.
+/// An output port of a running stage, and the number of messages sent on it.
 struct Port {
     name: &'static str,
     topic: TopicTemplate,
@@ -82,18 +82,18 @@ struct Port {
 }
 
 impl OutputPorts {
-    /// The ports of a stage in a pipeline, which lead to these ends in the order in which they are declared.
+    /// The ports of a stage in a pipeline, connected to these ends in the order of their declaration.
     pub(super) fn connected_to(ends: Vec<OutputEnd>) -> Self {
         Self { ends: ends.into_iter(), ..Self::default() }
     }
 
-    /// An output whose messages get the topic `/{robot}/{stage}/{name}` or, if they are about no robot in particular,
+    /// Declares an output whose messages have the topic `/{robot}/{stage}/{name}` or, if they are about no robot in particular,
     /// `/{stage}/{name}`.
     pub fn output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: false, summary })
     }
 
-    /// An output whose messages have a topic of their own, with `{robot}` and `{stage}` for the names of these.
+    /// Declares an output whose messages have the given topic, in which `{robot}` and `{stage}` are replaced by the names.
     pub fn output_on<T: RosMessage>(
         &mut self,
         topic: &'static str,
@@ -103,18 +103,18 @@ impl OutputPorts {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: Some(topic), side: false, summary })
     }
 
-    /// The same as [`output`](Self::output), for what is beside what the stage is for, such as what it went by: where a
-    /// pipeline names the stage alone, this output is not meant.
+    /// Declares a side output, for diagnostics and other secondary messages: like [`output`](Self::output), but never the
+    /// output that is meant where a pipeline names only the stage.
     pub fn side_output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: true, summary })
     }
 
-    /// An output for messages of any type, each of a channel that is [announced](Out::announce) before it.
+    /// Declares an output for messages of any type, each of a channel that was [announced](Out::announce) before.
     pub fn any_output(&mut self, name: &'static str, summary: &'static str) -> Out<AnyMessage> {
         self.encoded_output(PortType::Any, name, summary)
     }
 
-    /// An output of a type that is known only when the program runs, for messages that are encoded already.
+    /// Declares an output for encoded messages of a type that is known only at run time.
     pub fn encoded_output(
         &mut self,
         port_type: PortType,
@@ -124,7 +124,7 @@ impl OutputPorts {
         self.add(OutputPort { name, port_type, topic: None, side: false, summary })
     }
 
-    /// The same, with all that is said of the port.
+    /// The same, with all properties of the port.
     pub fn encoded_port(&mut self, port: OutputPort) -> Out<AnyMessage> {
         self.add(port)
     }
@@ -151,7 +151,7 @@ impl OutputPorts {
     }
 }
 
-/// What a stage has sent and warned of, as the engine sees it.
+/// The numbers of messages, warnings and counts of a stage, for the engine.
 pub(super) struct SentCounts {
     ports: Vec<Rc<RefCell<Port>>>,
     state: Rc<OutputState>,
@@ -183,7 +183,7 @@ impl SentCounts {
     }
 }
 
-/// What a stage sends through while it handles a message: its outputs `O`, for which it stands, and what they have in common.
+/// The outputs `O` of a stage while it handles a message, with their shared log time, warnings and counts. Dereferences to `O`.
 pub struct Output<O> {
     outputs: O,
     state: Rc<OutputState>,
@@ -198,33 +198,33 @@ impl<O> Deref for Output<O> {
 }
 
 impl<O> Output<O> {
-    /// The log time that what is sent will carry, unless it brings its own: that of the message that is handled.
+    /// The log time of messages that are sent without one of their own: that of the message being handled.
     pub fn log_time(&self) -> LogTime {
         self.state.log_time.get()
     }
 
-    /// Sets the log time of what a source sends next.
+    /// Sets the log time of the messages that a source sends next.
     pub fn set_log_time(&self, log_time: LogTime) {
         self.state.log_time.set(log_time);
     }
 
-    /// Counts something that is wrong with the input and that the stage can live with, such as "readings before the
-    /// first pose". The run's summary shows every text with its count.
+    /// Counts a warning: a problem with the input that the stage can continue with, such as "readings before the first pose".
+    /// The summary of the run shows every text with its count.
     pub fn warn(&self, what: impl Into<String>) {
         *self.state.warnings.borrow_mut().entry(what.into()).or_default() += 1;
     }
 
-    /// Counts something that the stage has done, such as "searches". The run's summary shows it with the stage.
+    /// Counts something that the stage has done, such as "searches". The summary of the run shows it with the stage.
     pub fn count(&self, what: &'static str, more: u64) {
         *self.state.counts.borrow_mut().entry(what).or_default() += more;
     }
 }
 
-/// Stands for a message of any type where a port takes or gives such.
+/// The message type of a port for messages of any type.
 #[derive(Clone, Copy, Debug)]
 pub struct AnyMessage;
 
-/// An output port of a stage, for messages of type `T`. A port that nothing reads takes messages and drops them.
+/// An output port of a stage, for messages of type `T`. A port without readers drops its messages.
 pub struct Out<T> {
     port: Rc<RefCell<Port>>,
     state: Rc<OutputState>,
@@ -243,8 +243,8 @@ impl<T: RosMessage> Out<T> {
 }
 
 impl Out<OccupancyGrid<'static>> {
-    /// Sends a grid about `robot`, whose cells `fill` writes straight into the memory that the readers will see. A port that
-    /// nothing reads does not ask for them.
+    /// Sends a grid about `robot`, whose cells `fill` writes directly to the memory that the readers see. `fill` is not called
+    /// if the port has no readers.
     ///
     /// # Errors
     /// The grid is too large for the message, the robot's name too long, `fill` fails, or the link has failed.
@@ -264,12 +264,12 @@ impl Out<OccupancyGrid<'static>> {
 }
 
 impl<T> Out<T> {
-    /// Whether anything reads the port. What nobody reads need not be made.
+    /// Whether the port has readers. Without readers a message need not be computed.
     pub fn is_read(&self) -> bool {
         self.port.borrow().sink.is_some()
     }
 
-    /// Sends a message about `robot` that is encoded already.
+    /// Sends an encoded message about `robot`.
     ///
     /// # Errors
     /// The robot's name is too long, or the link has failed.
@@ -278,7 +278,7 @@ impl<T> Out<T> {
         self.send_encoded(header, bytes)
     }
 
-    /// Sends a message that is encoded already, with a header of its own: for sources, which bring topics and times.
+    /// Sends an encoded message with the given header, for sources, whose messages have topics and times.
     ///
     /// # Errors
     /// The link has failed.
@@ -332,14 +332,14 @@ impl<T> Out<T> {
     }
 }
 
-/// A topic with a place for the robot's name, and the last name that was put in.
+/// A topic with the placeholder `{robot}`, and the last robot and topic as a cache.
 struct TopicTemplate {
     template: String,
     last: Option<(FixedText<64>, FixedText<128>)>,
 }
 
 impl TopicTemplate {
-    /// A message about no robot in particular leaves the robot's part of the path out.
+    /// The topic for a robot. For a message about no robot in particular, the robot's part of the path is omitted.
     fn topic(&mut self, robot: FixedText<64>) -> Result<FixedText<128>, StageError> {
         if let Some((last_robot, topic)) = self.last
             && last_robot == robot

@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// A value of a parameter that its type allows and its meaning does not.
+/// An invalid value of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{field}` {problem}")]
 pub struct ParameterError {
@@ -23,31 +23,31 @@ impl ParameterError {
 }
 
 /// The parameters of a stage kind: a struct with `#[serde(default, deny_unknown_fields)]`, whose doc comments are the
-/// reference that `gridweave kinds` prints; or `()` for none. Lengths are metres, angles radians, times seconds. A field's
-/// range stands in its attributes: `#[schemars(range(min = 0.0, max = 1.0))]`, or `#[schemars(extend("exclusiveMinimum" = 0.0))]`
-/// where the limit itself is not allowed. Without one, a number must be finite.
+/// reference that `gridweave kinds` prints; or `()` for none. Lengths are in metres, angles in radians, times in seconds. The
+/// range of a field is an attribute: `#[schemars(range(min = 0.0, max = 1.0))]`, or
+/// `#[schemars(extend("exclusiveMinimum" = 0.0))]` if the limit itself is not allowed. Without a range, a number must be finite.
 pub trait Parameters: Serialize + DeserializeOwned + JsonSchema + Default + 'static {
-    /// What is wrong beside ranges, such as a least value above the greatest.
+    /// Errors that involve several parameters, such as a minimum above the maximum.
     fn check_together(&self) -> Vec<ParameterError> {
         Vec::new()
     }
 
-    /// Every value that is out of its range, and what is wrong beside.
+    /// All errors: values out of their ranges, and those of [`check_together`](Self::check_together).
     fn check(&self) -> Vec<ParameterError> {
         let mut errors = match toml::Table::try_from(self) {
             Ok(table) => out_of_range(Self::schema().as_value(), &table),
             Err(error) => vec![ParameterError::new("", format!("a value does not fit in TOML: {error}"))],
         };
-        let is_told = |error: &ParameterError| errors.iter().any(|told| told.field == error.field);
-        let together: Vec<ParameterError> = self.check_together().into_iter().filter(|error| !is_told(error)).collect();
+        let is_new = |error: &ParameterError| errors.iter().all(|other| other.field != error.field);
+        let together: Vec<ParameterError> = self.check_together().into_iter().filter(is_new).collect();
         errors.extend(together);
         errors
     }
 
-    /// The parameters as a pipeline file has them.
+    /// Reads the parameters of a pipeline file.
     ///
     /// # Errors
-    /// A value has another type, or there is no parameter of that name.
+    /// A value has the wrong type, or a parameter does not exist.
     fn read(table: toml::Table) -> Result<Self, toml::de::Error> {
         Self::deserialize(table)
     }

@@ -1,4 +1,4 @@
-//! The ports of a stage kind: what it takes and what it gives.
+//! The input and output ports of a stage kind.
 
 use crate::ros::RosMessage;
 use std::fmt;
@@ -8,7 +8,7 @@ use std::fmt;
 pub enum PortType {
     /// One ROS 2 type, by name.
     Ros(&'static str),
-    /// Any: each message's channel says what it is.
+    /// Any type: the channel of each message says which.
     Any,
 }
 
@@ -39,30 +39,30 @@ impl fmt::Display for PortType {
 /// An input of a stage kind.
 #[derive(Clone, Debug)]
 pub struct InputPort {
-    /// Its name.
+    /// The name of the port.
     pub name: &'static str,
-    /// The type it takes.
+    /// The type of its messages.
     pub port_type: PortType,
-    /// Whether any number of outputs may be wired to it; otherwise it is one.
+    /// Whether several outputs may be wired to it.
     pub many: bool,
     /// Whether it may be left unwired.
     pub optional: bool,
-    /// What it is for.
+    /// A description of its messages.
     pub summary: &'static str,
 }
 
 /// An output of a stage kind.
 #[derive(Clone, Debug)]
 pub struct OutputPort {
-    /// Its name.
+    /// The name of the port.
     pub name: &'static str,
-    /// The type it gives.
+    /// The type of its messages.
     pub port_type: PortType,
-    /// The topic that its messages get in a log, where it is not `/{robot}/{stage}/{port}` or, for messages about no robot in
-    /// particular, `/{stage}/{port}`; `{robot}` and `{stage}` are put in.
+    /// The topic of its messages in a log, in which `{robot}` and `{stage}` are replaced; if none, `/{robot}/{stage}/{port}` or,
+    /// for messages about no robot in particular, `/{stage}/{port}`.
     pub topic: Option<&'static str>,
-    /// Whether it is beside what the stage is for: the name of a stage alone stands for its only output that is not.
+    /// Whether it is a side output: where a pipeline names only a stage, its only output that is not a side output is meant.
     pub side: bool,
-    /// What it carries.
+    /// A description of its messages.
     pub summary: &'static str,
 }

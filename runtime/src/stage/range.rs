@@ -1,11 +1,11 @@
-//! The ranges of parameters, which the attributes of their fields give: `#[schemars(range(min = 0.0, max = 1.0))]`, or
-//! `#[schemars(extend("exclusiveMinimum" = 0.0))]` where the limit itself is not in it.
+//! The ranges of parameters, given by attributes of their fields: `#[schemars(range(min = 0.0, max = 1.0))]`, or
+//! `#[schemars(extend("exclusiveMinimum" = 0.0))]` if the limit itself is not allowed.
 
 use super::ParameterError;
 use serde_json::Value;
 use std::fmt;
 
-/// The numbers that a parameter may be.
+/// The allowed range of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
     least: Option<Limit>,
@@ -19,14 +19,14 @@ struct Limit {
 }
 
 impl Range {
-    /// The range that a JSON schema gives.
+    /// The range in a JSON schema.
     pub(crate) fn of(schema: &Value) -> Self {
         let limit = |inclusive: &str, exclusive: &str| {
             let value = |key: &str| schema.get(key).and_then(Value::as_f64);
             let allowed = value(inclusive).map(|value| Limit { value, is_allowed: true });
             value(exclusive).map(|value| Limit { value, is_allowed: false }).or(allowed)
         };
-        // Limits of a number's size in memory say nothing: nobody chose them.
+        // The limits of an integer type are no chosen range.
         let is_of_memory = |limit: &Limit| {
             let format = schema.get("format").and_then(Value::as_str).unwrap_or_default();
             matches!(
@@ -38,7 +38,7 @@ impl Range {
         Self { least: chosen(limit("minimum", "exclusiveMinimum")), most: chosen(limit("maximum", "exclusiveMaximum")) }
     }
 
-    /// Whether a number is in it. What is not finite is in none.
+    /// Whether a number is in the range. A number that is not finite never is.
     fn contains(&self, value: f64) -> bool {
         let is_above = self.least.is_none_or(|least| value > least.value || (least.is_allowed && value == least.value));
         let is_below = self.most.is_none_or(|most| value < most.value || (most.is_allowed && value == most.value));
@@ -67,7 +67,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// The values of a table that are out of the ranges that its schema gives them, each told once.
+/// The values of a table that are out of the ranges of its schema, one error for each.
 pub(crate) fn out_of_range(schema: &Value, table: &toml::Table) -> Vec<ParameterError> {
     let properties = schema.get("properties").and_then(Value::as_object).into_iter().flatten();
     let wrong = properties.filter_map(|(field, schema)| {
@@ -77,7 +77,7 @@ pub(crate) fn out_of_range(schema: &Value, table: &toml::Table) -> Vec<Parameter
     wrong.collect()
 }
 
-/// What is wrong with a number, or with the first of a list that is.
+/// The error of a number, or of the first wrong number of a list.
 fn problem(schema: &Value, value: &toml::Value) -> Option<String> {
     let value = match value {
         toml::Value::Float(value) => *value,
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_its_range_is_told_with_the_range() {
+    fn the_error_of_a_value_out_of_range_states_the_range() {
         let share = json!({ "minimum": 0.0, "maximum": 1.0 });
         assert!(problems(&share, 0.0).is_empty() && problems(&share, 1).is_empty());
         assert_eq!(problems(&share, 1.5), ["`a` must be from 0 to 1, not 1.5"]);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_of_a_size_in_memory_are_no_range() {
+    fn limits_of_an_integer_type_are_no_range() {
         let range = |schema: Value| Range::of(&schema).to_string();
         assert_eq!(range(json!({ "format": "uint16", "minimum": 1, "maximum": 65535 })), "at least 1");
         assert_eq!(range(json!({ "format": "uint8", "minimum": 0, "maximum": 255 })), "from 0 to 255");

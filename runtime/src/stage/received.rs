@@ -1,11 +1,11 @@
-//! A message as a stage is given it.
+//! A received message, decoded.
 
 use crate::message::{LogTime, Message};
 use crate::ros::RosMessage;
 use std::ops::Deref;
 
-/// A message that has come in on a port of type `T`, decoded. It stands for its content, and borrows what that can borrow,
-/// such as the cells of a map, from the memory that the message came in.
+/// A message received on a port of type `T`, decoded. It dereferences to its content, which borrows what it can, such as the
+/// cells of a map, from the memory of the message.
 pub struct Received<'a, T: RosMessage> {
     message: &'a Message,
     content: T::Borrowed<'a>,
@@ -21,22 +21,22 @@ impl<'a, T: RosMessage> Received<'a, T> {
         self.message.robot()
     }
 
-    /// When it was logged.
+    /// The time at which it was logged.
     pub fn log_time(&self) -> LogTime {
         self.message.header().log_time
     }
 
-    /// Which of the stage's wires it came on, as an index into [`Context::inputs`](super::Context::inputs).
+    /// The wire that it was received on, an index into [`Context::inputs`](super::Context::inputs).
     pub fn wire(&self) -> usize {
         self.message.wire()
     }
 
-    /// The message as it came. A clone of it keeps the bytes where they are, without copying them.
+    /// The encoded message. Cloning it keeps its memory borrowed, without copying the bytes.
     pub fn message(&self) -> &'a Message {
         self.message
     }
 
-    /// What the message says.
+    /// The decoded content.
     pub fn into_content(self) -> T::Borrowed<'a> {
         self.content
     }

@@ -1,4 +1,4 @@
-//! All stage kinds that a program knows.
+//! The stage kinds of a program.
 
 use super::StageKind;
 use std::collections::BTreeMap;
@@ -10,13 +10,13 @@ pub struct Registry {
 }
 
 impl Registry {
-    /// A registry of the given kinds. Of two kinds with one name the later one counts.
+    /// A registry of the given kinds. Of two kinds with the same name, the later one is used.
     pub fn new(kinds: impl IntoIterator<Item = StageKind>) -> Self {
         Self { kinds: kinds.into_iter().map(|kind| (kind.name, kind)).collect() }
     }
 
-    /// The parameters of kinds that no pipeline can set, as a stage's table has a key of that name with a meaning of its own:
-    /// `KIND.PARAMETER`, by name. A program whose registry has any is wrong.
+    /// The parameters of all kinds that no pipeline can set, because their names are reserved keys of a stage's table:
+    /// `KIND.PARAMETER`, by name. Any of them is a bug in the program.
     pub fn shadowed_parameters(&self) -> Vec<String> {
         self.kinds
             .values()
@@ -41,7 +41,7 @@ mod tests {
     use schemars::json_schema;
 
     #[test]
-    fn a_parameter_that_no_pipeline_can_set_is_named() {
+    fn parameters_with_reserved_names_are_listed() {
         let kind = |name, properties: serde_json::Value| {
             StageKind::external::<()>(name, "")
                 .with_schema(json_schema!({ "type": "object", "properties": properties }))

@@ -1,11 +1,11 @@
-//! The links of the run that a stage is part of, for a stage that shows elsewhere what passes on them.
+//! The links of a run, for a stage that forwards their messages.
 
 use super::StageError;
 use crate::message::Message;
 use std::fmt;
 use std::sync::Arc;
 
-/// A link of a run: an output of a stage that others read.
+/// A link of a run: an output of a stage that has readers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunLink {
     /// The stage that the output belongs to.
@@ -14,27 +14,26 @@ pub struct RunLink {
     pub output: String,
     /// The ROS 2 type of its messages; empty for any.
     pub ros_type: String,
-    /// The definition of that type, a text of the form `ros2msg`; empty if the stage brings none, as those of all types that
-    /// Gridweave knows do not.
+    /// The definition of that type in the format `ros2msg`; empty for types that Gridweave knows.
     pub definition: String,
 }
 
-/// A link that is looked on at. It changes nothing in the run: where it is not asked often enough, it misses messages.
+/// An observed link. Observing never affects the run: if [`take`](Self::take) is not called often enough, messages are missed.
 pub trait LinkView {
-    /// Takes what has passed since the last call: the messages, and the announcements of their channels.
+    /// Takes the messages since the last call, and the announcements of their channels.
     ///
     /// # Errors
     /// The link cannot be read.
     fn take(&mut self, take: &mut dyn FnMut(Message)) -> Result<(), StageError>;
 
-    /// How many messages it has missed.
+    /// The number of messages that were missed.
     fn missed(&self) -> u64;
 }
 
 type Open = dyn Fn(usize) -> Result<Option<Box<dyn LinkView>>, StageError> + Send + Sync;
 
-/// The links of a run, and a way to look on at each. What passes changes with the clock: nothing that a stage makes of its input
-/// may rest on it.
+/// The links of a run, each of which can be observed. The observed messages depend on timing: the outputs of a stage must not
+/// depend on them.
 #[derive(Clone)]
 pub struct RunLinks {
     links: Arc<[RunLink]>,
@@ -42,7 +41,7 @@ pub struct RunLinks {
 }
 
 impl RunLinks {
-    /// These links. `open` looks on at one of them, by its index.
+    /// The given links. `open` starts to observe one of them, by its index.
     pub fn new(
         links: impl IntoIterator<Item = RunLink>,
         open: impl Fn(usize) -> Result<Option<Box<dyn LinkView>>, StageError> + Send + Sync + 'static,
@@ -55,11 +54,11 @@ impl RunLinks {
         &self.links
     }
 
-    /// Looks on at one of them, by its index in [`all`](Self::all). A live link sends the last message of each topic again for it.
-    /// None if its stage has not made it yet.
+    /// Starts to observe a link, by its index in [`all`](Self::all). A live link repeats the last message of each topic for it.
+    /// None if its stage has not created it yet.
     ///
     /// # Errors
-    /// The run has gone, or too many look on.
+    /// The run has ended, or the link has the maximum number of observers.
     pub fn open(&self, link: usize) -> Result<Option<Box<dyn LinkView>>, StageError> {
         (self.open)(link)
     }

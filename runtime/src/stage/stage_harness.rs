@@ -1,4 +1,4 @@
-//! Running a stage by itself, for its tests and benches: messages in, and what it sends kept in lists.
+//! A harness that runs a single stage in tests and benches, and collects the messages that it sends.
 
 use super::{Context, Node, OutputEnd, OutputSink, StageError, StageKind};
 use crate::message::{FixedText, LogTime, Message, MessageHeader, Write, write_vec};
@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// A stage that runs by itself. Ports are named.
+/// A harness that runs a single stage. Ports are given by name.
 pub struct StageHarness {
     node: Node,
     kind: StageKind,
@@ -31,18 +31,18 @@ impl OutputSink for List {
 }
 
 impl StageHarness {
-    /// A stage of a kind, with parameters in TOML.
+    /// Creates a stage of a kind, with parameters in TOML.
     ///
     /// # Errors
-    /// The parameters are wrong, or the stage cannot begin.
+    /// The parameters are wrong, or the stage cannot be created.
     pub fn new(kind: &StageKind, parameters: &str) -> Result<Self, StageError> {
         Self::with_context(kind, parameters, &Context::default())
     }
 
-    /// The same, in a pipeline of which `context` tells.
+    /// The same, with information about its pipeline.
     ///
     /// # Errors
-    /// The parameters are wrong, or the stage cannot begin.
+    /// The parameters are wrong, or the stage cannot be created.
     pub fn with_context(kind: &StageKind, parameters: &str, context: &Context) -> Result<Self, StageError> {
         let parameters = parameters.parse().map_err(|error| StageError::new("read the parameters", error))?;
         let sent: Vec<Rc<RefCell<Vec<Message>>>> = kind.outputs.iter().map(|_| Rc::default()).collect();
@@ -53,7 +53,7 @@ impl StageHarness {
         Ok(Self { node: kind.make(parameters, context, ends.collect())?, kind: kind.clone(), sent })
     }
 
-    /// Gives the stage a message about `robot`, logged at `log_time`.
+    /// Passes the stage a message about `robot`, logged at `log_time`.
     ///
     /// # Errors
     /// There is no such input, the message cannot be encoded, or the stage fails.
@@ -68,7 +68,7 @@ impl StageHarness {
         self.give_bytes(input, robot, log_time, bytes)
     }
 
-    /// Gives the stage a message that is encoded already.
+    /// Passes the stage an encoded message.
     ///
     /// # Errors
     /// There is no such input, or the stage fails.
@@ -83,7 +83,7 @@ impl StageHarness {
         self.give_message(input, Message::from_vec(MessageHeader { log_time, robot, ..Default::default() }, bytes))
     }
 
-    /// Gives the stage a message with a header of its own.
+    /// Passes the stage an encoded message with the given header.
     ///
     /// # Errors
     /// There is no such input, or the stage fails.
@@ -95,7 +95,7 @@ impl StageHarness {
         self.node.receive(port, &message)
     }
 
-    /// Tells the stage that its inputs have ended, having come to `log_time`.
+    /// Notifies the stage that its inputs have ended, at `log_time`.
     ///
     /// # Errors
     /// The stage fails.
@@ -104,12 +104,12 @@ impl StageHarness {
         self.node.finish()
     }
 
-    /// The stage as an engine has it: for what is not to do with ports.
+    /// The stage as used by an engine, for everything except ports.
     pub fn node(&mut self) -> &mut Node {
         &mut self.node
     }
 
-    /// Takes what was sent on an output since the last call. An output that does not exist has nothing.
+    /// Takes the messages sent on an output since the last call; none for an output that does not exist.
     pub fn take_messages(&mut self, output: &str) -> Vec<Message> {
         let port = self.kind.outputs.iter().position(|port| port.name == output);
         port.map(|port| self.sent[port].take()).unwrap_or_default()
@@ -125,12 +125,12 @@ impl StageHarness {
         decoded.collect::<Result<_, _>>().map_err(|error| StageError::new(format!("read a {}", T::NAME), error))
     }
 
-    /// What was warned of, and how often.
+    /// The warnings, each with the number of times.
     pub fn warnings(&self) -> BTreeMap<String, u64> {
         self.node.warnings()
     }
 
-    /// What the stage has counted of its work.
+    /// The counts of what the stage has done.
     pub fn counts(&self) -> BTreeMap<String, u64> {
         self.node.counts()
     }

@@ -1,42 +1,41 @@
-//! What the stages of a run have done so far, for stages that show it.
+//! The statistics of a run, for stages that show them.
 
 use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
 
-/// What one stage has done so far.
+/// The statistics of one stage so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StageStatistics {
-    /// Its name in the pipeline.
+    /// The name of the stage in the pipeline.
     pub name: String,
-    /// How it stands: `absent`, `starting`, `running` or `ended`.
+    /// Its state: `absent`, `starting`, `running` or `ended`.
     pub state: &'static str,
-    /// Messages that it was given.
+    /// Messages that it has received.
     pub messages_in: u64,
     /// Messages that it has sent.
     pub messages_out: u64,
-    /// How long it has worked, milliseconds.
+    /// Its working time, milliseconds.
     pub busy_ms: f64,
-    /// Messages that were dropped on their way to it because there was no room.
+    /// Messages to it that were dropped because it had not granted credit for them.
     pub dropped: u64,
-    /// How often it was started again after a failure.
+    /// How often it was restarted after a failure.
     pub restarts: u64,
-    /// How often it has warned of something.
+    /// The number of its warnings.
     pub warnings: u64,
 }
 
-/// Tells what the stages of a run have done so far. It changes with the clock: nothing that a stage makes of its input may rest
-/// on it.
+/// The statistics of the stages of a run. They depend on timing: the outputs of a stage must not depend on them.
 #[derive(Clone)]
 pub struct RunStatistics(Arc<dyn Fn() -> Vec<StageStatistics> + Send + Sync>);
 
 impl RunStatistics {
-    /// Tells what `now` gives.
+    /// Statistics that are read by `now`.
     pub fn new(now: impl Fn() -> Vec<StageStatistics> + Send + Sync + 'static) -> Self {
         Self(Arc::new(now))
     }
 
-    /// All stages, in the order of the pipeline.
+    /// The current statistics of all stages, in the order of the pipeline.
     pub fn now(&self) -> Vec<StageStatistics> {
         (self.0)()
     }
