@@ -1,21 +1,21 @@
-//! Memory of a message that nobody has written yet, and the proof that it was written.
+//! Uninitialized memory of a message, and the proof that it was initialized.
 //!
-//! A sender lends the memory that its readers will see as a [`Blank`]. What writes it gives a [`Filled`] back, which can
-//! be had in no other way than by writing all of a blank. So no byte is written twice, and none is sent unwritten.
+//! A sender lends the memory that its readers will see as a [`Blank`]. The writer returns a [`Filled`], which can only be
+//! obtained by writing all of a blank. So no byte is written twice, and none is sent uninitialized.
 
 use crate::stage::StageError;
 use std::mem::MaybeUninit;
 use std::ops::{Deref, DerefMut};
 
-/// Memory that is to be written, of the length that was asked for.
+/// Uninitialized memory that is to be written completely.
 #[derive(Debug)]
 pub struct Blank<'a>(&'a mut [MaybeUninit<u8>]);
 
-/// Memory of a [`Blank`], all of it written.
+/// The memory of a [`Blank`] after it was written completely.
 #[derive(Debug)]
 pub struct Filled<'a>(&'a mut [u8]);
 
-/// What writes a message in place.
+/// A function that writes a message in place.
 pub type Write<'w> = dyn for<'a> FnMut(Blank<'a>) -> Result<Filled<'a>, StageError> + 'w;
 
 impl<'a> Blank<'a> {
@@ -23,7 +23,7 @@ impl<'a> Blank<'a> {
         Self(memory)
     }
 
-    /// How many bytes are to be written.
+    /// The number of bytes to be written.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -33,7 +33,7 @@ impl<'a> Blank<'a> {
         self.0.is_empty()
     }
 
-    /// Writes the same value everywhere.
+    /// Fills the memory with one value.
     pub fn fill_with(self, value: u8) -> Filled<'a> {
         self.0.fill(MaybeUninit::new(value));
         // SAFETY: each byte was written.
@@ -53,7 +53,7 @@ impl<'a> Blank<'a> {
         }
     }
 
-    /// Copies the cells of a grid, as many as there are bytes.
+    /// Copies the cells of a grid of the same length.
     ///
     /// # Errors
     /// The lengths differ.
@@ -61,16 +61,16 @@ impl<'a> Blank<'a> {
         self.copy_from(bytemuck::cast_slice(cells))
     }
 
-    /// Copies `head` to the beginning, and has `rest` write what follows.
+    /// Copies `head` to the beginning, and lets `rest` write the remaining memory.
     ///
     /// # Errors
-    /// There is no room for `head`, or `rest` fails or gives other memory back than it was given.
+    /// `head` is too long, or `rest` fails or returns other memory than it was given.
     pub fn copy_then(self, head: &[u8], rest: &mut Write<'_>) -> Result<Filled<'a>, StageError> {
         if head.len() > self.len() {
             return Err(wrong(head.len(), self.len()));
         }
-        let (place, tail) = self.0.split_at_mut(head.len());
-        place.write_copy_of_slice(head);
+        let (start, tail) = self.0.split_at_mut(head.len());
+        start.write_copy_of_slice(head);
         write_all(tail, rest)?;
         // SAFETY: the head was copied, and `write_all` has succeeded for the rest.
         #[allow(unsafe_code)]
@@ -100,11 +100,11 @@ impl DerefMut for Filled<'_> {
     }
 }
 
-/// Has `write` write all of `memory`. When this succeeds, every byte of it is written.
+/// Lets `write` write all of `memory`. If this succeeds, every byte is initialized.
 pub(crate) fn write_all(memory: &mut [MaybeUninit<u8>], write: &mut Write<'_>) -> Result<(), StageError> {
     let (start, length) = (memory.as_ptr().cast::<u8>(), memory.len());
     let filled = write(Blank::new(memory))?;
-    // A `Filled` comes from a blank of the same place and length, and two of these cannot be there at once.
+    // A `Filled` with this address and length can only come from this blank, as no two blanks overlap.
     match filled.0.as_ptr() == start && filled.0.len() == length {
         true => Ok(()),
         false => {
@@ -113,22 +113,22 @@ pub(crate) fn write_all(memory: &mut [MaybeUninit<u8>], write: &mut Write<'_>) -
     }
 }
 
-/// A buffer of `length` bytes that `write` writes, in the memory of `buffer`: for a sink that keeps messages on the heap.
+/// Lets `write` write a buffer of `length` bytes, reusing the memory of `buffer`; for a sink with messages on the heap.
 ///
 /// # Errors
-/// `write` fails, or gives other memory back than it was given.
+/// `write` fails, or returns other memory than it was given.
 #[allow(unsafe_code)]
 pub fn write_vec(mut buffer: Vec<u8>, length: usize, write: &mut Write<'_>) -> Result<Vec<u8>, StageError> {
     buffer.clear();
     buffer.reserve_exact(length);
     write_all(&mut buffer.spare_capacity_mut()[..length], write)?;
-    // SAFETY: `length` is within the capacity, and `write_all` has succeeded, so that so many bytes are written.
+    // SAFETY: `length` is within the capacity, and `write_all` has succeeded, so that many bytes are initialized.
     unsafe { buffer.set_len(length) };
     Ok(buffer)
 }
 
-fn wrong(given: usize, room: usize) -> StageError {
-    StageError::new("write a message in place", format!("{given} bytes are given for {room}"))
+fn wrong(given: usize, expected: usize) -> StageError {
+    StageError::new("write a message in place", format!("{given} bytes were given, {expected} expected"))
 }
 
 #[cfg(test)]
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_of_another_message_is_no_proof() {
+    fn memory_of_another_message_is_rejected() {
         let other = || Blank::new(Box::leak(Box::new([MaybeUninit::uninit(); 4]))).fill_with(0);
         assert!(written(4, &mut |_| Ok(other())).is_err());
         let mut whole = [MaybeUninit::uninit(); 4];

@@ -1,12 +1,12 @@
-//! How a message of any type names its type: the channel that it was logged on.
+//! The channel of a message in a log, which defines its type.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A channel of a log: the topic, the type and the schema of the messages on it.
+/// A channel of a log: the topic, the type and the schema of its messages.
 ///
-/// A source announces a channel on a link before the first message of it, so that a sink can write messages of types
-/// that this program does not know, with all that their log says of them.
+/// A source announces a channel on a link before its first message, so that a sink can write messages of types that this
+/// program does not know, with all the information of the input log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Channel {
     /// The topic, as in the input.
@@ -20,17 +20,17 @@ pub struct Channel {
     /// The schema.
     #[serde(with = "serde_bytes")]
     pub schema: Vec<u8>,
-    /// What else the log says of the channel, such as quality of service.
+    /// Further information of the log about the channel, such as its quality of service.
     pub metadata: BTreeMap<String, String>,
 }
 
 impl Channel {
-    /// The channel as bytes: CDR, as any message.
+    /// Encodes the channel as CDR, like any message.
     pub fn encode(&self) -> Result<Vec<u8>, crate::ros::EncodeError> {
         crate::ros::encode(self)
     }
 
-    /// Reads what [`encode`](Self::encode) wrote.
+    /// Decodes a channel that was encoded by [`encode`](Self::encode).
     pub fn decode(bytes: &[u8]) -> Result<Self, crate::ros::DecodeError> {
         crate::ros::decode(bytes)
     }
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_channel_comes_back_as_it_went_in() {
+    fn decoding_an_encoded_channel_gives_the_same_channel() {
         let channel = Channel {
             topic: "/robot1/scan".into(),
             message_encoding: "cdr".into(),

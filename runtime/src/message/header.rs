@@ -1,15 +1,15 @@
-//! The header that goes with every message, the same in shared memory as in the code.
+//! The header of every message, with the same layout in shared memory and in the code.
 
 use super::{FixedText, LogTime};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// The most bytes of a robot's name.
+/// The maximum length of a robot's name, bytes.
 pub const LONGEST_ROBOT_NAME: usize = 64;
 
-/// The most bytes of a topic's name.
+/// The maximum length of a topic, bytes.
 pub const LONGEST_TOPIC: usize = 128;
 
-/// What a message is, as bits.
+/// The kind of a message, as bit flags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
 pub struct MessageFlags(pub u32);
@@ -17,13 +17,13 @@ pub struct MessageFlags(pub u32);
 impl MessageFlags {
     /// The bytes are a ROS 2 message.
     pub const DATA: Self = Self(1);
-    /// Nothing before `log_time` will follow on this link. There are no bytes.
+    /// No message before `log_time` will follow on this link. There is no payload.
     pub const WATERMARK: Self = Self(2);
-    /// The stream ends here. There are no bytes.
+    /// The stream ends here. There is no payload.
     pub const END: Self = Self(4);
     /// The bytes are a [`Channel`](super::Channel): the next messages with the same `channel` were logged there.
     pub const CHANNEL: Self = Self(8);
-    /// The message was sent before, and is sent again for a reader that has come since.
+    /// The message is sent again for late joiners.
     pub const REPEATED: Self = Self(16);
 
     /// Whether all bits of `other` are set.
@@ -32,32 +32,31 @@ impl MessageFlags {
     }
 }
 
-/// What goes with every message.
+/// The header of a message.
 ///
-/// In shared memory it is laid out as `#[repr(C)]`, little-endian, 240 bytes; it is part of version 4 of the link
-/// protocol.
+/// Its layout in shared memory is `#[repr(C)]`, little-endian, 240 bytes. It is part of version 4 of the link protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
 pub struct MessageHeader {
-    /// Counts the messages of one link, from 0.
+    /// The sequence number of the message on its link, from 0.
     pub sequence: u64,
-    /// When the message was logged. A stage's output carries the time of the input that caused it.
+    /// When the message was logged. An output of a stage has the log time of the input that caused it.
     pub log_time: LogTime,
-    /// When the message was published, in nanoseconds; kept from the log.
+    /// When the message was published, nanoseconds, as in the input log.
     pub publish_time: u64,
     /// The number of payload bytes that belong to the message.
     pub length: u64,
-    /// What it is.
+    /// The kind of the message.
     pub flags: MessageFlags,
-    /// The channel it was logged on, as announced on the same link; 0 for what a stage has made.
+    /// The number of the channel that it was logged on, as announced on the same link; 0 for the output of a stage.
     pub channel: u32,
-    /// Its sequence number in the log it came from.
+    /// Its sequence number in the input log.
     pub log_sequence: u32,
     /// Zero.
     pub reserved: u32,
     /// The robot it is about; empty if none in particular.
     pub robot: FixedText<LONGEST_ROBOT_NAME>,
-    /// The topic that it has, or will have, in a log.
+    /// Its topic in a log.
     pub topic: FixedText<LONGEST_TOPIC>,
 }
 
@@ -65,23 +64,23 @@ impl MessageHeader {
     /// The size in memory, bytes.
     pub const SIZE: usize = 240;
 
-    /// The header as it lies in memory.
+    /// The header as in memory.
     pub fn to_bytes(&self) -> [u8; Self::SIZE] {
         let mut bytes = [0; Self::SIZE];
         let words = [self.sequence, self.log_time.0, self.publish_time, self.length];
-        for (place, word) in bytes[..32].chunks_exact_mut(8).zip(words) {
-            place.copy_from_slice(&word.to_le_bytes());
+        for (target, word) in bytes[..32].chunks_exact_mut(8).zip(words) {
+            target.copy_from_slice(&word.to_le_bytes());
         }
         let halves = [self.flags.0, self.channel, self.log_sequence, self.reserved];
-        for (place, half) in bytes[32..48].chunks_exact_mut(4).zip(halves) {
-            place.copy_from_slice(&half.to_le_bytes());
+        for (target, half) in bytes[32..48].chunks_exact_mut(4).zip(halves) {
+            target.copy_from_slice(&half.to_le_bytes());
         }
         bytes[48..112].copy_from_slice(self.robot.as_bytes());
         bytes[112..].copy_from_slice(self.topic.as_bytes());
         bytes
     }
 
-    /// Reads what [`to_bytes`](Self::to_bytes) wrote. `None` unless there are [`SIZE`](Self::SIZE) bytes.
+    /// The header of the bytes of [`to_bytes`](Self::to_bytes). `None` unless there are [`SIZE`](Self::SIZE) bytes.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; Self::SIZE] = bytes.try_into().ok()?;
         let word = |at: usize| Some(u64::from_le_bytes(bytes[at..at + 8].try_into().ok()?));
@@ -114,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_comes_back_as_it_went_in() {
+    fn reading_a_written_header_gives_the_same_header() {
         let header = MessageHeader {
             sequence: 1,
             log_time: LogTime(2),

@@ -1,4 +1,4 @@
-//! Messages: a header, and the bytes of a ROS 2 message in CDR that may lie in shared memory.
+//! Messages: a header, and the bytes of a ROS 2 message in CDR, possibly in shared memory.
 
 mod blank;
 mod channel;
@@ -18,7 +18,7 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Memory that holds the bytes of one or more messages: a sample in shared memory, or a buffer on the heap.
+/// Memory with the bytes of one or more messages: a sample in shared memory, or a buffer on the heap.
 pub trait Storage {
     /// All bytes of this memory.
     fn bytes(&self) -> &[u8];
@@ -37,10 +37,10 @@ impl Storage for Arc<Vec<u8>> {
     }
 }
 
-/// One message, borrowed from the memory it came in.
+/// A message, borrowed from the memory that it was received in.
 ///
-/// Cloning it copies the header and no bytes. The memory is given back to its sender when the last clone is dropped,
-/// so a stage may keep a map for as long as it needs it.
+/// Cloning it copies the header, but no payload. The memory is released to its sender when the last clone is dropped, so a
+/// stage may keep a map for as long as it needs it.
 #[derive(Clone)]
 pub struct Message {
     header: MessageHeader,
@@ -50,7 +50,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// A message whose bytes are the given range of `storage`. `None` if the range lies outside of it.
+    /// A message whose bytes are the given range of `storage`. `None` if the range is out of bounds.
     pub fn new(header: MessageHeader, storage: Rc<dyn Storage>, range: Range<usize>) -> Option<Self> {
         storage.bytes().get(range.clone())?;
         Some(Self { header, storage, range, wire: 0 })
@@ -62,7 +62,7 @@ impl Message {
         Self { header, storage: Rc::new(bytes), range, wire: 0 }
     }
 
-    /// When it was logged, who it is about, and where it came from.
+    /// The header.
     pub fn header(&self) -> &MessageHeader {
         &self.header
     }
@@ -78,19 +78,19 @@ impl Message {
         self.header.robot.as_str()
     }
 
-    /// Which of the reader's wires it came on, as an index among all wires of the reading stage.
+    /// The wire that it was received on, an index among all wires of the reading stage.
     pub fn wire(&self) -> usize {
         self.wire
     }
 
-    /// The same message, come on another wire.
+    /// The same message with another wire.
     #[must_use]
     pub fn on_wire(mut self, wire: usize) -> Self {
         self.wire = wire;
         self
     }
 
-    /// Decodes the message as the ROS 2 type `T`, borrowing what `T` can borrow.
+    /// Decodes the message as the ROS 2 type `T`, which may borrow from it.
     pub fn decode<'a, T: serde::Deserialize<'a>>(&'a self) -> Result<T, crate::ros::DecodeError> {
         crate::ros::decode(self.bytes())
     }

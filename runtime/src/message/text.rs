@@ -1,18 +1,18 @@
-//! Short text of a fixed size, as it stands in shared memory.
+//! Short text of a fixed size, for shared memory.
 
 use iceoryx2::prelude::ZeroCopySend;
 use std::fmt;
 
 /// UTF-8 text of at most `N` bytes, padded with zero bytes.
 ///
-/// It has the same layout in every language: `N` bytes, no length, no terminator when it is full.
+/// It has the same layout in every language: `N` bytes, no length, and no terminator if it is full.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, ZeroCopySend)]
 #[repr(C)]
 pub struct FixedText<const N: usize> {
     bytes: [u8; N],
 }
 
-/// A text does not fit the fixed size that shared memory gives it.
+/// A text is too long for its fixed size.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` has {length} bytes, and at most {limit} fit: choose a shorter name")]
 pub struct TextTooLong {
@@ -20,25 +20,25 @@ pub struct TextTooLong {
     pub text: String,
     /// Its length in bytes.
     pub length: usize,
-    /// The most that fit.
+    /// The maximum length in bytes.
     pub limit: usize,
 }
 
 impl<const N: usize> FixedText<N> {
-    /// No text.
+    /// The empty text.
     pub const EMPTY: Self = Self { bytes: [0; N] };
 
     /// `text` in its fixed form.
     pub fn new(text: &str) -> Result<Self, TextTooLong> {
         let mut bytes = [0; N];
         match bytes.get_mut(..text.len()) {
-            Some(place) => place.copy_from_slice(text.as_bytes()),
+            Some(target) => target.copy_from_slice(text.as_bytes()),
             None => return Err(TextTooLong { text: text.to_owned(), length: text.len(), limit: N }),
         }
         Ok(Self { bytes })
     }
 
-    /// The text. Bytes from outside that are no UTF-8 are cut at the first bad one.
+    /// The text, up to the first byte that is not valid UTF-8.
     pub fn as_str(&self) -> &str {
         let end = self.bytes.iter().position(|&byte| byte == 0).unwrap_or(N);
         let bytes = &self.bytes[..end];
@@ -53,12 +53,12 @@ impl<const N: usize> FixedText<N> {
         &self.bytes
     }
 
-    /// A text that is in its fixed form already.
+    /// The text of its fixed form.
     pub fn from_bytes(bytes: [u8; N]) -> Self {
         Self { bytes }
     }
 
-    /// Whether there is no text.
+    /// Whether the text is empty.
     pub fn is_empty(&self) -> bool {
         self.bytes.first().is_none_or(|&byte| byte == 0)
     }
@@ -87,14 +87,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_comes_back_as_it_went_in() {
+    fn a_text_that_fits_is_unchanged() {
         for text in ["", "robot1", "Größe", "12345678"] {
             assert_eq!(FixedText::<8>::new(text).unwrap().as_str(), text);
         }
     }
 
     #[test]
-    fn too_long_a_text_is_refused() {
+    fn a_text_that_is_too_long_is_rejected() {
         let error = FixedText::<8>::new("123456789").unwrap_err();
         assert_eq!((error.length, error.limit), (9, 8));
     }

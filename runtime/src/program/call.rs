@@ -1,9 +1,9 @@
-//! A program as its stage calls it: the shared memory between them, and one call at a time.
+//! Calls of a program by its stage, over shared memory, one at a time.
 
 use super::header::{CALL_VERSION, CallHeader, Reply, Request};
-use super::process::{Launch, ProcessError, Process};
+use super::process::{Launch, Process, ProcessError};
 use crate::engine::RunFolder;
-use crate::link::{LinkError, SharedMemory, RunNames};
+use crate::link::{LinkError, RunNames, SharedMemory};
 use crate::message::MessageHeader;
 use crate::stage::StageError;
 use iceoryx2::node::Node;
@@ -15,24 +15,24 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::fmt::Debug;
 use std::time::Duration;
 
-/// How many samples of a program may wait for its stage.
+/// The credits of a program: the samples that may be pending for its stage.
 pub const CREDITS: usize = 16;
-/// How many messages a program may hold without copying them.
+/// The maximum number of messages that a program may borrow without copying them.
 const MAX_BORROWED: usize = 32;
-/// So long a program may take to come to the end of a call when nothing that it sends is of use any more.
+/// The time that a program has to end a call after its stage has failed.
 const END_TIME: Duration = Duration::from_secs(5);
-/// So much sooner than the engine gives up on the stage a call is given up, at the most: the program then says where it hangs.
+/// The maximum time by which a call times out before the engine kills the stage, so that the program can report where it hangs.
 const REPORT_MARGIN: Duration = Duration::from_secs(2);
-/// For how large a payload, in bytes, room is set aside before the first is sent.
+/// The initial capacity of each sample, bytes of payload.
 const INITIAL_CAPACITY: usize = 4 * 1024;
 
-/// A program that runs, and the memory that it shares with its stage.
+/// A running program, and the memory that it shares with its stage.
 pub(super) struct Program {
     process: Process,
     ports: Option<Ports>,
     folder: Option<RunFolder>,
     shared_memory: SharedMemory,
-    /// How long a call may take.
+    /// The maximum time of a call.
     longest: Option<Duration>,
     /// Whether it can still be called.
     is_alive: bool,
@@ -55,7 +55,8 @@ impl Ports {
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|error| failed("send to a program")(&error))?;
-        let subscriber = from.subscriber_builder().create().map_err(|error| failed("hear from a program")(&error))?;
+        let subscriber =
+            from.subscriber_builder().create().map_err(|error| failed("receive from a program")(&error))?;
         Ok(Self { publisher, subscriber, _node: node })
     }
 }
@@ -63,11 +64,11 @@ impl Ports {
 fn open(
     node: &Node<Service>,
     names: &RunNames,
-    way: &str,
+    direction: &str,
     buffer: usize,
 ) -> Result<PortFactory<Service, [u8], CallHeader>, LinkError> {
     SharedMemory::default().check_free(0, || "share memory with a program".to_owned())?;
-    node.service_builder(&names.call(way)?)
+    node.service_builder(&names.call(direction)?)
         .publish_subscribe::<[u8]>()
         .user_header::<CallHeader>()
         .enable_safe_overflow(false)
@@ -86,25 +87,29 @@ fn failed(doing: &str) -> impl FnOnce(&dyn Debug) -> LinkError {
 }
 
 impl Program {
-    /// Starts a program, of which each call may take `longest`.
+    /// Starts a program, each call of which may take `longest`.
     pub(super) fn start(launch: &Launch, longest: Option<Duration>) -> Result<Self, StageError> {
         let program = || format!("run `{}`", launch.program.display());
         let folder = RunFolder::create().map_err(|error| StageError::new(program(), error))?;
         let ports = Ports::open(&folder.names()).map_err(|error| StageError::new(program(), error))?;
         let process = Process::start(launch, folder.path()).map_err(|error| StageError::new(program(), error))?;
         let (ports, folder) = (Some(ports), Some(folder));
-        // A little before the engine would end the stage, which could not say where its program hangs.
+        // A little before the engine would kill the stage, which could not report where its program hangs.
         let longest = longest.map(|longest| longest - (longest / 4).min(REPORT_MARGIN));
-        let mut started = Self { process, ports, folder, shared_memory: SharedMemory::default(), longest, is_alive: true };
+        let mut started =
+            Self { process, ports, folder, shared_memory: SharedMemory::default(), longest, is_alive: true };
         match started.process.wait(longest) {
             Ok(b'r') => Ok(started),
-            Ok(other) => Err(StageError::new(program(), format!("it rings {other}, which says nothing"))),
+            Ok(other) => Err(StageError::new(
+                program(),
+                format!("it wrote the byte {other} to its standard output, which is not part of the protocol"),
+            )),
             Err(lost) => Err(StageError::new(program(), lost)),
         }
     }
 
-    /// Calls the program, and hands to `take` what it sends and warns of, until that fails. When this has failed otherwise, so
-    /// have all later calls.
+    /// Calls the program, and passes its outputs and warnings to `take` until `take` fails. After any other failure all later
+    /// calls do nothing.
     pub(super) fn call(
         &mut self,
         what: Request,
@@ -117,7 +122,8 @@ impl Program {
         }
         let (port, wire) = (port as u32, wire as u32);
         let header = CallHeader { version: CALL_VERSION, what: what as u32, port, wire, message: *message };
-        let result = self.send_request(header, bytes).map_err(CallError::from).and_then(|()| self.receive_replies(take));
+        let result =
+            self.send_request(header, bytes).map_err(CallError::from).and_then(|()| self.receive_replies(take));
         self.is_alive &= matches!(result, Ok(()) | Err(CallError::Stage(_)));
         result
     }
@@ -136,13 +142,13 @@ impl Program {
         Ok(())
     }
 
-    /// Hears what the program says until it is done.
+    /// Receives the replies of the program until it is done.
     fn receive_replies(
         &mut self,
         mut take: impl FnMut(Reply, &CallHeader, &[u8]) -> Result<(), StageError>,
     ) -> Result<(), CallError> {
         let Some(ports) = &self.ports else { return Ok(()) };
-        // What cannot be passed on ends the run, and the program comes to the end of its call, so that it can be told.
+        // An output that cannot be forwarded ends the run. The program still completes its call, so that it can be aborted.
         let mut refused: Option<StageError> = None;
         loop {
             let longest = match refused {
@@ -153,8 +159,10 @@ impl Program {
                 self.is_alive = false;
                 return Err(refused.map_or(CallError::Process(lost), CallError::Stage));
             }
-            let sample =
-                ports.subscriber.receive().map_err(|error| CallError::Link(failed("hear from a program")(&error)))?;
+            let sample = ports
+                .subscriber
+                .receive()
+                .map_err(|error| CallError::Link(failed("receive from a program")(&error)))?;
             let header = sample.as_ref().map(|sample| *sample.user_header()).unwrap_or_default();
             let reply = Reply::of(header.what).filter(|_| header.version == CALL_VERSION);
             let (Some(sample), Some(reply)) = (sample, reply) else { return Err(CallError::Protocol) };
@@ -176,7 +184,7 @@ impl Drop for Program {
     fn drop(&mut self) {
         self.process.end();
         self.ports = None;
-        // What cannot be removed is removed with what killed runs leave.
+        // What cannot be removed is left to the cleanup after killed runs.
         let _ = self.folder.take().map(RunFolder::remove);
     }
 }
@@ -184,22 +192,22 @@ impl Drop for Program {
 /// Why a call has failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CallError {
-    /// The program says so itself.
+    /// The program has reported a failure.
     #[error("{0}")]
     Failed(String),
-    /// The program is no more.
+    /// The process of the program has ended or hangs.
     #[error("{0}")]
     Process(ProcessError),
-    /// The memory between them fails.
+    /// The shared memory failed.
     #[error("{0}")]
     Link(LinkError),
-    /// There is none for what is to be said.
-    #[error("there is no room left in /dev/shm, which it needs on every engine; make room there")]
+    /// The shared memory is full.
+    #[error("there is no space left in /dev/shm, which it needs on every engine; free some")]
     Full,
-    /// It does not keep to the protocol.
-    #[error("it rings without saying anything that is known")]
+    /// The program violates the protocol.
+    #[error("it sent no known sample with its doorbell; its version of the protocol may differ")]
     Protocol,
-    /// What it says cannot be passed on.
+    /// An output of the program could not be forwarded.
     #[error("{0}")]
     Stage(StageError),
 }

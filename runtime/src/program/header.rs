@@ -1,4 +1,4 @@
-//! What goes with every sample between a stage and its program.
+//! The header of every sample between a stage and its program.
 
 use crate::message::MessageHeader;
 use iceoryx2::prelude::ZeroCopySend;
@@ -13,17 +13,17 @@ pub const CALL_VERSION: u32 = 1;
 pub struct CallHeader {
     /// [`CALL_VERSION`].
     pub version: u32,
-    /// What it says, as a number.
+    /// The kind of the sample, as a number.
     pub what: u32,
-    /// The input or output port, by its place in the interface.
+    /// The index of the input or output port in the interface.
     pub port: u32,
-    /// The wire that a message has come on.
+    /// The wire that a message was received on.
     pub wire: u32,
     /// The header of the message.
     pub message: MessageHeader,
 }
 
-/// What a sample to a program says.
+/// The kind of a sample to a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Request {
     Start = 1,
@@ -33,7 +33,7 @@ pub(super) enum Request {
     Next = 5,
 }
 
-/// What a sample of a program says.
+/// The kind of a sample from a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Reply {
     Output,
@@ -44,7 +44,7 @@ pub(super) enum Reply {
 }
 
 impl Reply {
-    /// By its number.
+    /// The reply with the given number.
     pub(super) fn of(what: u32) -> Option<Self> {
         Some(match what {
             16 => Self::Output,

@@ -1,4 +1,4 @@
-//! What a program says of its stage: its ports and parameters.
+//! The interface of a program's stage: its ports and parameters.
 
 use super::header::CALL_VERSION;
 use crate::stage::{InputPort, OutputPort, PortType, RESERVED_KEYS};
@@ -6,7 +6,7 @@ use schemars::Schema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// The ports and parameters of a stage that is a program, as that says in JSON:
+/// The ports and parameters of a stage that is a program, in JSON:
 ///
 /// ```
 /// # use gridweave_runtime::program::Interface;
@@ -20,22 +20,21 @@ use std::collections::BTreeMap;
 /// assert_eq!(Interface::read(text).unwrap().inputs[0].name, "map");
 /// ```
 ///
-/// An input may say `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a
-/// JSON schema. `definitions` may hold, by the name of a port's type that nobody else knows, its definition as a text of the form
-/// `ros2msg`.
+/// An input may have `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a
+/// JSON schema. `definitions` contains the definitions of custom types of ports in the format `ros2msg`, by name.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// What the stage does.
     pub summary: &'static str,
-    /// Its inputs, in the order that breaks ties; none of a source.
+    /// Its inputs, in the order that breaks ties; empty for a source.
     pub inputs: Vec<InputPort>,
     /// Its outputs.
     pub outputs: Vec<OutputPort>,
     /// The JSON schema of its parameters.
     pub parameters: Schema,
-    /// The definitions of types of its own, by their names.
+    /// The definitions of custom types, by name.
     pub definitions: BTreeMap<String, String>,
-    /// The text that this was read from.
+    /// The JSON text of the interface.
     pub text: String,
 }
 
@@ -68,32 +67,35 @@ struct WrittenPort {
 }
 
 impl Interface {
-    /// Reads what a program says of itself. Its texts are kept for as long as this program runs, as those of all stage kinds are.
+    /// Reads the interface of a program. Its texts are never freed, like those of all stage kinds.
     ///
     /// # Errors
-    /// It is no such JSON, is of another version of the protocol, or a stage cannot have such ports: why not.
+    /// The JSON is invalid, has another version of the protocol, or describes impossible ports; the text says why.
     pub fn read(text: &str) -> Result<Self, String> {
-        let written: Written = serde_json::from_str(text).map_err(|error| format!("it is not understood: {error}"))?;
+        let written: Written = serde_json::from_str(text).map_err(|error| format!("it cannot be read: {error}"))?;
         if written.protocol != CALL_VERSION {
             let protocol = written.protocol;
-            return Err(format!("it speaks protocol {protocol} of a call, and this program speaks {CALL_VERSION}"));
+            return Err(format!("it has version {protocol} of the call protocol, and this program has {CALL_VERSION}"));
         }
         if written.inputs.is_empty() && written.outputs.is_empty() {
             return Err("it has neither inputs nor outputs".to_owned());
         }
         let ports = || written.inputs.iter().chain(&written.outputs);
         if let Some(name) = ports().map(|port| &port.name).find(|name| !is_port_name(name)) {
-            return Err(format!("`{name}` is no name for a port: expected lower-case letters, digits and `_`"));
+            return Err(format!("`{name}` is not a valid port name: expected lower-case letters, digits and `_`"));
         }
         if let Some(port) = ports().find(|port| !is_ros_type(&port.ros_type)) {
-            return Err(format!("the port `{}` has the type `{}`, which is no ROS 2 type", port.name, port.ros_type));
+            return Err(format!(
+                "the port `{}` has the type `{}`, which is not a ROS 2 type",
+                port.name, port.ros_type
+            ));
         }
         if let Some(name) = written.definitions.keys().find(|name| !ports().any(|port| port.ros_type == **name)) {
             return Err(format!("it defines `{name}`, which is the type of none of its ports"));
         }
         for ports in [&written.inputs, &written.outputs] {
-            let is_double = |at: &usize| ports[..*at].iter().any(|port| port.name == ports[*at].name);
-            if let Some(at) = (0..ports.len()).find(is_double) {
+            let is_duplicate = |at: &usize| ports[..*at].iter().any(|port| port.name == ports[*at].name);
+            if let Some(at) = (0..ports.len()).find(is_duplicate) {
                 return Err(format!("two ports are called `{}`", ports[at].name));
             }
         }
@@ -101,7 +103,7 @@ impl Interface {
         let mut names = parameters.into_iter().flat_map(serde_json::Map::keys);
         if let Some(name) = names.find(|name| RESERVED_KEYS.contains(&name.as_str())) {
             return Err(format!(
-                "it has a parameter `{name}`, which no pipeline can set: that key says something else of every stage"
+                "it has a parameter `{name}`, which no pipeline can set: the key is reserved in every stage's table"
             ));
         }
         let input = |port: WrittenPort| InputPort {
@@ -159,11 +161,11 @@ mod tests {
     }
 
     #[test]
-    fn what_no_stage_can_have_is_refused_with_the_reason() {
+    fn an_invalid_interface_is_rejected_with_the_reason() {
         for (from, to, says) in [
-            ("\"protocol\": 1", "\"protocol\": 9", "speaks protocol 9"),
-            ("\"map\"", "\"Map\"", "`Map` is no name for a port"),
-            ("a/msg/B", "a/B", "`a/B`, which is no ROS 2 type"),
+            ("\"protocol\": 1", "\"protocol\": 9", "version 9 of the call protocol"),
+            ("\"map\"", "\"Map\"", "`Map` is not a valid port name"),
+            ("a/msg/B", "a/B", "`a/B`, which is not a ROS 2 type"),
             ("\"side\"", "\"out\"", "two ports are called `out`"),
             (
                 "\"properties\": {}",
@@ -175,8 +177,8 @@ mod tests {
                 "\"protocol\": 1, \"definitions\": { \"a/msg/None\": \"\" }",
                 "the type of none of its ports",
             ),
-            (TEXT, "{}", "not understood"),
-            (TEXT, "", "not understood"),
+            (TEXT, "{}", "cannot be read"),
+            (TEXT, "", "cannot be read"),
         ] {
             let error = Interface::read(&TEXT.replacen(from, to, 1)).unwrap_err();
             assert!(error.contains(says), "{error}");

@@ -10,45 +10,46 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// So long is waited at a time.
+/// The timeout of a single wait.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
-/// What counts of such a wait at the most: a process that has been away for longer was halted, and so was its program.
+/// The maximum time that a single wait counts: a wait that took longer means that this process was suspended, and probably its
+/// program too.
 const MAX_COUNTED_WAIT: Duration = Duration::from_secs(1);
-/// So long a program may take to exit that has been told to.
+/// The time that a program has to exit after its standard input is closed.
 const EXIT_TIME: Duration = Duration::from_secs(5);
-/// So long a program may take to say where it hangs.
+/// The time that a program has to report where it hangs.
 const REPORT_TIME: Duration = Duration::from_millis(500);
 
-/// How a program is started: with these arguments and, behind them, the folder of the run.
+/// The command line of a program; the folder of the run is appended to the arguments.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Launch {
     /// The program.
     pub program: PathBuf,
-    /// What stands before the folder.
+    /// The arguments before the folder.
     pub arguments: Vec<OsString>,
 }
 
-/// Why nothing more is to be expected of a program.
+/// An error of the process of a program.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ProcessError {
     /// Its process has ended.
     #[error("its process {0}")]
     Ended(String),
-    /// It has said nothing for too long.
+    /// It exceeded the maximum time of a call.
     #[error(
-        "it hangs: it has not been done with one message for {seconds} s, and was ended; what it did then stands above; \
+        "it hangs: it has worked on one message for {seconds} s, and was killed; see its output above for what it was doing; \
          `stall_timeout` in [pipeline] sets how long it may take"
     )]
     Hung {
-        /// For how long.
+        /// The timeout.
         seconds: f64,
     },
-    /// The system does not let it be watched.
+    /// The system cannot wait for it.
     #[error("its process cannot be watched: {0}")]
     Unwatched(io::Error),
 }
 
-/// A program that runs.
+/// A running program.
 pub(super) struct Process {
     child: Child,
     input: Option<ChildStdin>,
@@ -69,12 +70,12 @@ impl Process {
         }
     }
 
-    /// Rings at the program. That one is gone is heard when it is waited for.
+    /// Rings the doorbell of the program. A failure is ignored: the end of the program is noticed by [`wait`](Self::wait).
     pub(super) fn ring(&mut self, byte: u8) {
         let _ = self.input.as_mut().map(|input| input.write_all(&[byte]));
     }
 
-    /// Waits until the program rings, but not for longer than `longest`.
+    /// Waits until the program rings, for at most `longest`.
     pub(super) fn wait(&mut self, longest: Option<Duration>) -> Result<u8, ProcessError> {
         let mut waited = Duration::ZERO;
         while self.received.is_empty() {
@@ -84,7 +85,7 @@ impl Process {
             }
             waited += start.elapsed().min(MAX_COUNTED_WAIT);
             if let Some(longest) = longest.filter(|longest| waited >= *longest) {
-                self.end_hung();
+                self.kill_hung();
                 return Err(ProcessError::Hung { seconds: longest.as_secs_f64() });
             }
         }
@@ -111,28 +112,28 @@ impl Process {
         }
     }
 
-    /// How it ended. Its end of the pipe is closed; if it lives on all the same, it is ended.
+    /// How it ended, after it has closed its standard output. If it is still alive, it is killed.
     fn ended(&mut self) -> ProcessError {
         match self.exit_within(EXIT_TIME) {
             Some(how) => ProcessError::Ended(how),
             None => {
                 self.kill();
-                ProcessError::Ended("has closed its standard output, and was ended".to_owned())
+                ProcessError::Ended("has closed its standard output, and was killed".to_owned())
             }
         }
     }
 
-    /// Ends a program that hangs; one that can says before where it does.
-    fn end_hung(&mut self) {
+    /// Kills a program that hangs, after asking it to report where.
+    fn kill_hung(&mut self) {
         if let Some(process) = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw) {
-            // The number is that of the child until it is waited for.
+            // The id belongs to the child until it is waited for.
             let _ = kill_process(process, Signal::USR1);
             let _ = self.exit_within(REPORT_TIME);
         }
         self.kill();
     }
 
-    /// Tells it to exit, by the end of its standard input, and waits until it has.
+    /// Closes its standard input, which asks it to exit, and waits until it has.
     pub(super) fn end(&mut self) {
         self.input = None;
         if self.exit_within(EXIT_TIME).is_none() {
@@ -141,12 +142,12 @@ impl Process {
     }
 
     fn kill(&mut self) {
-        // One that has ended is only waited for.
+        // Killing fails if it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    /// How it ended, if it does so in this time.
+    /// How it ended, if it does so within this time.
     fn exit_within(&mut self, longest: Duration) -> Option<String> {
         const STEP: Duration = Duration::from_millis(5);
         let mut waited = Duration::ZERO;
@@ -172,7 +173,7 @@ impl Drop for Process {
 mod tests {
     use super::*;
 
-    /// A program of the shell, which gets the folder as `$0`.
+    /// A shell script, which gets the folder as `$0`.
     fn shell(script: &str) -> Process {
         let launch = Launch { program: "/bin/sh".into(), arguments: vec!["-c".into(), script.into()] };
         Process::start(&launch, Path::new("/tmp")).unwrap()
@@ -188,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn how_a_program_ended_is_told() {
+    fn the_error_states_how_a_program_ended() {
         for (script, says) in [
             ("exit 3", "its process ended with status 3"),
             ("kill -9 $$", "its process was ended by signal 9 (SIGKILL)"),
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_says_nothing_hangs_and_is_ended() {
+    fn a_program_that_does_not_ring_is_killed() {
         let mut process = shell("trap '' USR1; while :; do sleep 1; done");
         let lost = process.wait(Some(Duration::from_millis(200))).unwrap_err().to_string();
         assert!(lost.contains("it hangs") && lost.contains("0.2 s"), "{lost}");
@@ -208,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_is_not_there_cannot_be_started() {
+    fn a_program_that_does_not_exist_cannot_be_started() {
         let launch = Launch { program: "/nonexistent/python3".into(), arguments: Vec::new() };
         assert!(Process::start(&launch, Path::new("/tmp")).is_err());
     }

@@ -1,11 +1,11 @@
-//! The source round a program that has no inputs.
+//! The source of a program without inputs.
 
 use super::header::{Reply, Request};
 use super::stage::{Ports, ProgramStage, take};
 use crate::message::{LogTime, MessageHeader};
 use crate::stage::{Output, Source, StageError};
 
-/// A running program that makes messages.
+/// A source whose messages a running program produces.
 pub(super) struct ProgramSource {
     stage: ProgramStage,
     /// The log time of the last message.
@@ -33,7 +33,7 @@ impl Source for ProgramSource {
                 Reply::End => *has_ended = true,
                 Reply::Output if header.message.log_time < *reached => {
                     let cause = format!(
-                        "its log time, {} ns, is before that of the last, {} ns",
+                        "its log time, {} ns, is before that of the previous message, {} ns",
                         header.message.log_time.0, reached.0
                     );
                     return Err(StageError::new("send a message of a source", cause));
@@ -46,7 +46,7 @@ impl Source for ProgramSource {
             }
             take(output, reply, header, bytes)
         });
-        called.map_err(|error| self.stage.failed(error, |what| format!("make the next messages in {what}")))?;
+        called.map_err(|error| self.stage.failed(error, |what| format!("get the next messages of {what}")))?;
         Ok(!self.has_ended)
     }
 

@@ -1,4 +1,4 @@
-//! The stage round a program.
+//! The stage of a program.
 
 use super::call::{CallError, Program};
 use super::header::{CallHeader, Reply, Request};
@@ -10,34 +10,34 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-/// Parameters as they are given: the schema of the program says what they may be.
+/// The given parameters, which are checked by the schema of the program.
 #[derive(Default, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 struct Given(Map<String, Value>);
 
 impl Parameters for Given {}
 
-/// A running program, and what its stage calls it in errors.
+/// A stage whose messages a running program handles.
 pub(super) struct ProgramStage {
     pub(super) program: Program,
     /// The names of the inputs.
     inputs: Vec<&'static str>,
-    /// What runs, such as the name of a module.
+    /// The name of the program in errors, such as the name of a module.
     what: String,
 }
 
-/// An output for each that the interface has.
+/// The outputs of the interface.
 pub(super) struct Ports(Vec<Out<AnyMessage>>);
 
-/// The ports are those of an interface; see [`kind_of`].
+/// [`kind_of`] declares the ports of an interface instead.
 impl Outputs for Ports {
     fn declare(_: &mut OutputPorts) -> Self {
         Self(Vec::new())
     }
 }
 
-/// The kind `name` of a stage with the ports and parameters of `interface`, which is the program of `launch` and is called `what`
-/// in errors. It is kept for as long as this program runs.
+/// The stage kind `name` with the ports and parameters of `interface`, whose program `launch` starts. Errors call the program
+/// `what`. The kind is never freed.
 pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Launch) -> &'static StageKind {
     let Interface { summary, inputs, outputs, parameters, definitions, text } = interface;
     let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();
@@ -91,16 +91,17 @@ impl ProgramStage {
             format!("take a message{of_robot} on the input `{name}` in {what}")
         };
         let reply = (message.header(), message.bytes());
-        let called = self
-            .program
-            .call(Request::Message, (port, message.wire()), reply, |reply, header, bytes| take(output, reply, header, bytes));
+        let called = self.program.call(Request::Message, (port, message.wire()), reply, |reply, header, bytes| {
+            take(output, reply, header, bytes)
+        });
         called.map_err(|error| self.failed(error, doing))
     }
 
     fn finish(&mut self, output: &Output<Ports>) -> Result<(), StageError> {
         let nothing = (&MessageHeader::default(), &[][..]);
-        let called =
-            self.program.call(Request::Finish, (0, 0), nothing, |reply, header, bytes| take(output, reply, header, bytes));
+        let called = self
+            .program
+            .call(Request::Finish, (0, 0), nothing, |reply, header, bytes| take(output, reply, header, bytes));
         called.map_err(|error| self.failed(error, |what| format!("finish in {what}")))
     }
 
@@ -118,7 +119,7 @@ impl ProgramStage {
     }
 }
 
-/// Passes on what a program says.
+/// Forwards a reply of a program.
 pub(super) fn take(output: &Output<Ports>, reply: Reply, header: &CallHeader, bytes: &[u8]) -> Result<(), StageError> {
     match reply {
         Reply::Output => match output.0.get(header.port as usize) {

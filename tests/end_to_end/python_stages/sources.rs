@@ -91,7 +91,7 @@ impl Python {
                 let ended =
                     self.run_pipeline("sources.toml", "few.mcap", engine, &[&format!("source.what=\"{what}\"")]);
                 ended.assert(1, words);
-                ended.assert(1, &["`source`", "make the next messages in troubled_source.py"]);
+                ended.assert(1, &["`source`", "get the next messages of troubled_source.py"]);
                 assert_eq!(self.left_over(), Vec::<String>::new(), "{engine} {what}");
             }
             let endless = ["source.count=1000000000", "troubled.what=\"raise\"", "troubled.at=1"];
