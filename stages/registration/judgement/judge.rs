@@ -38,11 +38,12 @@ pub fn judge(
         }
         all.retain(is_possible);
     }
+    let all = merged(all);
     let listed = Listed::of(&all);
     let is_expected = known.window.is_some();
     let count = all.len();
     let chosen = known.hypothesis.map(|asked| (asked, asked.checked_sub(1).and_then(|index| all.get(index).cloned())));
-    let candidates = distinct(all, a, b, &comparison);
+    let candidates = deformed(all, a, b, &comparison);
     let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
     let probabilities = posterior(&log_odds);
     if let Some((asked, chosen)) = chosen {
@@ -77,7 +78,7 @@ pub fn candidates(
     hypotheses: &[Hypothesis],
     parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    distinct(compared(a, b, hypotheses, parameters), a, b, parameters)
+    deformed(merged(compared(a, b, hypotheses, parameters)), a, b, parameters)
 }
 
 /// Agreement of the maps at each hypothesis, without deformation, the best first.
@@ -99,14 +100,14 @@ fn compared(
     all
 }
 
-/// Merges equal candidates, before and after the deformation of map b, as several may become one by it.
-fn distinct(
-    compared: Vec<Candidate>,
+/// Deforms map b at each candidate, and merges those whose poses are the same after it.
+fn deformed(
+    candidates: Vec<Candidate>,
     a: &MapView<'_>,
     b: &MapView<'_>,
     parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    merged(merged(compared).into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
+    merged(candidates.into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
 }
 
 /// Probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum

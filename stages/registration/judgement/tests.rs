@@ -348,6 +348,17 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
 }
 
 #[test]
+fn hypotheses_at_one_pose_are_listed_once() {
+    let (a, b, [first, second]) = ambiguous();
+    let beside = pose(0.04, -0.03, 0.005) * second;
+    let refused = judged(&a, &b, &by_maps_alike(&[first, second, beside]));
+    assert!(matches!(&refused.refusal, Some(Refusal::Ambiguous { listed, .. }) if listed.0.len() == 2));
+    let known = UserKnowledge { hypothesis: Some(2), ..UserKnowledge::default() };
+    let chosen = judged_knowing(&a, &b, &by_maps_alike(&[first, second, beside]), &known);
+    assert_eq!((chosen.refusal, chosen.chosen), (None, Some((2, 2))));
+}
+
+#[test]
 fn the_short_text_of_a_refusal_fits_in_eighty_columns() {
     let (a, b, poses) = ambiguous();
     let reason = reason(&judged(&a, &b, &by_maps_alike(&poses)));
