@@ -1,4 +1,4 @@
-//! The frame solver, with simulated teams of robots: what it makes of wrong alignments, and what it costs when
+//! The frame solver, with simulated pose graphs: its results with wrong alignments, and its time when
 //! alignments arrive one by one.
 //!
 //!     cargo bench -p gridweave-stages --bench frame_solver
@@ -14,9 +14,9 @@ use gridweave_stages::shared;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-#[path = "../merge/frame_solver/team.rs"]
-mod team;
-use team::Team;
+#[path = "../merge/frame_solver/simulated_graph.rs"]
+mod simulated_graph;
+use simulated_graph::SimulatedGraph;
 
 /// How many of the nearest robots each is aligned with, and what that is called.
 const GRAPHS: [(usize, &str); 3] = [(3, "3 nearest"), (5, "5 nearest"), (usize::MAX, "all")];
@@ -32,7 +32,7 @@ fn main() {
         }
     }
     println!();
-    println!("| robots | aligned with | wrong | teams | robots placed | connected by right ones | placed wrong |");
+    println!("| robots | aligned with | wrong | graphs | robots placed | connected by right ones | placed wrong |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     for agreeing in [false, true] {
         for robots in [4, 8, 16, 32, 64] {
@@ -49,38 +49,39 @@ fn main() {
 }
 
 fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) {
-    let teams = if nearest > robots { 160 / robots as u64 } else { 800 / robots as u64 };
+    let graphs = if nearest > robots { 160 / robots as u64 } else { 800 / robots as u64 };
     let [mut placed, mut connected, mut wrong] = [0; 3];
-    for seed in 0..teams {
-        let team = Team::new(robots, nearest, seed);
-        let team = if agreeing { team.with_agreeing_mistakes(share) } else { team.with_mistakes(share) };
-        let names: BTreeSet<String> = (0..robots).map(Team::name).collect();
-        let alignments =
-            (0..team.edges.len()).filter_map(|index| merge::frame_solver::solution::by_name(team.alignment(index)));
+    for seed in 0..graphs {
+        let simulated = SimulatedGraph::new(robots, nearest, seed);
+        let simulated = if agreeing { simulated.with_agreeing_outliers(share) } else { simulated.with_outliers(share) };
+        let names: BTreeSet<String> = (0..robots).map(SimulatedGraph::name).collect();
+        let alignments = (0..simulated.edges.len())
+            .filter_map(|index| merge::frame_solver::solution::by_name(simulated.alignment(index)));
         let parameters =
             merge::frame_solver::FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..Default::default() };
         let solution = merge::frame_solver::solve::solve(
             &names,
             &alignments.collect(),
-            &Team::name(0),
+            &SimulatedGraph::name(0),
             &parameters,
             &merge::frame_solver::solution::Solution::default(),
         );
         for robot in 1..robots {
-            if let Some(frame) = solution.frames.get(&Team::name(robot)) {
+            if let Some(frame) = solution.frames.get(&SimulatedGraph::name(robot)) {
                 placed += 1;
-                wrong += usize::from(team.is_wrong(robot, &frame.pose));
+                wrong += usize::from(simulated.is_wrong(robot, &frame.pose));
             }
         }
-        let right = |index: usize| !team.wrong.contains(&index);
-        let reached = merge::frame_solver::graph::Forest::grow(robots, &team.edges, 0, right).poses(&team.edges, 0);
+        let right = |index: usize| !simulated.wrong.contains(&index);
+        let reached =
+            merge::frame_solver::graph::Forest::grow(robots, &simulated.edges, 0, right).poses(&simulated.edges, 0);
         connected += reached.iter().flatten().count() - 1;
     }
-    let all = teams as usize * (robots - 1);
+    let all = graphs as usize * (robots - 1);
     let percent = |count: usize| format!("{:.2} %", 100.0 * count as f64 / all as f64);
     let kind = if agreeing { " in twos" } else { "" };
     println!(
-        "| {robots} | {name} | {:.0} %{kind} | {teams} | {} | {} | {} |",
+        "| {robots} | {name} | {:.0} %{kind} | {graphs} | {} | {} | {} |",
         100.0 * share,
         percent(placed),
         percent(connected),
@@ -89,9 +90,9 @@ fn judge(robots: usize, nearest: usize, name: &str, share: f64, agreeing: bool) 
 }
 
 fn time(robots: usize, nearest: usize, name: &str, share: f64) {
-    let team = Team::new(robots, nearest, 1).with_mistakes(share);
-    let messages: Vec<Message> = (0..team.edges.len())
-        .map(|index| Message::from_vec(MessageHeader::default(), encode(&team.alignment(index)).unwrap()))
+    let simulated = SimulatedGraph::new(robots, nearest, 1).with_outliers(share);
+    let messages: Vec<Message> = (0..simulated.edges.len())
+        .map(|index| Message::from_vec(MessageHeader::default(), encode(&simulated.alignment(index)).unwrap()))
         .collect();
     let run = || {
         let mut stage = StageHarness::new(&merge::frame_solver::kind(), "").unwrap();

@@ -10,7 +10,7 @@ pub mod path_placer;
 
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![
         elastic_refiner::kind(),

@@ -1,48 +1,49 @@
-//! How a map is bent: a lattice of nodes over what it knows, each with a small displacement and a small turn, and the smooth
-//! field between them.
+//! Deformation of a map: a lattice of nodes over its known part, each with a small displacement and a small turn, and
+//! the smooth field between them.
 //!
-//! A node carries the map around it rigidly; a point takes the mean of what the nodes at the corners of its lattice square
-//! do with it, weighted bilinearly (the embedded deformation of Sumner et al. 2007 on a regular lattice). Turns are small,
-//! so their sines are left out: what a point does is linear in the nodes, which the estimate of them rests on.
+//! A node moves the map around it rigidly; a point takes the mean of the moves of the nodes at the corners of its
+//! lattice square, weighted bilinearly (the embedded deformation of Sumner et al. 2007 on a regular lattice). Turns
+//! are small, so their sines are linearized: the displacement of a point is linear in the nodes, as the estimate of
+//! them requires.
 
 use crate::shared::geometry::{Cell, Grid, Point2, is_known, quarter_turn};
 use gridweave_runtime::ros::MapDeformation;
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// A place of a lattice: column and row, counted from the map frame's origin.
+/// A vertex of a lattice: column and row, counted from the map frame's origin.
 pub type Vertex = (i32, i32);
 
-/// The corners of a lattice square that have nodes, by their numbers, each with its weight; the weights add up to 1.
+/// Indices of the nodes at the corners of a lattice square, with their weights, which add up to 1.
 pub type Corners = [(usize, f64); 4];
 
-/// No node lies farther from the origin along x or y, in vertices.
+/// Largest distance of a node from the origin along x or y, in vertices.
 const MOST_VERTICES: f64 = 1e6;
-/// A lattice has no more nodes than this, as their equations are solved together.
+/// Largest number of nodes of a lattice, as their equations are solved together.
 const MOST_NODES: usize = 10_000;
-/// Nor does it take more vertices, with those between that have no node.
+/// Largest number of its vertices, including those without a node.
 const MOST_TABLE: i64 = 1 << 22;
 
-/// After so many rounds a place is carried back to within a thousandth of the displacement.
+/// Rounds of the inverse: the error is then within a thousandth of the displacement.
 const INVERSE_ROUNDS: usize = 3;
 
 /// The nodes of a map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lattice {
-    /// Metres from node to node along x and along y.
+    /// Distance of nodes along x and along y, metres.
     spacing: f64,
-    /// The least column and row.
+    /// Least column and row.
     first: Vertex,
     columns: usize,
-    /// For each vertex, row by row, the number of its node.
+    /// For each vertex, row by row, the index of its node.
     nodes: Vec<Option<u32>>,
-    /// The nodes: row by row.
+    /// Vertices of the nodes, row by row.
     vertices: Vec<Vertex>,
 }
 
 impl Lattice {
-    /// A lattice with a node at each corner of each square of the side `spacing` in which the grid knows a cell; of twice the
-    /// side, or four times and so on, where that would take too many.
+    /// A lattice with a node at each corner of each square of the side `spacing` in which the grid has a known cell;
+    /// of twice the side, or four times and so on, where that would take too many.
     pub fn over(grid: &Grid<'_>, mut spacing: f64) -> Self {
         loop {
             let vertices = vertices_over(grid, spacing);
@@ -53,7 +54,7 @@ impl Lattice {
         }
     }
 
-    /// A lattice with nodes at the given vertices, which are in order: row by row.
+    /// A lattice with nodes at the given vertices, which are sorted row by row.
     fn of(vertices: Vec<Vertex>, spacing: f64) -> Self {
         let low = |part: fn(&Vertex) -> i32| vertices.iter().map(part).min().unwrap_or_default();
         let high = |part: fn(&Vertex) -> i32| vertices.iter().map(part).max().unwrap_or_default();
@@ -69,12 +70,12 @@ impl Lattice {
         lattice
     }
 
-    /// How many nodes there are.
+    /// Number of nodes.
     pub fn len(&self) -> usize {
         self.vertices.len()
     }
 
-    /// Metres from node to node along x and along y.
+    /// Distance of nodes along x and along y, metres.
     pub fn spacing(&self) -> f64 {
         self.spacing
     }
@@ -84,13 +85,13 @@ impl Lattice {
         self.vertices.is_empty()
     }
 
-    /// Where a node is, metres, map frame.
+    /// Position of a node, metres, map frame.
     pub fn position(&self, node: usize) -> Point2 {
         let (column, row) = self.vertices[node];
         Point2::new(f64::from(column), f64::from(row)) * self.spacing
     }
 
-    /// The pairs of nodes that lie side by side, each once.
+    /// Pairs of neighbouring nodes, each once.
     pub fn edges(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.vertices.iter().enumerate().flat_map(move |(node, &(column, row))| {
             [(column + 1, row), (column, row + 1)]
@@ -99,7 +100,7 @@ impl Lattice {
         })
     }
 
-    /// The nodes around a point. Where the map knows nothing around it there may be none.
+    /// The nodes around a point. None where the map is unknown around it.
     pub fn corners(&self, point: &Point2) -> Option<Corners> {
         let (column, row) = vertex_below(point, self.spacing)?;
         let x = (point.x / self.spacing - f64::from(column)).clamp(0.0, 1.0);
@@ -112,7 +113,7 @@ impl Lattice {
         ];
         let found = corners.map(|(vertex, weight)| (self.node(vertex), weight));
         let known: f64 = found.iter().filter(|(node, _)| node.is_some()).map(|(_, weight)| weight).sum();
-        // A corner without a node has no weight, whichever node stands for it.
+        // A corner without a node has no weight, so any node can be in its place.
         let any = found.iter().find_map(|(node, _)| *node)?;
         (known > 0.0).then(|| found.map(|(node, weight)| node.map_or((any, 0.0), |node| (node, weight / known))))
     }
@@ -121,7 +122,7 @@ impl Lattice {
         self.place(vertex).and_then(|place| self.nodes[place]).map(|node| node as usize)
     }
 
-    /// Where a vertex stands in the table; none if it lies outside.
+    /// Index of a vertex in the table; none if it is outside.
     fn place(&self, (column, row): Vertex) -> Option<usize> {
         let column = usize::try_from(i64::from(column) - i64::from(self.first.0)).ok()?;
         let row = usize::try_from(i64::from(row) - i64::from(self.first.1)).ok()?;
@@ -129,7 +130,7 @@ impl Lattice {
     }
 }
 
-/// The corners of the squares of the side `spacing` in which the grid knows a cell, row by row.
+/// Corners of the squares of the side `spacing` in which the grid has a known cell, row by row.
 fn vertices_over(grid: &Grid<'_>, spacing: f64) -> Vec<Vertex> {
     let geometry = &grid.geometry;
     let width = geometry.width.max(1);
@@ -148,14 +149,14 @@ fn vertices_over(grid: &Grid<'_>, spacing: f64) -> Vec<Vertex> {
     vertices.into_values().collect()
 }
 
-/// The vertex at the lower left of the square that a point lies in; none if it lies beyond all lattices.
+/// The vertex at the lower left of the square of a point; none if it is beyond all lattices.
 fn vertex_below(point: &Point2, spacing: f64) -> Option<Vertex> {
     let (column, row) = ((point.x / spacing).floor(), (point.y / spacing).floor());
     let fits = column.abs() < MOST_VERTICES && row.abs() < MOST_VERTICES;
     fits.then_some((column as i32, row as i32))
 }
 
-/// How a map is bent: where each of its points belongs, in its own frame.
+/// Deformation of a map: a displacement field in its own frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Deformation {
     /// The nodes.
@@ -165,12 +166,12 @@ pub struct Deformation {
 }
 
 impl Deformation {
-    /// No bend.
+    /// The zero deformation.
     pub fn none(lattice: Lattice) -> Self {
         Self { moves: vec![Vector3::zeros(); lattice.len()], lattice }
     }
 
-    /// What a message says; none if its nodes do not lie on a lattice.
+    /// The deformation of a message; none if its nodes are not on a lattice.
     pub fn from_message(message: &MapDeformation) -> Option<Self> {
         let spacing = message.spacing;
         let is_finite = |value: &f64| value.is_finite();
@@ -189,7 +190,7 @@ impl Deformation {
         fits.then(|| Self { lattice: Lattice::of(vertices, spacing), moves })
     }
 
-    /// Where a point of the map belongs, map frame.
+    /// Deformed position of a point of the map, map frame.
     pub fn apply(&self, point: &Point2) -> Point2 {
         let Some(corners) = self.lattice.corners(point) else { return *point };
         self.apply_at(point, &corners)
@@ -205,18 +206,18 @@ impl Deformation {
             })
     }
 
-    /// By how much what lies around a point is turned, radians.
+    /// Turn of the map around a point, radians.
     pub fn turn(&self, point: &Point2) -> f64 {
         let corners = self.lattice.corners(point);
         corners.map_or(0.0, |corners| corners.iter().map(|&(node, weight)| weight * self.moves[node].z).sum())
     }
 
-    /// The point of the map that belongs at a place, map frame.
+    /// The point of the map whose deformed position is `place`, map frame.
     pub fn inverse(&self, place: &Point2) -> Point2 {
         (0..INVERSE_ROUNDS).fold(*place, |point, _| place - (self.apply(&point) - point))
     }
 
-    /// No point is moved by more than this, metres.
+    /// Bound of the displacement of all points, metres.
     pub fn largest_move(&self) -> f64 {
         let of_node = |by: &Vector3<f64>| by.xy().norm() + by.z.abs() * std::f64::consts::SQRT_2 * self.lattice.spacing;
         self.moves.iter().map(of_node).fold(0.0, f64::max)
@@ -231,7 +232,7 @@ fn table_size(vertices: &[Vertex]) -> i64 {
     extent(|vertex| vertex.0).saturating_mul(extent(|vertex| vertex.1))
 }
 
-/// How a point moves with the move of a node: the derivative of [`Deformation::apply`] by it, for a weight of 1.
+/// Derivative of [`Deformation::apply`] with respect to the move of a node, for a weight of 1.
 pub fn node_jacobian(arm: &Vector2<f64>) -> Matrix2x3<f64> {
     Matrix2x3::new(1.0, 0.0, -arm.y, 0.0, 1.0, arm.x)
 }
@@ -253,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_stand_at_the_corners_of_squares_that_hold_something_known() {
+    fn nodes_are_at_the_corners_of_squares_with_known_cells() {
         let lattice = deformation(|_| Vector3::zeros()).lattice;
         // Columns -2 to 4 and rows -2 to 2; nothing is known where x > 8.5 and y > 3.
         assert_eq!(lattice.len(), 7 * 5 - 1);
@@ -288,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_that_is_no_lattice_is_none() {
+    fn a_message_without_a_lattice_is_refused() {
         let node = |x: f64, y: f64| DeformationNode { x, y, ..Default::default() };
         let message = |spacing, nodes| MapDeformation { spacing, nodes, robot: "robot1".into(), ..Default::default() };
         assert!(Deformation::from_message(&message(4.0, vec![node(0.0, 4.0), node(-4.0, 8.0)])).is_some());
@@ -306,7 +307,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_carried_there_is_carried_back(x in -7.0..13.0, y in -5.0..3.0, seed in 0.0..6.0f64) {
+        fn the_inverse_of_a_deformation_returns_the_point(x in -7.0..13.0, y in -5.0..3.0, seed in 0.0..6.0f64) {
             let deformed = deformation(|node: Point2| {
                 let (x, y): (f64, f64) = (node.x, node.y);
                 Vector3::new(0.3 * (x / 5.0 + seed).sin(), 0.2 * (y / 7.0).cos(), 0.02 * (x / 9.0).sin())

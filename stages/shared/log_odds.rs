@@ -1,14 +1,14 @@
 //! Occupancy in log-odds (Saeedi et al., "Group mapping", equation 7), and its entropy.
 //!
-//! A cell's value v stands for the probability v / 100, cut to a lower and an upper bound, so that no cell is ever beyond
-//! doubt; its log-odds are `ln(p / (1 - p))`. An unknown cell has log-odds of 0, which is a probability of one half.
+//! A cell's value v is the probability v / 100, clamped to a lower and an upper bound, so that no cell is certain;
+//! its log-odds are `ln(p / (1 - p))`. An unknown cell has log-odds of 0, which is a probability of one half.
 
 use crate::shared::geometry::{UNKNOWN, is_known};
 
-/// Steps of the table from log-odds to values for one unit of the natural logarithm.
+/// Steps of the table from log-odds to values per unit of the natural logarithm.
 const STEPS: f32 = 256.0;
 
-/// The tables that turn values into log-odds and back.
+/// Tables between values and log-odds.
 #[derive(Clone, Debug)]
 pub struct LogOdds {
     /// By value as an unsigned byte.
@@ -19,7 +19,8 @@ pub struct LogOdds {
 }
 
 impl LogOdds {
-    /// Tables for probabilities cut to `[min_probability, max_probability]`, which must hold one half and neither 0 nor 1.
+    /// Tables for probabilities clamped to `[min_probability, max_probability]`, which must contain one half and
+    /// neither 0 nor 1.
     pub fn new(min_probability: f64, max_probability: f64) -> Self {
         let cut = |probability: f64| log_odds(probability.max(min_probability).min(max_probability)) as f32;
         let (lowest, highest) = (cut(0.0), cut(1.0));
@@ -30,7 +31,7 @@ impl LogOdds {
         let steps = (STEPS * (highest - lowest)).clamp(0.0, 1e5).ceil() as usize;
         let value = |step: usize| {
             let sum = lowest + step as f32 / STEPS;
-            // The bounds themselves stand for 0 and 100.
+            // The bounds themselves become 0 and 100.
             match step {
                 0 => 0,
                 _ if step == steps => 100,
@@ -40,12 +41,12 @@ impl LogOdds {
         Self { of_value: Box::new(std::array::from_fn(of_value)), values: (0..=steps).map(value).collect(), lowest }
     }
 
-    /// The log-odds of a cell's value: 0 if it is unknown.
+    /// Log-odds of a cell's value: 0 if it is unknown.
     pub fn of(&self, value: i8) -> f32 {
         self.of_value[usize::from(value.cast_unsigned())]
     }
 
-    /// The value that log-odds amount to, 0 to 100; [`UNKNOWN`] for what is no number.
+    /// Value of log-odds, 0 to 100; [`UNKNOWN`] if they are not a number.
     pub fn value(&self, log_odds: f32) -> i8 {
         if log_odds.is_nan() {
             return UNKNOWN;
@@ -65,7 +66,7 @@ pub fn probability(log_odds: f64) -> f64 {
     1.0 / (1.0 + (-log_odds).exp())
 }
 
-/// The entropy of a cell that is occupied with the probability of these log-odds, in bits: 1 where nothing is known.
+/// Entropy of a cell that is occupied with the probability of these log-odds, in bits: 1 where nothing is known.
 pub fn entropy(log_odds: f64) -> f64 {
     let of = |probability: f64| if probability > 0.0 { -probability * probability.log2() } else { 0.0 };
     of(probability(log_odds)) + of(probability(-log_odds))
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_are_no_probabilities_do_no_harm() {
+    fn invalid_bounds_do_no_harm() {
         for (low, high) in [(f64::NAN, 0.9), (0.0, 1.0), (0.9, 0.1), (-1.0, 2.0)] {
             let table = LogOdds::new(low, high);
             (0..=100).for_each(|value| assert!((-1..=100).contains(&table.value(table.of(value)))));

@@ -1,4 +1,4 @@
-//! What several rooms share: poses, grids and their walls, deformations, and the last map of each robot.
+//! Code that several modules share: poses, grids and their walls, deformations, and the last map of each robot.
 
 pub mod deformation;
 pub mod geometry;

@@ -1,4 +1,4 @@
-//! Where what the robots have seen lies in the merged map: their frames, and how their maps are bent.
+//! Transforms from the robots' maps into the merged frame: frames and deformations.
 
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Point2, Pose2};
@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{MapDeformation, RobotFrames};
 use gridweave_runtime::stage::Output;
 use std::collections::BTreeMap;
 
-/// The frames that came last, and the last bend of each map.
+/// The latest frames, and the latest deformation of each map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placement {
     /// The frames.
@@ -14,32 +14,33 @@ pub struct Placement {
     deformations: BTreeMap<String, Deformation>,
 }
 
-/// How one robot's map lies in the world.
+/// Pose and deformation of one robot's map in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
     /// `T_world_map`: the pose of the map frame in the world.
     pub transform_world_map: Pose2,
-    /// How the map is bent; none if it is rigid.
+    /// Deformation of the map; none if it is rigid.
     pub deformation: Option<&'a Deformation>,
 }
 
 impl Placement {
-    /// Keeps a bend in place of the robot's last, and says whether it differs from that. One that is no lattice is warned of.
+    /// Stores a deformation in place of the robot's last, and returns whether it differs from that. Warns if it is
+    /// not a lattice.
     pub fn keep_deformation<O>(&mut self, message: &MapDeformation, output: &Output<O>) -> bool {
         let robot = &message.robot;
         let Some(deformation) = Deformation::from_message(message) else {
-            output.warn(format!("how the map of {robot} is bent was left out: its nodes do not lie on a lattice"));
+            output.warn(format!("a deformation of the map of {robot} was left out: its nodes are not on a lattice"));
             return false;
         };
         self.deformations.insert(robot.clone(), deformation.clone()).is_none_or(|before| before != deformation)
     }
 
-    /// How a robot's map is bent; none if nothing was said of it.
+    /// Deformation of a robot's map; none if there was no message.
     pub fn deformation(&self, robot: &str) -> Option<&Deformation> {
         self.deformations.get(robot)
     }
 
-    /// How the maps of all placed robots lie, by the order of the frames.
+    /// Poses and deformations of the maps of all placed robots, in the order of the frames.
     pub fn placed(&self) -> impl Iterator<Item = (&str, Placed<'_>)> {
         self.frames.frames.iter().map(|frame| {
             let robot = frame.robot.as_str();
@@ -52,7 +53,7 @@ impl Placement {
 }
 
 impl Placed<'_> {
-    /// Where a pose in the map lies in the world: it is carried and turned with the map around it.
+    /// Transforms a pose in the map to the world: it is moved and turned with the map around it.
     pub fn in_world(&self, in_map: &Pose2) -> Pose2 {
         let place = Point2::from(in_map.translation.vector);
         let deformed = self.deformation.map_or(*in_map, |deformation| {

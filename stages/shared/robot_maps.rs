@@ -8,24 +8,24 @@ use gridweave_runtime::stage::{Output, Received};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The last usable map of each robot, by name, each with something of the stage's own beside it.
+/// The last usable map of each robot, by name, each with data of the stage.
 #[derive(Debug)]
 pub struct RobotMaps<T> {
     maps: BTreeMap<String, RobotMap<T>>,
 }
 
-/// A robot's last map. Its cells stay where they came in.
+/// A robot's last map. Its cells stay in the message.
 #[derive(Debug)]
 pub struct RobotMap<T> {
-    /// What the stage keeps beside it.
+    /// Data of the stage for this map.
     pub own: T,
-    /// How many usable maps of the robot came before it.
+    /// Number of earlier usable maps of the robot.
     pub number: u64,
-    /// The frame that it is drawn in.
+    /// Frame of the map.
     pub frame_id: String,
     geometry: GridGeometry,
     message: Message,
-    /// Where the cells lie in the message.
+    /// Range of the cells in the message.
     cells: Range<usize>,
 }
 
@@ -36,8 +36,8 @@ impl<T> Default for RobotMaps<T> {
 }
 
 impl<T> RobotMaps<T> {
-    /// Keeps a map in place of the robot's last, with what `own` makes of it. One that cannot be used is warned of, and
-    /// `false` is the answer.
+    /// Stores a map in place of the robot's last, with the result of `own`. Returns `false`, with a warning, if it
+    /// cannot be used.
     pub fn keep<O>(
         &mut self,
         map: &Received<'_, OccupancyGrid<'_>>,
@@ -70,12 +70,12 @@ impl<T> RobotMaps<T> {
         self.maps.get(robot)
     }
 
-    /// The last maps of two robots, if there are both.
+    /// The last maps of two robots, if both exist.
     pub fn pair(&self, pair: &RobotPair) -> Option<(&RobotMap<T>, &RobotMap<T>)> {
         self.get(&pair.a).zip(self.get(&pair.b))
     }
 
-    /// Which robots of a pair have sent no usable map, as in "no usable map of robot1 and robot2 has come".
+    /// The robots of a pair without a usable map, as in "no usable map of robot1 and robot2 has come".
     pub fn missing(&self, pair: &RobotPair) -> Option<String> {
         let missing: Vec<&str> = pair.robots().into_iter().filter(|robot| self.get(robot).is_none()).collect();
         (!missing.is_empty()).then(|| format!("no usable map of {} has come", missing.join(" and ")))
@@ -94,12 +94,12 @@ impl<T> RobotMap<T> {
         Grid { geometry: self.geometry, cells: OccupancyGrid { data, ..Default::default() }.cells() }
     }
 
-    /// The message that it came in, encoded.
+    /// The encoded message of the map.
     pub fn bytes(&self) -> &[u8] {
         self.message.bytes()
     }
 
-    /// Whether the cells of another map are the same and lie at the same place.
+    /// Whether another map has the same cells at the same pose.
     pub fn is_same(&self, other: &OccupancyGrid<'_>) -> bool {
         self.geometry == GridGeometry::from(&other.info) && self.grid().cells == other.cells()
     }
@@ -114,7 +114,7 @@ mod tests {
     use std::cell::RefCell;
     use std::rc::Rc;
 
-    /// What a stage keeps of the maps that it is given.
+    /// The maps that a stage stores.
     fn kept(given: &[(&str, OccupancyGrid<'_>)]) -> (RobotMaps<usize>, usize) {
         type Shared = Rc<RefCell<RobotMaps<usize>>>;
         struct Keeper(Shared);

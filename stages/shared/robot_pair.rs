@@ -1,18 +1,18 @@
-//! Two robots whose maps are laid together.
+//! A pair of robots whose maps are aligned.
 
 use gridweave_runtime::ros::Alignment;
 
 /// The names of two robots.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RobotPair {
-    /// The robot whose map stays.
+    /// The robot whose map is fixed.
     pub a: String,
     /// The robot whose map is moved.
     pub b: String,
 }
 
 impl RobotPair {
-    /// Robot `b` on the map of robot `a`.
+    /// Robot `b` relative to robot `a`.
     pub fn new(a: impl Into<String>, b: impl Into<String>) -> Self {
         Self { a: a.into(), b: b.into() }
     }
@@ -23,7 +23,7 @@ impl RobotPair {
         if one < other { Self { a: one, b: other } } else { Self { a: other, b: one } }
     }
 
-    /// As an alignment names them.
+    /// The pair of an alignment.
     pub fn of(alignment: &Alignment) -> Self {
         Self::new(&alignment.a, &alignment.b)
     }

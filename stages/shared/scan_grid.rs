@@ -1,46 +1,47 @@
-//! An occupancy grid in log-odds that is drawn from scans: what a beam passes is free, and where it ends is something.
+//! An occupancy grid in log-odds, built from scans: cells that a beam passes are free, and the cell at its end is
+//! occupied.
 
 use crate::shared::geometry::{Cell, GridGeometry, Point2, UNKNOWN, pose};
 use nalgebra::Vector2;
 
-/// What beams say of cells, as log-odds.
+/// Log-odds that beams add to cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BeamEvidence {
-    /// What a beam's end adds to its cell.
+    /// Added to the cell at the end of a beam.
     pub hit: f32,
-    /// What a beam adds to a cell that it has passed; below 0.
+    /// Added to a cell that a beam has passed; below 0.
     pub miss: f32,
-    /// The least that is held of a cell, so that it can change its mind.
+    /// Lower bound of a cell, so that it can still change.
     pub least: f32,
-    /// The most that is held of a cell.
+    /// Upper bound of a cell.
     pub most: f32,
 }
 
 /// A beam over a grid, in cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellBeam {
-    /// Where it was sent, from the outer corner of cell (0, 0).
+    /// Origin of the beam, from the outer corner of cell (0, 0).
     pub origin: Point2,
-    /// From there to its end.
+    /// Vector from there to its end.
     pub way: Vector2<f64>,
-    /// Whether it has met something at its end.
+    /// Whether it has hit something at its end.
     pub is_hit: bool,
 }
 
-/// An occupancy grid that scans are drawn on.
+/// An occupancy grid that is built from scans.
 #[derive(Clone, Debug)]
 pub struct ScanGrid {
     geometry: GridGeometry,
     evidence: BeamEvidence,
     log_odds: Vec<f32>,
-    /// The cells in which the beams of the last scan end: kept to spare the allocations.
+    /// Cells in which the beams of the last scan end: kept to spare the allocations.
     ends: Vec<usize>,
 }
 
-/// A map as far as it was drawn.
+/// A map built so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SnapshotMap {
-    /// Where the cells lie in the robot's map frame.
+    /// Geometry of the cells in the robot's map frame.
     pub geometry: GridGeometry,
     /// Row by row: -1 unknown, 0 free to 100 occupied.
     pub cells: Vec<i8>,
@@ -52,20 +53,21 @@ impl ScanGrid {
         Self { geometry, evidence, log_odds: vec![0.0; geometry.cell_count()], ends: Vec::new() }
     }
 
-    /// An empty grid over the rectangle between two corners, lower left and upper right. Cell borders are multiples of the
-    /// resolution.
+    /// An empty grid over the rectangle between two corners, lower left and upper right. Cell borders are multiples
+    /// of the resolution.
     pub fn between(low: Point2, high: Point2, resolution: f64, evidence: BeamEvidence) -> Self {
         Self::over(lattice(low, high, resolution), evidence)
     }
 
-    /// Where its cells lie.
+    /// Geometry of its cells.
     pub fn geometry(&self) -> &GridGeometry {
         &self.geometry
     }
 
-    /// Adds the beams of a scan. What lies outside of the grid is left out.
+    /// Adds the beams of a scan. What is outside of the grid is ignored.
     ///
-    /// Beams pass free cells; a cell in which a beam of this scan has met something is a hit, whatever else passes it in the
+    /// Beams pass free cells; a cell in which a beam of this scan has hit something is a hit, even if other beams of
+    /// the scan pass it.
     /// same scan.
     pub fn add_scan(&mut self, beams: &[CellBeam]) {
         let mut ends = std::mem::take(&mut self.ends);
@@ -74,7 +76,7 @@ impl ScanGrid {
         ends.extend(hits.filter_map(|beam| self.index(&(beam.origin + beam.way))));
         ends.sort_unstable();
         ends.dedup();
-        // To give hit cells back what they had before this scan's misses is cheaper than to ask at every passed cell.
+        // Restoring hit cells to their value before this scan's misses is cheaper than a test at every passed cell.
         let before: Vec<f32> = ends.iter().map(|&index| self.log_odds[index]).collect();
         for beam in beams {
             self.pass(beam);
@@ -86,7 +88,7 @@ impl ScanGrid {
         self.ends = ends;
     }
 
-    /// Marks the cells that a beam passes, but the last (Amanatides and Woo, "A fast voxel traversal algorithm").
+    /// Marks the cells that a beam passes, except the last (Amanatides and Woo, "A fast voxel traversal algorithm").
     fn pass(&mut self, beam: &CellBeam) {
         let CellBeam { origin, way, .. } = beam;
         let BeamEvidence { miss, least, .. } = self.evidence;
@@ -97,7 +99,7 @@ impl ScanGrid {
         let per_cell = way.map(|w| if w == 0.0 { f64::INFINITY } else { 1.0 / w.abs() });
         let share = |start: f64, w: f64| if w < 0.0 { start - start.floor() } else { 1.0 - (start - start.floor()) };
         let mut next = Vector2::new(share(origin.x, way.x) * per_cell.x, share(origin.y, way.y) * per_cell.y);
-        // `next` runs from 0 to 1 over the way; a border beyond 1 means that the way ends in this cell.
+        // `next` runs from 0 to 1 along the beam; a border beyond 1 means that the beam ends in this cell.
         while next.x < 1.0 || next.y < 1.0 {
             if !(0..width).contains(&column) || !(0..height).contains(&row) {
                 return;
@@ -114,7 +116,7 @@ impl ScanGrid {
         }
     }
 
-    /// The map so far, cut to the cells that are known; `None` if there are none.
+    /// The map so far, cropped to the known cells; `None` if there are none.
     pub fn snapshot(&self) -> Option<SnapshotMap> {
         let GridGeometry { width, .. } = self.geometry;
         let known_rows: Vec<(usize, usize, usize)> = self
@@ -133,7 +135,7 @@ impl ScanGrid {
         Some(self.part(Cell { column: first, row: first_row }, Cell { column: last, row: last_row }))
     }
 
-    /// The map so far between two cells, these among it.
+    /// The map so far between two cells, including both.
     fn part(&self, low: Cell, high: Cell) -> SnapshotMap {
         let GridGeometry { width, resolution, origin, .. } = self.geometry;
         let corner = origin * Point2::new(low.column as f64 * resolution, low.row as f64 * resolution);
@@ -148,7 +150,7 @@ impl ScanGrid {
         SnapshotMap { geometry, cells }
     }
 
-    /// The map so far within so many metres of a place, along x and along y; `None` if none of it is on the grid.
+    /// The map so far within `reach` metres of a point along x and y; `None` if none of it is on the grid.
     pub fn around(&self, place: &Point2, reach: f64) -> Option<SnapshotMap> {
         let GridGeometry { width, height, .. } = self.geometry;
         let middle = self.to_cells(place);
@@ -159,7 +161,7 @@ impl ScanGrid {
         self.index(&middle).map(|_| self.part(low, high))
     }
 
-    /// The map so far, with the cells that are not known.
+    /// The map so far, including unknown margins.
     pub fn whole(&self) -> SnapshotMap {
         SnapshotMap { geometry: self.geometry, cells: self.log_odds.iter().map(|&value| percent(value)).collect() }
     }
@@ -237,7 +239,7 @@ mod tests {
         grid
     }
 
-    /// The same cells at the same place, but for rounding.
+    /// Whether two maps have the same cells at the same pose, but for rounding.
     fn is_same(one: &SnapshotMap, other: &SnapshotMap) -> bool {
         let apart = one.geometry.origin.translation.vector - other.geometry.origin.translation.vector;
         one.cells == other.cells && one.geometry.width == other.geometry.width && apart.norm() < 1e-9
@@ -245,7 +247,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_grid_that_has_grown_is_the_grid_that_was_large_from_the_start(
+        fn a_grid_that_has_grown_equals_one_that_was_large_from_the_start(
             left in -9.0..-2.0f64, low in -9.0..-2.0f64, right in 2.0..9.0f64, high in 2.0..9.0f64,
         ) {
             let small = drawn(Point2::new(-1.5, -1.6), Point2::new(1.4, 1.7));
@@ -259,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_that_has_met_nothing_leaves_no_wall() {
+    fn a_beam_without_a_hit_leaves_no_wall() {
         let mut grid = ScanGrid::between(Point2::new(-1.0, -1.0), Point2::new(3.0, 1.0), 0.05, EVIDENCE);
         let origin = grid.to_cells(&Point2::new(0.01, 0.01));
         grid.add_scan(&[CellBeam { origin, way: Vector2::new(40.0, 0.0), is_hit: false }]);
@@ -269,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn the_part_around_a_place_is_cut_to_the_grid() {
+    fn the_part_around_a_point_is_cut_to_the_grid() {
         let grid = drawn(Point2::new(-2.0, -2.0), Point2::new(2.0, 2.0));
         let part = grid.around(&Point2::new(1.5, 0.0), 1.0).unwrap();
         assert_eq!((part.geometry.width, part.geometry.height), (30, 41));

@@ -1,12 +1,13 @@
-//! Where all maps lie together, which no wall between them shows: the reference's map stays where it is in the mean.
+//! Fixes the gauge freedom of all maps together, which no wall between them constrains: the mean displacement of the
+//! reference's map is zero.
 
 use super::body::Body;
 use super::refine::RefinedMap;
 use crate::shared::geometry::{PointPair, Pose2, fit_rigid};
 use nalgebra::Vector3;
 
-/// Moves all bends together so that those of the reference map are zero in the mean: the rigid transform that is nearest to its bend is
-/// none. The bends of the others follow, as they are told in frames that stay.
+/// Moves all maps together so that the rigid transform nearest to the deformation of the reference map is the
+/// identity. The deformations of the other maps follow, as they are in frames that stay.
 pub(super) fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: usize) {
     let Some(change) = maps.get(reference).and_then(change) else { return };
     let of_maps: Vec<Pose2> = bodies
@@ -14,7 +15,7 @@ pub(super) fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: us
         .map(|body| body.transform_world_map.inverse() * bodies[reference].transform_world_map)
         .map(|transform_map_reference| transform_map_reference * change * transform_map_reference.inverse())
         .collect();
-    // A frame that lies too far away for numbers leaves all as it is.
+    // A frame that is too far away leaves all as it is.
     if !of_maps.iter().all(|of_map| of_map.translation.vector.iter().all(|value| value.is_finite())) {
         return;
     }
@@ -28,7 +29,7 @@ pub(super) fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: us
     }
 }
 
-/// What takes the bent reference map back to where it is rigid, in its frame; none if it is not bent.
+/// The rigid transform from the deformed reference map to the rigid one, in its frame; none if it is not deformed.
 fn change(reference: &RefinedMap) -> Option<Pose2> {
     let moves = &reference.deformation.moves;
     if moves.iter().all(|by| by.iter().all(|value| *value == 0.0)) {

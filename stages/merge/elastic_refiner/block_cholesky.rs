@@ -1,17 +1,17 @@
-//! The Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and what is needed of its inverse. Blocks of a fixed size
-//! take an index for nine numbers, and the processor keeps them in registers.
+//! Cholesky factor of a sparse symmetric matrix of blocks of 3 x 3, and the parts of its inverse that are needed.
+//! Blocks of a fixed size need one index for nine numbers, and the processor keeps them in registers.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// The lower factor `L` of a matrix `L L^T`.
+/// Lower factor `L` of a matrix `L L^T`.
 #[derive(Clone, Debug)]
 pub(super) struct BlockCholesky {
-    /// Where the blocks of each column begin.
+    /// Start of each column in `blocks`.
     pub(super) starts: Vec<usize>,
-    /// The row of each block: in each column the diagonal comes first, and then those below.
+    /// Row of each block: in each column the diagonal comes first, and then those below.
     pub(super) rows: Vec<usize>,
     pub(super) blocks: Vec<Matrix3<f64>>,
-    /// The inverse of each diagonal block.
+    /// Inverse of each diagonal block.
     pub(super) inverses: Vec<Matrix3<f64>>,
 }
 
@@ -22,13 +22,13 @@ impl BlockCholesky {
         self.rows[places.clone()].iter().copied().zip(&self.blocks[places])
     }
 
-    /// The logarithm of the matrix's determinant.
+    /// Logarithm of the determinant of the matrix.
     pub(super) fn log_determinant(&self) -> f64 {
         let diagonals = self.starts.iter().take(self.inverses.len()).map(|&own| self.blocks[own].diagonal());
         diagonals.map(|diagonal| 2.0 * diagonal.map(f64::ln).sum()).sum()
     }
 
-    /// What the matrix takes to `right`.
+    /// Solves the system with the right-hand side `right`.
     pub(super) fn solve(&self, right: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut solution = right.to_vec();
         for column in 0..solution.len() {
@@ -46,11 +46,12 @@ impl BlockCholesky {
         solution
     }
 
-    /// The blocks of the inverse where the factor has any, by the recursion of Takahashi, Fagan and Chen (1973). It takes
-    /// about as long as the factor did, where the whole inverse, which is dense, would take as many solutions as there are rows.
+    /// Computes the blocks of the inverse at which the factor has any, by the recursion of Takahashi, Fagan and Chen
+    /// (1973). It takes about as long as the factorization; the whole inverse, which is dense, would take one
+    /// solution for each row.
     pub(super) fn selected_inverse(&self) -> SelectedInverse<'_> {
         let mut values = vec![Matrix3::zeros(); self.blocks.len()];
-        // One column of sums, as the recursion needs it: for each row below the diagonal.
+        // Sums of one column, as the recursion needs them: one for each row below the diagonal.
         let mut sums: Vec<Matrix3<f64>> = Vec::new();
         for column in (0..self.inverses.len()).rev() {
             let (own, end) = (self.starts[column], self.starts[column + 1]);
@@ -59,7 +60,7 @@ impl BlockCholesky {
             sums.clear();
             sums.resize(below.len(), Matrix3::zeros());
             for (k, &row_k) in below.iter().enumerate() {
-                // Column k holds every later row of this column: that is how a factor fills in.
+                // Column k holds every later row of this column, by the fill-in of a factor.
                 let mut place = self.starts[row_k];
                 for i in k..below.len() {
                     while self.rows[place] < below[i] {
@@ -84,7 +85,7 @@ impl BlockCholesky {
     }
 }
 
-/// Some blocks of the inverse of a matrix: those where its factor has any.
+/// Blocks of the inverse of a matrix at which its factor has any.
 #[derive(Clone, Debug)]
 pub(super) struct SelectedInverse<'a> {
     factor: &'a BlockCholesky,
@@ -131,7 +132,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_solved_and_the_determinant_and_the_blocks_of_the_inverse_are_those_of_the_dense_matrix(
+        fn the_solution_and_the_determinant_and_the_blocks_of_the_inverse_are_those_of_the_dense_matrix(
             seed in prop::collection::vec(-1.0..1.0f64, 9 * BLOCKS * BLOCKS),
             holes in 0..100_usize,
         ) {

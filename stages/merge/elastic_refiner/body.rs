@@ -1,4 +1,4 @@
-//! A placed map, as it is bent: its walls with the side that they are seen from, and its lattice.
+//! A placed map for the refinement: its walls, the sides from which they are seen, and its lattice.
 
 use crate::shared::deformation::{Corners, Lattice};
 use crate::shared::geometry::{Grid, Point2, Pose2, is_free};
@@ -8,23 +8,23 @@ use nalgebra::Vector2;
 /// A map that is placed in the world.
 #[derive(Clone, Debug)]
 pub struct Body<'a> {
-    /// Its walls.
+    /// Walls of the map.
     pub(super) walls: &'a WallMap,
-    /// For each point of the walls, from which sides it is seen: that of its normal, and the other.
+    /// Sides from which each point of the walls is seen.
     pub(super) seen: Vec<Sides>,
-    /// Its nodes.
+    /// Nodes of the deformation.
     pub(super) lattice: Lattice,
     /// For each point of the walls, the nodes around it.
     pub(super) corners: Vec<Option<Corners>>,
-    /// The least and the greatest corner of the rectangle that holds the walls, map frame; none without walls.
+    /// Lower and upper corner of the bounding box of the walls, map frame; none without walls.
     pub(super) bounds: Option<[Point2; 2]>,
     /// `T_world_map`.
     pub(super) transform_world_map: Pose2,
-    /// Whether it stays as it is.
+    /// Whether it is not deformed.
     pub(super) is_kept: bool,
 }
 
-/// From which sides a wall is seen: from that of its normal, and from the other.
+/// Sides from which a wall is seen: that of its normal, and the opposite one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sides {
     ahead: bool,
@@ -32,7 +32,7 @@ pub(super) struct Sides {
 }
 
 impl<'a> Body<'a> {
-    /// A map with its walls that lies at `transform_world_map`, with nodes every `spacing` metres.
+    /// A map with its walls at the pose `transform_world_map`, with nodes every `spacing` metres.
     pub fn new(grid: &Grid<'_>, walls: &'a WallMap, transform_world_map: Pose2, spacing: f64) -> Self {
         let before = before_wall(grid.geometry.resolution);
         let is_seen = |point: &Point2, normal: &Vector2<f64>, side: f64| {
@@ -49,7 +49,7 @@ impl<'a> Body<'a> {
         Self { walls, seen, lattice, corners, bounds, transform_world_map, is_kept: false }
     }
 
-    /// The same map, which is not bent, while others are bent onto it.
+    /// The same map without deformation, while others are aligned with it.
     #[must_use]
     pub fn kept(self) -> Self {
         Self { is_kept: true, ..self }
@@ -59,7 +59,7 @@ impl<'a> Body<'a> {
 impl Sides {
     /// Whether two walls may be the same face, if the cosine between their normals, in one frame, is `cosine`.
     pub(super) fn fit(self, other: Self, cosine: f64) -> bool {
-        // Ends and corners of walls have no direction, and may be those of any.
+        // Ends and corners of walls have no direction, and match any.
         if cosine.abs() < LEAST_NORMAL_AGREEMENT {
             return false;
         }
@@ -75,11 +75,11 @@ mod tests {
     use super::Sides;
 
     #[test]
-    fn only_faces_that_look_to_the_same_side_are_the_same() {
+    fn only_faces_with_a_common_free_side_match() {
         let (ahead, behind) = (Sides { ahead: true, behind: false }, Sides { ahead: false, behind: true });
         let both = Sides { ahead: true, behind: true };
         assert!(ahead.fit(ahead, 1.0) && ahead.fit(behind, -1.0) && both.fit(behind, 0.95));
         assert!(!ahead.fit(behind, 1.0) && !ahead.fit(ahead, -1.0) && !both.fit(both, 0.5));
-        assert!(!Sides::default().fit(both, 1.0), "a wall that nobody has looked at from before");
+        assert!(!Sides::default().fit(both, 1.0), "a wall that is seen from no side");
     }
 }

@@ -1,4 +1,4 @@
-//! Where walls of two maps lie near each other, as equations for the nodes around.
+//! Correspondences of the walls of two maps, as equations for the nodes around them.
 
 use super::body::Body;
 use super::equations::Equations;
@@ -8,32 +8,32 @@ use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, stride};
 use nalgebra::{RowVector3, SMatrix, SVector, Vector2};
 use std::collections::BTreeMap;
 
-/// Points of the walls of a map that are looked up in another, at most.
+/// Most points of the walls of a map that are looked up in another.
 const MOST_POINTS: usize = 12_000;
-/// Metres of wall between two points that are looked up, at the least; and as a share of the reach, as what is looked for far
-/// away need not be known to a hand's breadth. Both are below the length of wall that counts as one measurement.
+/// Least spacing of the points that are looked up, metres; and their spacing as a share of the reach, as matches far
+/// away need not be known to a few centimetres. Both are below the length of wall that counts as one measurement.
 const LEAST_SPACING: f64 = 0.25;
 const SPACING_BY_REACH: f64 = 0.25;
 
-/// The nodes of one contact: four of each map.
+/// Nodes of one contact: four of each map.
 const NODES: usize = 8;
 const UNKNOWNS: usize = 3 * NODES;
 
-/// Contacts that concern the same nodes, summed up.
+/// Sum of the contacts of the same nodes.
 struct Sum {
     nodes: [usize; NODES],
     information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     vector: SVector<f64, UNKNOWNS>,
 }
 
-/// What the walls of map b say where they lie within `reach` of walls of map a.
+/// Contacts of the walls of map b with walls of map a within `reach`.
 pub(super) struct Contacts {
     sums: Vec<Sum>,
-    /// The length of wall of map b that lies on walls of map a, metres, each contact by its weight.
+    /// Length of wall of map b on walls of map a, metres, weighted by contact.
     pub(super) length: f64,
 }
 
-/// A map, how it is bent so far, and the number of its first node among those of all maps.
+/// A map with its current deformation, and the index of its first node among those of all maps.
 #[derive(Clone, Copy)]
 pub(super) struct DeformedBody<'a> {
     pub(super) body: &'a Body<'a>,
@@ -42,26 +42,26 @@ pub(super) struct DeformedBody<'a> {
 }
 
 impl DeformedBody<'_> {
-    /// Where a point of the walls lies, world, and the nodes around it.
+    /// Position of a point of the walls, world, and the nodes around it.
     fn in_world(&self, index: usize) -> Option<(Point2, Corners)> {
         let corners = self.body.corners[index]?;
         let point = self.body.walls.walls.points()[index];
         Some((self.body.transform_world_map * self.deformation.apply_at(&point, &corners), corners))
     }
 
-    /// The rectangle that holds what lies within `reach` of the walls, wherever they are bent to: least and greatest corner, map
-    /// frame.
+    /// Lower and upper corner of the bounding box of everything within `reach` of the walls, wherever they are
+    /// deformed to, map frame.
     fn bounds(&self, reach: f64) -> Option<[Point2; 2]> {
         let margin = Vector2::repeat(reach + self.deformation.largest_move());
         self.body.bounds.map(|[low, high]| [low - margin, high + margin])
     }
 }
 
-/// Looks the walls of map b up in map a. What lies `reach` metres apart counts a quarter of what lies on each other, and
-/// nothing beyond.
+/// Looks the walls of map b up in map a. A pair at a distance of `reach` metres counts a quarter of one at distance
+/// 0, and farther ones count nothing.
 pub(super) fn contacts(a: DeformedBody<'_>, b: DeformedBody<'_>, reach: f64) -> Contacts {
     let (length, found) = find_all(a, b, reach);
-    // Both maps are looked up in each other, and say the same.
+    // Both maps are looked up in each other, so each counts one half.
     let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
     let mut sums: BTreeMap<[usize; NODES], Sum> = BTreeMap::new();
     let mut matched = 0.0;
@@ -78,23 +78,23 @@ pub(super) fn contacts(a: DeformedBody<'_>, b: DeformedBody<'_>, reach: f64) -> 
     Contacts { sums: sums.into_values().collect(), length: matched }
 }
 
-/// How far apart two drawings of a wall lie, across the wall, metres.
+/// Distance between two drawings of a wall, across the wall, metres.
 pub(super) struct Apart {
-    /// As the rigid frames have them.
+    /// With rigid maps.
     pub(super) rigid: f64,
-    /// As the maps are bent.
+    /// With deformed maps.
     pub(super) deformed: f64,
 }
 
-/// The walls of map b that lie within `reach` of walls of map a, as they are bent: the length that each stands for, metres, and
-/// how far apart they lie.
+/// Points of the walls of map b within `reach` of walls of map a, with deformation: the length of wall per point,
+/// metres, and the distances.
 pub(super) fn apart<'a>(a: DeformedBody<'a>, b: DeformedBody<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
     let (length, found) = find_all(a, b, reach);
     (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), deformed: contact.residual.abs() }))
 }
 
 impl Contacts {
-    /// Adds what they say to the equations.
+    /// Adds the contacts to the equations.
     pub(super) fn add_to(&self, equations: &mut Equations) {
         for Sum { nodes, information, vector } in &self.sums {
             for (i, &row) in nodes.iter().enumerate() {
@@ -106,7 +106,7 @@ impl Contacts {
         }
     }
 
-    /// The nodes that each equation is about, by their numbers.
+    /// Indices of the nodes of each equation.
     pub(super) fn nodes(&self) -> impl Iterator<Item = &[usize; NODES]> {
         self.sums.iter().map(|sum| &sum.nodes)
     }
@@ -116,16 +116,16 @@ impl Contacts {
 struct Contact {
     of_a: Corners,
     of_b: Corners,
-    /// The point of the wall of map a, map frame, and its normal, world.
+    /// Point of the wall of map a, map frame, and its normal, world.
     partner: Point2,
     normal: Vector2<f64>,
-    /// How far the point lies from the wall, as the maps are bent so far, metres.
+    /// Signed distance of the point from the wall with the current deformation, metres.
     residual: f64,
-    /// The same as the maps came, and so what the moves of the nodes must make up for.
+    /// The same without deformation, which the moves of the nodes are to explain.
     target: f64,
 }
 
-/// Points of the walls of map b, each with what it meets on map a, and the length of wall that each stands for, metres.
+/// Points of the walls of map b with their partners in map a, and the length of wall per point, metres.
 fn find_all<'a>(
     a: DeformedBody<'a>,
     b: DeformedBody<'a>,
@@ -140,7 +140,7 @@ fn find_all<'a>(
     (every as f64 * b.body.walls.spacing, found)
 }
 
-/// What a point of the walls of map b meets within `reach` on map a, near whose walls nothing lies outside of the rectangle.
+/// Partner of a point of the walls of map b within `reach` in map a, whose walls are all within the rectangle.
 fn find(
     (a, [low, high]): (DeformedBody<'_>, &[Point2; 2]),
     b: DeformedBody<'_>,
@@ -173,7 +173,7 @@ fn find(
 }
 
 impl Contact {
-    /// The numbers of its nodes among those of all maps.
+    /// Indices of its nodes among those of all maps.
     fn nodes(&self, first_a: usize, first_b: usize) -> [usize; NODES] {
         std::array::from_fn(|place| match place < 4 {
             true => first_a + self.of_a[place].0,
@@ -181,7 +181,7 @@ impl Contact {
         })
     }
 
-    /// How far the point moves away from the wall with the moves of the nodes.
+    /// Derivative of the distance of the point from the wall with respect to the moves of the nodes.
     fn row(&self, a: DeformedBody<'_>, b: DeformedBody<'_>, point: &Point2) -> SVector<f64, UNKNOWNS> {
         let mut row = SVector::<f64, UNKNOWNS>::zeros();
         let ends = [(a, &self.of_a, &self.partner, -1.0), (b, &self.of_b, point, 1.0)];

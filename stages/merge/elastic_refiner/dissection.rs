@@ -1,26 +1,26 @@
-//! The order in which the nodes of all maps are eliminated.
+//! Elimination order of the nodes of all maps.
 
 use crate::shared::geometry::Point2;
 use std::ops::Range;
 
-/// So few nodes are not divided any further.
+/// Sets of fewer nodes are not divided any further.
 const LEAST_NODES: usize = 16;
 
-/// In which order nodes are eliminated, and what of that has nothing to do with each other.
+/// Elimination order of nodes, and its independent parts.
 #[derive(Clone, Debug)]
 pub(super) struct Dissection {
-    /// Where each node stands in the order.
+    /// Position of each node in the order.
     pub(super) places: Vec<usize>,
-    /// All of the order.
+    /// The whole order.
     pub(super) whole: Part,
 }
 
-/// A part of the order, of nodes that stand behind each other.
+/// A contiguous part of the order.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
-    /// The places of all its nodes.
+    /// Positions of all its nodes.
     pub(super) places: Range<usize>,
-    /// Two parts, with which it begins, of nodes that share no equation: what follows, separates them. None if it is not divided.
+    /// Two parts without a common equation, at its beginning; the rest separates them. None if it is not divided.
     pub(super) sides: Option<Box<[Part; 2]>>,
 }
 
@@ -32,9 +32,9 @@ impl Part {
 }
 
 impl Dissection {
-    /// The nodes in an order that leaves the factor of their equations sparse: what lies on one side of a line, what lies on the
-    /// other, and last those of one side that have to do with the other; and so on within each side (nested dissection, George
-    /// 1973, by where the nodes lie). `neighbours` are for each node those that it shares an equation with.
+    /// Computes an order with a sparse factor: the nodes on one side of a line, those on the other, and last those of
+    /// one side with equations to the other; and so on within each side (nested dissection, George 1973, by the
+    /// positions of the nodes). `neighbours` are for each node those with a common equation.
     pub(super) fn new(at: &[Point2], neighbours: &[Vec<usize>]) -> Self {
         let mut division = Division { at, neighbours, side_of: vec![0; at.len()], sides: 0, order: Vec::new() };
         let whole = division.divide((0..at.len()).collect());
@@ -44,18 +44,18 @@ impl Dissection {
     }
 }
 
-/// What is known while nodes are put in order.
+/// State while nodes are ordered.
 struct Division<'a> {
     at: &'a [Point2],
     neighbours: &'a [Vec<usize>],
-    /// On which side each node lies, of those that were told apart last.
+    /// Side of each node in the latest division.
     side_of: Vec<usize>,
     sides: usize,
     order: Vec<usize>,
 }
 
 impl Division<'_> {
-    /// Appends some nodes to the order. Each time half of them is left, so this goes as deep as their number has bits.
+    /// Appends nodes to the order. The number halves each time, so the recursion is as deep as its number of bits.
     fn divide(&mut self, mut nodes: Vec<usize>) -> Part {
         let first = self.order.len();
         sort_along(&mut nodes, self.at);
@@ -75,7 +75,7 @@ impl Division<'_> {
     }
 }
 
-/// Sorts nodes along the longer side of the rectangle that holds them.
+/// Sorts nodes along the longer side of their bounding box.
 fn sort_along(nodes: &mut [usize], places: &[Point2]) {
     let Some(&first) = nodes.first() else { return };
     let corners = (places[first], places[first]);
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn what_separates_two_sides_comes_after_both() {
-        // A strip of 8 x 4 nodes, each tied to those beside it.
+        // A strip of 8 x 4 nodes, each connected with those beside it.
         let places: Vec<Point2> = (0..32).map(|node| Point2::new(f64::from(node % 8), f64::from(node / 8))).collect();
         let is_near = |one: usize, other: usize| (places[one] - places[other]).norm() < 1.1 && one != other;
         let neighbours: Vec<Vec<usize>> =

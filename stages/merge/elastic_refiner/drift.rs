@@ -1,25 +1,25 @@
-//! How much a map is found to bend, which is what `deformation` and `turn` should have been.
+//! Estimates the drift of a map, which the parameters `bend` and `turn` assume.
 
 use super::ElasticRefinerParameters;
 use super::equations::{Covariances, Edge};
 use crate::shared::deformation::Deformation;
 use nalgebra::Matrix3;
 
-/// Fewer bends between neighbouring nodes than walls tell of say nothing of the next.
+/// Least number of edges between nodes that walls constrain, for an estimate.
 const LEAST_KNOWN: f64 = 6.0;
 
-/// How a map bends, as its walls tell: standard deviations for the root of each metre.
+/// Drift of a map, estimated from its walls: standard deviations per square root of a metre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Of the displacement of two places against each other, metres.
+    /// Of the displacement of two points against each other, metres.
     pub displacement: f64,
-    /// Of the turn of two places against each other, radians.
+    /// Of the turn of two points against each other, radians.
     pub turn: f64,
 }
 
-/// The drift under which the bends that were found are likeliest: their squares by the number of those that walls tell of and not
-/// what was assumed (one step of MacKay 1992, "Bayesian interpolation"). `first` is the number of the map's first node
-/// among those of all maps. `None` if walls tell too little.
+/// Estimates the drift with the maximum likelihood: the squared deformations by the number of those that walls
+/// constrain, not the prior (one step of MacKay 1992, "Bayesian interpolation"). `first` is the index of the map's
+/// first node among those of all maps. `None` if walls constrain too little.
 pub(super) fn drift(
     deformation: &Deformation,
     first: usize,
@@ -37,7 +37,7 @@ pub(super) fn drift(
             + edge.by_j * covariances.of(j, j) * edge.by_j.transpose()
             + mixed
             + mixed.transpose();
-        // The share of each part that is known from walls.
+        // Share of each component that walls constrain.
         let from_walls = |part: usize| (1.0 - left[(part, part)] * edge.information[(part, part)]).clamp(0.0, 1.0);
         squares[0] += (found.x.powi(2) + found.y.powi(2)) / arm.norm();
         squares[1] += found.z.powi(2) / arm.norm();

@@ -1,4 +1,4 @@
-//! The normal equations of all nodes of all maps, and their solution.
+//! Normal equations of all nodes of all maps, and their solution.
 
 use super::ElasticRefinerParameters;
 use super::block_cholesky::{BlockCholesky, SelectedInverse};
@@ -10,23 +10,23 @@ use crate::shared::geometry::Point2;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::sync::Arc;
 
-/// The nodes lie about where the rigid frames have them: standard deviations, metres and radians. Far more than what is
-/// left by frames, so that it decides only what nothing else does, such as where all maps lie together.
+/// Prior of the nodes about the rigid frames: standard deviations, metres and radians. They are far larger than the
+/// error of frames, so the prior only fixes what nothing else does, such as the pose of all maps together.
 const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
-/// The same of a map that is not to be bent: as good as nothing.
+/// The same for a map that is not to be deformed: nearly zero.
 const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 
-/// Normal equations, node by node. The nodes of all bodies are numbered one after the other.
+/// Normal equations by node. The nodes of all bodies are numbered consecutively.
 #[derive(Clone, Debug)]
 pub(super) struct Equations {
-    /// The order in which nodes are eliminated.
+    /// Elimination order of the nodes.
     pub(super) order: Arc<Dissection>,
     columns: Columns,
     vector: Vec<Vector3<f64>>,
 }
 
 impl Equations {
-    /// What is known of the nodes of the bodies without looking at walls.
+    /// Prior on the deformations of the bodies, without walls.
     pub(super) fn of_deformations(
         bodies: &[Body<'_>],
         order: &Arc<Dissection>,
@@ -51,8 +51,8 @@ impl Equations {
         equations
     }
 
-    /// Two nodes side by side: the displacement between them is that of a rigid piece which is turned as they are in the
-    /// mean, and both are turned alike.
+    /// Adds the prior on two neighbouring nodes: the displacement between them is that of a rigid piece that is
+    /// turned by the mean of both, and both are turned alike.
     fn add_edge(
         &mut self,
         (i, at_i): (usize, Point2),
@@ -67,7 +67,7 @@ impl Equations {
         }
     }
 
-    /// Adds a block for two nodes. They are symmetric: what is told of two nodes is to be added both ways round.
+    /// Adds a block for two nodes. The matrix is symmetric, so blocks of two nodes are to be added in both orders.
     pub(super) fn add(&mut self, row: usize, column: usize, block: impl FnOnce() -> Matrix3<f64>) {
         let (row, column) = (self.order.places[row], self.order.places[column]);
         if row >= column {
@@ -79,7 +79,7 @@ impl Equations {
         self.vector[self.order.places[node]] += part;
     }
 
-    /// Solves them. `None` if they have no solution.
+    /// Solves the equations. `None` if they have no solution.
     pub(super) fn solve(&self) -> Option<Solution> {
         let factor = factor(&self.columns, &self.order.whole)?;
         let solved = factor.solve(&self.vector);
@@ -88,24 +88,25 @@ impl Equations {
         Some(Solution { moves, explained, order: Arc::clone(&self.order), factor })
     }
 
-    /// The logarithm of the determinant of their matrix. `None` if they have no solution.
+    /// Logarithm of the determinant of the matrix. `None` if the equations have no solution.
     pub(super) fn log_determinant(&self) -> Option<f64> {
         Some(factor(&self.columns, &self.order.whole)?.log_determinant())
     }
 }
 
-/// What drift says of two nodes i and j that lie side by side.
+/// Drift between two neighbouring nodes i and j.
 pub(super) struct Edge {
-    /// How (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i) changes with what node i does.
+    /// Derivative of (t_j - t_i - (turn_i + turn_j) / 2 * quarter turn of the arm, turn_j - turn_i) with respect to
+    /// the move of node i.
     pub(super) by_i: Matrix3<f64>,
-    /// And with what node j does.
+    /// The same for node j.
     pub(super) by_j: Matrix3<f64>,
-    /// The inverse of its covariance.
+    /// Inverse of its covariance.
     pub(super) information: Matrix3<f64>,
 }
 
 impl Edge {
-    /// Of two nodes with `arm` from i to j.
+    /// Edge between two nodes with `arm` from i to j, metres.
     pub(super) fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
         let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * arm.norm().sqrt();
         let half = 0.5 * arm;
@@ -117,7 +118,7 @@ impl Edge {
     }
 }
 
-/// Half the squared bends between neighbouring nodes, in standard deviations.
+/// Half the squared deformations between neighbouring nodes, in standard deviations.
 pub(super) fn deformation_cost(deformation: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
     let edges = deformation.lattice.edges().map(|(i, j)| {
         let edge = Edge::new(&(deformation.lattice.position(j) - deformation.lattice.position(i)), parameters);
@@ -127,36 +128,36 @@ pub(super) fn deformation_cost(deformation: &Deformation, parameters: &ElasticRe
     edges.sum()
 }
 
-/// What the nodes do.
+/// Solution of the normal equations.
 pub(super) struct Solution {
     /// Displacement and turn of each node.
     pub(super) moves: Vec<Vector3<f64>>,
-    /// By how much the moves lessen the sum of all squares, in variances.
+    /// Reduction of the sum of squares by the moves, in variances.
     pub(super) explained: f64,
     order: Arc<Dissection>,
     factor: BlockCholesky,
 }
 
 impl Solution {
-    /// The logarithm of the determinant of the equations' matrix.
+    /// Logarithm of the determinant of the matrix of the equations.
     pub(super) fn log_determinant(&self) -> f64 {
         self.factor.log_determinant()
     }
 
-    /// How uncertain the nodes are.
+    /// Covariances of the nodes.
     pub(super) fn covariances(&self) -> Covariances<'_> {
         Covariances { places: &self.order.places, inverse: self.factor.selected_inverse() }
     }
 }
 
-/// How uncertain nodes are, alone and together with those beside them.
+/// Covariances of nodes, and of neighbouring nodes with each other.
 pub(super) struct Covariances<'a> {
     places: &'a [usize],
     inverse: SelectedInverse<'a>,
 }
 
 impl Covariances<'_> {
-    /// The covariance of what two nodes do that are one or lie side by side.
+    /// Covariance of the moves of two nodes, equal or neighbouring.
     pub(super) fn of(&self, one: usize, other: usize) -> Matrix3<f64> {
         self.inverse.at(self.places[one], self.places[other])
     }

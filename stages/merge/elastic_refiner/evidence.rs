@@ -1,26 +1,26 @@
-//! Whether maps bend at all, or lie as the rigid frames have them.
+//! Evidence for the deformation of maps against rigid maps.
 
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::equations::{Equations, Solution};
 use super::refine::Round;
 
-/// Where maps bend little, what they are allowed is too much to be likely. So bends are tried that are less, by this share of the
-/// deviations.
+/// Where maps are deformed little, the prior is too wide to be likely. So smaller deformations are tried as well,
+/// with this share of the standard deviations.
 const LITTLE: f64 = 0.25;
 
-/// How much likelier what walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm: the ratio
-/// of the evidence of two linear models (MacKay 1992, "Bayesian interpolation"), the maps being allowed to bend as far as
-/// `parameters` say, or a little, whichever is likelier. Above 0 the bend gains more than it costs. `None` if there is no number.
+/// Logarithm of the evidence ratio of deformed to rigid maps, for two linear models (MacKay 1992, "Bayesian
+/// interpolation"), with the prior of `parameters` or a narrower one, whichever is likelier. Above 0 the deformation
+/// gains more than it costs. `None` if it is not finite.
 ///
-/// What walls say is what they said in the last round. They are taken to be as wrong as one cell in every half metre: as the
-/// cells of a map round all of a wall alike, maps that are not bent must not seem so for it.
+/// The walls are those of the last round. Their error is assumed to be one cell in every half metre: all of a wall is
+/// rounded to cells alike, which must not look like a deformation.
 pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefinerParameters) -> Option<f64> {
     let log_ratio = |of_deformations: &Equations, solution: &Solution| {
         Some(0.5 * (of_deformations.log_determinant()? - solution.log_determinant() + solution.explained))
     };
     let mut best = log_ratio(&last.of_deformations, &last.solution)?;
-    // It is the sign that counts, and most maps that bend do so clearly.
+    // Only the sign counts, and most deformed maps are clearly so.
     if best <= 0.0 {
         let little =
             ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };

@@ -1,8 +1,8 @@
-//! How a sparse symmetric matrix of blocks of 3 x 3 is factored.
+//! Factorization of a sparse symmetric matrix of blocks of 3 x 3.
 //!
-//! The factor is made column by column, each from those before it that reach it (left-looking; Davis, "Direct Methods for
-//! Sparse Linear Systems", 2006). What a dissection has told apart is made at once, on as many cores as there are; what is added
-//! up is added in one order all the same.
+//! The factor is computed column by column, each from the earlier ones that reach it (left-looking; Davis, "Direct
+//! Methods for Sparse Linear Systems", 2006). Independent parts of a dissection are computed in parallel; sums are in
+//! a fixed order all the same.
 
 use super::block_cholesky::BlockCholesky;
 use super::dissection::Part;
@@ -10,19 +10,19 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The lower triangle of a symmetric matrix by its columns: the entries of each in any order, and several for one place, which
-/// are added up.
+/// Lower triangle of a symmetric matrix by columns: the entries of each in any order, and several for one position,
+/// which are summed.
 pub(super) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
 
 /// No column.
 const NONE: usize = usize::MAX;
-/// Parts of fewer columns are made in one go.
+/// Parts of fewer columns are computed by one thread.
 const LEAST_DIVIDED: usize = 200;
-/// So many columns at least are made by one thread.
+/// Least number of columns for each thread.
 const LEAST_TOGETHER: usize = 8;
 
-/// Factors a matrix, whose columns are in an order of which `whole` tells what has nothing to do with each other. `None` if it is
-/// not positive definite.
+/// Factors a matrix whose columns are in an order with the independent parts `whole`. `None` if it is not positive
+/// definite.
 pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<BlockCholesky> {
     let (starts, rows) = pattern(columns);
     let mut blocks = vec![Matrix3::zeros(); rows.len()];
@@ -33,23 +33,23 @@ pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<BlockCholesky> {
     Some(BlockCholesky { starts, rows, blocks, inverses })
 }
 
-/// A matrix that is being factored, and where its factor has blocks.
+/// A matrix that is being factored, and the pattern of its factor.
 struct Factoring<'a> {
     columns: &'a Columns,
     starts: &'a [usize],
     rows: &'a [usize],
 }
 
-/// The columns of the factor that belong to a part.
+/// Columns of the factor that belong to a part.
 struct MadeColumns<'a> {
     blocks: &'a mut [Matrix3<f64>],
     inverses: &'a mut [Matrix3<f64>],
-    /// For each column that is made, its first block that lies in no row of a column that is made.
+    /// For each finished column, the index of its first block that is in no row of a finished column.
     next: &'a mut [usize],
 }
 
 impl<'a> MadeColumns<'a> {
-    /// The first so many columns, which have so many blocks, and the others.
+    /// Splits after some columns, which have the given number of blocks.
     fn split(self, columns: usize, blocks: usize) -> [MadeColumns<'a>; 2] {
         let (first_blocks, blocks) = self.blocks.split_at_mut(blocks);
         let (first_inverses, inverses) = self.inverses.split_at_mut(columns);
@@ -66,8 +66,8 @@ impl<'a> MadeColumns<'a> {
 }
 
 impl Factoring<'_> {
-    /// Makes the columns of a part: those of its sides at once, as none reaches a column of the other side, and then those that
-    /// separate them. In which order parts are added up does not depend on which side is done first.
+    /// Computes the columns of a part: those of its two sides in parallel, as they are independent, and then those
+    /// that separate them. The order of sums does not depend on which side is done first.
     fn factor(&self, part: &Part, mut made: MadeColumns<'_>) -> Option<()> {
         let mut own = part.places.clone();
         if let Some(sides) = part.sides.as_deref().filter(|_| own.len() > LEAST_DIVIDED) {
@@ -82,14 +82,14 @@ impl Factoring<'_> {
         self.factor_own(part.places.start, own, made)
     }
 
-    /// Makes the columns `own` of a part that begins with the column `first`. Those before them are made.
+    /// Computes the columns `own` of a part that begins with the column `first`. Those before them are finished.
     fn factor_own(&self, first: usize, own: Range<usize>, made: MadeColumns<'_>) -> Option<()> {
         let MadeColumns { blocks, inverses, next } = made;
         let begin = self.starts[first];
         let (made_blocks, own_blocks) = blocks.split_at_mut(self.starts[own.start] - begin);
         self.take_off_made(first, &own, made_blocks, own_blocks, next);
         let begin = self.starts[own.start];
-        // For each own column those before it whose next block lies in its row, by their number and that of the block.
+        // For each own column the earlier ones whose next block is in its row, by their index and that of the block.
         let mut reaching: Vec<Vec<(usize, usize)>> = vec![Vec::new(); own.len()];
         let reach = |reaching: &mut Vec<Vec<(usize, usize)>>, column: usize, block: usize| {
             if block < self.starts[column + 1] && own.contains(&self.rows[block]) {
@@ -121,8 +121,8 @@ impl Factoring<'_> {
         Some(())
     }
 
-    /// Writes to the own columns those of the matrix, less what the columns take off that are made. As these are done, each own
-    /// column is by itself.
+    /// Initializes the own columns with those of the matrix, less the updates of finished columns. Each own column is
+    /// independent of the others here.
     fn take_off_made(
         &self,
         first: usize,
@@ -132,7 +132,7 @@ impl Factoring<'_> {
         next: &mut [usize],
     ) {
         let begin = self.starts[first];
-        // The blocks of columns that are made in the row of each own one, by the end of their column.
+        // Blocks of finished columns in the row of each own one, by the end of their column.
         let mut in_row: Vec<Vec<Range<usize>>> = vec![Vec::new(); own.len()];
         for column in first..own.start {
             let end = self.starts[column + 1];
@@ -167,8 +167,8 @@ impl Factoring<'_> {
         );
     }
 
-    /// Takes off a column what another does, whose `blocks`, from that in its row on, are the first of `from`. `work` is by row,
-    /// from the row `first_row` on.
+    /// Subtracts the update of another column, whose `blocks`, from that in its row on, are the first of `from`.
+    /// `work` is by row, from the row `first_row` on.
     fn take_off(&self, blocks: Range<usize>, from: &[Matrix3<f64>], work: &mut [Matrix3<f64>], first_row: usize) {
         let Some(by) = from.first().map(Matrix3::transpose) else { return };
         for (row, block) in self.rows[blocks].iter().zip(from) {
@@ -177,9 +177,9 @@ impl Factoring<'_> {
     }
 }
 
-/// Where the columns of the factor begin, and the rows of their blocks: a column has those of the matrix, and those of the
-/// columns whose first block below the diagonal lies in its row (Liu 1990, "The role of elimination trees in sparse
-/// factorization").
+/// Pattern of the factor: start of each column, and the rows of its blocks. A column has those of the matrix, and
+/// those of the columns whose first block below the diagonal is in its row (Liu 1990, "The role of elimination trees
+/// in sparse factorization").
 fn pattern(columns: &Columns) -> (Vec<usize>, Vec<usize>) {
     let mut starts = vec![0];
     let mut rows: Vec<usize> = Vec::new();
@@ -215,7 +215,7 @@ mod tests {
     use crate::shared::geometry::Point2;
 
     #[test]
-    fn sides_that_are_made_at_once_give_the_same_factor() {
+    fn sides_that_are_computed_in_parallel_give_the_same_factor() {
         const WIDTH: usize = 36;
         let at: Vec<Point2> =
             (0..18 * WIDTH).map(|node| Point2::new((node % WIDTH) as f64, (node / WIDTH) as f64)).collect();

@@ -1,22 +1,23 @@
-//! Bends the maps of robots that are placed in one world, so that walls that several have seen lie on each other (the maps
-//! of a SLAM are right in every room and bent as a whole).
+//! Non-rigid refinement: deforms the maps of robots that are placed in one world, so that walls that several have
+//! seen are aligned. The maps of a SLAM are right in every room and deformed as a whole.
 //!
-//! Each map gets a lattice of nodes ([`Deformation`](crate::shared::deformation::Deformation)). All nodes of all maps are found
-//! together, as the least squares of
+//! Each map gets a lattice of nodes ([`Deformation`](crate::shared::deformation::Deformation)). All nodes of all maps
+//! are estimated together, as the least squares of
 //!
-//! - walls: a point of a wall of one map lies on the same face of a wall of another, measured across that wall, with a
+//! - walls: a point of a wall of one map is on the same face of a wall of another, measured across that wall, with a
 //!   Geman-McClure kernel that narrows from round to round (graduated non-convexity, Yang et al. 2020);
-//! - bends: neighbouring nodes of a map are displaced and turned alike, as far as the drift of a SLAM allows, a random walk:
-//!   the variance grows with the distance. Where only one map knows the place, this carries the bend on, and
-//!   the map is rigid in itself;
-//! - frames: the maps lie about where the rigid frames have them.
+//! - drift: neighbouring nodes of a map are displaced and turned alike, as far as the drift of a SLAM allows, a
+//!   random walk: the variance grows with the distance. Where only one map is known, this extrapolates the deformation,
+//!   and the map is locally rigid;
+//! - frames: a wide prior keeps the maps near their rigid frames.
 //!
-//! Maps stay rigid where that is likelier than a bend: where it explains the walls as well as the noise of cells does.
+//! Maps stay rigid where that is likelier than a deformation: where the noise of cells explains the walls as well.
 //!
-//! Nodes that are rigid pieces tied by what drift allows are the submaps of Atlas (Bosse et al. 2004) and Cartographer (Hess
-//! et al. 2016), on a lattice as in Kimera-Multi's deformation graphs (Tian et al. 2022) and in the embedded deformation
-//! (Sumner et al. 2007). That walls are drawn onto walls of the other map everywhere at once, and not region by region, is
-//! the optimisation of Shahbandi, Magnusson and Iagnemma (2018), with points and lines in place of a distance map's gradient.
+//! Nodes that are rigid pieces connected by drift are the submaps of Atlas (Bosse et al. 2004) and Cartographer (Hess
+//! et al. 2016), on a lattice as in Kimera-Multi's deformation graphs (Tian et al. 2022) and in the embedded
+//! deformation (Sumner et al. 2007). The alignment of all walls at once, and not region by region, is the
+//! optimisation of Shahbandi, Magnusson and Iagnemma (2018), with points and lines in place of a distance map's
+//! gradient.
 
 mod anchor;
 mod block_cholesky;
@@ -47,15 +48,15 @@ use stage::ElasticRefiner;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "elastic_refiner",
-        "Bends the maps of all placed robots, so that walls that several have seen lie on each other; they stay as they are where \
-         that is likelier. What is sent for each robot is a lattice of small displacements and turns with their covariances, and how \
-         sharp its walls come out; the rigid frames stay as they are. The bends are estimated when other robots are placed, when a \
+        "Deforms the maps of all placed robots, so that walls that several have seen are aligned; maps stay rigid where \
+         that is likelier. It sends for each robot a lattice of small displacements and turns with their covariances, and the \
+         sharpness of its walls; the rigid frames stay as they are. Deformations are estimated when other robots are placed, when a \
          frame has changed by more than `min_move` or `min_turn` or a map has grown by more than `min_growth`, and at the end if \
          anything has changed since.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)
-    .input("frames", "Where the maps lie.", ElasticRefiner::receive_frames)
+    .input("frames", "The poses of the maps.", ElasticRefiner::receive_frames)
     .finish(ElasticRefiner::finish)
     .build()
 }

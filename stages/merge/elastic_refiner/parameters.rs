@@ -1,39 +1,39 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the elastic refiner. What takes them expects values that have passed [`check`](Parameters::check).
+/// Parameters of the elastic refiner. Functions expect values that have passed [`check`](Parameters::check).
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ElasticRefinerParameters {
-    /// Whether maps are bent. If not, frames go through and nothing else is sent: the maps are rigid.
+    /// Whether maps are deformed. If not, frames are passed on and nothing else is sent: the maps are rigid.
     pub enabled: bool,
-    /// Whether the map of the reference robot stays as it is, and only the others are bent onto it.
+    /// Whether the map of the reference robot stays as it is, and only the others are deformed to align with it.
     pub keep_reference: bool,
-    /// Metres from node to node: within such a distance a map counts as rigid.
+    /// Spacing of the nodes, metres: within such a distance a map counts as rigid.
     #[schemars(range(min = 0.5, max = 100.0))]
     pub spacing: f64,
-    /// How maps bend: standard deviation of the displacement of two places of a map against each other, metres for the root of
-    /// each metre between them. What a map was found to do is told with its bend.
+    /// Deformation: standard deviation of the displacement of two points of a map against each other, metres per
+    /// square root of a metre between them. The estimate from a map's walls is sent with its deformation.
     #[schemars(range(min = 1e-6, max = 10.0))]
     pub bend: f64,
-    /// How maps turn: standard deviation of the turn of two places of a map against each other, radians for the root of each
-    /// metre between them.
+    /// Deformation: standard deviation of the turn of two points of a map against each other, radians per square root
+    /// of a metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub turn: f64,
-    /// Metres. Walls that lie farther apart, as the rigid frames have them, are not laid on each other.
+    /// Largest distance of walls, with rigid frames, that are aligned with each other, metres.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub reach: f64,
-    /// Metres. While the robots explore, the bends are estimated again when a frame has moved by more than this; at the end
-    /// they are in any case.
+    /// While the robots explore, the deformations are estimated again when a frame has moved by more than this,
+    /// metres. At the end they are estimated in any case.
     #[schemars(range(min = 0.0))]
     pub min_move: f64,
-    /// Radians. The same when a frame has turned by more than this.
+    /// The same when a frame has turned by more than this, radians.
     #[schemars(range(min = 0.0))]
     pub min_turn: f64,
-    /// The same when a map covers more than before by this share.
+    /// The same when the area of a map has grown by more than this share.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub min_growth: f64,
 }

@@ -1,4 +1,4 @@
-//! The estimate of all bends together.
+//! Estimates the deformations of all maps together.
 
 use super::ElasticRefinerParameters;
 use super::body::Body;
@@ -13,38 +13,38 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// How far walls may lie apart from round to round, as shares of the reach: wide at first, when the maps lie where the rigid
-/// frames have them, and at the end about as far as a wall is drawn wrong.
+/// Largest distance of walls in each round, as a share of the reach: wide at first, when the maps are rigid, and at
+/// the end about the error with which a wall is drawn.
 const ROUNDS: [f64; 8] = [1.0, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.15];
 
-/// How one map is bent.
+/// Deformation of one map.
 #[derive(Clone, Debug)]
 pub struct RefinedMap {
-    /// Where its places belong.
+    /// The deformation.
     pub deformation: Deformation,
-    /// The covariance of each node: (x, y, turn).
+    /// Covariance of each node: (x, y, turn), metres and radians.
     pub covariances: Vec<Matrix3<f64>>,
-    /// The length of its walls that lie on walls of others, metres.
+    /// Length of its walls on walls of others, metres.
     pub wall_matched: f64,
-    /// How unlikely it is that a map bends so: the logarithm of how much likelier no bend is, half the squared bends between
+    /// Cost of the deformation: the logarithm of how much likelier none is, half the squared deformations between
     /// neighbouring nodes in standard deviations.
     pub cost: f64,
-    /// How it bends; none if its walls tell too little of that.
+    /// Drift of the map; none if its walls constrain it too little.
     pub drift: Option<Drift>,
 }
 
-/// How all maps are bent.
+/// Deformations of all maps.
 #[derive(Clone, Debug)]
 pub struct Refinement {
-    /// Of each body.
+    /// One for each body.
     pub maps: Vec<RefinedMap>,
-    /// How much likelier what the walls say is if the maps bend than if they lie as the rigid frames have them, as a logarithm.
-    /// Not above 0 the maps are rather not bent, and what is in `maps` is the walls' noise.
+    /// Logarithm of the evidence ratio of deformed to rigid maps. If it is not above 0, `maps` fits the noise of
+    /// walls.
     pub gain: f64,
 }
 
 impl Refinement {
-    /// The bends if they are likelier than none; else none, as uncertain as they are.
+    /// The deformations if the evidence supports them; else none, with the same covariances.
     #[must_use]
     pub fn if_supported(self) -> Vec<RefinedMap> {
         if self.gain > 0.0 { self.maps } else { self.maps.into_iter().map(RefinedMap::undeformed).collect() }
@@ -58,18 +58,18 @@ impl RefinedMap {
     }
 }
 
-/// What was found in one round.
+/// Result of one round.
 pub(super) struct Round {
-    /// What the walls say, pair by pair.
+    /// Contacts of the walls, for each pair of maps.
     pub(super) walls: Vec<Contacts>,
-    /// What is known without looking at walls.
+    /// The prior, without walls.
     pub(super) of_deformations: Equations,
-    /// What follows from both.
+    /// The solution of both.
     pub(super) solution: Solution,
 }
 
-/// Bends placed maps, so that walls that several show lie on each other. `None` if numbers are so large that the equations have
-/// no solution.
+/// Deforms placed maps so that walls that several of them have are aligned. `None` if the equations have no solution,
+/// because numbers are too large.
 pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Refinement> {
     let mut deformations: Vec<Deformation> =
         bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
@@ -90,7 +90,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
     let mut last: Option<Round> = None;
     for share in ROUNDS {
         let walls = find(&deformations, share);
-        // What is tied to what changes from round to round, and with it the order that leaves the factor sparse.
+        // Contacts change from round to round, and with them the order that leaves the factor sparse.
         let order = Arc::new(order(bodies, &firsts, &walls));
         let of_deformations = Equations::of_deformations(bodies, &order, parameters);
         let mut equations = of_deformations.clone();
@@ -122,7 +122,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
         .then(|| Refinement { maps: deformations.into_iter().zip(matched).zip(&firsts).map(refined).collect(), gain })
 }
 
-/// A rectangle of the world, least and greatest corner, that holds the walls of a body and what lies within `reach` of them.
+/// Lower and upper corner of a rectangle of the world that holds everything within `reach` of the walls of a body.
 fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     let mut points = body.walls.walls.points().iter().map(|point| body.transform_world_map * point);
     let first = points.next()?;
@@ -131,7 +131,7 @@ fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
     Some([low - margin, high + margin])
 }
 
-/// The order in which the nodes of all bodies are eliminated.
+/// Elimination order of the nodes of all bodies.
 fn order(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Dissection {
     let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
     let at: Vec<Point2> =

@@ -1,13 +1,13 @@
-//! How sharp the merged map is: whether walls that several maps show come out once.
+//! Sharpness of the merged map: the thickness spread of walls, and the share of double walls.
 
 use super::contacts::{DeformedBody, apart};
 use super::{Body, ElasticRefinerParameters, RefinedMap};
 use gridweave_runtime::ros::Sharpness;
 use rayon::prelude::*;
 
-/// Metres. Drawings of one wall that lie farther apart look like two walls: two cells of most maps.
+/// Distance above which two drawings of one wall look like two walls, metres: two cells of most maps.
 const DOUBLED: f64 = 0.1;
-/// Metres. Walls that lie farther apart when the maps are bent are taken for different ones.
+/// Distance above which walls count as different ones, with deformation, metres.
 const SAME_WALL: f64 = 0.5;
 
 /// Lengths of wall, metres.
@@ -31,8 +31,7 @@ impl Sum {
     }
 }
 
-/// For each body, how the walls that others show as well lie on theirs: as the rigid frames have them, and as the maps are bent.
-/// Of walls that no other shows there is nothing to say.
+/// For each body, the sharpness of the walls that other maps have as well: with rigid maps, and with deformation.
 pub fn sharpness(
     bodies: &[Body<'_>],
     maps: &[RefinedMap],

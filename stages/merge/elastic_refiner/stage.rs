@@ -1,4 +1,5 @@
-//! The stage: keeps each robot's map and the frames, and bends the maps of the placed robots when any of it has changed.
+//! The stage: keeps each robot's map and the frames, and deforms the maps of the placed robots when any of them has
+//! changed.
 
 use super::anchor::anchor;
 use super::{Body, ElasticRefinerParameters, RefinedMap, refine, sharpness};
@@ -10,7 +11,7 @@ use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyG
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct Deformations {
     deformation: Out<MapDeformation>,
     frames: Out<RobotFrames>,
@@ -19,34 +20,34 @@ pub(super) struct Deformations {
 impl Outputs for Deformations {
     fn declare(ports: &mut OutputPorts) -> Self {
         Self {
-            deformation: ports.output("deformation", "How the map of each placed robot is bent."),
+            deformation: ports.output("deformation", "The deformation of the map of each placed robot."),
             frames: ports.side_output(
                 "frames",
-                "The frames as they came, sent after the bends that belong to them: for stages that need both.",
+                "The frames as received, sent after the deformations that belong to them: for stages that need both.",
             ),
         }
     }
 }
 
-/// Bends the maps of placed robots.
+/// Deforms the maps of placed robots.
 pub(super) struct ElasticRefiner {
     parameters: ElasticRefinerParameters,
     maps: RobotMaps<WallsOnDemand>,
     frames: RobotFrames,
-    /// The frames in which the maps were bent last.
+    /// Frames at the latest refinement.
     deformed_frames: RobotFrames,
-    /// The maps that were bent last, by robot.
+    /// Maps at the latest refinement, by robot.
     deformed_maps: BTreeMap<String, DeformedMap>,
-    /// Whether any bend was sent.
+    /// Whether any deformation was sent.
     has_sent: bool,
 }
 
-/// A map as it was when it was bent.
+/// A map at its latest refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct DeformedMap {
-    /// Which of its robot's maps it was.
+    /// Number of the map among those of its robot.
     number: u64,
-    /// How many nodes its lattice had.
+    /// Number of nodes of its lattice.
     nodes: usize,
 }
 
@@ -62,7 +63,8 @@ impl ElasticRefiner {
         }
     }
 
-    /// Maps wait for frames, or for the end: a map that has grown a little is bent as the last one was until then.
+    /// Maps wait for frames, or for the end: until then the latest deformation holds for a map that has grown a
+    /// little.
     pub(super) fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
@@ -78,7 +80,7 @@ impl ElasticRefiner {
         output: &Output<Deformations>,
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
-        // What changes little waits for the end: bends are told in the map's own frame, and hold in a frame that lies beside.
+        // Small changes wait for the end: deformations are in the map's own frame, and hold for a frame nearby.
         if self.is_near() { output.frames.send("", &self.frames) } else { self.deform(output) }
     }
 
@@ -89,7 +91,7 @@ impl ElasticRefiner {
         if is_deformed { Ok(()) } else { self.deform(output) }
     }
 
-    /// Whether the robots are about where they were when their maps were bent, and know about as much.
+    /// Whether the robots are near their frames of the latest refinement, and their maps have grown little.
     fn is_near(&self) -> bool {
         let (before, after) = (&self.deformed_frames, &self.frames);
         let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
@@ -101,14 +103,14 @@ impl ElasticRefiner {
             && self.placed().zip(self.deformed_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
     }
 
-    /// Whether a map knows so much that it did not when it was bent that it is to be bent again.
+    /// Whether a map has grown so much since its latest refinement that it is to be refined again.
     fn has_grown(&self, before: &DeformedMap, map: &RobotMap<WallsOnDemand>) -> bool {
         let ElasticRefinerParameters { min_growth, spacing, .. } = self.parameters;
         let most = before.nodes as f64 * (1.0 + min_growth);
         map.number != before.number && Lattice::over(&map.grid(), spacing).len() as f64 > most
     }
 
-    /// The maps of the placed robots, by their names.
+    /// The maps of the placed robots, by name.
     fn placed(&self) -> impl Iterator<Item = (&String, &RobotMap<WallsOnDemand>)> {
         let placed: BTreeMap<&String, &RobotMap<WallsOnDemand>> =
             self.frames.frames.iter().filter_map(|frame| Some((&frame.robot, self.maps.get(&frame.robot)?))).collect();
@@ -124,7 +126,7 @@ impl ElasticRefiner {
         self.deformed_maps = self.placed().map(of_map).collect();
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
-        // What is alone is not bent, which is news if it was.
+        // A single map is not deformed; that is sent if it was deformed before.
         let has_news = placed.len() > 1 || self.has_sent;
         if self.parameters.enabled && has_news {
             self.has_sent = true;

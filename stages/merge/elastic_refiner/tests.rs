@@ -1,4 +1,4 @@
-//! What bends do to made-up maps.
+//! Refinement of drawn maps.
 
 use super::anchor::anchor;
 use super::{Body, ElasticRefinerParameters, RefinedMap, Refinement, kind, refine};
@@ -16,7 +16,7 @@ fn body(map: &DrawnMap, transform_world_map: Pose2) -> Body<'_> {
     Body::new(&map.view().grid, &map.walls, transform_world_map, PARAMETERS().spacing)
 }
 
-/// How far two maps of one building lie apart at its places, metres: the mean and the most, of those known to both.
+/// Distance between two maps of one building, metres: the mean and the largest over points known to both.
 fn apart(maps: &[RefinedMap], bodies: &[Body<'_>], most: f64, places: &[Point2]) -> (f64, f64) {
     let distances = places.iter().map(|place| {
         let in_a = bodies[0].transform_world_map * maps[0].deformation.apply(place);
@@ -32,7 +32,7 @@ fn places() -> Vec<Point2> {
 }
 
 #[test]
-fn the_reference_stays_where_it_is_in_the_mean_and_the_others_with_it() {
+fn the_mean_displacement_of_the_reference_is_zero() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let deformed = map.deformed(0.4);
     let bodies = [body(&map, pose(3.0, -2.0, 0.7)), body(&deformed, pose(3.0, -2.0, 0.7))];
@@ -50,7 +50,7 @@ fn the_reference_stays_where_it_is_in_the_mean_and_the_others_with_it() {
 }
 
 #[test]
-fn a_bent_map_is_laid_on_a_straight_one() {
+fn a_deformed_map_is_aligned_with_a_straight_one() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let mut drifts = Vec::new();
     for most in [0.1, 0.4] {
@@ -81,7 +81,7 @@ fn a_bent_map_is_laid_on_a_straight_one() {
         assert!(deformed.apart < 0.03 && deformed.doubled < 0.03, "{most}: {deformed:?}");
         drifts.push(refined[1].drift.unwrap());
     }
-    // What bends more is found to, though next to nothing is seen of small bends.
+    // A larger deformation gives a larger estimate, though small deformations are hardly seen.
     let [little, much] = drifts[..] else { panic!() };
     assert!(much.displacement > 2.0 * little.displacement && much.turn > 1.5 * little.turn, "{little:?}, {much:?}");
     assert!((0.005..0.05).contains(&much.displacement) && (0.001..0.01).contains(&much.turn), "{much:?}");
@@ -169,7 +169,7 @@ fn numbers_without_bounds_are_refused_or_bounded() {
     }
 }
 
-/// A stage that has been given two maps and their frames.
+/// A stage that has received two maps and their frames.
 fn stage(parameters: &str, map_b: &[i8]) -> (StageHarness, DrawnMap, RobotFrames) {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let mut stage = StageHarness::new(&kind(), parameters).unwrap();

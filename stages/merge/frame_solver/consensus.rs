@@ -1,17 +1,17 @@
 //! The largest set of alignments that agree with each other.
 //!
 //! A set agrees if each of its edges closes the shortest cycle that it makes with the others, up to the covariances.
-//! The largest one is sought by moves, each of which changes the pose of any number of robots at once. An edge outside
-//! of the set says by how much the robots at its one end should move against those at its other end, and other edges
-//! outside may agree with that. Which robots are best moved along is a least cut: an edge of the set that joins a
-//! robot that moves to one that stays is lost, an edge outside that agrees with the move is won. A move that wins more
-//! than it loses is made; a move that wins just as much as it loses shows that it cannot be told which reading is
-//! right (`consistency`).
+//! The largest one is sought by moves, each of which changes the pose of any number of robots at once. An edge
+//! outside of the set implies a move of the robots at one of its ends relative to those at the other, and other edges
+//! outside may agree with that. The best set of robots to move is a minimum cut: an edge of the set between a robot
+//! that moves and one that stays is lost, an edge outside that agrees with the move is won. A move that wins more
+//! than it loses is made; a move that wins as much as it loses shows that the evidence does not decide between the
+//! two (`consistency`).
 //!
-//! Moves by which all robots that move stay together suffice, unless wrong alignments close cycles among themselves by
-//! chance. For let another reading part a set in which no robot hangs on one edge alone into k + 1 pieces that move
-//! apart: it loses at least k + 1 edges, and k edges are all it takes to tie the pieces together in another way. What
-//! it wins beyond these k agrees with them, as two edges between the same pieces do, which one move wins together.
+//! Moves by which all robots that move stay together suffice, unless wrong alignments close cycles among themselves
+//! by chance. For let another solution split a set in which no robot depends on one edge alone into k + 1 pieces that
+//! move apart: it loses at least k + 1 edges, and k edges suffice to connect the pieces in another way. What it wins
+//! beyond these k agrees with them, as two edges between the same pieces do, which one move wins together.
 
 use super::cut::{CutGraph, LeastCut};
 use super::graph::{Cycle, Edge, Forest, Neighbours};
@@ -20,7 +20,7 @@ use crate::shared::geometry::wrap_angle;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// How many of the triangles of an edge are looked at to find the edges that agree most.
+/// Number of the triangles of an edge that are tested to find the edges that agree most.
 const WITNESSES: usize = 8;
 
 /// A set of edges that agree with each other.
@@ -33,17 +33,17 @@ pub(super) struct Consensus<'a> {
     agrees: Vec<bool>,
 }
 
-/// What speaks for an edge outside of the set.
+/// Gain and loss of an edge outside of the set.
 struct Move {
-    /// The edges outside that agree with it, itself among them.
+    /// Number of edges outside that agree with it, including itself.
     won: usize,
-    /// What is lost if it is followed. `None` if that is more than what is won.
+    /// Loss if it is followed. `None` if that is more than the gain.
     lost: Option<LeastCut>,
 }
 
 impl<'a> Consensus<'a> {
-    /// Finds a set that no move makes larger, from edges that are known to agree. A cycle is closed if it is within
-    /// `gate` standard deviations of it.
+    /// Finds a set that no move enlarges, from edges that are known to agree. A cycle is closed if its Mahalanobis
+    /// distance from the identity is within `gate`.
     pub(super) fn find(
         robots: usize,
         edges: &'a [Edge],
@@ -53,7 +53,7 @@ impl<'a> Consensus<'a> {
     ) -> Self {
         let mut consensus = Self { robots, edges, neighbours, gate, agrees: known };
         let mut order: Vec<usize> = (0..edges.len()).collect();
-        // What closes triangles is most likely right, and a good start needs few moves.
+        // Edges that close triangles are most likely right, and a good start needs few moves.
         let closing: Vec<usize> = order
             .iter()
             .map(|&index| if consensus.agrees[index] { 0 } else { consensus.closing_triangles(index) })
@@ -76,10 +76,10 @@ impl<'a> Consensus<'a> {
         (0..self.edges.len()).filter(|&index| !self.agrees[index]).collect()
     }
 
-    /// The edges of which it cannot be told whether they are right, with a cycle that shows the contradiction.
+    /// Edges that are disputed, with a cycle that shows the contradiction.
     ///
-    /// An edge outside of the set is disputed if following it loses no more than it wins, and so is what it may cost.
-    /// What is disputed vouches for nothing, so the rest is looked at again without it.
+    /// An edge outside of the set is disputed if following it loses no more than it wins, and so are the edges that
+    /// it may lose. Disputed edges are no evidence for others, so the rest is checked again without them.
     pub(super) fn disputed(&self) -> BTreeMap<usize, Cycle> {
         let outside = self.outside();
         let mut disputed: BTreeMap<usize, Cycle> = BTreeMap::new();
@@ -104,7 +104,7 @@ impl<'a> Consensus<'a> {
         }
     }
 
-    /// How many triangles an edge closes, of the first few that it is in.
+    /// Number of triangles that an edge closes, of the first few that it is in.
     fn closing_triangles(&self, index: usize) -> usize {
         let Edge { a, b, transform_a_b } = self.edges[index];
         let mut side_of_b = vec![None; self.robots];
@@ -123,7 +123,7 @@ impl<'a> Consensus<'a> {
         triangles.take(WITNESSES).filter(closes).count()
     }
 
-    /// Takes in every edge that agrees with the set, in the order given.
+    /// Adds every edge that agrees with the set, in the order given.
     fn extend(&mut self, order: &[usize]) {
         for &index in order {
             if !self.agrees[index] {
@@ -133,7 +133,7 @@ impl<'a> Consensus<'a> {
         }
     }
 
-    /// Makes the first move that wins more than it loses. Whether there was one.
+    /// Makes the first move that wins more than it loses. Returns whether there was one.
     fn make_a_move(&mut self, order: &[usize]) -> bool {
         let outside = self.outside();
         let mut moves = Moves::new(self, |index| self.agrees[index]);
@@ -156,7 +156,7 @@ impl<'a> Consensus<'a> {
     }
 }
 
-/// What the moves of robots win and lose, over a part of a set of edges that agree.
+/// Gains and losses of moves of robots, over a part of a set of edges that agree.
 struct Moves<'a> {
     edges: &'a [Edge],
     gate: f64,
@@ -177,8 +177,7 @@ impl<'a> Moves<'a> {
         Self { edges, gate, forest, placed, graph }
     }
 
-    /// What is lost and won when robot b of an edge outside of the set moves so that the edge agrees, while robot a
-    /// stays.
+    /// Gain and loss when robot b of an edge outside of the set moves so that the edge agrees, while robot a stays.
     fn follow(&mut self, index: usize, outside: &[usize]) -> Move {
         let Edge { a: stays, b: moved, transform_a_b: transform_stays_moved } = self.edges[index];
         let mut wishes = Vec::new();
@@ -194,7 +193,7 @@ impl<'a> Moves<'a> {
         Move { won, lost: self.graph.part(moved, stays, wishes.into_iter(), won) }
     }
 
-    /// Whether two edges outside ask for the same move of the robots at their one end against those at the other.
+    /// Whether two edges outside imply the same move of the robots at one end relative to those at the other.
     fn agree(
         &self,
         transform_stays_moved: &UncertainPose,
@@ -203,7 +202,7 @@ impl<'a> Moves<'a> {
         [other_moved, other_stays]: [usize; 2],
     ) -> bool {
         let transform_other = self.edges[other].transform_from(other_moved);
-        // The angles alone tell most pairs apart, and cost little.
+        // Comparing the angles first rejects most pairs, and costs little.
         let turn = |robot: usize| self.placed[robot].pose.rotation.angle();
         let angle = transform_stays_moved.pose.rotation.angle() + turn(other_moved) - turn(moved)
             + transform_other.pose.rotation.angle()

@@ -1,42 +1,43 @@
-//! Which alignments contradict each other, and which of them are wrong.
+//! Finds alignments that contradict each other, and which of them are wrong.
 //!
 //! The transforms along a cycle of alignments multiply to the identity, up to their covariances, when all of them are
-//! right. Where they do not, some alignment of the cycle is wrong. It can be told which one only if other cycles vouch
-//! for the rest: the smallest sets of alignments whose removal makes all cycles agree are found, and an alignment
+//! right. Where they do not, some alignment of the cycle is wrong. Which one can be decided only if other cycles
+//! confirm the rest: the smallest sets of alignments whose removal makes all cycles agree are found, and an alignment
 //! counts as wrong if it is in all of those sets, as right if it is in none, and as **disputed** otherwise. In a lone
 //! triangle that does not close, all three are disputed. Where two wrong alignments of a robot agree with each other,
 //! and two right ones do, all four are; but two that agree outweigh one.
 //!
-//! Alignments that are in no cycle cannot be checked and count as right. Cycles that share no alignment are judged
-//! apart from each other. Where there are few contradictions all sets are tried (`search`), else the largest set of
-//! alignments that agree is sought by moves, and what might be otherwise is disputed (`consensus`).
+//! Alignments that are in no cycle cannot be checked and count as right. Cycles without a common alignment are judged
+//! independently. Where there are few contradictions all sets are tried (`search`), else the largest set of
+//! alignments that agree is sought by moves, and alternatives are disputed (`consensus`).
 //!
-//! Scores are not weighed: those of different methods do not compare. Nor do small covariances speak for an alignment:
-//! they say how exact it is if it is right, not whether it is.
+//! Scores are not used: those of different methods are not comparable. Nor are small covariances evidence for an
+//! alignment: they are its accuracy if it is right, not the probability that it is.
 
 use super::consensus::Consensus;
 use super::graph::{Cycle, Edge, Forest, Neighbours};
 use super::search::{Search, count_disjoint};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Contradictions apart from each other beyond which not all sets are tried.
+/// Number of disjoint contradictions above which not all sets are tried.
 const SEARCHED_DEPTH: usize = 6;
 
-/// What the cycles say of one alignment.
+/// Verdict of the cycles on one alignment.
 #[derive(Clone, Debug)]
 pub enum EdgeVerdict {
     /// It agrees with every cycle it is in.
     Right,
     /// It contradicts the others, which agree with each other. The cycle is one that it closes with them.
     Wrong(Cycle),
-    /// It is part of a contradiction, and nothing tells which part is wrong. The cycle shows the contradiction.
+    /// It is part of a contradiction, and the evidence does not decide which part is wrong. The cycle shows the
+    /// contradiction.
     Disputed(Cycle),
 }
 
-/// Judges every edge. A cycle contradicts if it is more than `gate` standard deviations from closing.
+/// Judges every edge. A cycle contradicts if its Mahalanobis distance from the identity is above `gate`.
 ///
-/// `known` marks edges that were right when the rest was judged before: they agree with each other. It saves work, and
-/// may mark none.
+/// `known` marks edges that were right when the rest was judged before: they agree with each other. It saves work,
+/// and may mark none.
 pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<EdgeVerdict> {
     let mut verdicts = vec![EdgeVerdict::Right; edges.len()];
     let neighbours = Neighbours::new(robots, edges);
@@ -82,7 +83,7 @@ pub fn judge(robots: usize, edges: &[Edge], known: &[bool], gate: f64) -> Vec<Ed
     verdicts
 }
 
-/// Judges a group of edges that share cycles, however many contradictions there are.
+/// Judges a group of edges that share cycles, with any number of contradictions.
 fn judge_by_moves(
     robots: usize,
     edges: &[Edge],
@@ -112,8 +113,8 @@ fn judge_by_moves(
     }
 }
 
-/// The edges that lie on cycles, in groups: two edges are in one group if a cycle goes through both (the biconnected
-/// components of the graph). Each group by rising index.
+/// The edges on cycles, in groups: two edges are in one group if a cycle contains both (the biconnected components of
+/// the graph). Each group by rising index.
 ///
 /// `cycles` are those that the edges outside of a spanning forest close; joining the edges of each gives the groups.
 fn groups_of_cycles(cycles: &[Cycle], edge_count: usize) -> Vec<Vec<usize>> {
@@ -133,7 +134,7 @@ fn groups_of_cycles(cycles: &[Cycle], edge_count: usize) -> Vec<Vec<usize>> {
     groups.into_values().collect()
 }
 
-/// The leader of a set, with path halving.
+/// The representative of a set, with path halving.
 fn find(leader: &mut [usize], mut member: usize) -> usize {
     while leader[member] != member {
         leader[member] = leader[leader[member]];
@@ -145,7 +146,7 @@ fn find(leader: &mut [usize], mut member: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::super::UncertainPose;
-    use super::super::team::Team;
+    use super::super::simulated_graph::SimulatedGraph;
     use super::*;
     use crate::shared::geometry::{Pose2, pose};
     use nalgebra::Matrix3;
@@ -203,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shared_side_tells_which_triangle_is_wrong_but_not_which_side_of_it() {
+    fn a_shared_side_shows_which_triangle_is_wrong_but_not_which_side_of_it() {
         let pairs = [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3)];
         assert_eq!(verdicts(4, &pairs, &[(1, 3)]), "...??");
         assert_eq!(verdicts(4, &pairs, &[(1, 2)]), "..x..");
@@ -258,7 +259,7 @@ mod tests {
             robots in 3usize..=5,
             steps in prop::collection::vec(0u8..12, 10),
         ) {
-            // A mistake is a step in the frame of the building, so that mistakes often agree with each other.
+            // Errors are steps in the frame of the building, so that they often agree with each other.
             let error = |index: usize| pose(2.0 * f64::from(steps[index].saturating_sub(8)), 0.0, 0.0);
             let place = |robot: usize| pose(3.0 * robot as f64, (robot * robot) as f64, robot as f64);
             let edge = |(index, (a, b)): (usize, (usize, usize))| {
@@ -269,35 +270,43 @@ mod tests {
             let (judged, expected) = (letters(&judge_all(robots, &edges)), verdicts_by_trial(robots, &edges));
             for (judged, expected) in judged.chars().zip(expected.chars()) {
                 prop_assert_eq!(judged == '.', expected == '.');
-                // What no right path leads round is disputed, though it be in none of the largest sets.
+                // An edge that no right path bypasses is disputed, though it is in none of the largest sets.
                 prop_assert!(judged != 'x' || expected == 'x');
             }
         }
     }
 
     #[test]
-    fn a_tangle_that_takes_too_long_is_disputed() {
+    fn a_component_that_takes_too_long_is_disputed() {
         let pairs = complete(9);
         let wrong: Vec<_> = pairs.iter().copied().filter(|(a, b)| (a + b) % 5 != 0).collect();
         assert_eq!(verdicts(9, &pairs, &wrong), "?".repeat(pairs.len()));
     }
 
     #[test]
-    fn among_many_robots_with_many_mistakes_no_wrong_alignment_counts_as_right() {
-        let team = Team::new(32, 6, 3).with_mistakes(0.2);
-        let verdicts = judge_all(32, &team.edges);
-        assert!(team.wrong.iter().all(|&index| !matches!(verdicts[index], EdgeVerdict::Right)));
+    fn among_many_robots_with_many_outliers_no_wrong_alignment_counts_as_right() {
+        let simulated = SimulatedGraph::new(32, 6, 3).with_outliers(0.2);
+        let verdicts = judge_all(32, &simulated.edges);
+        assert!(simulated.wrong.iter().all(|&index| !matches!(verdicts[index], EdgeVerdict::Right)));
         let right = verdicts.iter().filter(|verdict| matches!(verdict, EdgeVerdict::Right)).count();
-        assert!(right > 70 * (team.edges.len() - team.wrong.len()) / 100, "{right} of {}", team.edges.len());
+        assert!(
+            right > 70 * (simulated.edges.len() - simulated.wrong.len()) / 100,
+            "{right} of {}",
+            simulated.edges.len()
+        );
     }
 
     #[test]
     fn two_wrong_alignments_that_agree_are_outweighed_by_more_right_ones() {
         for seed in 0..20 {
-            let team = Team::new(10, 9, seed).with_agreeing_mistakes(0.1);
-            assert_eq!(team.wrong.len(), 4);
-            for (index, verdict) in judge_all(10, &team.edges).iter().enumerate() {
-                assert_eq!(matches!(verdict, EdgeVerdict::Wrong(_)), team.wrong.contains(&index), "{seed} {index}");
+            let simulated = SimulatedGraph::new(10, 9, seed).with_agreeing_outliers(0.1);
+            assert_eq!(simulated.wrong.len(), 4);
+            for (index, verdict) in judge_all(10, &simulated.edges).iter().enumerate() {
+                assert_eq!(
+                    matches!(verdict, EdgeVerdict::Wrong(_)),
+                    simulated.wrong.contains(&index),
+                    "{seed} {index}"
+                );
             }
         }
     }

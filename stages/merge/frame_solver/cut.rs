@@ -1,17 +1,17 @@
-//! The least cut of a graph (Ford and Fulkerson, with the shortest augmenting paths of Edmonds and Karp).
+//! Minimum cut of a graph (Ford and Fulkerson, with the shortest augmenting paths of Edmonds and Karp).
 
 use std::collections::VecDeque;
 
-/// How much a terminal that must stay on its side is tied to it: more than any graph of robots has edges.
+/// Capacity of an edge that must not be cut: more than any graph of robots has edges.
 const FIRM: usize = usize::MAX / 4;
 
-/// A graph of robots whose edges cost one each to cut, and two terminals: those on the side of `mover` move, those on
-/// the side of `stayer` stay.
+/// A graph of robots whose edges cost one each to cut, and two terminals: the robots on the side of `mover` move,
+/// those on the side of `stayer` stay.
 #[derive(Clone, Debug)]
 pub(super) struct CutGraph {
-    /// Arcs in pairs: the arc `index ^ 1` leads back.
+    /// Arcs in pairs: the arc `index ^ 1` is the reverse one.
     arcs: Vec<Arc>,
-    /// The arcs that leave each node.
+    /// Outgoing arcs of each node.
     leaving: Vec<Vec<usize>>,
     mover: usize,
     stayer: usize,
@@ -21,20 +21,20 @@ pub(super) struct CutGraph {
 struct Arc {
     to: usize,
     capacity: usize,
-    /// What can still flow.
+    /// Residual capacity.
     residual: usize,
-    /// The edge of the caller that this is.
+    /// Index of the caller's edge.
     edge: Option<usize>,
 }
 
-/// The cheapest way to part the movers from the stayers.
+/// A minimum cut between the robots that move and those that stay.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LeastCut {
-    /// The sum of all that is cut.
+    /// Number of edges that are cut.
     pub(super) cost: usize,
-    /// For every robot whether it moves; of the cheapest ways the one in which the fewest move.
+    /// For every robot whether it moves; of several minimum cuts the one in which the fewest move.
     pub(super) moves: Vec<bool>,
-    /// The edges that are in any of the cheapest cuts, by rising index.
+    /// Edges that are in any minimum cut, by rising index.
     pub(super) in_some_cut: Vec<usize>,
 }
 
@@ -56,9 +56,9 @@ impl CutGraph {
         }
     }
 
-    /// The least cut when the robot `moves` is to move and `stays` is to stay, and each of `wishes`, pairs of a robot
-    /// that would rather move and one that would rather stay, costs one for either that does not. `None` if it costs
-    /// more than `most`.
+    /// Minimum cut when the robot `moves` is to move and `stays` is to stay, and each of `wishes`, pairs of a robot
+    /// that should move and one that should stay, costs one for either that does not. `None` if it costs more than
+    /// `most`.
     pub(super) fn part(
         &mut self,
         moves: usize,
@@ -108,7 +108,7 @@ impl CutGraph {
         }
     }
 
-    /// The nodes that more could flow to, with the arc it would come by: `Some(None)` is the start itself.
+    /// The nodes with residual capacity from `start`, each with its incoming arc: `Some(None)` is the start itself.
     fn reach(&self, start: usize, goal: Option<usize>) -> Vec<Option<Option<usize>>> {
         let mut reached_by = vec![None; self.leaving.len()];
         reached_by[start] = Some(None);
@@ -128,7 +128,8 @@ impl CutGraph {
         reached_by
     }
 
-    /// An edge is in some least cut if nothing more can flow through it, nor round it from one end to the other.
+    /// An edge is in some minimum cut if it has no residual capacity, neither directly nor on another path between
+    /// its ends.
     fn in_some_cut(&self) -> Vec<usize> {
         let mut found = Vec::new();
         for (index, arc) in self.arcs.iter().enumerate() {
@@ -170,7 +171,7 @@ mod tests {
         let pairs = [(0, 1), (1, 2), (0, 2)];
         let mut graph = graph(3, &pairs);
         assert_eq!(graph.part(1, 0, std::iter::empty(), 1), None);
-        assert_eq!(graph.part(1, 0, std::iter::empty(), 2).unwrap().cost, 2, "the first call has left nothing behind");
+        assert_eq!(graph.part(1, 0, std::iter::empty(), 2).unwrap().cost, 2, "calls are independent");
     }
 
     proptest! {

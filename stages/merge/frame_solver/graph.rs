@@ -1,11 +1,11 @@
-//! The pose graph: robots, the alignments between them, and the cycles that these close.
+//! The pose graph: robots, the alignments between them, and the cycles that they close.
 
 use super::UncertainPose;
 
-/// An alignment of two robots, which are named by their index.
+/// An alignment of two robots, given by their indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// The robot whose map stays.
+    /// The robot whose map is fixed.
     pub a: usize,
     /// The robot whose map is moved.
     pub b: usize,
@@ -25,20 +25,20 @@ impl Edge {
     }
 }
 
-/// A cycle of alignments, and what is left when the transforms along it are multiplied: the identity, if they agree.
+/// A cycle of alignments with the product of its transforms, which is the identity if they agree.
 #[derive(Clone, Debug)]
 pub struct Cycle {
-    /// The edges; the first is the one that was asked about.
+    /// The edges; the first is the closing one.
     pub edges: Vec<usize>,
     /// The product of the transforms round the cycle.
     pub remainder: UncertainPose,
 }
 
-/// The edges of a pose graph by the robots at their ends.
+/// Edges of a pose graph by robot.
 #[derive(Clone, Debug)]
 pub struct Neighbours {
     edges_of: Vec<Vec<usize>>,
-    /// The least spread of the edges of each robot.
+    /// Least spread of the edges of each robot.
     least_spread: Vec<f64>,
 }
 
@@ -71,7 +71,7 @@ impl Neighbours {
         cost[a] = 0.0;
         let mut border = vec![a];
         while let Some(robot) = take_cheapest(&mut border, &cost) {
-            // Nothing that lies between can lead to the goal on a shorter way.
+            // No remaining path to the goal can be shorter.
             if robot == b || cost[robot] + self.least_spread[b] >= cost[b] {
                 break;
             }
@@ -79,7 +79,7 @@ impl Neighbours {
             for &index in self.of(robot).iter().filter(|&&index| index != closing && used(index)) {
                 let next = edges[index].other(robot);
                 let through = cost[robot] + edges[index].transform_a_b.spread();
-                // What is as far off as the goal cannot lead to it.
+                // A node as far away as the goal is on no shorter path.
                 if !reached[next] && through < cost[next].min(cost[b]) {
                     if parent[next].is_none() {
                         border.push(next);
@@ -152,7 +152,7 @@ impl Forest {
         [edge.a, edge.b].iter().any(|&robot| self.parent[robot].is_some_and(|(through, _)| through == index))
     }
 
-    /// The cycle that an edge outside of the trees closes with them. `None` if its ends lie in different trees.
+    /// The cycle that an edge outside of the trees closes with them. `None` if its ends are in different trees.
     pub fn cycle(&self, edges: &[Edge], closing: usize) -> Option<Cycle> {
         let edge = &edges[closing];
         let (mut on_cycle, transform_b_a) = self.path(edges, edge.b, edge.a)?;
@@ -160,13 +160,13 @@ impl Forest {
         Some(Cycle { edges: on_cycle, remainder: edge.transform_a_b.then(&transform_b_a) })
     }
 
-    /// The edges along the trees between two robots, in no order, and `T_from_to` along them. `None` if the robots lie
-    /// in different trees.
+    /// The edges along the trees between two robots, in no order, and `T_from_to` along them. `None` if the robots
+    /// are in different trees.
     pub fn path(&self, edges: &[Edge], from: usize, to: usize) -> Option<(Vec<usize>, UncertainPose)> {
         let mut sides = [(from, UncertainPose::identity()), (to, UncertainPose::identity())];
         let mut on_path = Vec::new();
         while sides[0].0 != sides[1].0 {
-            // The deeper side climbs, so that both meet at their nearest common ancestor.
+            // The deeper side goes up first, so that both meet at their nearest common ancestor.
             let climbs = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
             let (robot, transform_end_robot) = &mut sides[climbs];
             let (through, parent) = self.parent[*robot]?;
@@ -178,7 +178,7 @@ impl Forest {
         Some((on_path, transform_from_meet.then(&transform_to_meet.inverse())))
     }
 
-    /// `T_root_robot` for every robot, along its tree, whichever root that has.
+    /// `T_root_robot` for every robot, along its tree.
     pub fn poses_by_tree(&self, edges: &[Edge]) -> Vec<UncertainPose> {
         let mut poses = vec![UncertainPose::identity(); self.parent.len()];
         for &robot in &self.order {
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cycle_leads_back_along_the_most_certain_path() {
+    fn a_cycle_returns_along_the_most_certain_path() {
         let edges = [edge(0, 1, 1.0, 1.0), edge(1, 2, 1.0, 1.0), edge(0, 2, 5.0, 3.0), edge(2, 0, -4.0, 4.0)];
         let neighbours = Neighbours::new(4, &edges);
         let cycle = neighbours.cycle(&edges, 2, |_| true).unwrap();
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_without_edges_are_trees_of_their_own() {
+    fn robots_without_edges_are_trees_by_themselves() {
         let edges = [edge(1, 2, 1.0, 1.0)];
         let forest = Forest::grow(4, &edges, 3, |_| true);
         let placed: Vec<bool> = forest.poses(&edges, 1).iter().map(Option::is_some).collect();

@@ -8,7 +8,7 @@ use gridweave_runtime::ros::{Alignment, Header, RobotFrame, RobotFrames, RobotGr
 use gridweave_runtime::stage::frame_of_robot;
 use std::collections::BTreeMap;
 
-/// Where the robots' maps lie. `frame_ids` are the names of the map frames of robots that have sent a map.
+/// Poses of the robots' maps. `frame_ids` are the names of the map frames of robots that have sent a map.
 pub(super) fn robot_frames(
     solution: &Solution,
     header: Header,
@@ -39,7 +39,7 @@ pub(super) fn robot_frames(
     }
 }
 
-/// What became of every alignment.
+/// Verdicts on all alignments.
 pub(super) fn verdicts(solution: &Solution, alignments: &Alignments) -> Vec<Verdict> {
     let unchecked = solution.unchecked();
     let verdict = |(pair, alignment): (&RobotPair, &Alignment)| {
@@ -53,7 +53,7 @@ pub(super) fn verdicts(solution: &Solution, alignments: &Alignments) -> Vec<Verd
     alignments.iter().map(verdict).collect()
 }
 
-/// Leaves the robots that were `sent` in their places. Both by name.
+/// Replaces the poses of robots in `frames` by those in `sent`. Both are sorted by name.
 pub(super) fn hold(frames: &mut [RobotFrame], sent: &[RobotFrame]) {
     for frame in frames {
         if let Ok(place) = sent.binary_search_by(|sent| sent.robot.cmp(&frame.robot)) {
@@ -63,8 +63,8 @@ pub(super) fn hold(frames: &mut [RobotFrame], sent: &[RobotFrame]) {
     }
 }
 
-/// Whether two messages differ by nothing but their times and covariances.
-pub(super) fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
+/// Whether two messages are equal up to their times and covariances.
+pub(super) fn is_same(one: &RobotFrames, other: &RobotFrames) -> bool {
     let place = |frame: &RobotFrame| RobotFrame { covariance: [0.0; 9], ..frame.clone() };
     let same = |one: &[RobotFrame], other: &[RobotFrame]| one.iter().map(place).eq(other.iter().map(place));
     let same_group =
@@ -76,7 +76,7 @@ pub(super) fn says_the_same(one: &RobotFrames, other: &RobotFrames) -> bool {
         && one.groups.iter().zip(&other.groups).all(same_group)
 }
 
-/// The name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
+/// Name of a robot's map frame in a tree of frames that holds all robots: `map` becomes `robot1/map`.
 pub(super) fn prefixed(robot: &str, frame_id: &str) -> String {
     let frame_id = if frame_id.trim_start_matches('/').is_empty() { "map" } else { frame_id };
     frame_of_robot(robot, frame_id).into_owned()

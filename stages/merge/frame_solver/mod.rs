@@ -1,19 +1,19 @@
-//! Frame solver: alignments of pairs of robots in, one pose of each robot's map in the reference robot's map out.
+//! Frame solver: estimates one pose of each robot's map in the reference robot's map from alignments of pairs.
 //!
-//! The accepted alignments form a pose graph. Cycles of the graph are checked: alignments that contradict the others
-//! are left out, and where it cannot be told which of several is wrong, the robots that hang on them are not merged,
-//! for a wrong merge is worse than none. All the others are solved together by weighted least squares. Any number of
-//! robots. Robots that are tied to each other, but not to the reference, are solved in the same way in a frame of their
+//! The accepted alignments form a pose graph. Its cycles are checked: alignments that contradict the others are left
+//! out, and where the evidence does not decide which of several is wrong, the robots that depend on them are not
+//! merged, as a wrong merge is worse than none. All the others are solved together by weighted least squares. Robots
+//! that are connected with each other, but not with the reference, are solved in the same way in a frame of their
 //! own.
 //!
-//! Maps grow, and so alignments are refined again and again. Frames that were sent stay until the alignments fit others
-//! better by a margin, and the reference stays once robots are placed in its frame.
+//! Maps grow, and so alignments are refined again and again. Frames that were sent stay until the alignments fit
+//! others better by a margin, and the reference stays once robots are placed in its frame.
 //!
 //! - [`solve`]: names in, poses and reasons out; the whole of the algorithm.
-//! - [`solution`]: what is solved for, and from what.
+//! - [`solution`]: the data of a problem and of its solution.
 //! - [`graph`]: the pose graph, its spanning trees and cycles.
 //! - [`consistency`]: which alignments contradict each other; by trial where there are few contradictions (`search`),
-//!   else by moves of robots (`consensus`), which are least cuts (`cut`).
+//!   else by moves of robots (`consensus`), which are minimum cuts (`cut`).
 //! - [`optimize`]: least squares on SE(2).
 //! - [`uncertain`]: transforms with a covariance.
 
@@ -26,11 +26,11 @@ pub mod optimize;
 mod parameters;
 mod reasons;
 mod search;
+#[cfg(test)]
+mod simulated_graph;
 pub mod solution;
 pub mod solve;
 mod stage;
-#[cfg(test)]
-mod team;
 #[cfg(test)]
 mod tests;
 mod tree;

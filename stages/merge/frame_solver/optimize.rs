@@ -10,11 +10,11 @@ const STEPS: usize = 30;
 /// A step that changes no metre and no radian by more than this is the last.
 const CONVERGED: f64 = 1e-10;
 
-/// Moves the poses so that the squared errors of all edges, weighted by their inverse covariances, are least
-/// (Gauss-Newton on SE(2)), and gives the covariances that follow from the normal equations.
+/// Minimizes the squared errors of all edges, weighted by their inverse covariances (Gauss-Newton on SE(2)), and
+/// computes the covariances from the normal equations.
 ///
-/// `poses` are `T_root_robot`, `None` for robots that take no part; edges to such robots are left out. The root stays
-/// where it is, known exactly. `None` if the equations have no solution: the poses given are then the best there are.
+/// `poses` are `T_root_robot`, `None` for robots that take no part; edges to such robots are ignored. The root is
+/// fixed and known exactly. `None` if the equations have no solution: the given poses are then the best available.
 pub fn optimize(poses: &[Option<UncertainPose>], edges: &[Edge], root: usize) -> Option<Vec<Option<UncertainPose>>> {
     let mut estimate: Vec<Option<Pose2>> = poses.iter().map(|pose| pose.map(|pose| pose.pose)).collect();
     let mut unknown = vec![None; poses.len()];
@@ -66,15 +66,14 @@ pub fn optimize(poses: &[Option<UncertainPose>], edges: &[Edge], root: usize) ->
     None
 }
 
-/// The squared deviation (Mahalanobis distance) of an edge from the poses of its ends. Infinite if its covariance has
-/// no inverse.
+/// Squared Mahalanobis distance of an edge from the poses of its ends. Infinite if its covariance has no inverse.
 pub fn squared_deviation(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> f64 {
     let (error, _, _) = linearize(edge, pose_a, pose_b);
     let squared = edge.transform_a_b.covariance.cholesky().map(|cholesky| error.dot(&cholesky.solve(&error)));
     squared.unwrap_or(f64::INFINITY)
 }
 
-/// The error of an edge and its derivatives by (x, y, yaw) of both ends.
+/// Error of an edge and its derivatives with respect to (x, y, yaw) of both ends.
 fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matrix3<f64>, Matrix3<f64>) {
     let predicted = error_vector(&(pose_a.inverse() * pose_b));
     let mut error = predicted - error_vector(&edge.transform_a_b.pose);
@@ -89,8 +88,8 @@ fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matr
     (error, by_a, by_b)
 }
 
-/// The poses with their covariances: of the inverse of the normal equations `L L^T` only the blocks on the diagonal are
-/// needed, which are the products of three columns of `L^-1` with each other. `None` if `L` has no inverse.
+/// The poses with their covariances: of the inverse of the normal equations `L L^T` only the blocks on the diagonal
+/// are needed, which are the products of three columns of `L^-1` with each other. `None` if `L` has no inverse.
 fn assemble(
     estimate: &[Option<Pose2>],
     unknown: &[Option<usize>],
@@ -156,7 +155,7 @@ mod tests {
         let solved = solve(3, &edges);
         assert!((solved[1].pose.translation.x - 1.1).abs() < 1e-9);
         assert!((solved[2].pose.translation.x - 2.2).abs() < 1e-9);
-        assert!((solved[2].covariance[(0, 0)] - 2.0 / 3.0).abs() < 1e-9, "two paths know more than one");
+        assert!((solved[2].covariance[(0, 0)] - 2.0 / 3.0).abs() < 1e-9, "two paths reduce the variance");
     }
 
     #[test]
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_covariance_that_is_none_has_no_solution() {
+    fn an_invalid_covariance_has_no_solution() {
         let edges = [edge(0, 1, pose(1.0, 0.0, 0.0), -1.0)];
         let start = vec![Some(UncertainPose::identity()); 2];
         assert!(optimize(&start, &edges, 0).is_none());

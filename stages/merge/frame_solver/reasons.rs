@@ -1,18 +1,18 @@
-//! Why an alignment was left out, and why a robot is not merged, in plain words.
+//! Why an alignment was left out, and why a robot is not merged, for the user.
 
 use super::UncertainPose;
 use super::solution::{Alignments, OpenCycle, Solution};
 use crate::shared::robot_pair::RobotPair;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The reason of an alignment that the others show to be wrong.
+/// Reason of an alignment that the others show to be wrong.
 pub(super) fn contradicts(cycle: &OpenCycle) -> String {
     format!("it contradicts other alignments, which agree with each other ({})", gap(cycle))
 }
 
-/// The reason of an alignment of which it cannot be told whether it is wrong.
+/// Reason of a disputed alignment.
 pub(super) fn disputed(cycle: &OpenCycle) -> String {
-    format!("alignments contradict each other, and it cannot be told which is wrong ({})", gap(cycle))
+    format!("alignments contradict each other, and the others do not decide which is wrong ({})", gap(cycle))
 }
 
 fn gap(cycle: &OpenCycle) -> String {
@@ -26,7 +26,7 @@ fn gap(cycle: &OpenCycle) -> String {
     )
 }
 
-/// The reason for every robot that the solution has no frame for.
+/// Reason for every robot that the solution has no frame for.
 pub(super) fn unmerged(
     robots: &BTreeSet<String>,
     solution: &Solution,
@@ -42,26 +42,26 @@ pub(super) fn unmerged(
             return reason.clone();
         }
         let Some(group) = groups.iter().find(|group| group.frames.contains_key(robot)) else {
-            return no_tie(robot, frames, &refusals);
+            return no_alignment(robot, frames, &refusals);
         };
         let others: Vec<String> = group.frames.keys().filter(|other| *other != robot).cloned().collect();
-        // What keeps the group apart may be known of another member only.
+        // The alignment that keeps the group apart may be one of another member only.
         let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
         let known = members.clone().find_map(|member| disputed.get(member).cloned());
-        let refused = || members.clone().find_map(|member| refusals.telling(member, frames));
-        let why = known.or_else(refused).unwrap_or_else(|| "no alignment ties them to a merged robot".into());
-        format!("it is tied to {} only, not to the reference: {why}", list(&others))
+        let refused = || members.clone().find_map(|member| refusals.most_informative(member, frames));
+        let why = known.or_else(refused).unwrap_or_else(|| "no alignment connects them with a merged robot".into());
+        format!("it is connected with {} only, not with the reference: {why}", list(&others))
     };
     outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
 }
 
-fn no_tie(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
-    refusals.telling(robot, frames).unwrap_or_else(|| {
-        format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that others know")
+fn no_alignment(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
+    refusals.most_informative(robot, frames).unwrap_or_else(|| {
+        format!("no alignment with any robot was found: {robot} has no tag readings, or none of a tag that another robot has read")
     })
 }
 
-/// An alignment that was not used, as one of its robots sees it.
+/// An alignment that was not used, from the view of one of its robots.
 #[derive(Clone, Copy)]
 struct UnusedAlignment<'a> {
     other: &'a str,
@@ -91,21 +91,21 @@ impl<'a> UnusedAlignments<'a> {
         Self(by_robot)
     }
 
-    /// The most telling of a robot's: towards merged robots if there are any, and of these the one that came nearest to
-    /// being accepted. `None` if none was tried.
-    fn telling(&self, robot: &str, frames: &BTreeMap<String, UncertainPose>) -> Option<String> {
+    /// The most informative refusal of a robot: towards merged robots if there are any, and of these the one with the
+    /// highest score. `None` if no alignment was tried.
+    fn most_informative(&self, robot: &str, frames: &BTreeMap<String, UncertainPose>) -> Option<String> {
         let mut refusals = self.0.get(robot)?.clone();
         if refusals.iter().any(|refusal| frames.contains_key(refusal.other)) {
             refusals.retain(|refusal| frames.contains_key(refusal.other));
         }
         refusals.sort_by(|one, next| next.score.total_cmp(&one.score).then_with(|| one.other.cmp(next.other)));
-        let telling = refusals.first()?;
+        let most_informative = refusals.first()?;
         let same: Vec<String> = refusals
             .iter()
-            .filter(|refusal| refusal.reason == telling.reason)
+            .filter(|refusal| refusal.reason == most_informative.reason)
             .map(|refusal| refusal.other.to_owned())
             .collect();
-        let reason = if telling.reason.is_empty() { "no reason was given" } else { telling.reason };
+        let reason = if most_informative.reason.is_empty() { "no reason was given" } else { most_informative.reason };
         // A reason of several lines begins on a line of its own.
         let gap = if reason.contains('\n') { "\n" } else { " " };
         Some(format!("no alignment with {}:{gap}{reason}", list(&same)))

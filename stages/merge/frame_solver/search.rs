@@ -5,7 +5,7 @@
 use super::graph::{Cycle, Edge, Forest};
 use std::collections::BTreeSet;
 
-/// How much is tried for one group of cycles before the search gives up: pose graphs times edges.
+/// Bound of the work on one group of cycles: pose graphs times edges.
 const MOST_WORK: usize = 100_000;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -15,8 +15,8 @@ enum Choice {
     Removed,
 }
 
-/// The search for the smallest removals in one group of cycles: at least one edge of a contradicting cycle has to go,
-/// so each of them is tried in turn, to a depth that grows until something is found.
+/// Search for the smallest removals in one group of cycles: at least one edge of a contradicting cycle must be
+/// removed, so each of them is tried in turn, to a depth that grows until a solution is found.
 pub(super) struct Search<'a> {
     robots: usize,
     edges: &'a [Edge],
@@ -29,7 +29,7 @@ pub(super) struct Search<'a> {
 
 impl<'a> Search<'a> {
     pub(super) fn new(robots: usize, edges: &'a [Edge], group: &'a [usize], gate: f64) -> Self {
-        // Edges of other groups stay out of it.
+        // Edges of other groups are ignored.
         let mut choices = vec![Choice::Removed; edges.len()];
         group.iter().for_each(|&index| choices[index] = Choice::Open);
         Self { robots, edges, group, gate, choices, trials: 0, found: Vec::new() }
@@ -50,12 +50,12 @@ impl<'a> Search<'a> {
         cycles
     }
 
-    /// All smallest sets of edges whose removal leaves no contradiction; none if the search takes too long. There is
-    /// never a set with more than one edge for each of the `most` cycles that contradict at first.
+    /// All smallest sets of edges whose removal leaves no contradiction; none if the search takes too long. A set
+    /// never has more than one edge for each of the `most` cycles that contradict at first.
     pub(super) fn smallest_removals(&mut self, most: usize) -> Vec<BTreeSet<usize>> {
         for size in 0..=most {
             self.descend(size);
-            if self.is_tired() {
+            if self.is_over_budget() {
                 return Vec::new();
             }
             if !self.found.is_empty() {
@@ -66,7 +66,7 @@ impl<'a> Search<'a> {
     }
 
     fn descend(&mut self, left: usize) {
-        if self.is_tired() {
+        if self.is_over_budget() {
             return;
         }
         let contradictions = self.contradictions();
@@ -74,7 +74,7 @@ impl<'a> Search<'a> {
             self.found.push(self.removed());
             return;
         };
-        // Contradictions that share no edge need a removal each.
+        // Contradictions without a common edge need one removal each.
         if count_disjoint(&contradictions) > left {
             return;
         }
@@ -83,13 +83,13 @@ impl<'a> Search<'a> {
         for &index in &open {
             self.choices[index] = Choice::Removed;
             self.descend(left - 1);
-            // The sets without this edge remain; so no set is found twice.
+            // The sets without this edge remain, so no set is found twice.
             self.choices[index] = Choice::Kept;
         }
         open.iter().for_each(|&index| self.choices[index] = Choice::Open);
     }
 
-    fn is_tired(&self) -> bool {
+    fn is_over_budget(&self) -> bool {
         self.trials.saturating_mul(self.group.len()) > MOST_WORK
     }
 
@@ -98,7 +98,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// How many of the cycles can be picked, the first first, so that no two share an edge.
+/// Number of cycles without a common edge that can be picked, in order.
 pub(super) fn count_disjoint(cycles: &[Cycle]) -> usize {
     let mut taken = BTreeSet::new();
     let mut count = 0;

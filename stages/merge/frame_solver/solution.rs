@@ -1,4 +1,4 @@
-//! What is solved for, and from what.
+//! The data of a problem and of its solution.
 
 use super::graph::{Edge, Forest};
 use super::{UncertainPose, optimize};
@@ -8,35 +8,35 @@ use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Where every robot's map lies.
+/// Poses of all robots' maps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Solution {
-    /// `T_reference_robot` for every robot that is tied to the reference, itself among them. Its covariance is relative
-    /// to the reference.
+    /// `T_reference_robot` for every robot that is connected with the reference, including itself. The covariance is
+    /// relative to the reference.
     pub frames: BTreeMap<String, UncertainPose>,
     /// The robots that are not, with the reason.
     pub unmerged: BTreeMap<String, String>,
-    /// Those of them that are tied to each other, by the name of the group's reference.
+    /// Those of them that are connected with each other, by the name of the group's reference.
     pub groups: Vec<Group>,
-    /// The alignments that their stage accepted and that were left out here, with the reason.
+    /// Alignments that their stage accepted and that were left out here, with the reason.
     pub left_out: BTreeMap<RobotPair, String>,
-    /// The others, `T_a_b` with the floors added to the covariance: what the frames were solved from.
+    /// The others, `T_a_b` with the floors added to the covariance, from which the frames were solved.
     pub used: BTreeMap<RobotPair, UncertainPose>,
 }
 
-/// Robots that are tied to each other, but not to the reference.
+/// Robots that are connected with each other, but not with the reference.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
     /// The robot in whose map frame the others are placed.
     pub reference: String,
-    /// `T_reference_robot` for every robot of the group, two at least, the reference among them. Its covariance is
+    /// `T_reference_robot` for every robot of the group, two at least, including the reference. The covariance is
     /// relative to the group's reference.
     pub frames: BTreeMap<String, UncertainPose>,
 }
 
 impl Solution {
-    /// The sum of the squared deviations (Mahalanobis distances) of all alignments that are used, if the robots' map
-    /// frames were at the poses given: those tied to each other in one frame.
+    /// Sum of the squared Mahalanobis distances of all alignments that are used, for given poses of the robots' map
+    /// frames, with those connected with each other in one frame.
     pub fn squared_deviations(&self, poses: &BTreeMap<&str, Pose2>) -> f64 {
         let deviation = |(pair, transform_a_b): (&RobotPair, &UncertainPose)| {
             let [pose_a, pose_b] = [poses.get(pair.a.as_str())?, poses.get(pair.b.as_str())?];
@@ -45,7 +45,7 @@ impl Solution {
         self.used.iter().filter_map(deviation).sum()
     }
 
-    /// The alignments that are used and that no other one can check: those in no cycle.
+    /// The used alignments that no other one can check: those in no cycle.
     pub fn unchecked(&self) -> BTreeSet<&RobotPair> {
         let robots: BTreeSet<&String> = self.used.keys().flat_map(|pair| [&pair.a, &pair.b]).collect();
         let places: BTreeMap<&String, usize> =
@@ -66,7 +66,7 @@ impl Solution {
 /// The latest alignment of each pair, of which robot a is the first by name.
 pub type Alignments = BTreeMap<RobotPair, Alignment>;
 
-/// Brings an alignment into the form in which `a` is the first of the pair by name. `None` if it is no pair.
+/// Inverts an alignment, if necessary, so that `a` is the first of the pair by name. `None` if it is no pair.
 pub fn by_name(mut alignment: Alignment) -> Option<(RobotPair, Alignment)> {
     if alignment.a == alignment.b || alignment.a.is_empty() || alignment.b.is_empty() {
         return None;
@@ -84,14 +84,14 @@ pub fn by_name(mut alignment: Alignment) -> Option<(RobotPair, Alignment)> {
     Some((RobotPair::of(&alignment), alignment))
 }
 
-/// What a reader needs to know of a cycle that does not close.
+/// Description of a cycle that does not close, for a reader.
 pub(super) struct OpenCycle {
     /// The pairs along it.
     pub(super) pairs: Vec<RobotPair>,
-    /// By how much it does not close, metres.
+    /// Translation of the product of the cycle, metres.
     pub(super) metres: f64,
-    /// By how much it does not close, radians.
+    /// Rotation of the product of the cycle, radians.
     pub(super) radians: f64,
-    /// The same in standard deviations.
+    /// Mahalanobis distance of the product from the identity.
     pub(super) deviations: f64,
 }

@@ -10,18 +10,17 @@ use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A length (metres) or variance beyond which a value of an alignment is taken for garbage.
+/// A length (metres) or variance beyond which a value of an alignment is invalid.
 const ABSURD: f64 = 1e7;
 
 /// Solves for the frames of all `robots` in the frame of `reference`, which must be one of them.
 ///
-/// Alignments that cannot be right, given the others, are left out; a robot that is tied to the reference only through
-/// alignments of which it cannot be told whether they are right is not merged. What remains is solved by weighted
-/// least squares, from the poses along the paths of least variance; so is each group of robots that are tied to each
-/// other only.
+/// Alignments that cannot be right, given the others, are left out; a robot that is connected with the reference only
+/// through disputed alignments is not merged. What remains is solved by weighted least squares, from the poses along
+/// the paths of least variance; so is each group of robots that are connected with each other only.
 ///
-/// `before` is the solution of the last call, if there was one: groups keep their references, and what has been found
-/// to agree is not looked at again.
+/// `before` is the solution of the last call, if there was one: groups keep their references, and alignments that
+/// were found to agree are not checked again.
 pub fn solve(
     robots: &BTreeSet<String>,
     alignments: &Alignments,
@@ -92,7 +91,7 @@ pub fn solve(
     solution
 }
 
-/// `T_root_robot` for all robots that the edges tie to the root.
+/// `T_root_robot` for all robots that the edges connect with the root.
 fn place(names: &[&str], edges: &[Edge], root: usize) -> BTreeMap<String, UncertainPose> {
     let along_tree = Forest::grow(names.len(), edges, root, |_| true).poses(edges, root);
     let poses = optimize::optimize(&along_tree, edges, root).unwrap_or(along_tree);
@@ -103,13 +102,13 @@ fn place(names: &[&str], edges: &[Edge], root: usize) -> BTreeMap<String, Uncert
 fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<UncertainPose, String> {
     if alignment.provisional {
         return Err(format!(
-            "it is provisional, and no stage between has confirmed it by the walls of the maps, as merge_verifier does ({})",
+            "it is provisional, and no stage such as merge_verifier has confirmed it by the maps ({})",
             alignment.reason
         ));
     }
     let values = [alignment.x, alignment.y, alignment.yaw].into_iter().chain(alignment.covariance);
     if !values.into_iter().all(|value| value.abs() < ABSURD) {
-        return Err("its transform or covariance holds a value that is no finite number or absurdly large".into());
+        return Err("a value of its transform or covariance is not finite, or absurdly large".into());
     }
     let covariance = Matrix3::from_row_slice(&alignment.covariance);
     let symmetric = (covariance + covariance.transpose()) / 2.0;
@@ -117,7 +116,7 @@ fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<U
         .with_floor(parameters.position_floor, parameters.yaw_floor);
     match transform_a_b.covariance.cholesky() {
         Some(_) => Ok(transform_a_b),
-        None => Err("its covariance is none: it has a negative variance in some direction".into()),
+        None => Err("its covariance is invalid: it has a negative variance in some direction".into()),
     }
 }
 

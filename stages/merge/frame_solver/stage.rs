@@ -1,7 +1,7 @@
 //! The frame solver as a stage.
 
 use super::FrameSolverParameters;
-use super::messages::{hold, prefixed, robot_frames, says_the_same, verdicts};
+use super::messages::{hold, is_same, prefixed, robot_frames, verdicts};
 use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
 use super::tree::Tree;
@@ -13,15 +13,15 @@ use std::collections::{BTreeMap, BTreeSet};
 pub fn kind() -> StageKind {
     StageKind::stage(
         "frame_solver",
-        "Places every robot's map in the reference robot's map, from alignments of pairs. Alignments that contradict \
-         others along a cycle are left out; robots that cannot be placed with confidence are not merged, and the reason \
-         is given. Where the pipeline names no reference, it is the first robot by name of those heard of when the \
+        "Estimates the pose of every robot's map in the reference robot's map, from alignments of pairs. Alignments that \
+         contradict others along a cycle are left out; robots that cannot be placed with confidence are not merged, and \
+         the reason is given. If the pipeline names no reference, it is the first robot by name of those known when the \
          first two are merged, and stays so.",
         |parameters, context| Ok(FrameSolver::new(parameters, context)),
     )
     .optional_input(
         "map",
-        "the robots' maps: says which robots there are, and how their map frames are called; without it there are those that \
+        "the robots' maps, for the names of robots and of their map frames; without it the robots are those that \
          alignments name",
         FrameSolver::receive_map,
     )
@@ -30,7 +30,7 @@ pub fn kind() -> StageKind {
     .build()
 }
 
-/// Where the robots' maps lie, and what that rests on.
+/// Poses of the robots' maps, and the verdicts on the alignments.
 struct Placement {
     frames: Out<RobotFrames>,
     tf: Out<TFMessage>,
@@ -43,16 +43,16 @@ impl Outputs for Placement {
             frames: ports.output_on(
                 "/robot_frames",
                 "frames",
-                "the pose of every robot's map, why the others have none, and how those of them that are tied to each \
-                 other lie; sent when something changes. Robots are moved only if that improves the fit by more than \
+                "the pose of every robot's map, why the others have none, and the poses of those of them that are connected \
+                 with each other; sent when something changes. Robots are moved only if that improves the fit by more than \
                  `min_improvement`, and at the end",
             ),
             tf: ports.output_on(
                 "/tf_static",
                 "tf",
                 "the same poses as static transforms from `world`, once it is certain which robot is the reference; at the \
-                 end also those of robots tied to each other only, from a frame of their own, `world/ROBOT`, with the \
-                 name of the robot in whose map frame they are placed. No frame ever changes its parent",
+                 end also those of robots connected with each other only, from a frame of their own, `world/ROBOT`, with \
+                 the name of the robot in whose map frame they are placed. No frame ever changes its parent",
             ),
             verdicts: ports.output_on(
                 "/verdicts",
@@ -68,7 +68,7 @@ struct FrameSolver {
     parameters: FrameSolverParameters,
     /// The reference that the pipeline names.
     wanted: Option<String>,
-    /// All robots that were heard of, and the names of their map frames in the merged tree of frames.
+    /// All known robots, and the names of their map frames in the merged tree of frames.
     robots: BTreeSet<String>,
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
@@ -98,7 +98,7 @@ impl FrameSolver {
         }
     }
 
-    /// A map tells something new if its robot or the name of its frame is another.
+    /// A map changes the solution if its robot or the name of its frame is new.
     fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
@@ -116,7 +116,7 @@ impl FrameSolver {
         if is_new || is_renamed { self.solve_and_send(output) } else { Ok(()) }
     }
 
-    /// An alignment tells something new if it differs from the last one of its pair.
+    /// An alignment changes the solution if it differs from the last one of its pair.
     fn receive_alignment(
         &mut self,
         alignment: Received<'_, Alignment>,
@@ -150,7 +150,7 @@ impl FrameSolver {
     }
 
     fn solve_and_send(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
-        // Once robots are placed in its frame, a reference stays: an earlier name is no reason to move them all.
+        // Once robots are placed in its frame, the reference stays, even if a robot with an earlier name appears.
         let is_settled = self.solution.frames.len() > 1;
         self.reference = match &self.wanted {
             Some(wanted) => self.robots.get(wanted).cloned(),
@@ -167,9 +167,9 @@ impl FrameSolver {
         }
     }
 
-    /// Sends the frames and transforms if they differ from those sent last: the `last` ones as they are solved, others
-    /// with the robots that were sent left in place as long as the parameters allow. Without a reference there is
-    /// nothing to send. Whether there was something.
+    /// Sends the frames and transforms if they differ from those sent last: the `last` ones as they are solved,
+    /// others with the robots that were sent left in place as long as the parameters allow. Without a reference there
+    /// is nothing to send. Returns whether something was sent.
     fn send(&mut self, output: &Output<Placement>, last: bool) -> Result<bool, StageError> {
         let Some(reference) = self.reference.clone() else { return Ok(false) };
         let header = Header::new(output.log_time(), RobotFrames::WORLD);
@@ -180,7 +180,7 @@ impl FrameSolver {
         };
         if self.sent.as_ref().is_some_and(|sent| match last {
             true => RobotFrames { header: sent.header.clone(), ..message.clone() } == *sent,
-            false => says_the_same(sent, &message),
+            false => is_same(sent, &message),
         }) {
             if last {
                 self.send_transforms(&message, last, output)?;
@@ -193,7 +193,7 @@ impl FrameSolver {
         Ok(true)
     }
 
-    /// As long as the reference may still become another robot, nothing can be told to lie in the world.
+    /// As long as the reference may change, no transform to the world is certain.
     fn send_transforms(
         &mut self,
         frames: &RobotFrames,
@@ -210,7 +210,7 @@ impl FrameSolver {
         }
     }
 
-    /// Sends what became of the alignments if it differs from what was sent last.
+    /// Sends the verdicts if they differ from those sent last.
     fn send_verdicts(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
         if self.reference.is_none() || !output.verdicts.is_read() {
             return Ok(());
@@ -225,8 +225,8 @@ impl FrameSolver {
         Ok(())
     }
 
-    /// What was solved, with the robots that were `sent` in the same frame left in their places; or as it is, if the
-    /// alignments fit it better by more than `min_improvement`.
+    /// The solution, with the robots that were `sent` in the same frame left in their places, unless the alignments
+    /// fit the solution better by more than `min_improvement`.
     fn held(&self, sent: &RobotFrames, solved: RobotFrames) -> RobotFrames {
         let mut held = solved.clone();
         if held.reference == sent.reference {

@@ -13,7 +13,7 @@ pub struct UncertainPose {
 }
 
 impl UncertainPose {
-    /// The transform that changes nothing, known exactly.
+    /// The identity, known exactly.
     pub fn identity() -> Self {
         Self { pose: Pose2::identity(), covariance: Matrix3::zeros() }
     }
@@ -28,7 +28,7 @@ impl UncertainPose {
         Self { pose: self.pose.inverse(), covariance: jacobian * self.covariance * jacobian.transpose() }
     }
 
-    /// `T_a_c` of this `T_a_b` and `T_b_c`, whose errors are taken as independent; covariance to first order.
+    /// `T_a_c` from this `T_a_b` and `T_b_c`, whose errors are assumed independent; covariance to first order.
     #[must_use]
     pub fn then(&self, transform_b_c: &Self) -> Self {
         let lever = quarter_turn(&(self.pose.rotation * transform_b_c.pose.translation.vector));
@@ -45,8 +45,8 @@ impl UncertainPose {
     /// The same transform with the variances `position_deviation`^2 (metres, along x and y) and `yaw_deviation`^2
     /// (radians) added.
     ///
-    /// The added turn is one about the point that the covariance itself turns about, which is where the maps were laid
-    /// on each other, and not about the map's origin, which may lie far off.
+    /// The added turn is about the point that the covariance itself turns about, where the maps were aligned, and not
+    /// about the map's origin, which may be far away.
     #[must_use]
     pub fn with_floor(&self, position_deviation: f64, yaw_deviation: f64) -> Self {
         let covariance = &self.covariance;
@@ -60,16 +60,14 @@ impl UncertainPose {
         Self { pose: self.pose, covariance: covariance + position + turn }
     }
 
-    /// How many standard deviations the transform is from the identity (Mahalanobis distance). Infinite if the
-    /// covariance has no inverse.
+    /// Mahalanobis distance of the transform from the identity. Infinite if the covariance has no inverse.
     pub fn distance_from_identity(&self) -> f64 {
         let error = error_vector(&self.pose);
         let squared = self.covariance.cholesky().map(|cholesky| error.dot(&cholesky.solve(&error)));
         squared.filter(|squared| squared.is_finite()).map_or(f64::INFINITY, f64::sqrt)
     }
 
-    /// A measure of the uncertainty that adds up along a path: the variance, in square metres, of a point ten metres
-    /// off.
+    /// Scalar uncertainty that adds up along a path: the variance of a point ten metres away, square metres.
     pub fn spread(&self) -> f64 {
         const LEVER: f64 = 10.0;
         self.covariance[(0, 0)] + self.covariance[(1, 1)] + LEVER * LEVER * self.covariance[(2, 2)]
@@ -99,7 +97,7 @@ mod tests {
         }
     }
 
-    /// The change of `f(pose)` when each of x, y and yaw changes a little: the Jacobian by differences.
+    /// Jacobian of `f(pose)` with respect to x, y and yaw, by differences.
     fn differences(at: &Pose2, f: impl Fn(&Pose2) -> Pose2) -> Matrix3<f64> {
         const STEP: f64 = 1e-6;
         let columns = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {

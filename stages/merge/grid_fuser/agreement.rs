@@ -1,29 +1,29 @@
-//! How much of a fused map is known to one map and to several, and how much of it is in conflict.
+//! Areas of a fused map that one map knows, that several know, and that are in conflict.
 
 use crate::shared::geometry::{UNKNOWN, is_known};
 use gridweave_runtime::ros::{Header, MapAgreement};
 use rayon::prelude::*;
 use std::ops::Add;
 
-/// A cell is in conflict from this value on: half of what two maps that are sure of the opposite come to. Two maps of
-/// 0 and 100 only are in conflict where one says a wall, and the other free space.
+/// Least conflict value at which a cell counts as in conflict: half of that of two maps that are certain of opposite
+/// states. Two maps of values 0 and 100 only are in conflict where one has a wall, and the other free space.
 pub const IN_CONFLICT: i8 = 50;
-/// As many cells are counted at a time.
+/// Number of cells that are counted at a time.
 const BLOCK: usize = 1 << 16;
 
 /// Counts of the cells of a fused map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Agreement {
-    /// Cells that one map alone knows.
+    /// Cells that only one map knows.
     pub known_to_one: u64,
-    /// Cells that several maps know, those in conflict among them.
+    /// Cells that several maps know, including those in conflict.
     pub known_to_several: u64,
-    /// Cells of which maps say the opposite.
+    /// Cells in which maps are in conflict.
     pub in_conflict: u64,
 }
 
 impl Agreement {
-    /// Counts the cells of a fused map and of its conflicts, which are of one size.
+    /// Counts the cells of a fused map and of its conflicts, which have the same size.
     pub fn of(cells: &[i8], conflicts: &[i8]) -> Self {
         let blocks = cells.par_chunks(BLOCK).zip(conflicts.par_chunks(BLOCK));
         blocks.map(|(cells, conflicts)| Self::of_block(cells, conflicts)).reduce(Self::default, Self::add)
@@ -39,7 +39,7 @@ impl Agreement {
         }
     }
 
-    /// The areas, of cells of `cell_area` square metres.
+    /// The areas as a message, for cells of `cell_area` square metres.
     pub fn message(&self, header: Header, cell_area: f64) -> MapAgreement {
         let area = |cells: u64| cells as f64 * cell_area;
         MapAgreement {

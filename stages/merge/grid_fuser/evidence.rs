@@ -1,38 +1,37 @@
-//! Cell values as log-odds, their sum, and how far they contradict each other.
+//! Cell values as log-odds, their sum, and their conflict.
 //!
-//! A cell's value v stands for the probability v / 100, cut to a lower and an upper bound; its log-odds are
-//! `ln(p / (1 - p))`. Log-odds of several maps add. Unknown cells say nothing. The sum, cut to the log-odds of the two
-//! bounds, becomes a probability again and that a value, where the bounds themselves stand for 0 and 100. A cell that
-//! one map alone knows keeps its value.
+//! A cell's value v is the probability v / 100, clamped to a lower and an upper bound; its log-odds are `ln(p / (1 -
+//! p))`. Log-odds of several maps add. Unknown cells add nothing. The sum, clamped to the log-odds of the two bounds,
+//! becomes a probability again and then a value, where the bounds themselves become 0 and 100. A cell that only one
+//! map knows keeps its value.
 //!
-//! What the maps say for a cell being occupied and what they say for its being free are added apart, so that it shows
-//! where they contradict each other: the sum alone does not tell two maps that are sure of the opposite from two that
-//! know nothing for sure.
+//! Positive and negative log-odds are added separately, to show conflicts: the sum alone does not distinguish two
+//! maps that are certain of opposite states from two that are uncertain.
 //!
-//! The log-odds are whole numbers of a small unit, so that the sums do not depend on the order of the maps.
+//! The log-odds are integers of a small unit, so that the sums do not depend on the order of the maps.
 
 use crate::shared::geometry::UNKNOWN;
 
-/// Steps of the whole-number log-odds for one unit of the natural logarithm.
+/// Steps of the integer log-odds per unit of the natural logarithm.
 const STEPS: f64 = 256.0;
-/// The log-odds of one map are within this. No probability below 1 - 1e-15 comes near it.
+/// Bound of the log-odds of one map. No probability below 1 - 1e-15 reaches it.
 const MOST_STEPS: f64 = 16_384.0;
 
-/// The tables that turn values into log-odds and back.
+/// Tables between values and log-odds.
 #[derive(Clone, Debug)]
 pub struct EvidenceTable {
-    /// What a map's cell says, by its value as an unsigned byte.
+    /// Evidence of a map's cell, by its value as an unsigned byte.
     of_value: Box<[Evidence; 256]>,
     /// The value for every sum from the lowest to the highest.
     values: Vec<i8>,
-    /// The log-odds of the two bounds, in steps: the most that one map can say for a cell being free, below 0, and for its
-    /// being occupied.
+    /// Log-odds of the two bounds, in steps: the most that one map can add for a free cell, below 0, and for an
+    /// occupied one.
     lowest: i32,
     highest: i32,
 }
 
 impl EvidenceTable {
-    /// Tables for probabilities cut to `[min_probability, max_probability]`, which must hold one half.
+    /// Tables for probabilities clamped to `[min_probability, max_probability]`, which must contain one half.
     pub fn new(min_probability: f64, max_probability: f64) -> Self {
         let steps = |probability: f64| {
             let cut = probability.max(min_probability).min(max_probability);
@@ -56,12 +55,12 @@ impl EvidenceTable {
         }
     }
 
-    /// Adds what a map says of a cell. Values that are none, such as -1, say nothing.
+    /// Adds a map's cell. Invalid values and unknown cells, such as -1, add nothing.
     pub fn add(&self, cell: &mut Evidence, value: i8) {
         *cell = cell.plus(self.of_value[usize::from(value.cast_unsigned())]);
     }
 
-    /// The value that the evidence amounts to.
+    /// Value of the evidence.
     pub fn value(&self, cell: Evidence) -> i8 {
         match cell.maps {
             0 => UNKNOWN,
@@ -74,12 +73,11 @@ impl EvidenceTable {
         }
     }
 
-    /// How far the maps contradict each other: unknown where fewer than two know the cell, 0 where all that say
-    /// something say the same, and up to 100.
+    /// Conflict of the maps: unknown where fewer than two know the cell, 0 where all agree, and up to 100.
     ///
-    /// The log-odds for occupied and those for free are taken as shares of the most that one map can say for each (its
-    /// bound), no more than 1. The smaller share counts, in percent. So 100 is where maps that are as sure as one can be
-    /// stand on both sides, and what hardly says anything hardly contradicts anything.
+    /// The log-odds for occupied and those for free are divided by the most that one map can add for each (its
+    /// bound), clamped to 1. The smaller share counts, in percent. So 100 is where maps of greatest certainty are on
+    /// both sides, and uncertain cells are hardly in conflict.
     pub fn conflict(&self, cell: Evidence) -> i8 {
         match cell {
             Evidence { maps: 0 | 1, .. } => UNKNOWN,
@@ -91,23 +89,23 @@ impl EvidenceTable {
     }
 }
 
-/// A sum as a share of the most that one map can say, no more than 1, in percent.
+/// A sum as a share of the most that one map can add, clamped to 1, in percent.
 fn percent(sum: u32, most: u32) -> i8 {
     let most = most.max(1);
     ((100 * sum.min(most) + most / 2) / most) as i8
 }
 
-/// What the maps say of one cell so far. All are sums over the maps, so that no order matters, and nothing is asked when
-/// a map is added; those of 200,000 maps fit.
+/// Evidence of the maps on one cell. All fields are sums over the maps, so that their order does not matter and
+/// adding needs no branch; the sums of 200,000 maps fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Evidence {
-    /// Log-odds for the cell being occupied, in steps.
+    /// Log-odds for occupied, in steps.
     occupied: u32,
-    /// Log-odds for its being free.
+    /// Log-odds for free, in steps.
     free: u32,
-    /// How many maps know it.
+    /// Number of maps that know it.
     maps: u32,
-    /// Their values: where one map knows it, its value.
+    /// Sum of their values: the value, if one map knows it.
     values: u32,
 }
 
@@ -115,7 +113,7 @@ impl Evidence {
     /// No map knows the cell.
     pub const NONE: Self = Self { occupied: 0, free: 0, maps: 0, values: 0 };
 
-    /// One map knows it: its value, and that in log-odds, above 0 for occupied and below for free.
+    /// One map knows it: its value and its log-odds, above 0 for occupied and below for free.
     fn of_one_map(value: u32, log_odds: i32) -> Self {
         let occupied = log_odds.max(0).unsigned_abs();
         Self { occupied, free: log_odds.min(0).unsigned_abs(), maps: 1, values: value }
@@ -166,7 +164,7 @@ mod tests {
         }
 
         #[test]
-        fn what_two_maps_say_is_in_conflict_if_it_lies_on_both_sides_of_one_half(one in 0i8..=100, other in 0i8..=100) {
+        fn two_maps_are_in_conflict_if_they_are_on_both_sides_of_one_half(one in 0i8..=100, other in 0i8..=100) {
             let is_within = (0..=100).contains(&conflict(&[one, other]));
             prop_assert!(is_within);
             let is_split = (one < 50 && other > 50) || (one > 50 && other < 50);
@@ -175,7 +173,7 @@ mod tests {
         }
 
         #[test]
-        fn another_map_takes_no_conflict_away(values in prop::collection::vec(0i8..=100, 2..6), more in -1i8..=100) {
+        fn another_map_removes_no_conflict(values in prop::collection::vec(0i8..=100, 2..6), more in -1i8..=100) {
             let all = [values.clone(), vec![more]].concat();
             prop_assert!(conflict(&all) >= conflict(&values));
         }
@@ -187,7 +185,7 @@ mod tests {
         }
 
         #[test]
-        fn unknown_says_nothing(value in -128i8..=127) {
+        fn unknown_cells_add_nothing(value in -128i8..=127) {
             let known = if (0..=100).contains(&value) { value } else { -1 };
             prop_assert_eq!(fuse(&[value]), known);
             prop_assert_eq!(fuse(&[-1, value, -1, 101, -128]), known);
@@ -238,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_are_no_probabilities_do_no_harm() {
+    fn invalid_bounds_do_no_harm() {
         for (low, high) in [(f64::NAN, 0.9), (0.0, 1.0), (0.9, 0.1), (-1.0, 2.0)] {
             let table = EvidenceTable::new(low, high);
             let mut cell = Evidence::NONE;

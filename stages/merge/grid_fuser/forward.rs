@@ -1,18 +1,18 @@
-//! Fusing by carrying every map cell to the output (Tsardoulias et al., section 4.4).
+//! Fusion by forward mapping of every cell to the output (Tsardoulias et al., section 4.4).
 //!
-//! Rounding the turned cells leaves gaps (equations 14, 15), which a conditional mean closes.
+//! Rounding turned cells leaves gaps (equations 14, 15), which a conditional mean closes.
 
 use super::evidence::{Evidence, EvidenceTable};
 use super::{Fused, KnownArea, PlacedGrid};
 use crate::shared::geometry::{Cell, GridGeometry, UNKNOWN, is_known, is_occupied};
 use rayon::prelude::*;
 
-/// How many of its eight neighbours must be known for an unknown cell to be a gap. The border of a straight or
-/// rounded area has at most five, and gaps come single or in pairs.
+/// Least number of known neighbours, of eight, for an unknown cell to be a gap. The border of a straight or rounded
+/// area has at most five, and gaps are single or in pairs.
 const GAP_NEIGHBOURS: usize = 6;
 
-/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`: each map is carried over, its
-/// gaps are closed, and the evidence is added.
+/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`: each map is transformed,
+/// its gaps are closed, and the evidence is added.
 pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
     let mut evidence = vec![Evidence::NONE; fused.cells.len()];
     for (map, _) in maps {
@@ -23,8 +23,8 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
     fused.conflicts.par_iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence));
 }
 
-/// The known cells of a map on the cells of `geometry` that their centres fall in (equation 15). Where several fall in
-/// one cell, the one that is most occupied counts.
+/// The known cells of a map on the cells of `geometry` that contain their centres (equation 15). Of several in one
+/// cell, the most occupied one counts.
 pub fn carry(map: &PlacedGrid<'_>, geometry: &GridGeometry) -> Vec<i8> {
     let mut carried = vec![UNKNOWN; geometry.cell_count()];
     let width = map.grid.geometry.width.max(1);
@@ -42,11 +42,10 @@ pub fn carry(map: &PlacedGrid<'_>, geometry: &GridGeometry) -> Vec<i8> {
     carried
 }
 
-/// Gives every gap the mean of the free and undecided cells among its neighbours (equation 16 under the conditions
-/// at the end of section 4.4: walls do not spread, and nothing spreads into what is unknown).
+/// Gives every gap the mean of the free and undecided cells among its neighbours (equation 16 under the conditions at
+/// the end of section 4.4: neither walls nor known cells spread).
 ///
-/// A gap is an unknown cell most of whose neighbours are known. A gap among occupied cells only is occupied as they
-/// are on average.
+/// A gap is an unknown cell most of whose neighbours are known. A gap among occupied cells only takes their mean.
 pub fn close_gaps(cells: &[i8], geometry: &GridGeometry) -> Vec<i8> {
     let (width, height) = (geometry.width, geometry.height);
     let mut closed = cells.to_vec();
@@ -93,7 +92,7 @@ mod tests {
     use crate::shared::geometry::{Grid, Pose2, pose};
     use nalgebra::{Isometry2, Translation2};
 
-    /// The paper's points are whole numbers, and a grid's are the centres of its cells.
+    /// The paper's points are integers, and a grid's are the centres of its cells.
     fn golden_area(value: i8) -> (Vec<i8>, GridGeometry, Pose2, GridGeometry) {
         let area = GridGeometry { width: 5, height: 5, resolution: 1.0, origin: pose(97.5, 97.5, 0.0) };
         let turn = Isometry2::rotation(30f64.to_radians());

@@ -1,4 +1,4 @@
-//! Fusing by looking every output cell up in the maps.
+//! Fusion by inverse mapping: every output cell is looked up in the maps.
 
 use super::evidence::{Evidence, EvidenceTable};
 use super::known::TILE;
@@ -8,14 +8,14 @@ use crate::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, is_known};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-/// What is no longer than this share of the distance between two nodes of a bend is straight.
+/// Largest length, as a share of the distance between two nodes of a deformation, that is treated as straight.
 const LONGEST_STRAIGHT: f64 = 0.75;
 
-/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`, which lies along the world's
-/// axes.
+/// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`, whose axes are those of the
+/// world.
 ///
-/// Every cell takes what each map says of the cell that its centre falls in. Rows are independent of each other and
-/// made in parallel.
+/// Every cell takes the evidence of each map's cell that contains its centre. Rows are independent and computed in
+/// parallel.
 pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
     let lookups: Vec<Lookup<'_>> = maps.iter().map(|(map, area)| Lookup::new(map, area, geometry)).collect();
     let width = geometry.width.max(1);
@@ -33,7 +33,7 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
                     cells.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.value(*evidence));
                     conflicts.iter_mut().zip(&evidence).for_each(|(cell, evidence)| *cell = table.conflict(*evidence));
                 }
-                // Most of what is known is known to one map, which nothing contradicts.
+                // Most known cells are known to one map only, and are in no conflict.
                 (only, _) => {
                     cells.fill(UNKNOWN);
                     conflicts.fill(UNKNOWN);
@@ -46,17 +46,17 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
     });
 }
 
-/// How output cells are found in one map: its column and row are linear in the output's. Those of a map that is bent are so
-/// over the length of a stretch, over which a bend changes next to nothing.
+/// Lookup of output cells in one map: its column and row are linear in the output's. With a deformation they are
+/// linear over the length of a stretch, over which the deformation hardly changes.
 struct Lookup<'a> {
     grid: Grid<'a>,
     area: &'a KnownArea,
     deformation: Option<&'a Deformation>,
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
-    /// How they change by one output column; by one output row they change by the same turned by a quarter turn.
+    /// Their change by one output column; by one output row it is the same turned by a quarter turn.
     step: Vector2<f64>,
-    /// The known columns and rows: the first, and the one behind the last.
+    /// The known columns and rows: the first, and the one after the last.
     columns: (f64, f64),
     rows: (f64, f64),
 }
@@ -78,7 +78,7 @@ impl<'a> Lookup<'a> {
         }
     }
 
-    /// The part of an output row of `count` cells that falls on the known part of the map.
+    /// The part of an output row of `count` cells on the known part of the map.
     fn row(&self, row: usize, count: usize) -> LookupRow<'_> {
         let row = row as f64;
         let start = Point2::new(self.start.x - row * self.step.y, self.start.y + row * self.step.x);
@@ -90,7 +90,7 @@ impl<'a> Lookup<'a> {
         LookupRow { lookup: self, start, from: by_column.0.max(by_row.0), to: by_column.1.min(by_row.1) }
     }
 
-    /// The place of the map, in cells, that its bend lays at a place where the map would lie without it.
+    /// Inverts the deformation of a point, both in cells.
     fn undeformed(&self, place: &Point2, deformation: &Deformation) -> Point2 {
         let GridGeometry { resolution, origin, .. } = self.grid.geometry;
         let point = deformation.inverse(&(origin * (place * resolution)));
@@ -110,16 +110,16 @@ impl<'a> Lookup<'a> {
 /// One output row on one map.
 struct LookupRow<'a> {
     lookup: &'a Lookup<'a>,
-    /// Where the centre of the row's first cell falls.
+    /// Position of the centre of the row's first cell.
     start: Point2,
-    /// The cells of the row that may fall on the known part of the map: the first, and the one behind the last.
+    /// The cells of the row that may be on the known part of the map: the first, and the one after the last.
     from: usize,
     to: usize,
 }
 
 impl LookupRow<'_> {
-    /// The part of the `count` output cells from `first` on, at most [`TILE`] of them, that may fall on known cells of the
-    /// map. `None` if no cell does.
+    /// The part of the `count` output cells from `first` on, at most [`TILE`] of them, that may be on known cells of
+    /// the map. `None` if no cell is.
     fn stretch(&self, first: usize, count: usize) -> Option<Stretch<'_>> {
         let (from, to) = (self.from.max(first), self.to.min(first + count));
         if from >= to {
@@ -129,7 +129,7 @@ impl LookupRow<'_> {
         if let Some(deformed) = self.lookup.deformation {
             let ends = [from, to].map(|index| start + step * index as f64);
             let length = (ends[1] - ends[0]).norm() * self.lookup.grid.geometry.resolution;
-            // A long stretch may bend within itself.
+            // The deformation may change within a long stretch.
             if length > LONGEST_STRAIGHT * deformed.lattice.spacing() {
                 deformation = Some(deformed);
             } else {
@@ -150,19 +150,19 @@ struct Stretch<'a> {
     lookup: &'a Lookup<'a>,
     /// The first cell of the stretch.
     first: usize,
-    /// Its cells that may fall on the known part of the map: the first, and the one behind the last.
+    /// Its cells that may be on the known part of the map: the first, and the one after the last.
     from: usize,
     to: usize,
-    /// Where the centre of the row's first cell would fall, if the whole row went as this stretch does, and how that changes
-    /// by one cell.
+    /// Position of the centre of the row's first cell if the whole row were linear as this stretch, and its change by
+    /// one cell.
     start: Point2,
     step: Vector2<f64>,
-    /// Through which each cell is looked up by itself, if it is.
+    /// Deformation by which each cell is looked up individually, if it is.
     deformation: Option<&'a Deformation>,
 }
 
 impl Stretch<'_> {
-    /// Hands out what the map says of every cell of the stretch that may fall on its known part.
+    /// Visits every cell of the stretch that may be on the known part of the map.
     fn values<T>(&self, cells: &mut [T], take: impl Fn(&mut T, i8)) {
         for (index, cell) in (self.from..self.to).zip(&mut cells[self.from - self.first..]) {
             let place = self.start + self.step * index as f64;
@@ -172,8 +172,8 @@ impl Stretch<'_> {
     }
 }
 
-/// The indices from 0 to `count` for which `start + index * step` lies within the bounds, and maybe one more at both
-/// ends: the first, and the one behind the last.
+/// The indices from 0 to `count` for which `start + index * step` is within the bounds, and maybe one more at both
+/// ends: the first, and the one after the last.
 fn range_within(start: f64, step: f64, (low, high): (f64, f64), count: usize) -> (usize, usize) {
     if step.abs() < 1e-12 {
         return if start >= low && start < high { (0, count) } else { (0, 0) };
@@ -221,7 +221,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_reference_map_comes_out_as_it_went_in(cells in cells(13, 9), x in -99.0..99.0, y in -99.0..99.0) {
+        fn the_reference_map_is_unchanged(cells in cells(13, 9), x in -99.0..99.0, y in -99.0..99.0) {
             let source = geometry(13, 9, 0.05, pose(x, y, 0.0));
             let grid = Grid::new(source, &cells).unwrap();
             let (laid, fused) = fuse_all(&[PlacedGrid::rigid(grid, Pose2::identity())]);
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_whose_origin_is_turned_lies_where_its_origin_says() {
+    fn the_yaw_of_a_grids_origin_is_applied() {
         let cells = [100, 0, 0, 0, 0, 0];
         let turned = Grid::new(geometry(3, 2, 1.0, pose(0.0, 0.0, std::f64::consts::FRAC_PI_2)), &cells).unwrap();
         let (laid, fused) = fuse_all(&[PlacedGrid::rigid(turned, Pose2::identity())]);

@@ -1,4 +1,4 @@
-//! Where the known cells of a grid lie.
+//! The known cells of a grid.
 
 use crate::shared::geometry::{Grid, Point2, is_known};
 
@@ -9,9 +9,9 @@ pub const TILE: usize = 32;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnownArea {
     rows: Vec<KnownRow>,
-    /// The columns that hold all known cells: the first, and the one behind the last.
+    /// The columns that contain all known cells: the first, and the one after the last.
     pub columns: (usize, usize),
-    /// For every tile, row by row, whether it or one of its eight neighbours holds a known cell.
+    /// For every tile, row by row, whether it or one of its eight neighbours contains a known cell.
     near: Vec<bool>,
     tile_columns: usize,
 }
@@ -64,8 +64,8 @@ impl KnownArea {
         }
     }
 
-    /// Whether there may be known cells within [`TILE`] cells of a place on the grid, in cells along x and y. A place
-    /// off the grid counts as its nearest place on it.
+    /// Whether there may be known cells within [`TILE`] cells of a position, in cells along x and y. A position
+    /// outside the grid counts as the nearest one on it.
     pub fn is_near(&self, x: f64, y: f64) -> bool {
         let column = (x.max(0.0) as usize / TILE).min(self.tile_columns.saturating_sub(1));
         let row = y.max(0.0) as usize / TILE;
@@ -78,7 +78,7 @@ impl KnownArea {
         self.rows.is_empty()
     }
 
-    /// The rows that hold all known cells: the first, and the one behind the last.
+    /// The rows that contain all known cells: the first, and the one after the last.
     pub fn row_range(&self) -> (usize, usize) {
         match (self.rows.first(), self.rows.last()) {
             (Some(first), Some(last)) => (first.row, last.row + 1),
@@ -86,7 +86,7 @@ impl KnownArea {
         }
     }
 
-    /// The number of cells between the first and the last known one of every row.
+    /// Number of cells between the first and the last known one of every row.
     pub(super) fn cell_count(&self) -> usize {
         self.rows.iter().map(|row| row.behind - row.first).sum()
     }
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn no_known_cell_is_farther_from_a_near_place_than_a_tile() {
+    fn no_known_cell_is_farther_from_a_near_position_than_a_tile() {
         let mut cells = vec![-1; 200 * 150];
         cells[70 * 200 + 100] = 0;
         let area = KnownArea::of(&grid(200, &cells));

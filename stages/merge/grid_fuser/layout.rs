@@ -1,4 +1,4 @@
-//! How large the fused grid is, and where its cells lie.
+//! Size and origin of the fused grid.
 
 use super::{KnownArea, PlacedGrid};
 use crate::shared::geometry::{GridGeometry, Point2, most_cells_over, pose};
@@ -10,50 +10,51 @@ struct Extent {
     high: Point2,
 }
 
-/// The lattice that the fused grid's cells lie on, and its limits.
+/// The lattice of the fused grid's cells, and its limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice {
-    /// A corner of a cell, metres in the world: that of the reference robot's map, so that its cells fall on cells of
-    /// the fused map.
+    /// A corner of a cell, metres in the world: that of the reference robot's map, so that its cells coincide with
+    /// cells of the fused map.
     pub anchor: Point2,
-    /// Metres a cell.
+    /// Metres per cell.
     pub resolution: f64,
-    /// The longest side that a grid may have, metres.
+    /// Longest side of a grid, metres.
     pub max_extent: f64,
-    /// The most cells that a grid may have.
+    /// Largest number of cells of a grid.
     pub max_cells: u64,
 }
 
-/// Where the fused cells lie, and which maps take part.
+/// The fused grid, and the maps in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// The fused grid in the world: along its axes, cropped to what is known. `None` if nothing is.
+    /// The fused grid in the world: along its axes, cropped to its known part. `None` if nothing is known.
     pub geometry: Option<GridGeometry>,
-    /// For every map, whether it is part of it.
+    /// For every map, whether it is in the grid.
     pub takes_part: Vec<Result<(), LeftOut>>,
 }
 
-/// Why a map is no part of the fused grid.
+/// Why a map is not in the fused grid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LeftOut {
-    /// Its pose is no finite number.
-    #[error("where it lies is no finite number")]
+    /// Its pose is not finite.
+    #[error("its pose is not finite")]
     NotFinite,
-    /// The grid would be longer than a side may be.
-    #[error("it lies so far away that the fused map would be longer than `max_extent`, {0} m; {DOUBT}")]
+    /// A side of the grid would be too long.
+    #[error("it is so far away that the fused map would be longer than `max_extent`, {0} m; {DOUBT}")]
     TooLong(f64),
-    /// The grid would have more cells than it may have.
+    /// The grid would have too many cells.
     #[error("the fused map would have more cells than `max_cells`, {0}; {DOUBT}")]
     TooManyCells(u64),
-    /// The grid would be all but unknown.
-    #[error("it lies so far away that next to nothing of the fused map would be known; {DOUBT}")]
+    /// Nearly all of the grid would be unknown.
+    #[error("it is so far away that nearly all of the fused map would be unknown; {DOUBT}")]
     Unknown,
 }
 
 /// What puts a map far away, other than a wrong merge.
 const DOUBT: &str = "does the origin of each map fit the poses of its robot?";
 
-/// Lays out the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left out.
+/// Computes the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left
+/// out.
 pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
     let mut layout = Layout { geometry: None, takes_part: Vec::with_capacity(maps.len()) };
     let (mut whole, mut known): (Option<Extent>, f64) = (None, 0.0);
@@ -71,7 +72,7 @@ pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layo
     layout
 }
 
-/// The rectangle that holds what is known of a map, if anything is.
+/// Bounding rectangle of the known part of a map, if there is any.
 fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, LeftOut> {
     let mut extent: Option<Extent> = None;
     for corner in area.corners() {
@@ -92,7 +93,7 @@ impl Extent {
 }
 
 impl Lattice {
-    /// The grid of the cells whose centres lie within the extent, about `known` of which are known.
+    /// The grid of the cells whose centres are within the extent, about `known` of which are known.
     fn geometry(&self, extent: &Extent, known: f64) -> Result<GridGeometry, LeftOut> {
         let (left, width) = self.cells(extent.low.x, extent.high.x)?;
         let (bottom, height) = self.cells(extent.low.y, extent.high.y)?;
@@ -108,9 +109,9 @@ impl Lattice {
         Ok(GridGeometry { width, height, resolution: self.resolution, origin })
     }
 
-    /// The first cell and the number of cells on one axis.
+    /// First cell and number of cells on one axis.
     fn cells(&self, low: f64, high: f64) -> Result<(f64, usize), LeftOut> {
-        // The extent's ends lie on the borders of cells, mostly; centres are half a cell away from rounding errors.
+        // The extent's ends are mostly on the borders of cells; centres are half a cell away from rounding errors.
         let (mut first, mut behind) = ((low - 0.5).ceil(), (high - 0.5).floor() + 1.0);
         if behind <= first {
             (first, behind) = (low.floor(), low.floor() + 1.0);
@@ -154,7 +155,7 @@ mod tests {
     ];
 
     #[test]
-    fn the_grid_is_cropped_and_lies_on_the_reference_cells() {
+    fn the_grid_is_cropped_and_coincides_with_the_reference_cells() {
         let layout = lay_out_at(grid(&CELLS), &[Pose2::identity()]);
         let laid = layout.geometry.unwrap();
         assert_eq!((laid.width, laid.height), (3, 2));
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_grid_goes_with_what_is_known_and_not_with_how_far_apart_it_lies() {
+    fn the_largest_grid_depends_on_the_known_area_and_not_on_the_distance() {
         let lattice = Lattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
         let known = vec![0; 6 * 4];
         let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
@@ -196,7 +197,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_known_cell_lies_on_the_grid(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
+        fn every_known_cell_is_on_the_grid(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
             let transform_world_map = pose(x, y, yaw);
             let laid = lay_out_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
             for cell in [Cell { column: 2, row: 1 }, Cell { column: 3, row: 1 }, Cell { column: 1, row: 2 }] {

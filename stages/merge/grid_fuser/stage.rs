@@ -15,18 +15,18 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "grid_fuser",
         "Fuses the maps of all placed robots in log-odds: unknown says nothing, evidence adds. The map is sent when the \
-         frames change by more than `min_move` or `min_turn` or maps are bent otherwise, when a robot that is placed has another map, and at the \
+         frames change by more than `min_move` or `min_turn` or deformations change, when a robot that is placed has another map, and at the \
          end if anything has changed since. Where maps contradict each other, and the area of that, is sent beside it.",
         |parameters, _: &Context| Ok(GridFuser::new(parameters)),
     )
     .input("map", "the robots' maps, or their coverage fields", GridFuser::receive_map)
-    .optional_input("deformation", "how the maps are bent", GridFuser::receive_deformation)
-    .input("frames", "where the maps lie", GridFuser::receive_frames)
+    .optional_input("deformation", "the deformations of the maps", GridFuser::receive_deformation)
+    .input("frames", "the poses of the maps", GridFuser::receive_frames)
     .finish(GridFuser::finish)
     .build()
 }
 
-/// The fused map, and how far the robots' maps agree in it.
+/// The fused map, its conflicts, and their areas.
 struct FusedMap {
     map: Out<OccupancyGrid<'static>>,
     conflicts: Out<OccupancyGrid<'static>>,
@@ -59,9 +59,9 @@ struct GridFuser {
     parameters: GridFuserParameters,
     maps: RobotMaps<KnownArea>,
     placement: Placement,
-    /// Whether a bend has come that is in no fused map.
+    /// Whether a deformation has arrived that is in no fused map.
     has_new_deformations: bool,
-    /// The frames that the fused map sent last was made with.
+    /// Frames of the fused map sent last.
     fused: Option<RobotFrames>,
 }
 
@@ -78,7 +78,7 @@ impl GridFuser {
         }
     }
 
-    /// A map of a robot that is not placed waits for its frame, which mostly follows at the same log time.
+    /// A map of a robot without a pose waits for its frame, which usually follows at the same log time.
     fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
@@ -91,8 +91,8 @@ impl GridFuser {
         if is_placed { self.fuse(output) } else { Ok(()) }
     }
 
-    /// A bend waits for the frames that belong to it, which follow at the same log time, or for the end. Those of one map
-    /// belong to those of the others: all change together.
+    /// A deformation waits for the frames that belong to it, which follow at the same log time, or for the end.
+    /// Deformations of several maps belong together: all change at once.
     fn receive_deformation(
         &mut self,
         deformation: Received<'_, MapDeformation>,
@@ -121,7 +121,7 @@ impl GridFuser {
         if is_sent && !self.has_new_deformations { Ok(()) } else { self.fuse(output) }
     }
 
-    /// Whether the robots are where the frames that were `fused` have them, as far as the parameters ask.
+    /// Whether the robots are within the parameters' tolerances of the frames that were fused.
     fn is_near(&self, fused: &RobotFrames) -> bool {
         let GridFuserParameters { min_move, min_turn, .. } = self.parameters;
         let is_near = |(one, next): (&RobotFrame, &RobotFrame)| one.is_near(next, min_move, min_turn);
@@ -131,7 +131,7 @@ impl GridFuser {
             && before.into_iter().zip(after).all(is_near)
     }
 
-    /// The frames of robots that have sent a map, the reference first and then by name.
+    /// Frames of robots that have sent a map, the reference first and then by name.
     fn placed<'a>(&self, frames: &'a RobotFrames) -> Vec<&'a RobotFrame> {
         let mut placed: Vec<&RobotFrame> =
             frames.frames.iter().filter(|frame| self.maps.get(&frame.robot).is_some()).collect();
@@ -201,7 +201,7 @@ impl GridFuser {
     }
 }
 
-/// The corner of the first map that holds anything: the reference robot's, if it does.
+/// Corner of the first map that has known cells: the reference robot's, if it has any.
 fn anchor(maps: &[(PlacedGrid<'_>, &KnownArea)]) -> Point2 {
     let corners = maps.iter().filter(|(_, area)| !area.is_empty()).map(|(map, _)| map.transform_world_grid());
     let mut finite = corners.filter(|corner| corner.translation.vector.iter().all(|value| value.is_finite()));

@@ -1,4 +1,4 @@
-//! The stage from outside.
+//! The stage as a whole: messages in, messages out.
 
 use super::kind;
 use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
@@ -22,20 +22,21 @@ impl Run {
         Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
-    /// Gives a map and takes the fused maps that it caused.
+    /// Sends a map and returns the fused maps that follow.
     fn map(&mut self, robot: &str, x: f64, cells: &[i8]) -> Vec<Fused> {
         self.0.give_bytes("map", robot, TIME, map(x, cells)).unwrap();
         self.fused()
     }
 
-    /// The same of frames.
+    /// The same for frames.
     fn frames(&mut self, placed: &[(&str, f64)]) -> Vec<Fused> {
         self.0.give::<RobotFrames>("frames", "", TIME, &frames(placed)).unwrap();
         self.fused()
     }
 
-    /// The same of a bend, which displaces the map of a robot by `dx` metres about x = 0 and by nothing from x = 8 on.
-    fn deformation(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
+    /// The same for a deformation that displaces the map of a robot by `dx` metres about x = 0 and by nothing from x
+    /// = 8 on.
+    fn deform(&mut self, robot: &str, dx: f64) -> Vec<Fused> {
         let node = |x: f64, dx: f64| [0.0, 8.0].map(|y| DeformationNode { x, y, dx, ..Default::default() });
         let nodes = [node(0.0, dx), node(8.0, 0.0), node(16.0, 0.0)].concat();
         let deformation = MapDeformation { robot: robot.into(), spacing: 8.0, nodes, ..Default::default() };
@@ -48,7 +49,7 @@ impl Run {
         self.fused()
     }
 
-    /// What was sent on `conflicts` and `agreement`.
+    /// Messages sent on `conflicts` and `agreement`.
     fn conflicts(&mut self) -> (Vec<Vec<i8>>, Vec<MapAgreement>) {
         let read = |message: &Message| {
             assert_eq!(message.header().topic.as_str(), "/map_conflicts");
@@ -84,32 +85,33 @@ fn frames(placed: &[(&str, f64)]) -> RobotFrames {
 }
 
 #[test]
-fn a_bent_map_is_drawn_as_it_is_bent_in_both_ways_to_carry_cells() {
+fn a_map_is_fused_with_its_deformation_by_both_warps() {
     for warp in ["inverse", "forward"] {
         let mut run = Run::new(&format!("warp = \"{warp}\""));
         run.map("robot1", 0.0, &[100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
         let straight = run.frames(&[("robot1", 0.0)]);
         assert_eq!(straight[0].2, [100, 0, 0, 0, 0, 0, 0, 0, 0, 100, 0]);
-        assert!(run.deformation("robot1", 2.4).is_empty(), "it waits for its frames");
-        // The left end goes to the right by two cells and the rest follows: the wall beyond the bend stays.
+        assert!(run.deform("robot1", 2.4).is_empty(), "it waits for its frames");
+        // The left end is displaced to the right by two cells and the rest follows: the wall beyond the deformation
+        // stays.
         let deformed = run.frames(&[("robot1", 0.0)]);
         assert_eq!(deformed[0].2.iter().filter(|cell| **cell == 100).count(), 2, "{deformed:?}");
         assert_eq!((deformed[0].0, deformed[0].2[0], deformed[0].2[7]), (9, 100, 100), "{warp}: {deformed:?}");
-        assert!(run.deformation("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
+        assert!(run.deform("robot1", 2.4).is_empty() && run.finish().is_empty(), "nothing has changed");
     }
 }
 
 #[test]
-fn a_bend_that_no_frames_follow_is_drawn_at_the_end_and_one_that_is_none_is_left_out() {
+fn a_deformation_without_frames_is_applied_at_the_end_and_an_invalid_one_is_left_out() {
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[100, 0, 0]);
     run.frames(&[("robot1", 0.0)]);
-    run.deformation("robot1", f64::NAN);
+    run.deform("robot1", f64::NAN);
     assert_eq!((run.0.warnings().len(), run.finish().len()), (1, 0));
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[100, 0, 0]);
     run.frames(&[("robot1", 0.0)]);
-    run.deformation("robot1", 1.0);
+    run.deform("robot1", 1.0);
     assert_eq!(run.finish().len(), 1);
 }
 
@@ -184,7 +186,7 @@ fn both_warps_give_the_same_where_nothing_is_turned() {
 }
 
 #[test]
-fn conflicts_lie_on_the_cells_of_the_fused_map_and_their_area_is_sent() {
+fn conflicts_are_on_the_cells_of_the_fused_map_and_their_area_is_sent() {
     for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
         let mut run = Run::new(parameters);
         run.map("robot1", 0.0, &[0, 100, 100, -1, 0]);
@@ -241,7 +243,7 @@ fn an_output_is_the_same_if_nothing_else_is_read() {
 }
 
 #[test]
-fn nothing_is_said_of_a_map_that_is_not_made() {
+fn nothing_is_sent_without_a_map() {
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[-1]);
     run.frames(&[("robot1", 0.0)]);
@@ -249,7 +251,7 @@ fn nothing_is_said_of_a_map_that_is_not_made() {
 }
 
 #[test]
-fn the_resolution_can_be_given() {
+fn the_resolution_can_be_set() {
     let mut run = Run::new("resolution = 0.5");
     run.map("robot1", 0.0, &[0, 100]);
     let fused = run.frames(&[("robot1", 0.0)]);

@@ -1,7 +1,7 @@
-//! Draws each placed robot's map where it lies in the merged one: through its bend and its frame, alone.
+//! Transforms each placed robot's map into the merged frame, by its deformation and its frame.
 //!
-//! What the [grid fuser](crate::merge::grid_fuser) adds up, robot by robot, for those who want to see who saw what: pictures, and
-//! layers in a viewer. Nothing of it is in any other result.
+//! These are the maps that the [grid fuser](crate::merge::grid_fuser) adds up, one for each robot, for pictures and
+//! for layers in a viewer. No other result depends on them.
 
 mod stage;
 
@@ -13,7 +13,7 @@ use crate::merge::grid_fuser::{Fused, GridFuserParameters, KnownArea, PlacedGrid
 use crate::shared::geometry::{Grid, GridGeometry};
 use crate::shared::placement::Placed;
 
-/// A map, where it lies in the world, and the cells that it takes there.
+/// A map with its pose in the world, and the grid that it covers there.
 #[derive(Debug)]
 pub struct PlacedMap<'a> {
     map: (PlacedGrid<'a>, &'a KnownArea),
@@ -21,8 +21,8 @@ pub struct PlacedMap<'a> {
 }
 
 impl<'a> PlacedMap<'a> {
-    /// Lays a map on cells of its own size along the axes of the world. None if nothing of it is known, or if it lies too far
-    /// away for numbers.
+    /// Transforms a map to cells of its own size along the axes of the world. None if nothing of it is known, or if
+    /// it is too far away.
     pub fn new(grid: Grid<'a>, area: &'a KnownArea, placed: &Placed<'a>) -> Option<Self> {
         let Placed { transform_world_map, deformation } = *placed;
         let map = (PlacedGrid { grid, transform_world_map, deformation }, area);
@@ -32,7 +32,7 @@ impl<'a> PlacedMap<'a> {
         Some(Self { map, geometry: lay_out(&[map], &lattice).geometry? })
     }
 
-    /// Where its cells lie in the world.
+    /// Its grid in the world.
     pub fn geometry(&self) -> &GridGeometry {
         &self.geometry
     }
@@ -41,7 +41,7 @@ impl<'a> PlacedMap<'a> {
     pub fn draw(&self, cells: &mut [i8]) {
         let GridFuserParameters { min_probability, max_probability, .. } = Default::default();
         let table = EvidenceTable::new(min_probability, max_probability);
-        // Nothing contradicts a map that is alone.
+        // A single map is in no conflict.
         let mut conflicts = vec![0; self.geometry.cell_count()];
         inverse::fuse(&[self.map], &self.geometry, &table, Fused { cells, conflicts: &mut conflicts });
     }

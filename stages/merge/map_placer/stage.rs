@@ -11,12 +11,12 @@ use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Recei
 pub fn kind() -> StageKind {
     StageKind::stage(
         "map_placer",
-        "Draws each placed robot's last map where it lies in the merged one, through its bend and its frame, at the end.",
+        "Transforms each placed robot's last map into the merged frame, by its deformation and its frame, at the end.",
         |(), _: &Context| Ok(MapPlacer::default()),
     )
     .inputs("map", "the robots' maps", MapPlacer::receive_map)
-    .optional_inputs("deformation", "how the maps are bent", MapPlacer::receive_deformation)
-    .inputs("frames", "where the maps lie", MapPlacer::receive_frames)
+    .optional_inputs("deformation", "the deformations of the maps", MapPlacer::receive_deformation)
+    .inputs("frames", "the poses of the maps", MapPlacer::receive_frames)
     .finish(MapPlacer::finish)
     .build()
 }
@@ -27,7 +27,7 @@ struct PlacedMaps {
 
 impl Outputs for PlacedMaps {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let summary = "each placed robot's map as it lies in the merged one, in the frame `world`";
+        let summary = "each placed robot's map, transformed to the frame `world`";
         Self { map: ports.output_on("/{robot}/merged_map", "map", summary) }
     }
 }
@@ -75,7 +75,7 @@ impl MapPlacer {
     }
 }
 
-/// Sends a map as it lies in the world. One that lies too far away for numbers, of which the grid fuser warns, is left out.
+/// Sends a transformed map. One that is too far away, of which the grid fuser warns, is left out.
 fn draw(
     robot: &str,
     map: &RobotMap<KnownArea>,

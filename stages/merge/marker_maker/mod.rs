@@ -1,8 +1,8 @@
-//! Turns what was found in maps into shapes that RViz and Foxglove draw: walls, directions, tags with ellipses of two standard
-//! deviations, topological maps, and how hypotheses lay the maps.
+//! Turns features of maps and hypotheses into shapes for RViz and Foxglove: walls, directions, tags with ellipses of
+//! two standard deviations, topological maps, and the relative poses of hypotheses.
 //!
-//! Shapes are in the frame that the finding is in, which is its robot's map: viewers place them by `/tf_static`. Bends are left
-//! out, as transforms cannot bend.
+//! Shapes are in the frame of the feature, which is its robot's map: viewers place them by `/tf_static`. Deformations
+//! are left out, as transforms are rigid.
 
 mod shapes;
 mod stage;

@@ -1,4 +1,4 @@
-//! Findings as shapes. Each list takes the place of all that was shown before on its topic.
+//! Features and hypotheses as shapes. Each list replaces all that was shown before on its topic.
 
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use gridweave_runtime::ros::{
@@ -7,21 +7,21 @@ use gridweave_runtime::ros::{
 };
 use nalgebra::Matrix2;
 
-/// Of what is accepted.
+/// Colour of accepted hypotheses.
 const ACCEPTED: [u8; 3] = [0, 158, 115];
-/// Of what is refused.
+/// Colour of refused hypotheses.
 const REFUSED: [u8; 3] = [213, 94, 0];
-/// Of walls, metres.
+/// Width of walls, metres.
 const WALL_WIDTH: f64 = 0.08;
-/// Of ways and of the lines of hypotheses, metres.
+/// Width of paths and of the lines of hypotheses, metres.
 const LINE_WIDTH: f64 = 0.05;
 const TEXT_HEIGHT: f64 = 0.35;
-/// How far above the map shapes are, so that it does not hide them, metres.
+/// Height of shapes above the map, so that it does not hide them, metres.
 const HEIGHT: f64 = 0.05;
-/// How long the arrows of directions and axes are, metres.
+/// Length of the arrows of directions and axes, metres.
 const ARROW_LENGTH: f64 = 2.0;
 const DEVIATIONS: f64 = 2.0;
-/// What is thinner cannot be seen, metres.
+/// Least visible thickness, metres.
 const THINNEST: f64 = 0.02;
 
 /// Straight walls as lines, fainter the less reliable they are.
@@ -64,7 +64,7 @@ pub fn tags(found: &TagEstimates, colour: [u8; 3]) -> MarkerArray {
     array(&found.header, shapes)
 }
 
-/// A topological map: ways as lines, places as balls, fainter the less probable they are.
+/// A topological map: paths as lines, nodes as balls, fainter the less probable they are.
 pub fn ways(found: &TopologicalMap, colour: [u8; 3]) -> MarkerArray {
     let mut lines = Lines::default();
     for way in &found.paths {
@@ -86,7 +86,7 @@ pub fn ways(found: &TopologicalMap, colour: [u8; 3]) -> MarkerArray {
     array(&found.header, [lines.marker("ways", LINE_WIDTH), places])
 }
 
-/// How the hypotheses of pairs lay the maps: the x axis of map b's frame in map a's, a line from one origin to the other, and the
+/// Relative poses of hypotheses: the x axis of map b's frame in map a's, a line from one origin to the other, and the
 /// score; bluish green where it is accepted, vermilion where it is refused.
 pub fn hypotheses<'a>(found: impl Iterator<Item = &'a Alignment>) -> MarkerArray {
     let mut header = Header::default();
@@ -110,15 +110,15 @@ pub fn hypotheses<'a>(found: impl Iterator<Item = &'a Alignment>) -> MarkerArray
     array(&header, shapes)
 }
 
-/// The shapes, behind one that takes all before away, each with a number; those without a frame get that of the header.
+/// Numbers the shapes, after one that deletes all earlier ones; those without a frame get that of the header.
 fn array(header: &Header, shapes: impl IntoIterator<Item = Marker>) -> MarkerArray {
     let numbered = (0..).zip(shapes).map(|(id, marker)| {
         let own = if marker.header.frame_id.is_empty() { header.clone() } else { marker.header.clone() };
-        // Transforms may come after what was found, so that a shape goes where they say in the end.
+        // Transforms may arrive later, so shapes are to follow the latest ones.
         Marker { id, header: own, frame_locked: true, ..marker }
     });
     let shapes: Vec<Marker> = numbered.collect();
-    // Some viewers ask even of this for a frame.
+    // Some viewers require a frame even of this one.
     let header = shapes.first().map_or(header, |shape| &shape.header).clone();
     let clear = Marker { action: Marker::DELETE_ALL, header, ..Marker::default() };
     MarkerArray { markers: std::iter::once(clear).chain(shapes).collect() }
@@ -152,7 +152,7 @@ impl Lines {
     }
 }
 
-/// A colour that what lies behind shines through by what `opacity`, 0 to 1, leaves.
+/// A colour with an `opacity` from 0 to 1.
 fn rgba([r, g, b]: [u8; 3], opacity: f64) -> ColorRGBA {
     let part = |value: u8| f32::from(value) / 255.0;
     let opacity = if opacity.is_finite() { opacity.clamp(0.0, 1.0) } else { 1.0 };
@@ -179,7 +179,7 @@ fn text(sort: &str, x: f64, y: f64, words: String, color: ColorRGBA) -> Marker {
     Marker { ns: sort.to_owned(), shape: Marker::TEXT, pose: at, scale, color, text: words, ..Marker::default() }
 }
 
-/// The half axes of two standard deviations, and the direction of the first.
+/// Half axes of two standard deviations, and the direction of the first.
 fn half_axes(covariance: &[f64; 4]) -> ([f64; 2], f64) {
     match CovarianceEllipse::new(&Matrix2::from_row_slice(covariance), DEVIATIONS) {
         Some(ellipse) => (ellipse.half_axes.map(|half| half.max(THINNEST)), ellipse.direction),

@@ -17,8 +17,8 @@ pub fn kind() -> StageKind {
     .optional_inputs("direction", "the directions of their walls", MarkerMaker::direction)
     .optional_inputs("tags", "where the tags are", MarkerMaker::tags)
     .optional_inputs("topology", "topological maps", MarkerMaker::topology)
-    .optional_inputs("alignment", "how maps may lie to each other", MarkerMaker::alignment)
-    .optional_inputs("verdicts", "what became of each pair of robots", MarkerMaker::verdicts)
+    .optional_inputs("alignment", "hypotheses of the relative poses of maps", MarkerMaker::alignment)
+    .optional_inputs("verdicts", "the verdict on each pair of robots", MarkerMaker::verdicts)
     .build()
 }
 
@@ -42,21 +42,21 @@ impl Outputs for Markers {
             ),
             tags: ports.output_on("/{robot}/markers/tags", "tags", "the tags as ellipses of two standard deviations"),
             ways: ports.output_on("/{robot}/markers/ways", "ways", "topological maps as lines and balls"),
-            hypotheses: ports.output_on("/markers/hypotheses", "hypotheses", "where hypotheses lay the maps"),
-            graph: ports.output_on("/markers/graph", "graph", "the pairs of robots, and what became of each"),
+            hypotheses: ports.output_on("/markers/hypotheses", "hypotheses", "the relative poses of the hypotheses"),
+            graph: ports.output_on("/markers/graph", "graph", "the pairs of robots, and the verdict on each"),
         }
     }
 }
 
-/// A stage that sends hypotheses, by its wire, and the pair that they are of.
+/// Source of hypotheses: its wire, and the pair of robots.
 type Source = (usize, String, String);
 
 #[derive(Default)]
 struct MarkerMaker {
-    /// In the order in which they were first heard of.
+    /// In the order of their first message.
     robots: Vec<String>,
     hypotheses: BTreeMap<Source, Vec<Alignment>>,
-    /// The frame of a robot's map.
+    /// Frame of a robot's map.
     frames: BTreeMap<String, String>,
 }
 
@@ -89,7 +89,7 @@ impl MarkerMaker {
         output.ways.send(&found.robot, &ways(&found, colour))
     }
 
-    /// Hypotheses of a pair come one after the other, by rank; they are shown once all have come.
+    /// Hypotheses of a pair arrive one by one, by rank; they are shown once all have arrived.
     fn alignment(&mut self, found: Received<'_, Alignment>, output: &Output<Markers>) -> Result<(), StageError> {
         let source = (found.wire(), found.a.clone(), found.b.clone());
         let alignment = found.into_content();
@@ -106,7 +106,7 @@ impl MarkerMaker {
         output.hypotheses.send("", &hypotheses(self.hypotheses.values().flatten()))
     }
 
-    /// Verdicts name no frames: they are in those of the alignments that they are about.
+    /// Verdicts name no frames: their frames are those of the alignments.
     fn verdicts(&mut self, found: Received<'_, Verdicts>, output: &Output<Markers>) -> Result<(), StageError> {
         let mut verdicts = found.into_content();
         for alignment in verdicts.verdicts.iter_mut().map(|verdict| &mut verdict.alignment) {

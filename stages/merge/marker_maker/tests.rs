@@ -10,7 +10,7 @@ fn header() -> Header {
     Header { frame_id: "robot1/map".into(), ..Default::default() }
 }
 
-/// All but the first, which takes what was shown before away.
+/// All but the first, which deletes what was shown before.
 #[track_caller]
 fn shapes(array: &MarkerArray) -> &[Marker] {
     assert_eq!(array.markers[0].action, Marker::DELETE_ALL);
@@ -77,7 +77,7 @@ fn a_direction_is_two_arrows_across_each_other_or_nothing() {
 }
 
 #[test]
-fn a_hypothesis_shows_where_it_lays_the_map_and_whether_it_was_accepted() {
+fn a_hypothesis_shows_the_pose_of_the_map_and_whether_it_was_accepted() {
     let place = |x, accepted, rank| Alignment {
         header: Header { stamp: Time { sec: 3, nanosec: 0 }, frame_id: "robot1/map".into() },
         a: "robot1".into(),

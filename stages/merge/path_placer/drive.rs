@@ -1,19 +1,19 @@
-//! Where a robot drove in its own map.
+//! The path of a robot in its own map.
 
 use crate::shared::geometry::Pose2;
 use gridweave_runtime::ros::Time;
 
-/// Poses of a robot in its map frame, in the order in which they came, at least some way apart.
+/// Poses of a robot in its map frame, in the order of their messages, at a least distance from each other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drive {
     poses: Vec<(Time, Pose2)>,
-    /// The pose that came last, if it lies too near to the last of `poses` to be one of them.
+    /// The latest pose, if it is too near to the last of `poses` to be one of them.
     last: Option<(Time, Pose2)>,
 }
 
 impl Drive {
-    /// Adds a pose. One that lies less than `spacing` metres from the one before, or is no number, is left out, but for the end of
-    /// the drive.
+    /// Adds a pose. One less than `spacing` metres from the one before, or that is not finite, is left out, except at
+    /// the end of the path.
     pub fn add(&mut self, stamp: Time, pose: Pose2, spacing: f64) {
         if !pose.translation.vector.iter().all(|value| value.is_finite()) || !pose.rotation.angle().is_finite() {
             return;
@@ -29,7 +29,7 @@ impl Drive {
         }
     }
 
-    /// The poses, with their times, and the end of the drive.
+    /// The poses with their times, including the latest one.
     pub fn poses(&self) -> impl Iterator<Item = (Time, Pose2)> + '_ {
         self.poses.iter().chain(&self.last).copied()
     }
@@ -41,7 +41,7 @@ mod tests {
     use crate::shared::geometry::pose;
 
     #[test]
-    fn a_drive_keeps_poses_some_way_apart_and_where_it_ends() {
+    fn a_path_keeps_poses_some_distance_apart_and_its_end() {
         let mut drive = Drive::default();
         let at = |sec| Time { sec, nanosec: 0 };
         for (second, x) in [0.0, 0.04, f64::NAN, 0.12, 0.13, 0.14].into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Where each robot drove, in the merged frame: its poses carried through its map's bend and frame.
+//! Transforms each robot's path into the merged frame, by its map's deformation and frame.
 
 mod drive;
 mod stage;

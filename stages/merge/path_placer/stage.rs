@@ -10,11 +10,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The parameters of the path placer.
+/// Parameters of the path placer.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PathPlacerParameters {
-    /// Metres. A pose nearer than this to the one before is left out.
+    /// Least distance of a pose from the one before, metres; nearer ones are left out.
     #[schemars(range(min = 0.0))]
     spacing: f64,
 }
@@ -31,13 +31,13 @@ impl Parameters for PathPlacerParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "path_placer",
-        "Where each placed robot drove, in the merged frame: its poses carried through its map's bend and frame. Sent when \
-         frames or bends change, and at the end if any robot has moved since.",
+        "Transforms each placed robot's path into the merged frame, by its map's deformation and frame. Sent when frames or \
+         deformations change, and at the end if any robot has moved since.",
         |parameters: PathPlacerParameters, _: &Context| Ok(PathPlacer { parameters, ..PathPlacer::default() }),
     )
     .inputs("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
-    .optional_input("deformation", "how the maps are bent", PathPlacer::receive_deformation)
-    .input("frames", "where the maps lie", PathPlacer::receive_frames)
+    .optional_input("deformation", "the deformations of the maps", PathPlacer::receive_deformation)
+    .input("frames", "the poses of the maps", PathPlacer::receive_frames)
     .finish(PathPlacer::finish)
     .build()
 }
@@ -48,7 +48,7 @@ struct Paths {
 
 impl Outputs for Paths {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let summary = "where the robot drove, in the frame `world`; each pose with its own time";
+        let summary = "the path of the robot, in the frame `world`; each pose with its own time";
         Self { path: ports.output_on("/{robot}/merged_path", "path", summary) }
     }
 }
@@ -58,9 +58,9 @@ struct PathPlacer {
     parameters: PathPlacerParameters,
     drives: BTreeMap<String, Drive>,
     placement: Placement,
-    /// Whether a bend has come that is in no path that was sent.
+    /// Whether a deformation has arrived that is in no path that was sent.
     has_new_deformations: bool,
-    /// Whether a pose has.
+    /// The same for a pose.
     has_new_poses: bool,
 }
 
@@ -80,7 +80,7 @@ impl PathPlacer {
         Ok(())
     }
 
-    /// A bend waits for the frames that belong to it.
+    /// A deformation waits for the frames that belong to it.
     fn receive_deformation(
         &mut self,
         deformation: Received<'_, MapDeformation>,

@@ -1,9 +1,9 @@
-//! The part of a grid that there is something to do in.
+//! Bounding box of cells of a grid.
 
 use super::Grid;
 use std::ops::Range;
 
-/// The rows and columns of a grid that hold all of its cells of one sort.
+/// Bounding box of all cells of one sort.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CellBox {
     /// Along the grid's y axis.
@@ -13,8 +13,8 @@ pub struct CellBox {
 }
 
 impl CellBox {
-    /// The box that holds all cells of which `is_of_sort` is true, with one other cell to each side where the grid goes on.
-    /// None if there are none.
+    /// The bounding box of all cells for which `is_of_sort` is true, enlarged by one cell to each side where the grid
+    /// allows. None if there are none.
     pub fn holding(grid: &Grid<'_>, is_of_sort: impl Fn(i8) -> bool) -> Option<Self> {
         let (width, height) = (grid.geometry.width, grid.geometry.height);
         let mut held: Option<Self> = None;

@@ -1,13 +1,13 @@
-//! Occupancy grids: where their cells lie, and what they say.
+//! Occupancy grids: their geometry and their cells.
 
 use super::{Point2, Pose2};
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
 use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, Time};
 
-/// As many cells are looked at together.
+/// Number of cells that are tested together.
 const BLOCK: usize = 64;
 
-/// A cell's place in a grid: column (along x) and row (along y).
+/// Indices of a cell in a grid: column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Cell {
     /// Along the grid's x axis, from 0.
@@ -16,7 +16,7 @@ pub struct Cell {
     pub row: usize,
 }
 
-/// Where the cells of a grid lie in its map frame.
+/// Geometry of the cells of a grid in its map frame.
 ///
 /// Cell (column, row) has its centre at `origin * ((column + 0.5) * resolution, (row + 0.5) * resolution)`. The origin
 /// is a pose with yaw.
@@ -26,21 +26,21 @@ pub struct GridGeometry {
     pub width: usize,
     /// Cells along y.
     pub height: usize,
-    /// Metres a cell.
+    /// Metres per cell.
     pub resolution: f64,
     /// `T_map_grid`: the pose of the outer corner of cell (0, 0) in the map frame.
     pub origin: Pose2,
 }
 
 impl GridGeometry {
-    /// The centre of a cell in the map frame.
+    /// Centre of a cell in the map frame.
     pub fn centre(&self, cell: Cell) -> Point2 {
         let x = (cell.column as f64 + 0.5) * self.resolution;
         let y = (cell.row as f64 + 0.5) * self.resolution;
         self.origin * Point2::new(x, y)
     }
 
-    /// The cell that holds a point of the map frame, if it lies on the grid.
+    /// The cell that contains a point of the map frame, if it is on the grid.
     pub fn cell(&self, point: &Point2) -> Option<Cell> {
         let local = self.origin.inverse_transform_point(point) / self.resolution;
         if !(local.x >= 0.0 && local.y >= 0.0) {
@@ -50,17 +50,17 @@ impl GridGeometry {
         (cell.column < self.width && cell.row < self.height).then_some(cell)
     }
 
-    /// The place of a cell in the row-by-row list of cells.
+    /// Index of a cell in the row-by-row list of cells.
     pub fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.column
     }
 
-    /// The number of cells.
+    /// Number of cells.
     pub fn cell_count(&self) -> usize {
         self.width * self.height
     }
 
-    /// What a message says of a grid that was made at a time. The sides must be less than 2^32.
+    /// Map meta data of a message for a grid that was loaded at a time. The sides must be less than 2^32.
     pub fn meta_data(&self, map_load_time: Time) -> MapMetaData {
         MapMetaData {
             map_load_time,
@@ -71,15 +71,15 @@ impl GridGeometry {
         }
     }
 
-    /// All of a grid's message but its cells. The sides must be less than 2^32.
+    /// A grid's message without its cells. The sides must be less than 2^32.
     pub fn prefix(&self, header: Header) -> GridPrefix {
         GridPrefix { info: self.meta_data(header.stamp), header }
     }
 }
 
-/// The most cells of a grid that is laid over several, of which `known` cells are known in all: memory goes with what is
-/// known, and not with how far apart a message says that it lies. The first are 200 x 200 m in cells of 0.05 m; beyond, maps
-/// that hang together know more than a sixty-fourth of the rectangle round them.
+/// Largest number of cells of a grid that covers several maps with `known` known cells in all: memory is bounded by
+/// the known area, and not by distances in messages. The bound is at least 200 x 200 m in cells of 0.05 m; beyond
+/// that, connected maps know more than a sixty-fourth of their bounding rectangle.
 pub fn most_cells_over(known: f64) -> f64 {
     (16 << 20) as f64 + 64.0 * known
 }
@@ -88,20 +88,20 @@ pub fn most_cells_over(known: f64) -> f64 {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// The number of cells is not width x height.
-    #[error("it has {actual} cells, but its size calls for {width} x {height}")]
+    #[error("it has {actual} cells, but its size is {width} x {height}")]
     CellCount {
-        /// Cells there are.
+        /// Number of cells.
         actual: usize,
-        /// Cells along x, as said.
+        /// Cells along x by the message.
         width: usize,
-        /// Cells along y, as said.
+        /// Cells along y by the message.
         height: usize,
     },
     /// The resolution is not a positive number.
-    #[error("its resolution is {0} m a cell, which is no positive number")]
+    #[error("its resolution is {0} m per cell, which is not positive")]
     Resolution(f32),
     /// The origin is not a pose.
-    #[error("its origin holds a value that is no finite number")]
+    #[error("a value of its origin is not finite")]
     Origin,
 }
 
@@ -115,8 +115,8 @@ pub struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// A grid of `cells`, of which there must be width x height. One without cells is 0 x 0, whatever its sides are said to
-    /// be: what is made of a grid takes memory by its sides.
+    /// A grid of `cells`, of which there must be width x height. One without cells is 0 x 0, whatever its sides, as
+    /// memory is allocated by the sides.
     pub fn new(mut geometry: GridGeometry, cells: &'a [i8]) -> Result<Self, GridError> {
         let GridGeometry { width, height, resolution, origin } = geometry;
         if width.checked_mul(height) != Some(cells.len()) {
@@ -139,7 +139,7 @@ impl<'a> Grid<'a> {
         Self::new(GridGeometry::from(&message.info), message.cells())
     }
 
-    /// The value of a cell; unknown outside of the grid.
+    /// Value of a cell; unknown outside of the grid.
     pub fn value(&self, cell: Cell) -> i8 {
         match cell.column < self.geometry.width && cell.row < self.geometry.height {
             true => self.cells[self.geometry.index(cell)],
@@ -147,14 +147,14 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// The value of the cell that a point falls in; unknown outside of the grid.
+    /// Value of the cell that contains a point; unknown outside of the grid.
     pub fn value_at(&self, point: &Point2) -> i8 {
         self.geometry.cell(point).map_or(UNKNOWN, |cell| self.value(cell))
     }
 
-    /// The cells that hold an obstacle, row by row.
+    /// The occupied cells, row by row.
     pub fn occupied(&self) -> impl Iterator<Item = Cell> + 'a {
-        // Most of a map is free or unknown. Whole blocks of it are passed over by their greatest value.
+        // Most of a map is free or unknown. Whole blocks are skipped by their greatest value.
         let may_hold_one = |block: &[i8]| is_occupied(block.iter().fold(UNKNOWN, |most, v| most.max(*v)).min(100));
         let rows = self.cells.chunks(self.geometry.width.max(1)).enumerate();
         rows.flat_map(move |(row, cells)| {
@@ -172,8 +172,8 @@ impl From<&MapMetaData> for GridGeometry {
         Self {
             width: info.width as usize,
             height: info.height as usize,
-            // 0.05 as f32 is 0.05000000074505806; the decimal that was meant keeps maps from drifting by a cell
-            // over their width.
+            // 0.05 as f32 is 0.05000000074505806; the intended decimal keeps maps from drifting by a cell over their
+            // width.
             resolution: shortest_decimal(info.resolution),
             origin: info.origin.planar(),
         }
@@ -197,7 +197,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_centre_of_a_cell_lies_in_that_cell(
+        fn the_centre_of_a_cell_is_in_that_cell(
             x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0, column in 0usize..30, row in 0usize..20,
         ) {
             let geometry = geometry(x, y, yaw);
@@ -208,10 +208,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_occupied_cells_are_those_that_a_look_at_every_cell_finds(
+        fn the_occupied_cells_are_those_of_a_test_of_every_cell(
             width in 0usize..200, height in 0usize..5, values in prop::collection::vec(prop::num::i8::ANY, 1000),
         ) {
-            // Most cells are free, so that there are blocks to pass over.
+            // Most cells are free, so that there are blocks to skip.
             let cells: Vec<i8> =
                 values.iter().enumerate().map(|(i, v)| if i % 7 == 0 { *v } else { 0 }).take(width * height).collect();
             let geometry = GridGeometry { width, height, ..geometry(0.0, 0.0, 0.0) };
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grid_that_cannot_be_is_refused() {
+    fn an_invalid_grid_is_refused() {
         let good = geometry(0.0, 0.0, 0.0);
         assert!(Grid::new(good, &[0; 600]).is_ok());
         assert!(matches!(Grid::new(good, &[0; 599]), Err(GridError::CellCount { actual: 599, .. })));
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn the_resolution_is_the_decimal_that_was_meant() {
+    fn the_resolution_is_the_intended_decimal() {
         let info = MapMetaData { resolution: 0.05, ..Default::default() };
         assert_eq!(GridGeometry::from(&info).resolution, 0.05);
     }

@@ -1,14 +1,13 @@
-//! Nearest neighbours among points that lie in the plane about as densely as the cells of a map.
+//! Nearest neighbours among points in the plane about as dense as the cells of a map.
 //!
-//! The points are sorted into square buckets, so that a query reads a few short runs of memory. For the two searches
-//! that occur here, a small radius and points that are spread along walls, this takes a fraction of the time that a k-d
-//! tree takes, and it settles ties by the order of the points, so that no result depends on the machine's vector
-//! instructions.
+//! The points are sorted into square buckets, so that a query reads a few short runs of memory. For a small radius
+//! and points along walls this takes a fraction of the time of a k-d tree, and ties are broken by the order of the
+//! points, so that no result depends on the machine's vector instructions.
 
 use super::Point2;
 use std::ops::Range;
 
-/// How a rectangle of the plane is cut into square buckets.
+/// A division of a rectangle of the plane into square buckets.
 #[derive(Clone, Copy, Debug)]
 pub struct Buckets {
     /// The corner of least x and y.
@@ -22,8 +21,8 @@ pub struct Buckets {
 }
 
 impl Buckets {
-    /// Buckets of the given side that hold all of the points, which are finite; of a wider one where they lie far apart, so
-    /// that few points take few buckets.
+    /// Buckets of the given side that contain all of the points, which are finite; of a wider side where they are far
+    /// apart, so that few points need few buckets.
     fn around(points: &[Point2], mut side: f64) -> Self {
         let Some(first) = points.first() else { return Self { corner: Point2::origin(), side, columns: 1, rows: 1 } };
         let (low, high) = points.iter().fold((*first, *first), |(low, high), point| (low.inf(point), high.sup(point)));
@@ -35,12 +34,12 @@ impl Buckets {
         Self { corner: low, side, columns: count(low.x, high.x), rows: count(low.y, high.y) }
     }
 
-    /// The column of buckets that `x` lies in; the nearest one for what lies outside.
+    /// The column of buckets that contains `x`; the nearest one for what is outside.
     pub fn column(&self, x: f64) -> usize {
         (((x - self.corner.x) / self.side).max(0.0) as usize).min(self.columns - 1)
     }
 
-    /// The row of buckets that `y` lies in; the nearest one for what lies outside.
+    /// The row of buckets that contains `y`; the nearest one for what is outside.
     pub fn row(&self, y: f64) -> usize {
         (((y - self.corner.y) / self.side).max(0.0) as usize).min(self.rows - 1)
     }
@@ -50,7 +49,7 @@ impl Buckets {
 #[derive(Clone, Debug)]
 pub struct PointIndex {
     buckets: Buckets,
-    /// Where each bucket's points begin in `points`, row of buckets by row, and the end of the last.
+    /// Start of each bucket in `points`, row of buckets by row, and the end of the last.
     starts: Vec<u32>,
     /// The points, bucket by bucket.
     points: Vec<Point2>,
@@ -59,16 +58,16 @@ pub struct PointIndex {
 /// The nearest neighbour of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Its place in [`PointIndex::points`].
+    /// Its index in [`PointIndex::points`].
     pub index: usize,
     /// Square of the distance to it.
     pub squared_distance: f64,
 }
 
 impl PointIndex {
-    /// Sorts points into buckets of the given side, or of a wider one where they lie far apart. `order[i]` of the second
-    /// result is the place that point `i` of the index had in `points`. Points that are not finite, and points beyond the
-    /// first 2^32, are left out.
+    /// Sorts points into buckets of the given side, or of a wider one where they are far apart. `order[i]` of the
+    /// second result is the index that point `i` of the index had in `points`. Points that are not finite, and points
+    /// beyond the first 2^32, are left out.
     pub fn new(points: &[Point2], side: f64) -> (Self, Vec<usize>) {
         let is_finite = |point: &Point2| point.x.is_finite() && point.y.is_finite();
         let (places, finite): (Vec<usize>, Vec<Point2>) =
@@ -78,13 +77,13 @@ impl PointIndex {
         (index, order)
     }
 
-    /// Sorts points into buckets; those of one bucket stay in their order. `moved` is told from where to where each of
-    /// them goes. Points beyond the first 2^32 are left out.
+    /// Sorts points into buckets; those of one bucket stay in their order. `moved` is called with the old and the new
+    /// index of each of them. Points beyond the first 2^32 are left out.
     pub fn in_buckets(points: &[Point2], buckets: Buckets, mut moved: impl FnMut(usize, usize)) -> Self {
         let points = &points[..points.len().min(u32::MAX as usize)];
         let numbers: Vec<usize> =
             points.iter().map(|point| buckets.row(point.y) * buckets.columns + buckets.column(point.x)).collect();
-        // Points are counted two places on, so that the starts can serve as the places of the next points.
+        // Points are counted two indices on, so that the starts can be used as the indices of the next points.
         let mut starts = vec![0u32; buckets.columns * buckets.rows + 2];
         for number in &numbers {
             starts[number + 2] += 1;
@@ -112,21 +111,20 @@ impl PointIndex {
         &self.buckets
     }
 
-    /// The places in [`points`](Self::points) of what lies in a row of buckets from column `first` to `last`: the buckets
-    /// of a row follow each other.
+    /// Indices in [`points`](Self::points) of the points in a row of buckets from column `first` to `last`: the
+    /// buckets of a row are contiguous.
     pub fn run(&self, row: usize, first: usize, last: usize) -> Range<usize> {
         let start = row * self.buckets.columns;
         self.starts[start + first] as usize..self.starts[start + last + 1] as usize
     }
 
-    /// The point nearest to `point`, if one lies within `radius` of it. Of several that are equally near it is
-    /// the first.
+    /// The point nearest to `point`, if one is within `radius` of it. Of several at equal distance it is the first.
     pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
         let Buckets { corner, side, columns, rows } = self.buckets;
         let local = (point - corner) / side;
         let reach = radius / side;
         let (column_end, row_end) = (columns as f64, rows as f64);
-        // Written so that a value that is no number fails it.
+        // Written so that a value that is not a number fails it.
         let inside = local.x + reach >= 0.0
             && local.y + reach >= 0.0
             && local.x - reach < column_end
@@ -181,7 +179,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_nearest_point_is_the_one_that_looking_at_all_finds(
+        fn the_nearest_point_is_that_of_a_test_of_all_points(
             points in prop::collection::vec((-5.0..5.0, -3.0..3.0), 0..200),
             x in -7.0..7.0, y in -7.0..7.0, radius in 0.0..3.0,
         ) {
@@ -204,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_no_numbers_are_left_out() {
+    fn points_that_are_not_finite_are_left_out() {
         let points = [Point2::new(f64::NAN, 0.0), Point2::new(1.0, 2.0), Point2::new(0.0, f64::INFINITY)];
         let (index, order) = PointIndex::new(&points, SIDE);
         assert_eq!(order, [1]);
@@ -214,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_lie_far_apart_take_few_buckets() {
+    fn points_far_apart_need_few_buckets() {
         let points = [Point2::new(-1e300, -1e300), Point2::new(1e300, 1e300), Point2::new(0.0, 0.0)];
         let (index, _) = PointIndex::new(&points, SIDE);
         assert!(index.starts.len() < 10_000);
@@ -222,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_equally_near_points_the_first_is_taken() {
+    fn of_two_points_at_equal_distance_the_first_is_taken() {
         let points = [Point2::new(1.0, 0.0), Point2::new(-1.0, 0.0)];
         let (index, order) = PointIndex::new(&points, SIDE);
         let found = index.nearest(&Point2::origin(), 2.0).unwrap();

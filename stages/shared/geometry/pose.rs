@@ -3,7 +3,7 @@
 use nalgebra::{Isometry2, Matrix3, Vector2};
 use std::f64::consts::{PI, TAU};
 
-/// A pose in the plane, or the rigid transform that it stands for: metres and radians.
+/// A pose in the plane, or the rigid transform from its frame: metres and radians.
 pub type Pose2 = Isometry2<f64>;
 
 /// A point in the plane, metres.
@@ -14,12 +14,12 @@ pub fn pose(x: f64, y: f64, yaw: f64) -> Pose2 {
     Isometry2::new(Vector2::new(x, y), yaw)
 }
 
-/// A vector turned left by a quarter turn: how a point moves under a small turn about the origin.
+/// A vector turned left by a quarter turn: the motion of a point under a small turn about the origin.
 pub fn quarter_turn(vector: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-vector.y, vector.x)
 }
 
-/// A covariance of (x, y, yaw) as messages carry it.
+/// A covariance of (x, y, yaw) as a row-major array, as in messages.
 pub fn row_by_row(covariance: &Matrix3<f64>) -> [f64; 9] {
     std::array::from_fn(|index| covariance[(index / 3, index % 3)])
 }
@@ -52,7 +52,7 @@ mod tests {
         }
 
         #[test]
-        fn a_difference_of_directions_lies_within_half_a_period(a in -9.0..9.0, b in -9.0..9.0) {
+        fn a_difference_of_directions_is_within_half_a_period(a in -9.0..9.0, b in -9.0..9.0) {
             let difference = turn_difference(a, b, FRAC_PI_2);
             prop_assert!(difference.abs() <= FRAC_PI_2 / 2.0 + 1e-12);
             let turns = (a - b - difference) / FRAC_PI_2;

@@ -12,24 +12,24 @@ pub struct PointPair {
     pub a: Point2,
     /// The point in frame b, metres.
     pub b: Point2,
-    /// How much the pair counts: the inverse of the variance of `a - T_a_b * b` along one axis, 1 / square metres. Where
-    /// variances are not known, any positive number; the fit's covariance then means nothing.
+    /// Weight of the pair: the inverse of the variance of `a - T_a_b * b` along one axis, 1 / square metres. Where
+    /// variances are not known, any positive number; the covariance of the fit is then meaningless.
     pub weight: f64,
 }
 
 /// A rigid transform fitted to pairs of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidFit {
-    /// `T_a_b`: takes a point in frame b to frame a.
+    /// `T_a_b`: transforms a point in frame b to frame a.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw) of `T_a_b`, metres and radians, if the weights are inverse variances.
     pub covariance: Matrix3<f64>,
-    /// Weighted root mean square of the distances that remain, metres.
+    /// Weighted root mean square of the residuals, metres.
     pub rms: f64,
 }
 
 impl RigidFit {
-    /// The covariance of `T_a_b * b` that comes from the transform alone, square metres.
+    /// Covariance of `T_a_b * b` from the transform only, square metres.
     pub fn point_covariance(&self, b: &Point2) -> Matrix2<f64> {
         let jacobian = point_jacobian(&self.transform_a_b, b);
         jacobian * self.covariance * jacobian.transpose()
@@ -41,16 +41,16 @@ impl RigidFit {
     }
 }
 
-/// The derivative of `T_a_b * b` by (x, y, yaw).
+/// Derivative of `T_a_b * b` with respect to (x, y, yaw).
 pub fn point_jacobian(transform_a_b: &Pose2, b: &Point2) -> Matrix2x3<f64> {
     let turned = transform_a_b.rotation * b.coords;
     Matrix2x3::new(1.0, 0.0, -turned.y, 0.0, 1.0, turned.x)
 }
 
-/// The covariance of (x, y, yaw) of a `T_a_b` that lays a point of b on a place of a with a covariance, square metres, and turns
-/// b about there with a variance, square radians, independent of it.
+/// Covariance of (x, y, yaw) of a `T_a_b` that transforms a point of b to a point of a with a covariance, square
+/// metres, and turns about it with an independent variance, square radians.
 pub fn covariance_about(transform_a_b: &Pose2, b: &Point2, of_place: &Matrix2<f64>, yaw_variance: f64) -> Matrix3<f64> {
-    // t = a - R b, so that a turn moves t against the way that it moves the point.
+    // t = a - R b, so a turn moves t opposite to the point.
     let arm = -quarter_turn(&(transform_a_b.rotation * b.coords));
     let mut covariance = Matrix3::zeros();
     covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&(of_place + arm * arm.transpose() * yaw_variance));
@@ -60,10 +60,11 @@ pub fn covariance_about(transform_a_b: &Pose2, b: &Point2, of_place: &Matrix2<f6
     covariance
 }
 
-/// The `T_a_b` that makes the weighted sum of the squared distances between `a` and `T_a_b * b` least.
+/// Minimizes the weighted sum of the squared distances between `a` and `T_a_b * b`.
 ///
-/// Pairs with a value that is not finite, or with a weight that is not positive, do not count. It is never a
-/// reflection. `None` if the rotation cannot be told: fewer than two pairs, or all points of a set in one place.
+/// Pairs with a value that is not finite, or with a weight that is not positive, are ignored. The result is never a
+/// reflection. `None` if the rotation is not determined: fewer than two pairs, or all points of a set at one
+/// position.
 pub fn fit_rigid(pairs: &[PointPair]) -> Option<RigidFit> {
     let usable = || pairs.iter().filter(|pair| is_usable(pair));
     let count = usable().count();
@@ -87,7 +88,7 @@ pub fn fit_rigid(pairs: &[PointPair]) -> Option<RigidFit> {
         spread_b += share * b.norm_squared();
     }
     let strength = cosine.hypot(sine);
-    // Rounding of coordinates far from the origin must not pass for a spread.
+    // Rounding of coordinates far from the origin must not count as a spread.
     let size = centre_a.coords.norm_squared().max(centre_b.coords.norm_squared());
     let least = 1e-24 + 1e-26 * size;
     if !(spread_a > least && spread_b > least && strength > 1e-9 * (spread_a * spread_b).sqrt()) {
@@ -97,7 +98,7 @@ pub fn fit_rigid(pairs: &[PointPair]) -> Option<RigidFit> {
     let translation = centre_a.coords - rotation * centre_b.coords;
     let transform_a_b = Isometry2::new(translation, wrap_angle(rotation.angle()));
 
-    // About the centre, translation and rotation are independent; moving to the origin of b ties them.
+    // About the centroid, translation and rotation are independent; moving to the origin of b correlates them.
     let yaw_variance = 1.0 / (weight * spread_b);
     let about_centre = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / weight, 1.0 / weight, yaw_variance));
     let arm = rotation * centre_b.coords;
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_do_not_tell_the_rotation_give_none() {
+    fn points_that_do_not_determine_the_rotation_give_none() {
         let pair =
             |ax: f64, bx: f64, weight: f64| PointPair { a: Point2::new(ax, 7.0), b: Point2::new(bx, 7.0), weight };
         assert_eq!(fit_rigid(&[]), None);
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_that_lays_a_point_on_a_place_is_as_uncertain_there_as_that() {
+    fn the_covariance_of_a_transform_about_a_point_is_that_of_the_point() {
         let (transform_a_b, b) = (pose(3.0, -2.0, 0.8), Point2::new(5.0, 7.0));
         let of_place = Matrix2::new(0.04, 0.01, 0.01, 0.09);
         let covariance = covariance_about(&transform_a_b, &b, &of_place, 0.02);

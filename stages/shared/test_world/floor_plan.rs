@@ -1,4 +1,4 @@
-//! Floor plans for tests, and maps of them as robots would draw them.
+//! Floor plans for tests, and robots' maps of them.
 
 use crate::registration::comparison::MapView;
 use crate::registration::icp::FirstGuess;
@@ -15,14 +15,14 @@ pub(crate) struct FloorPlan {
     walls: Vec<(Point2, Point2)>,
 }
 
-/// What a robot sees of the world: the rectangle between two corners, metres.
+/// The part of the world that a robot sees: the rectangle between two corners, metres.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen {
     pub(crate) low: Point2,
     pub(crate) high: Point2,
 }
 
-/// Where a map's frame lies, and how the map is drawn.
+/// Pose of a map's frame, and how the map is drawn.
 #[derive(Clone, Copy)]
 pub(crate) struct Drawing {
     pub(crate) transform_world_map: Pose2,
@@ -133,7 +133,7 @@ impl FloorPlan {
     pub(crate) fn draw(&self, part: Seen, drawing: Drawing) -> DrawnMap {
         let Drawing { transform_world_map, resolution, grid_yaw } = drawing;
         let turn = nalgebra::UnitComplex::new(grid_yaw);
-        // The smallest grid of that yaw that holds what was seen.
+        // The smallest grid of that yaw that contains what was seen.
         let (low, high) = (part.low, part.high);
         let corners = [low, Point2::new(high.x, low.y), high, Point2::new(low.x, high.y)];
         let corners = corners.map(|corner| turn.inverse() * (transform_world_map.inverse() * corner));
@@ -167,7 +167,7 @@ impl FloorPlan {
 }
 
 impl DrawnMap {
-    /// What a message says of the grid.
+    /// Meta data of the grid's message.
     pub(crate) fn info(&self) -> MapMetaData {
         MapMetaData {
             resolution: self.geometry.resolution as f32,
@@ -178,7 +178,7 @@ impl DrawnMap {
         }
     }
 
-    /// The cells as a message holds them.
+    /// The cells as in a message.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         self.cells.iter().map(|cell| *cell as u8).collect()
     }
@@ -187,7 +187,7 @@ impl DrawnMap {
         MapView::rigid(Grid::new(self.geometry, &self.cells).unwrap(), &self.walls)
     }
 
-    /// The map of a robot that errs: what this one shows at a place shows there displaced by [`deformation_at`].
+    /// This map deformed by drift: every point is displaced by [`deformation_at`].
     pub(crate) fn deformed(&self, most: f64) -> Self {
         let grid = Grid::new(self.geometry, &self.cells).unwrap();
         let cells = (0..self.cells.len()).map(|index| {
@@ -200,13 +200,14 @@ impl DrawnMap {
         Self { cells, walls, ..*self }
     }
 
-    /// `T_self_other`, as it was drawn.
+    /// True `T_self_other`.
     pub(crate) fn transform_to(&self, other: &Self) -> Pose2 {
         self.transform_world_map.inverse() * other.transform_world_map
     }
 }
 
-/// How a bent map displaces a place: by up to `most` metres along x and along y, in waves that are longer than a building.
+/// Displacement of a point of a deformed map: up to `most` metres along x and along y, in waves that are longer than
+/// a building.
 pub(crate) fn deformation_at(most: f64, place: &Point2) -> Vector2<f64> {
     most * Vector2::new((place.y / 7.0).sin(), (place.x / 13.0).sin())
 }
@@ -215,7 +216,7 @@ pub(crate) fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
     Drawing { transform_world_map: crate::shared::geometry::pose(x, y, yaw), resolution: 0.05, grid_yaw: 0.0 }
 }
 
-/// A first guess that is off by a shift and a turn about the origin of map b, and says that it is not better than that.
+/// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
 pub(crate) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
     let mut transform_a_b = transform_a_b;
@@ -224,7 +225,7 @@ pub(crate) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGues
     FirstGuess { transform_a_b, covariance }
 }
 
-/// How far two transforms lie apart: metres in the plan's middle, and radians.
+/// Distance of two transforms: metres in the plan's middle, and radians.
 pub(crate) fn apart(one: &Pose2, other: &Pose2, map_b: &DrawnMap) -> (f64, f64) {
     let middle = map_b.transform_world_map.inverse() * Point2::new(10.0, 6.0);
     ((one * middle - other * middle).norm(), one.rotation.angle_to(&other.rotation).abs())

@@ -1,4 +1,4 @@
-//! What the tests of several stages share: buildings as robots draw them, and stages from outside.
+//! Buildings and stages that the tests of several modules share.
 
 pub(crate) mod floor_plan;
 pub(crate) mod stage_bench;

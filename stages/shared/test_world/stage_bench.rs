@@ -1,11 +1,11 @@
-//! A stage from outside: maps and alignments in, alignments out.
+//! A stage as a whole: maps and alignments in, alignments out.
 
 use super::floor_plan::DrawnMap;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Context, StageHarness, StageKind};
 
-/// A stage that is given a message each second.
+/// A stage that receives a message each second.
 pub(crate) struct StageBench {
     pub(crate) stage: StageHarness,
     seconds: u64,
@@ -17,38 +17,38 @@ impl StageBench {
         Self { stage: StageHarness::new(kind, parameters).unwrap(), seconds: 0 }
     }
 
-    /// The same, in a pipeline of which `context` tells.
+    /// The same, with the context of a pipeline.
     pub(crate) fn with_context(kind: &StageKind, parameters: &str, context: &Context) -> Self {
         Self { stage: StageHarness::with_context(kind, parameters, context).unwrap(), seconds: 0 }
     }
 
-    /// Gives the stage an alignment; what it sends then.
+    /// Sends an alignment to the stage; returns what the stage sends then.
     pub(crate) fn give(&mut self, alignment: &Alignment) -> Vec<Alignment> {
         let log_time = self.next();
         self.stage.give::<Alignment>("alignment", "", log_time, alignment).unwrap();
         self.sent()
     }
 
-    /// Gives the stage the map of a robot; what it sends then.
+    /// Sends the map of a robot to the stage; returns what the stage sends then.
     pub(crate) fn give_map(&mut self, robot: &str, map: &DrawnMap) -> Vec<Alignment> {
         let header = Header { frame_id: format!("{robot}/map"), ..Default::default() };
         self.give_grid(robot, &OccupancyGrid { header, info: map.info(), data: &map.bytes() })
     }
 
-    /// The same, of a map as a message.
+    /// The same, for a map as a message.
     pub(crate) fn give_grid(&mut self, robot: &str, map: &OccupancyGrid<'_>) -> Vec<Alignment> {
         let log_time = self.next();
         self.stage.give::<OccupancyGrid<'_>>("map", robot, log_time, map).unwrap();
         self.sent()
     }
 
-    /// Ends the inputs of the stage; what it sends then.
+    /// Ends the inputs of the stage; returns what the stage sends then.
     pub(crate) fn finish(&mut self) -> Vec<Alignment> {
         self.stage.finish(LogTime(self.seconds)).unwrap();
         self.sent()
     }
 
-    /// What the stage has counted of its work.
+    /// A counter of the stage.
     pub(crate) fn counted(&self, what: &str) -> u64 {
         self.stage.counts()[what]
     }

@@ -1,4 +1,4 @@
-//! The line that a wall cell lies on, from the wall cells around it.
+//! The line of a wall cell, fitted to the wall cells around it.
 
 use crate::shared::geometry::{Cell, Point2};
 use nalgebra::Vector2;
@@ -9,22 +9,22 @@ pub(super) struct LineFit {
     pub(super) normal: Vector2<f64>,
 }
 
-/// Cells by row. Of all cells in a window few are walls, so it is quicker to go through those alone.
+/// Cells by row. Few cells of a window are walls, so it is faster to visit those only.
 pub(super) struct CellRows {
-    /// Where each row begins in `columns`, and the end of the last.
+    /// Start of each row in `columns`, and the end of the last.
     starts: Vec<usize>,
-    /// Rising within a row.
+    /// Columns, rising within a row.
     columns: Vec<usize>,
 }
 
 impl CellRows {
-    /// Of cells row by row, and within a row by column, in a grid of `height` rows.
+    /// Cells sorted by row and column, in a grid of `height` rows.
     pub(super) fn new(cells: &[Cell], height: usize) -> Self {
         let starts = (0..=height).map(|row| cells.partition_point(|cell| cell.row < row)).collect();
         Self { starts, columns: cells.iter().map(|cell| cell.column).collect() }
     }
 
-    /// The columns of a row's cells from `first` to `last`; none of a row that is not there.
+    /// The columns of a row's cells from `first` to `last`; none for a row outside the grid.
     fn between(&self, row: usize, first: usize, last: usize) -> impl Iterator<Item = usize> {
         let columns = match (self.starts.get(row), self.starts.get(row.saturating_add(1))) {
             (Some(&start), Some(&end)) => &self.columns[start..end],
@@ -37,7 +37,7 @@ impl CellRows {
 
 /// The cells within a radius.
 pub(super) struct Window {
-    /// For each row from the middle: how many columns it reaches to either side.
+    /// For each row from the middle: the number of columns to either side.
     reaches: Vec<(isize, usize)>,
 }
 
@@ -70,7 +70,7 @@ impl Window {
             product += offset.x * offset.y;
         }
         let centre = Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5);
-        // Two cells make a line, but not one that can be trusted.
+        // Two cells make a line, but not a reliable one.
         if count < 3.0 {
             return LineFit { point: centre, normal: Vector2::zeros() };
         }
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_window_holds_the_cells_within_its_radius() {
+    fn a_window_contains_the_cells_within_its_radius() {
         let cells: Vec<Cell> =
             (0..900).filter(|i| i * 7 % 11 < 4).map(|i| Cell { column: i % 30, row: i / 30 }).collect();
         let rows = CellRows::new(&cells, 30);

@@ -1,4 +1,4 @@
-//! What registration and verification need of one map, made once for each map.
+//! Walls and known space of one map, for registration and verification.
 
 use super::wall_line::{CellRows, LineFit, Window};
 use crate::shared::deformation::Deformation;
@@ -7,10 +7,10 @@ use nalgebra::Vector2;
 
 /// Distance between the samples of known space, metres.
 const SAMPLE_SPACING: f64 = 0.2;
-/// Side of a bucket of wall points, metres: near the last search radius of a registration, so that nine buckets hold the
-/// answer.
+/// Side of a bucket of wall points, metres: near the last search radius of a registration, so that nine buckets
+/// contain the answer.
 const BUCKET_SIDE: f64 = 0.2;
-/// As many cells in a row may be unknown between a wall and the space before it: RTAB-Map leaves one or two, and so does the
+/// Most unknown cells in a row between a wall and the space before it: RTAB-Map leaves one or two, and so does the
 /// fringe of a wall whose grey values are neither free nor occupied.
 const MOST_UNKNOWN: isize = 2;
 
@@ -22,26 +22,26 @@ pub struct WallMap {
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
     pub normals: Vec<Vector2<f64>>,
-    /// Metres of wall that one point stands for.
+    /// Length of wall per point, metres.
     pub spacing: f64,
     /// Known space, sampled evenly.
     pub samples: Vec<KnownSample>,
-    /// Square metres that one sample stands for.
+    /// Area per sample, square metres.
     pub sample_area: f64,
 }
 
-/// A place whose occupancy is known.
+/// A point whose occupancy is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownSample {
-    /// Where, metres, map frame.
+    /// Position, metres, map frame.
     pub point: Point2,
     /// Whether it is free of obstacles.
     pub free: bool,
 }
 
 impl WallMap {
-    /// The walls of a grid. A wall's direction is taken from the wall cells within `normal_radius` metres, and never
-    /// from less than the cells two away.
+    /// Extracts the walls of a grid. A wall's direction is estimated from the wall cells within `normal_radius`
+    /// metres, and at least from the cells two away.
     pub fn new(grid: &Grid<'_>, normal_radius: f64) -> Self {
         let resolution = grid.geometry.resolution;
         let cells: Vec<Cell> = grid.occupied().filter(|cell| faces_known_space(grid, *cell)).collect();
@@ -55,7 +55,7 @@ impl WallMap {
         Self { walls, normals, spacing: resolution, samples, sample_area }
     }
 
-    /// The same walls and samples where a bend puts them. Bends turn so little that the normals stay.
+    /// The same walls and samples, displaced by a deformation. Its turns are so small that the normals stay.
     #[must_use]
     pub fn deformed(&self, deformation: &Deformation) -> Self {
         let moved: Vec<Point2> = self.walls.points().iter().map(|point| deformation.apply(point)).collect();
@@ -67,8 +67,8 @@ impl WallMap {
     }
 }
 
-/// Whether a cell faces known space that holds no obstacle. The inside of a thick wall, and its far side that nobody has seen,
-/// say nothing about where the wall's face is. Some mappers leave cells unknown before a wall; across these it faces space, too.
+/// Whether a cell faces known free space. The inside of a thick wall, and its far side that no robot has seen, are no
+/// measurement of the wall's face. Some mappers leave cells unknown before a wall; these are skipped.
 fn faces_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
     let directions = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (x, y))).filter(|direction| *direction != (0, 0));
     let mut directions = directions.map(|(x, y): (isize, isize)| {
@@ -81,7 +81,7 @@ fn faces_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
     directions.any(|met| met.is_some_and(|value| !is_occupied(value)))
 }
 
-/// Known cells at about [`SAMPLE_SPACING`], and the area that one stands for.
+/// Known cells at about [`SAMPLE_SPACING`], and the area per sample.
 fn known_samples(grid: &Grid<'_>) -> (Vec<KnownSample>, f64) {
     let resolution = grid.geometry.resolution;
     let stride = (SAMPLE_SPACING / resolution).round().clamp(1.0, 1e6) as usize;
@@ -107,7 +107,7 @@ mod tests {
 
     const SIDE: usize = 60;
 
-    /// A grid in which `value` says what is at a point (x, y), both in cells.
+    /// A grid with the values of `value` at points (x, y), both in cells.
     fn map_of(value: impl Fn(f64, f64) -> i8) -> WallMap {
         let geometry = GridGeometry { width: SIDE, height: SIDE, resolution: 0.05, origin: pose(1.0, 2.0, 0.3) };
         let cells: Vec<i8> =
@@ -124,7 +124,7 @@ mod tests {
         let (mut worst, mut inside) = (0.0_f64, 0);
         for (point, found) in map.walls.points().iter().zip(&map.normals) {
             let cell = transform.inverse() * point / 0.05;
-            // At the border of the grid the neighbours lie to one side only.
+            // At the border of the grid the neighbours are to one side only.
             if (8.0..52.0).contains(&cell.x) && (8.0..52.0).contains(&cell.y) {
                 inside += 1;
                 worst = worst.max(across(cell.x, cell.y).abs());
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_stand_for_the_known_area() {
+    fn samples_cover_the_known_area() {
         let map = map_of(|x, _| if x < 40.0 { 0 } else { UNKNOWN });
         let area = map.samples.len() as f64 * map.sample_area;
         assert!((area - 2.0 * 3.0).abs() < 1e-9, "{area}");

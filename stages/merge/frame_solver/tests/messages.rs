@@ -1,4 +1,4 @@
-//! What is sent, and when.
+//! Which messages are sent, and when.
 
 use super::*;
 
@@ -101,7 +101,7 @@ fn transforms_lead_from_the_world_to_frames_with_the_robots_name() {
 }
 
 #[test]
-fn a_robot_without_alignments_says_so() {
+fn a_robot_without_alignments_has_a_reason() {
     let mut run = Run::new(None);
     run.map("robot1", "map");
     run.map("robot2", "map");
@@ -109,7 +109,7 @@ fn a_robot_without_alignments_says_so() {
 }
 
 #[test]
-fn the_most_telling_refusal_is_the_reason() {
+fn the_most_informative_refusal_is_the_reason() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));
     run.align(&refused("robot1", "robot3", 0.0, "no tags in common"));
@@ -122,17 +122,18 @@ fn the_most_telling_refusal_is_the_reason() {
 }
 
 #[test]
-fn robots_tied_to_each_other_but_not_to_the_reference_say_so() {
+fn robots_connected_with_each_other_but_not_with_the_reference_have_a_reason() {
     let mut run = Run::new(None);
     run.map("robot1", "map");
     run.align(&between(2, 3));
     run.align(&refused("robot1", "robot3", 0.2, "no tags in common"));
-    let expected = "it is tied to robot3 only, not to the reference: no alignment with robot1: no tags in common";
+    let expected =
+        "it is connected with robot3 only, not with the reference: no alignment with robot1: no tags in common";
     assert_eq!(run.reason("robot2"), expected);
 }
 
 #[test]
-fn a_verdict_says_what_the_alignment_said() {
+fn a_verdict_contains_the_reason_of_the_alignment() {
     let mut run = Run::new(None);
     let refusal = refused("robot1", "robot3", 0.2, "no tags in common");
     [between(1, 2), refusal.clone()].iter().for_each(|alignment| run.align(alignment));
@@ -162,7 +163,7 @@ fn verdicts_are_sent_after_frames_and_at_the_end_if_they_have_changed() {
 }
 
 #[test]
-fn a_score_that_moves_no_robot_is_told_at_the_end() {
+fn a_score_that_moves_no_robot_is_sent_at_the_end() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));
     let scored = Alignment { score: 0.95, ..between(1, 2) };
@@ -186,7 +187,7 @@ fn covariances_are_sent_as_solved_at_the_end() {
 }
 
 #[test]
-fn garbage_is_left_out_with_a_reason() {
+fn an_invalid_alignment_is_left_out_with_a_reason() {
     let mut run = Run::new(None);
     run.map("robot1", "map");
     for (x, variance) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (1e300, 1.0), (0.0, f64::NAN), (0.0, -5.0)] {

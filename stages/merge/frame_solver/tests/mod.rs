@@ -12,7 +12,7 @@ use gridweave_runtime::stage::{Context, StageError, StageHarness};
 
 struct Run {
     stage: StageHarness,
-    /// What was sent last.
+    /// The message sent last.
     latest: Option<RobotFrames>,
     verdicts: Option<Verdicts>,
 }
@@ -101,7 +101,7 @@ fn is_near(one: &Pose2, other: &Pose2, tolerance: f64) -> bool {
         && wrap_angle(one.rotation.angle() - other.rotation.angle()).abs() < tolerance
 }
 
-/// Where robot `n` (from 1) is in these tests.
+/// The pose of robot `n` (from 1) in these tests.
 fn place(robot: usize) -> Pose2 {
     let n = robot as f64 - 1.0;
     pose(4.0 * n, -3.0 * n * n % 11.0, 0.8 * n)

@@ -1,10 +1,10 @@
-//! Where the robots are placed, in spite of wrong alignments.
+//! Poses of the robots in spite of wrong alignments.
 
 use super::*;
 use crate::merge::frame_solver::FrameSolverParameters;
+use crate::merge::frame_solver::simulated_graph::SimulatedGraph;
 use crate::merge::frame_solver::solution::{Solution, by_name};
 use crate::merge::frame_solver::solve::solve;
-use crate::merge::frame_solver::team::Team;
 use crate::merge::frame_solver::uncertain::error_vector;
 use proptest::prelude::*;
 
@@ -19,14 +19,14 @@ fn a_later_alignment_replaces_the_earlier_one() {
 }
 
 #[test]
-fn a_contradiction_that_cannot_be_told_leaves_its_robots_out() {
+fn a_contradiction_that_cannot_be_decided_leaves_its_robots_out() {
     let mut run = Run::new(None);
     let mut wrong = between(2, 3);
     wrong.x += 3.0;
     [between(1, 2), between(1, 3), wrong, between(3, 4)].iter().for_each(|alignment| run.align(alignment));
     assert_eq!(run.latest().unwrap().frames.len(), 1);
-    assert!(run.reason("robot2").contains("it cannot be told which is wrong"), "{}", run.reason("robot2"));
-    assert!(run.reason("robot4").contains("it is tied to robot3 only"), "{}", run.reason("robot4"));
+    assert!(run.reason("robot2").contains("the others do not decide which is wrong"), "{}", run.reason("robot2"));
+    assert!(run.reason("robot4").contains("it is connected with robot3 only"), "{}", run.reason("robot4"));
     let accepted: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.alignment.accepted).collect();
     assert_eq!(accepted, [false, false, false, true]);
 }
@@ -89,7 +89,7 @@ fn robots_that_were_sent_stay_until_the_alignments_fit_much_better() {
 }
 
 #[test]
-fn robots_tied_to_each_other_only_are_placed_in_a_frame_of_their_own() {
+fn robots_connected_with_each_other_only_are_placed_in_a_frame_of_their_own() {
     let mut run = Run::new(None);
     (1..=6).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
     run.align(&between(4, 5));
@@ -121,30 +121,30 @@ fn an_alignment_in_no_cycle_is_not_checked() {
 
 #[test]
 fn robots_are_placed_right_in_spite_of_wrong_alignments() {
-    let team = Team::new(10, 5, 7).with_mistakes(0.1);
+    let simulated = SimulatedGraph::new(10, 5, 7).with_outliers(0.1);
     let mut run = Run::new(None);
-    (0..team.edges.len()).for_each(|index| run.align(&team.alignment(index)));
+    (0..simulated.edges.len()).for_each(|index| run.align(&simulated.alignment(index)));
     let placed: Vec<(usize, Pose2)> =
-        (1..10).filter_map(|robot| Some((robot, run.pose_of(&Team::name(robot))?))).collect();
+        (1..10).filter_map(|robot| Some((robot, run.pose_of(&SimulatedGraph::name(robot))?))).collect();
     assert!(placed.len() >= 8, "{}", placed.len());
-    assert!(placed.iter().all(|(robot, pose)| !team.is_wrong(*robot, pose)));
+    assert!(placed.iter().all(|(robot, pose)| !simulated.is_wrong(*robot, pose)));
 }
 
 #[test]
-fn covariances_say_how_far_off_the_frames_are() {
+fn covariances_are_consistent_with_the_errors_of_the_frames() {
     let parameters =
         FrameSolverParameters { position_floor: 1e-6, yaw_floor: 1e-6, ..FrameSolverParameters::default() };
     let robots = 12;
     let mut sum = 0.0;
     let mut count = 0.0;
     for seed in 0..60 {
-        let team = Team::new(robots, 4, seed);
-        let names = (0..robots).map(Team::name).collect();
-        let alignments = (0..team.edges.len()).filter_map(|index| by_name(team.alignment(index))).collect();
-        let solution = solve(&names, &alignments, &Team::name(0), &parameters, &Solution::default());
+        let simulated = SimulatedGraph::new(robots, 4, seed);
+        let names = (0..robots).map(SimulatedGraph::name).collect();
+        let alignments = (0..simulated.edges.len()).filter_map(|index| by_name(simulated.alignment(index))).collect();
+        let solution = solve(&names, &alignments, &SimulatedGraph::name(0), &parameters, &Solution::default());
         for robot in 1..robots {
-            let Some(frame) = solution.frames.get(&Team::name(robot)) else { continue };
-            let truth = team.places[0].inverse() * team.places[robot];
+            let Some(frame) = solution.frames.get(&SimulatedGraph::name(robot)) else { continue };
+            let truth = simulated.poses[0].inverse() * simulated.poses[robot];
             let mut error = error_vector(&frame.pose) - error_vector(&truth);
             error.z = wrap_angle(error.z);
             sum += error.dot(&(frame.covariance.try_inverse().unwrap() * error));
@@ -152,7 +152,7 @@ fn covariances_say_how_far_off_the_frames_are() {
         }
     }
     // The squared error in standard deviations is 3 in the mean if the covariances are right: one for each of x, y and
-    // yaw. The robots of one team are off together, so the mean of 60 teams scatters by about 0.25.
+    // yaw. The errors of one graph are correlated, so the mean of 60 graphs scatters by about 0.25.
     let mean = sum / count;
     assert!((2.3..3.7).contains(&mean), "{mean}");
 }

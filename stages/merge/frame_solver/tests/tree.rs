@@ -1,4 +1,4 @@
-//! The transforms, as a program sees them that listens to them all.
+//! The transforms, as a program receives them that subscribes to all.
 
 use super::*;
 use proptest::prelude::*;
@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 /// Static transforms as a reader keeps them: the last of each frame, which has one parent for good.
 #[derive(Default)]
 struct Buffer {
-    /// By child: the parent, and the child in it.
+    /// By child: the parent, and the pose of the child in it.
     edges: BTreeMap<String, (String, Pose2)>,
 }
 
 impl Buffer {
-    /// Takes up what was sent since the last look.
+    /// Receives what was sent since the last call.
     fn listen(&mut self, run: &mut Run) {
         for one in run.stage.take::<TFMessage>("tf").unwrap().into_iter().flat_map(|message| message.transforms) {
             let (parent, place) = (one.header.frame_id, one.transform.planar());
@@ -22,7 +22,7 @@ impl Buffer {
         }
     }
 
-    /// The root above a frame, and the frame in it.
+    /// The root above a frame, and the pose of the frame in it.
     fn root(&self, frame: &str) -> (String, Pose2) {
         match self.edges.get(frame) {
             None => (frame.to_owned(), Pose2::identity()),
@@ -51,7 +51,7 @@ fn the_robots_of_a_group_that_meets_the_reference_have_never_been_elsewhere() {
     run.align(&between(1, 2));
     buffer.listen(&mut run);
     buffer.assert_at("robot2/map", "world", &place(2));
-    assert_eq!(buffer.root("robot4/map").0, "robot4/map", "it may still be tied to the reference");
+    assert_eq!(buffer.root("robot4/map").0, "robot4/map", "it may still be connected with the reference");
     run.align(&between(2, 3));
     buffer.listen(&mut run);
     run.finish().unwrap();
@@ -60,7 +60,7 @@ fn the_robots_of_a_group_that_meets_the_reference_have_never_been_elsewhere() {
 }
 
 #[test]
-fn a_group_that_stays_apart_is_told_at_the_end_in_a_tree_of_its_own() {
+fn a_group_that_stays_apart_is_sent_at_the_end_in_a_tree_of_its_own() {
     let (mut run, mut buffer) = (Run::new(None), Buffer::default());
     (1..=4).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
     run.align(&between(3, 4));
@@ -75,7 +75,7 @@ fn a_group_that_stays_apart_is_told_at_the_end_in_a_tree_of_its_own() {
 }
 
 #[test]
-fn a_robot_that_is_the_reference_for_a_while_only_does_not_lie_in_the_world() {
+fn a_robot_that_is_the_reference_for_a_while_only_is_not_in_the_world() {
     let (mut run, mut buffer) = (Run::new(None), Buffer::default());
     run.map("robot2", "map");
     run.map("robot1", "map");
@@ -86,7 +86,7 @@ fn a_robot_that_is_the_reference_for_a_while_only_does_not_lie_in_the_world() {
 }
 
 #[test]
-fn the_reference_that_the_pipeline_names_lies_in_the_world_at_once() {
+fn the_reference_that_the_pipeline_names_is_in_the_world_at_once() {
     let (mut run, mut buffer) = (Run::new(Some("robot2")), Buffer::default());
     run.map("robot1", "map");
     run.map("robot2", "map");
@@ -95,7 +95,7 @@ fn the_reference_that_the_pipeline_names_lies_in_the_world_at_once() {
 }
 
 #[test]
-fn a_robot_that_has_been_in_the_world_is_told_in_no_other_tree() {
+fn a_robot_that_has_been_in_the_world_is_sent_in_no_other_tree() {
     let (mut run, mut buffer) = (Run::new(None), Buffer::default());
     run.align(&between(1, 2));
     run.align(&between(2, 3));
@@ -113,7 +113,7 @@ proptest! {
 
     /// The buffer checks that no frame ever changes its parent.
     #[test]
-    fn what_is_merged_lies_in_the_world_whatever_was_said_before(
+    fn merged_robots_are_in_the_world_whatever_was_sent_before(
         statements in prop::collection::vec((1..7_usize, 1..7_usize, 0..4), 1..25),
     ) {
         let (mut run, mut buffer) = (Run::new(None), Buffer::default());
