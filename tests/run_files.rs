@@ -83,7 +83,7 @@ pub fn signal(process: u32, signal: &str) {
     assert!(Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).status().unwrap().success());
 }
 
-/// Waits until something is so that nothing tells of: files grow, and runs go on, without a word to others.
+/// Waits for a condition without a notification: files grow and runs proceed silently.
 #[track_caller]
 pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
@@ -93,7 +93,7 @@ pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// Where a file lies while it is written.
+/// The path of a file while it is written.
 pub fn part(file: &Path) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
     name.push(".part");

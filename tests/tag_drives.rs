@@ -21,7 +21,7 @@ const TICK: f64 = 0.1;
 /// How a robot perceives tags.
 #[derive(Clone, Copy, Debug)]
 pub enum Sense {
-    /// It hears how far they are, with this standard deviation in metres; this share of the ranges is up to 5 m too long.
+    /// Standard deviation of its range measurements, metres; this share of the ranges is up to 5 m too long.
     Ranges {
         /// Metres.
         stddev: f64,
@@ -49,7 +49,7 @@ pub enum Sense {
 pub struct TagDrive {
     /// Its name.
     pub robot: &'static str,
-    /// Where it starts in the world: the frame in which it tells its poses.
+    /// Its start in the world: the frame of its poses.
     pub start: Isometry2<f64>,
     /// The corners of its way in the world, metres, which it drives round twice.
     pub corners: Vec<Point2<f64>>,
@@ -64,7 +64,7 @@ pub struct TagDrive {
 }
 
 impl TagDrive {
-    /// Writes what the robot tells of itself and of tags, which are named by their number.
+    /// Writes the poses of the robot and its measurements of tags, which are named by their number.
     pub fn write(&self, log: &mut LogBuilder, tags: &[Point2<f64>]) {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let noise = Normal::new(0.0, 1.0).unwrap();
@@ -89,7 +89,7 @@ impl TagDrive {
             log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
         }
         let mut place = Point2::from(self.start.translation.vector);
-        let mut told = Isometry2::identity();
+        let mut odometry = Isometry2::identity();
         let mut heading = self.start.rotation.angle();
         let mut seconds = 0.0;
         for corner in self.corners.iter().chain(&self.corners) {
@@ -99,9 +99,9 @@ impl TagDrive {
                 heading += turn;
                 place += step;
                 let error = self.drift * step.norm().sqrt() * noise.sample(&mut random);
-                told = told * Isometry2::rotation(turn + error) * Isometry2::translation(step.norm(), 0.0);
+                odometry = odometry * Isometry2::rotation(turn + error) * Isometry2::translation(step.norm(), 0.0);
                 seconds += TICK;
-                let pose = PoseStamped { header: header(seconds, format!("{robot}/map")), pose: told.into() };
+                let pose = PoseStamped { header: header(seconds, format!("{robot}/map")), pose: odometry.into() };
                 log.message(seconds, &format!("/{robot}/pose"), &pose);
                 let base = Isometry2::new(place.coords, heading);
                 for (number, tag) in tags.iter().enumerate() {

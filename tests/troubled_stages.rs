@@ -1,4 +1,4 @@
-//! The command `gridweave` with stages that get into trouble when told to, for tests of runs of several processes.
+//! The command `gridweave` with stages that fail when configured to, for tests of runs of several processes.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
@@ -58,8 +58,8 @@ impl Trouble {
             return Ok(());
         }
         match self.what.as_str() {
-            "fail" => Err(StageError::new("go on", "it was told so")),
-            "panic" => panic!("it was told so"),
+            "fail" => Err(StageError::new("go on", "as configured")),
+            "panic" => panic!("as configured"),
             "abort" => std::process::abort(),
             "hang" => loop {
                 std::thread::sleep(Duration::from_secs(1));
@@ -80,7 +80,7 @@ impl Trouble {
 
     fn start(self) -> Result<Self, StageError> {
         match self.at_start {
-            true => Err(StageError::new("start", "it was told so")),
+            true => Err(StageError::new("start", "as configured")),
             false => Ok(self),
         }
     }

@@ -1,11 +1,11 @@
-//! Nobody reads what a command prints: that is no failure, and no reason to panic.
+//! A closed standard output or standard error is no failure of a command, and never a panic.
 
 use crate::support::{gridweave_program, simulate};
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
 #[test]
-fn no_command_panics_when_nobody_reads_what_it_prints() {
+fn no_command_panics_when_its_output_is_closed() {
     let folder = TempDir::new().unwrap();
     simulate(folder.path(), "in.mcap", &["--robots", "2", "--set", "duration=20"]);
     let commands: [&[&str]; 10] = [
@@ -31,13 +31,13 @@ fn no_command_panics_when_nobody_reads_what_it_prints() {
             .spawn()
             .unwrap();
         let ended = child.wait_with_output().unwrap();
-        let said = String::from_utf8_lossy(&ended.stderr);
-        assert!(matches!(ended.status.code(), Some(0 | 3)) && !said.contains("panicked"), "{args:?}: {said}");
+        let stderr = String::from_utf8_lossy(&ended.stderr);
+        assert!(matches!(ended.status.code(), Some(0 | 3)) && !stderr.contains("panicked"), "{args:?}: {stderr}");
     }
 }
 
 #[test]
-fn no_command_panics_when_nobody_reads_its_errors() {
+fn no_command_panics_when_its_standard_error_is_closed() {
     let folder = TempDir::new().unwrap();
     for (args, status) in [(&["info", "missing.mcap"][..], 1), (&["run", "missing"], 2), (&["check", "missing"], 2)] {
         let (_, output) = std::io::pipe().unwrap();

@@ -37,7 +37,7 @@ fn named(entries: &Value) -> Vec<(String, String)> {
 }
 
 #[test]
-fn every_pipeline_is_run_on_every_log_and_told_in_the_order_in_which_they_were_given() {
+fn every_pipeline_is_run_on_every_log_and_reported_in_the_given_order() {
     let folder = worlds();
     let args = [
         "--pipelines",
@@ -52,11 +52,11 @@ fn every_pipeline_is_run_on_every_log_and_told_in_the_order_in_which_they_were_g
         "--csv",
         "table.csv",
     ];
-    let told = compared(folder.path(), &args);
+    let output = compared(folder.path(), &args);
     let expected =
         ["tag_only", "hough_spectrum"].map(|pipeline| ["one", "two", "all"].map(|log| (pipeline.into(), log.into())));
-    assert_eq!(named(&told["rows"]), expected.concat());
-    let runs = told["runs"].as_array().unwrap();
+    assert_eq!(named(&output["rows"]), expected.concat());
+    let runs = output["runs"].as_array().unwrap();
     let seeds: Vec<u64> = runs.iter().map(|run| run["seed"].as_u64().unwrap()).collect();
     assert_eq!(seeds, [1, 2].repeat(4));
     for run in runs {
@@ -64,7 +64,7 @@ fn every_pipeline_is_run_on_every_log_and_told_in_the_order_in_which_they_were_g
         assert!(run["time_s"].as_f64().unwrap() > 0.0 && run["cpu_s"].as_f64().unwrap() > 0.0, "{run}");
         assert!(run["memory_bytes"].as_u64().unwrap() > 1_000_000, "{run}");
     }
-    let tag_only = &told["rows"][2];
+    let tag_only = &output["rows"][2];
     assert_eq!(
         (&tag_only["runs"], &tag_only["robots"], &tag_only["success"]),
         (&json!(4), &json!(4), &json!(4)),
@@ -77,12 +77,12 @@ fn every_pipeline_is_run_on_every_log_and_told_in_the_order_in_which_they_were_g
     assert_eq!(lines.len(), 7);
     assert!(lines[0].starts_with("pipeline,log,runs,failed,robots,success,wrong,refused,median_m"), "{csv}");
     assert!(lines[3].starts_with("tag_only,all,4,0,4,4,0,0,0."), "{csv}");
-    let told = compare(folder.path(), &["--pipelines", "tag_only", "--inputs", "logs/one.mcap", "--markdown"]);
-    told.assert(0, &["| tag_only | one | 1 of 1 | 0 | 0 | 0 |"]);
+    let output = compare(folder.path(), &["--pipelines", "tag_only", "--inputs", "logs/one.mcap", "--markdown"]);
+    output.assert(0, &["| tag_only | one | 1 of 1 | 0 | 0 | 0 |"]);
 }
 
 #[test]
-fn a_run_that_fails_does_not_end_the_others_and_is_told() {
+fn a_run_that_fails_does_not_end_the_others_and_is_reported() {
     let folder = worlds();
     let (broken, truth) = (folder.path().join("logs/broken.mcap"), folder.path().join("logs/broken.truth.json"));
     fs::write(broken, b"this is not a log, for sure").unwrap();
@@ -94,7 +94,7 @@ fn a_run_that_fails_does_not_end_the_others_and_is_told() {
 }
 
 #[test]
-fn a_run_that_is_killed_is_told_with_what_it_has_taken() {
+fn a_killed_run_is_reported_with_its_time_and_memory() {
     let folder = worlds();
     let pipeline = r#"
         [stages.log]
@@ -115,10 +115,10 @@ fn a_run_that_is_killed_is_told_with_what_it_has_taken() {
     let ended =
         compare(folder.path(), &["--pipelines", "aborts.toml", "tag_only", "--inputs", "logs/one.mcap", "--json"]);
     ended.assert(1, &[]);
-    let told: Value = serde_json::from_str(&ended.stdout).unwrap();
-    assert_eq!(told["runs"][0]["failure"], "it was ended by signal 6", "{told}");
-    assert!(told["runs"][0]["memory_bytes"].as_u64().unwrap() > 1_000_000, "{told}");
-    assert_eq!((&told["rows"][0]["failed"], &told["rows"][1]["success"]), (&json!(1), &json!(1)));
+    let output: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(output["runs"][0]["failure"], "it was ended by signal 6", "{output}");
+    assert!(output["runs"][0]["memory_bytes"].as_u64().unwrap() > 1_000_000, "{output}");
+    assert_eq!((&output["rows"][0]["failed"], &output["rows"][1]["success"]), (&json!(1), &json!(1)));
 }
 
 /// A room with a corner cut off, moved by 1 m in the second map.
@@ -146,21 +146,21 @@ fn pairs_of_map_files_are_measured_at_the_places_that_they_have_in_common() {
     let pair = |name: &str, common: &Value| json!({"pair": name, "a": "day1", "b": "day2", "common": common});
     let pairs = json!([pair("rooms", &json!(common)), pair("nothing", &json!([]))]);
     fs::write(folder.path().join("pairs.json"), pairs.to_string()).unwrap();
-    let told = compared(folder.path(), &["--pipelines", "hough_spectrum", "--inputs", "."]);
+    let output = compared(folder.path(), &["--pipelines", "hough_spectrum", "--inputs", "."]);
     assert_eq!(
-        named(&told["rows"]),
+        named(&output["rows"]),
         ["rooms", "nothing", "all"].map(|log| ("hough_spectrum".to_owned(), log.to_owned()))
     );
-    let robot = &told["runs"][0]["robots"][0];
-    assert_eq!((&robot["robot"], &robot["outcome"]), (&json!("day2"), &json!("right")), "{told}");
+    let robot = &output["runs"][0]["robots"][0];
+    assert_eq!((&robot["robot"], &robot["outcome"]), (&json!("day2"), &json!("right")), "{output}");
     assert!(robot["error_m"].as_f64().unwrap() < 0.1 && robot["error_deg"].as_f64().unwrap() < 0.5, "{robot}");
-    assert_eq!(told["runs"][1]["robots"][0]["outcome"], "wrong", "they are merged, and have nothing in common");
+    assert_eq!(output["runs"][1]["robots"][0]["outcome"], "wrong", "they are merged, and have nothing in common");
     let brief = compared(folder.path(), &["--pipelines", "hough_spectrum", "--inputs", ".", "--by", "input"]);
     assert_eq!(named(&brief["rows"]), [("hough_spectrum".to_owned(), ".".to_owned())]);
 }
 
 #[test]
-fn what_cannot_be_compared_is_told_before_anything_runs() {
+fn inputs_that_cannot_be_compared_are_errors_before_anything_runs() {
     let folder = worlds();
     fs::copy(folder.path().join("logs/one.mcap"), folder.path().join("lone.mcap")).unwrap();
     fs::copy(folder.path().join("logs/one.mcap"), folder.path().join("odd.mcap")).unwrap();
@@ -183,6 +183,6 @@ fn what_cannot_be_compared_is_told_before_anything_runs() {
         ended.assert(status, &words);
         assert!(ended.stdout.is_empty(), "{ended:#?}");
     }
-    let told = compared(folder.path(), &["--pipelines", "tag_only", "--inputs", "lone.mcap", "--unrelated"]);
-    assert_eq!(told["runs"][0]["robots"][0]["outcome"], "wrong", "{told}");
+    let output = compared(folder.path(), &["--pipelines", "tag_only", "--inputs", "lone.mcap", "--unrelated"]);
+    assert_eq!(output["runs"][0]["robots"][0]["outcome"], "wrong", "{output}");
 }

@@ -1,4 +1,4 @@
-//! Maps that lie far from the origin of their frames: what a merge takes goes with what is known, not with that distance.
+//! Maps far from the origin of their frames: time and memory of a merge depend on the known area, not on that distance.
 
 use crate::support::{Ended, change_log, gridweave_program, simulate, start_program};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, decode, encode};
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 /// How far, metres.
 const FAR: f64 = 10_000.0;
 
-/// A log of two robots, of which the frame of robot2 is moved so that its map lies far from its origin, and the true frames.
+/// A log of two robots, where the frame of robot2 is moved so that its map is far from its origin, and the true frames.
 struct Far {
     folder: TempDir,
     log: PathBuf,
@@ -37,7 +37,7 @@ impl Far {
             }
             Some(data.to_vec())
         });
-        // The same place in the world: the frame lies as far on the other side.
+        // The same place in the world: the frame is as far on the other side.
         let mut true_frames: Value = serde_json::from_slice(&fs::read(&truth).unwrap()).unwrap();
         let frame = &mut true_frames["frames"]["robot2"];
         let number = |name: &str| frame[name].as_f64().unwrap();
@@ -73,7 +73,7 @@ impl Far {
 }
 
 #[test]
-fn a_robot_whose_map_lies_far_from_the_origin_of_its_frame_is_merged_right() {
+fn a_robot_whose_map_is_far_from_the_origin_of_its_frame_is_merged_right() {
     let far = Far::new(true);
     far.run("tag_merge").assert(0, &["merged 2 of 2 robots"]);
     far.evaluate().assert(0, &["\"right\": 1", "\"wrong\": 0"]);
@@ -82,10 +82,10 @@ fn a_robot_whose_map_lies_far_from_the_origin_of_its_frame_is_merged_right() {
 }
 
 #[test]
-fn a_map_that_lies_far_from_where_its_robot_drives_is_not_merged_and_the_reason_is_told() {
+fn a_map_far_from_the_path_of_its_robot_is_not_merged_and_the_reason_is_reported() {
     let far = Far::new(false);
     far.run("tag_merge").assert(3, &["the maps have no walls near each other"]);
-    // Without a look at the maps the tags are believed, and the map lies where its origin says.
+    // Without a comparison of the maps the tags decide, and the map is at its origin.
     far.run("tag_only").assert(0, &["longer than `max_extent`, 1000 m; does the origin of each map fit the poses"]);
     let (width, height) = image::image_dimensions(far.path("map.pgm")).unwrap();
     assert!(width.max(height) < 1000, "{width} x {height}");

@@ -54,9 +54,9 @@ fn a_client_with_python_libraries_that_comes_late_gets_the_last_of_all_that_is_l
     run.command(&["play", LOG, "--rate", "0", "--end", "1"]).wait().assert(0, &[]);
     // One that reads nothing is there all the time.
     let mut halted = client(port, &["--halt"]).spawn().unwrap();
-    let mut said = String::new();
-    BufReader::new(halted.stdout.take().unwrap()).read_line(&mut said).unwrap();
-    assert_eq!(said.trim(), "halted");
+    let mut output = String::new();
+    BufReader::new(halted.stdout.take().unwrap()).read_line(&mut output).unwrap();
+    assert_eq!(output.trim(), "halted");
     run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &[]);
     let wanted = ["/map", "/robot1/map", "/tf_static", "/markers/graph", "/robot_frames", "/gridweave/stages"];
     let shown = client(port, &wanted).output().unwrap();

@@ -27,7 +27,7 @@ kind = "mcap_sink"
 inputs = ["source", "hangs"]
 "#;
 
-/// Mounts a small file system at /dev/shm, for this program and those it starts only, and then does what it is told.
+/// Mounts a small file system at /dev/shm, only for this program and those it starts, and then runs its arguments.
 const SMALL: &str = "mount -t tmpfs -o size=4m tmpfs /dev/shm && exec \"$0\" \"$@\"";
 /// The same, and nothing fits into it.
 const FULL: &str =
@@ -39,7 +39,7 @@ const FILLED: &str = "mount -t tmpfs -o size=64m tmpfs /dev/shm && {
     exec \"$0\" \"$@\"
 }";
 
-/// Starts a run with such a /dev/shm, in a folder of its own.
+/// Starts a run with such a /dev/shm, in a separate folder.
 fn start_with(shared_memory: &str, engine: &str, settings: &[&str]) -> (TempDir, Running) {
     let own = ["--user", "--map-root-user", "--mount"];
     let folder = TempDir::new().unwrap();
@@ -63,7 +63,7 @@ fn run_with(shared_memory: &str, engine: &str) -> (TempDir, Ended, u32) {
 }
 
 #[test]
-#[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
+#[ignore = "needs a machine that lets a program mount a separate /dev/shm: unshare --user --map-root-user --mount"]
 fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
     let (folder, ended, _) = run_with(SMALL, "processes");
     ended.assert(1, &["stage `source`", "/dev/shm"]);
@@ -72,7 +72,7 @@ fn a_run_that_fills_shared_memory_says_so_and_closes_its_log() {
 }
 
 #[test]
-#[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
+#[ignore = "needs a machine that lets a program mount a separate /dev/shm: unshare --user --map-root-user --mount"]
 fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
     let (_, ended, id) = run_with(FULL, "processes");
     ended.assert(1, &["cannot create the shared counters of the run", &format!("/dev/shm/gw{id}_"), "No space left"]);
@@ -81,7 +81,7 @@ fn a_run_without_any_room_in_shared_memory_says_so_at_once() {
 }
 
 #[test]
-#[ignore = "needs a machine that lets a program mount a /dev/shm of its own: unshare --user --map-root-user --mount"]
+#[ignore = "needs a machine that lets a program mount a separate /dev/shm: unshare --user --map-root-user --mount"]
 fn a_run_whose_room_in_shared_memory_another_program_takes_says_so() {
     let settings = ["source.gates=[2]", "source.pause=0", "hangs.what=print", "hangs.at=1"];
     let (folder, run) = start_with(FILLED, "threads-ipc", &settings);

@@ -1,4 +1,4 @@
-//! Every stage sends what its golden cases expect, and so does the example of a stage of one's own.
+//! Every stage sends the messages that its golden cases expect, and so does the stage of the example.
 
 use crate::support::{WITHOUT_TROUBLE, gridweave_with};
 use std::path::{Path, PathBuf};

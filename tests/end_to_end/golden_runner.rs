@@ -1,4 +1,4 @@
-//! `gridweave golden` tells what differs from what is expected, and blesses what is right.
+//! `gridweave golden` reports differences from the expected messages, and blesses them.
 
 use crate::support::golden_cases::{Cases, SOURCE, TAGS, estimates};
 use crate::support::{LogBuilder, gridweave};
@@ -28,7 +28,7 @@ fn what_was_blessed_passes_and_is_not_written_again() {
 }
 
 #[test]
-fn a_field_that_differs_is_told_with_topic_time_and_values() {
+fn a_field_that_differs_is_reported_with_topic_time_and_values() {
     let cases = Cases::four_tags(TAGS);
     cases.bless();
     cases.input("tag_filter/four_tags", |log| estimates(log, 3));
@@ -68,7 +68,7 @@ fn numbers_may_differ_by_the_tolerance_that_is_given() {
 }
 
 #[test]
-fn messages_that_are_missing_and_surplus_are_told() {
+fn missing_and_surplus_messages_are_reported() {
     let cases = Cases::new();
     cases.stage("mcap_source/poses", SOURCE);
     let poses = |seconds: &[f64]| {
@@ -113,7 +113,7 @@ fn cells_that_differ_are_counted_and_drawn() {
 }
 
 #[test]
-fn a_warning_that_differs_is_told() {
+fn a_warning_that_differs_is_reported() {
     let cases = Cases::four_tags(TAGS);
     cases.bless();
     cases.input("tag_filter/four_tags", |log| {

@@ -26,10 +26,7 @@ fn comes_back(stage: &str) {
     done.assert_done();
     done.ended.assert(
         0,
-        &[
-            &format!("stage `{stage}` lost its process, which was ended by signal 9 (SIGKILL)"),
-            "restarting in 1.0 s",
-        ],
+        &[&format!("stage `{stage}` lost its process, which was ended by signal 9 (SIGKILL)"), "restarting in 1.0 s"],
     );
     done.assert_right(&truth);
     assert_eq!(done.numbers(stage, ["restarts"]), [2]);
@@ -193,7 +190,7 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
     let done = run.interrupt();
     let waits: Vec<&str> = done.ended.stderr.lines().filter_map(|line| line.split(" again in ").nth(1)).collect();
     assert!(waits.starts_with(&["0.5 s", "1.0 s", "2.0 s"]), "{:#?}", done.ended);
-    done.ended.assert(1, &["stage `middle` failed: cannot start: it was told so"]);
+    done.ended.assert(1, &["stage `middle` failed: cannot start: as configured"]);
 }
 
 #[test]

@@ -122,7 +122,7 @@ fn what_a_sender_says_that_comes_and_goes_while_a_recorder_stalls_is_counted_as_
     let output = done.output();
     let sent = output[POSES].len() + output["/robot2/pose"].len();
     let counted = number_before(" messages of 1 links") + number_before(" messages were missed");
-    // What the owner of the link has not looked at when the sender leaves is lost with the sender, and nobody can count it.
+    // Messages that the owner of the link has not read when the sender leaves are lost with the sender, and cannot be counted.
     assert!((sent - OWNERS_BUFFER..=sent).contains(&counted), "{counted} of {sent}");
 }
 
@@ -182,7 +182,7 @@ fn of_a_killed_recorder_all_but_the_last_moment_can_be_read() {
 }
 
 #[test]
-fn a_tap_prints_as_many_messages_as_it_is_told() {
+fn a_tap_prints_the_given_number_of_messages() {
     let run = Run::start(TROUBLED, &[]);
     let tap = run.command(&["tap", "source.out", "--json", "--count", "5"]).wait();
     tap.assert(0, &[]);
@@ -212,7 +212,7 @@ fn a_tap_ends_with_the_program_that_reads_it() {
 }
 
 #[test]
-fn a_link_that_is_not_there_is_told_with_the_nearest_name() {
+fn the_error_for_an_unknown_link_suggests_a_similar_name() {
     let run = Run::start(TROUBLED, &[]);
     for command in ["tap", "record"] {
         let args: &[&str] = if command == "record" { &["-o", "recorded.mcap"] } else { &[] };

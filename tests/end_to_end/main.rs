@@ -1,7 +1,6 @@
-//! The command as a user runs it, from its arguments to the files and the shared memory that it leaves.
+//! Tests of the command as a user runs it, from its arguments to the files and the shared memory that it leaves.
 //!
-//! All tests run one program: the command with the stages that ship, and with `troubled_stages` that get into trouble when
-//! they are told to.
+//! All tests run one program: the command with the shipped stages, and with `troubled_stages` that fail when they are configured to.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
@@ -15,7 +14,7 @@ mod far_from_the_origin;
 mod foxglove_view;
 mod full_shared_memory;
 mod golden;
-mod golden_mistakes;
+mod golden_errors;
 mod golden_runner;
 mod group_mapping;
 mod interrupted;
@@ -24,6 +23,7 @@ mod live;
 mod live_restarts;
 mod log_output;
 mod log_tools;
+mod logging;
 mod looking_on;
 mod map_merge;
 mod merge_map_files;
@@ -41,7 +41,7 @@ mod report;
 mod scans;
 mod support;
 mod tags_as_they_come;
-mod telling;
+
 mod topological;
 mod torture;
 mod two_tags;

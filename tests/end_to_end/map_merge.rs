@@ -54,8 +54,8 @@ fn maps_of_two_buildings_are_not_merged() {
         let (a, b) = (maps_of("robot1", folder.path(), seed_a), maps_of("robot2", folder.path(), seed_b));
         let (ended, summary) = merge(folder.path(), &[&a, &b], &[]);
         ended.assert(3, &["not merged: robot2"]);
-        let said = summary["unmerged"]["robot2"].as_str().unwrap();
-        assert!(!said.is_empty());
+        let reason = summary["unmerged"]["robot2"].as_str().unwrap();
+        assert!(!reason.is_empty());
     }
 }
 
@@ -118,7 +118,7 @@ fn without_enough_tags_a_merge_goes_by_the_maps() {
 #[test]
 fn robots_in_a_building_whose_parts_are_alike_are_not_merged_wrongly() {
     let folder = TempDir::new().unwrap();
-    // In the second, two robots have seen opposite ends, and only what each map says of itself tells that it is alike.
+    // In the second, two robots have seen opposite ends, and only the self-similarity of each map shows the ambiguity.
     let (ambiguous, alike) = ("the evidence does not decide which is right", "the building is self-similar");
     for (layout, seed, reason) in
         [("symmetric", "903", ambiguous), ("symmetric", "904", alike), ("repeated", "901", ambiguous)]

@@ -34,7 +34,7 @@ fn map_files(seed: &str) -> (TempDir, PathBuf) {
     (folder, truth)
 }
 
-/// Merges in `folder`, with a folder for temporary files of its own, which must be empty afterwards.
+/// Merges in `folder`, with a separate folder for temporary files, which must be empty afterwards.
 #[track_caller]
 fn merge(folder: &Path, args: &[&str]) -> Ended {
     let temporary = TempDir::new().unwrap();
@@ -280,7 +280,7 @@ fn files_that_are_no_maps_are_named() {
 }
 
 #[test]
-fn names_that_are_alike_are_told_apart_by_their_folders() {
+fn equal_names_are_distinguished_by_their_folders() {
     let folder = TempDir::new().unwrap();
     for robot in ["r1", "r2", "b/r2"] {
         fs::create_dir_all(folder.path().join(robot)).unwrap();

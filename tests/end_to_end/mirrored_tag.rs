@@ -12,7 +12,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
-/// Merges `log` in `folder`. Gives what the tag filter said last, and the measured outcome.
+/// Merges `log` in `folder`. Returns the last decision of the tag filter, and the measured outcome.
 fn merge(folder: &Path, log: &str) -> (CommonTags, Value) {
     let args =
         ["run", "tag_merge", "--input", log, "--output", "out.mcap", "--results-only", "--summary", "summary.json"];

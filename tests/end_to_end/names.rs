@@ -19,7 +19,7 @@ struct World {
     folder: TempDir,
     log: PathBuf,
     truth: PathBuf,
-    /// Whether the logs say where the maps of robots lie.
+    /// Whether the logs have the poses of the robots' maps.
     is_placed: bool,
 }
 
@@ -60,7 +60,7 @@ impl World {
             let seconds = time.seconds_since(LogTime(1_700_000_000_000_000_000));
             let header = |frame: &str| Header::new(time, format!("{}{frame}", names.frames[1]));
             if started.insert(*robot) && self.is_placed {
-                // Somebody has recorded where the maps lie, as static transforms and again and again.
+                // The poses of the maps were recorded, as static transforms and as periodic ones.
                 for (topic, parent) in [("/tf_static", "world"), ("/tf", "earth")] {
                     let placed = Convention { frames: ["", ""], ..**names };
                     out.message(
@@ -197,7 +197,7 @@ fn a_log_for_each_robot_without_names_is_put_under_those_that_are_given() {
 }
 
 #[test]
-fn a_map_that_somebody_has_placed_already_is_placed_by_the_merge_alone() {
+fn a_map_with_a_recorded_pose_is_placed_only_by_the_merge() {
     let world = World { is_placed: true, ..World::new() };
     let [first, second] = ["robot1", "robot2"]
         .map(|robot| [format!("/{robot}/map"), format!("/{robot}/pose"), format!("{robot}/"), format!("/{robot}")]);
@@ -206,10 +206,10 @@ fn a_map_that_somebody_has_placed_already_is_placed_by_the_merge_alone() {
     }
     world.write("all.mcap", &[("robot1", &named(&first)), ("robot2", &named(&second))]);
     let ended = world.merge(&["all.mcap"], ["robot1", "robot2"]);
-    let told = "transforms of the input that place the map of a robot were left out";
-    assert_eq!(ended.text().matches(told).count(), 1, "{ended:#?}");
+    let warning = "transforms of the input that place the map of a robot were left out";
+    assert_eq!(ended.text().matches(warning).count(), 1, "{ended:#?}");
     // What a merge has written can be merged again.
-    world.run(&["merge", "out.mcap", "-o", "again.mcap"]).assert(0, &["merged 2 of 2", told]);
+    world.run(&["merge", "out.mcap", "-o", "again.mcap"]).assert(0, &["merged 2 of 2", warning]);
     assert_is_one_tree(&world.folder.path().join("again.mcap"), ["robot1", "robot2"]);
 }
 

@@ -1,4 +1,4 @@
-//! Stages as processes: the same result as in one thread, and a failure that is told, closed and cleaned up, whatever
+//! Stages as processes: the same result as in one thread, and a failure that is reported, closed and cleaned up, whatever
 //! dies and however.
 
 use crate::support::{
@@ -45,7 +45,7 @@ fn assert_failed(folder: &Path, run: u32, ended: &Ended, words: &[&str]) {
     }
 }
 
-/// A stage that gets into trouble by itself.
+/// A stage that fails by itself.
 #[track_caller]
 fn fails_by_itself(settings: &[&str], words: &[&str]) {
     let folder = folder();
@@ -57,12 +57,12 @@ fn fails_by_itself(settings: &[&str], words: &[&str]) {
 
 #[test]
 fn a_stage_that_returns_an_error_ends_the_run_with_its_name() {
-    fails_by_itself(&["middle.what=fail", "middle.at=3000"], &["`middle` failed: cannot go on: it was told so"]);
+    fails_by_itself(&["middle.what=fail", "middle.at=3000"], &["`middle` failed: cannot go on: as configured"]);
 }
 
 #[test]
 fn a_stage_that_panics_ends_the_run_with_its_name() {
-    fails_by_itself(&["join.what=panic", "join.at=9000"], &["`join` panicked: it was told so"]);
+    fails_by_itself(&["join.what=panic", "join.at=9000"], &["`join` panicked: as configured"]);
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn a_stage_that_cannot_start_ends_the_run_with_its_name() {
     let folder = folder();
     let run = run_diamond(folder.path(), "processes", &["middle.at_start=true"]);
     let id = run.id();
-    run.wait().assert(1, &["stage `middle` failed: cannot start: it was told so"]);
+    run.wait().assert(1, &["stage `middle` failed: cannot start: as configured"]);
     assert_eq!((processes(id), left_over(id)), (vec![], vec![]));
 }
 
@@ -127,7 +127,7 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     let folder = folder();
     let expected = run_diamond(folder.path(), "single", &["source.count=20000", "source.pause=0"]).wait();
     assert_eq!(expected.status, 0, "{expected:#?}");
-    // The logs tell of different parameters.
+    // The logs record different parameters.
     let expected = read(&folder.path().join(OUTPUT));
     fs::remove_file(folder.path().join(OUTPUT)).unwrap();
     let run = run_diamond(folder.path(), "processes", &["source.count=20000"]);
@@ -206,7 +206,7 @@ fn clean_removes_what_is_left_of_dead_runs_and_touches_no_living_one() {
     let clean = start(dead_folder.path(), &["clean"], &[]).wait();
     assert_eq!(clean.status, 0, "{clean:#?}");
     assert_eq!(left_over(dead_id), Vec::<PathBuf>::new());
-    // It goes on until it is told to end.
+    // It goes on until it is signalled to end.
     signal(living_id, "INT");
     let ended = living.wait();
     assert_failed(living_folder.path(), living_id, &ended, &["the run was interrupted"]);
@@ -218,7 +218,7 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
     let output = |engine: &str, settings: &[&str]| {
         let ended = run_diamond(folder.path(), engine, settings).wait();
         assert_eq!(ended.status, 0, "{ended:#?}");
-        // All messages: beside them the logs tell of different parameters.
+        // All messages: beside them the logs record different parameters.
         read(&folder.path().join(OUTPUT))
     };
     let base = ["source.count=3000", "source.pause=0", "middle.what=nothing_passes"];

@@ -37,7 +37,7 @@ kind = "mcap_sink"
 inputs = ["log.*", "invert", "troubled"]
 "#;
 
-/// What `simulate` is told where nothing hangs on the building.
+/// Arguments of `simulate` where the building does not matter.
 const TWO_ROBOTS: [&str; 4] = ["--robots", "2", "--set", "beams=90"];
 
 /// An environment with the package, and a folder with a pipeline and its modules.
@@ -149,7 +149,7 @@ impl Python {
         assert_eq!((on("/robot1/invert/inverted"), on("/robot1/troubled/seen"), on("/troubled/seen")), (maps, maps, 1));
     }
 
-    fn whatever_happens_to_a_stage_is_told_and_nothing_is_left(&self) {
+    fn failures_of_a_stage_are_reported_and_nothing_is_left(&self) {
         let cases: [(&str, &[&str]); 5] = [
             ("raise", &["ValueError: it was told so", "Traceback", "troubled.py\", line", "in do_raise", "of robot"]),
             ("exit", &["ended with status 7"]),
@@ -250,10 +250,10 @@ impl Python {
             ["compare", "--pipelines", "tag_merge", pipeline.to_str().unwrap(), "--inputs", "small.mcap", "--json"];
         let ended = self.gridweave(&args);
         ended.assert(0, &[]);
-        let told: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
-        let rows = told["rows"].as_array().unwrap();
-        assert_eq!(rows.len(), 2, "{told:#}");
-        assert!(rows.iter().all(|row| row["right"] == rows[0]["right"] && row["wrong"] == 0), "{told:#}");
+        let output: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+        let rows = output["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), 2, "{output:#}");
+        assert!(rows.iter().all(|row| row["right"] == rows[0]["right"] && row["wrong"] == 0), "{output:#}");
     }
 }
 
@@ -282,7 +282,7 @@ fn python_stages_are_stages_as_any_other() {
     python.what_is_wrong_is_underlined_before_anything_runs();
     python.every_engine_gives_the_same_bytes_twice();
     python.a_message_that_cannot_be_decoded_is_left_out_and_counted();
-    python.whatever_happens_to_a_stage_is_told_and_nothing_is_left();
+    python.failures_of_a_stage_are_reported_and_nothing_is_left();
     python.golden_cases_pass_and_a_difference_is_shown();
 }
 

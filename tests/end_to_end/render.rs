@@ -25,7 +25,9 @@ fn a_picture_is_written_in_the_format_of_its_name_and_is_the_same_every_time() {
     }
     let svg = fs::read_to_string(folder.path().join("a.SVG")).unwrap();
     assert!(!svg.contains(MARKUP) && !svg.contains("<script"));
-    for title in ["walls found", "tags, 2 sigma", "drives", "directions of the walls", "ways and places", "bends, "] {
+    for title in
+        ["walls found", "tags, 2 sigma", "drives", "directions of the walls", "ways and places", "deformation, "]
+    {
         assert!(svg.contains(&format!("<title>{title}")), "{title}");
     }
 }
@@ -47,7 +49,7 @@ fn maps_are_drawn_merged_apart_and_one_by_one() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_told() {
+fn inputs_that_cannot_be_drawn_are_errors() {
     let folder = folder();
     let refused = |args: &[&str], words: &str| {
         gridweave(folder.path(), &[&["render", "merged.mcap"], args].concat()).assert(2, &[words]);

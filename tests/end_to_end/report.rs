@@ -15,7 +15,7 @@ fn page(folder: &TempDir) -> String {
     fs::read_to_string(folder.path().join("report.html")).unwrap()
 }
 
-/// What the script of a page is told.
+/// The data for the script of a page.
 fn data(page: &str) -> Value {
     let (_, rest) = page.split_once("id=\"data\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
@@ -65,7 +65,7 @@ fn the_summary_of_the_run_adds_what_stages_did() {
 }
 
 #[test]
-fn what_cannot_be_reported_is_told() {
+fn inputs_that_cannot_be_reported_are_errors() {
     let folder = folder();
     let refused = |args: &[&str], status: i32, words: &str| {
         gridweave(folder.path(), &[&["report", "-o", "report.html"], args].concat()).assert(status, &[words]);

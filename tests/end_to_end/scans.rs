@@ -37,7 +37,7 @@ fn robots_with_scans_and_poses_and_without_maps_are_merged() {
         .assert(0, &["there is no map of robot1: `merge` draws one from its", "at the poses of /robot1/pose"]);
     merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
-    // What was drawn is in the output, as is what it was drawn from.
+    // The output has the maps that were built, and the scans that they were built from.
     let info = gridweave(folder, &["info", "out.mcap", "--json"]);
     let info: Value = serde_json::from_str(&info.stdout).unwrap();
     let topics: Vec<&str> =
@@ -122,8 +122,8 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     simulate(folder, "in.mcap", &[&world[..], &small].concat());
     for (in_tf, along) in [(false, "`/robot1/odom`"), (true, "tf (robot1/odom to robot1/base_link)")] {
         with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf);
-        let told = format!("each matched with those before it along {along}");
-        gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&told]);
+        let method = format!("each matched with those before it along {along}");
+        gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&method]);
         merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
         assert_eq!(judged(folder), [1, 0].map(Value::from));
     }

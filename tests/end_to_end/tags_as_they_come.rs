@@ -118,8 +118,8 @@ fn a_log_of_tags_without_maps_gives_frames_and_no_map() {
     info.assert(0, &["/tf_static", "/robot_frames", "/robot1/log/tags", "/robot2/merged_path"]);
     assert!(!info.stdout.contains("OccupancyGrid"), "{info:#?}");
     let info = world.run(&["info", "in.mcap", "--json"]);
-    let told: Value = serde_json::from_str(&info.stdout).unwrap();
-    let tags = told["robots"]["robot1"]["tags"].as_object().unwrap();
+    let output: Value = serde_json::from_str(&info.stdout).unwrap();
+    let tags = output["robots"]["robot1"]["tags"].as_object().unwrap();
     assert!(tags.len() > 5 && tags.keys().all(|tag| !tag.contains('/')), "{tags:?}");
 }
 
@@ -167,7 +167,7 @@ fn tags_that_a_camera_sees_merge_maps() {
     world.write(true, |out, seconds, robot, pose, reading| {
         if !std::mem::replace(&mut started, true) {
             for robot in ["robot1", "robot2"] {
-                // What the detector says besides tf; its layout differs from version to version, and nobody looks into it.
+                // Messages of the detector beside tf; their layout differs between versions, and they are not read.
                 let topic = format!("/{robot}/camera/detections");
                 out.raw(seconds, &topic, "apriltag_msgs/msg/AprilTagDetectionArray", &[0, 1, 0, 0]);
                 let mount = Isometry2::new(Vector2::new(0.2, -0.1), 0.3);
@@ -196,7 +196,7 @@ fn tags_that_a_camera_sees_merge_maps() {
 }
 
 /// Two robots that drive round a place of this size, in metres, from two sides, with odometry that drifts. Gives where the frame
-/// of robot2 lies in that of robot1 by the merge, and by the truth.
+/// of robot2 is in that of robot1 by the merge, and by the truth.
 fn merged_drives(
     [width, height]: [f64; 2],
     drift: f64,

@@ -1,4 +1,4 @@
-//! The pipeline `topological` merges what it can, and `topology_file_merge` what was drawn by hand.
+//! The pipeline `topological` merges topological maps of logs, and `topology_file_merge` those that were drawn by hand.
 
 use crate::support::{gridweave, simulate};
 use serde_json::Value;
@@ -39,7 +39,7 @@ fn drawn(nodes: &[[f64; 2]], paths: &[[usize; 2]]) -> String {
 }
 
 #[test]
-fn topological_maps_in_json_files_are_laid_on_each_other() {
+fn topological_maps_in_json_files_are_aligned() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     let nodes = [[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [13.0, 0.0], [13.0, -2.5], [0.0, 3.0], [-5.0, 0.0]];
@@ -60,7 +60,7 @@ fn topological_maps_in_json_files_are_laid_on_each_other() {
 }
 
 #[test]
-fn topological_maps_are_told_from_what_else_there_is() {
+fn topological_maps_are_distinguished_from_other_inputs() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     fs::write(folder.join("a.json"), drawn(&[[0.0, 0.0]], &[])).unwrap();

@@ -3,7 +3,7 @@
 use crate::support::{gridweave_program, start_program};
 use tempfile::TempDir;
 
-/// Runs are killed, halted, told to end, started twice and left without room; then every promise is looked at.
+/// Runs are killed, halted, sent signals, started twice and left without room; then every promise is checked.
 #[test]
 fn whatever_is_done_to_runs_every_promise_holds() {
     let folder = TempDir::new().unwrap();

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 /// The two tags that robots 1 and 2 both locate well.
 const TWO: [&str; 2] = ["tag03", "tag04"];
 
-/// A log of two robots in one building of which only two tags are left, in a folder of its own.
+/// A log of two robots in one building of which only two tags are left, in a separate folder.
 struct World {
     folder: TempDir,
     log: PathBuf,
@@ -30,7 +30,7 @@ impl World {
         self.folder.path()
     }
 
-    /// Merges a log of this folder. Gives how that ended, what is said of the pair, and the outcome.
+    /// Merges a log of this folder. Returns how that ended, the decision on the pair, and the outcome.
     fn merge(&self, log: &Path, more: &[&str]) -> (Ended, Value, Value) {
         let args = [
             "run",
@@ -73,8 +73,8 @@ fn assert_refused(outcome: &(Ended, Value, Value), reason: &str) {
     let (ended, alignment, evaluation) = outcome;
     ended.assert(3, &["not merged: robot2"]);
     assert_eq!((&evaluation["wrong"], &evaluation["refused"]), (&Value::from(0), &Value::from(1)), "{evaluation}");
-    let said = alignment["reason"].as_str().unwrap();
-    assert!(said.contains(reason), "{said}");
+    let found = alignment["reason"].as_str().unwrap();
+    assert!(found.contains(reason), "{found}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What the user knows of where the maps lie decides where the maps alone do not.
+//! Poses that the user knows decide between hypotheses where the maps alone do not.
 
 use crate::support::{SimulatedWorld, gridweave};
 use gridweave_logs::summary::Frame;
@@ -10,7 +10,7 @@ fn symmetric_world() -> SimulatedWorld {
 }
 
 #[test]
-fn an_initial_pose_tells_one_end_of_a_building_from_the_other() {
+fn an_initial_pose_distinguishes_one_end_of_a_building_from_the_other() {
     let world = symmetric_world();
     world.merge(&[]).assert(3, &["the maps fit at 2 poses", "try: --accept robot2=N", "--initial robot2=X,Y,YAW"]);
     let Frame { x, y, yaw, .. } = world.truth();
@@ -60,7 +60,7 @@ fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
 }
 
 #[test]
-fn a_refusal_is_short_and_the_whole_of_it_is_told_on_demand() {
+fn a_refusal_is_short_and_explained_in_full_on_demand() {
     let world = symmetric_world();
     let short = world.merge(&[]);
     short.assert(3, &["missing: a probability of 0.98"]);

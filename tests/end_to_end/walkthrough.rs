@@ -25,15 +25,15 @@ fn the_walkthrough_is_true_of_bags_that_python_libraries_have_written() {
         .filter_map(|line| Some(line.strip_prefix("    gridweave ")?.split_whitespace().collect()))
         .collect();
     assert!(commands.len() >= 5, "{commands:?}");
-    let mut said = String::new();
+    let mut printed = String::new();
     for command in commands {
         let ended = gridweave(folder.path(), &command);
         ended.assert(0, &[]);
-        said.push_str(&ended.stdout);
+        printed.push_str(&ended.stdout);
     }
     // What it shows of the output.
     for line in page.lines().filter_map(|line| line.strip_prefix("    ")).filter(|line| line.contains("robot2  ")) {
-        assert!(said.lines().any(|told| told.trim() == line.trim()), "no `{line}` in\n{said}");
+        assert!(printed.lines().any(|found| found.trim() == line.trim()), "no `{line}` in\n{printed}");
     }
     for file in
         ["maps.png", "merged.yaml", "merged.pgm", "merged.png", "summary.json", "report.html", "merged/metadata.yaml"]

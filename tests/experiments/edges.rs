@@ -1,4 +1,4 @@
-//! The edges of the Voronoi diagrams of two maps, and which of them tell the translation.
+//! The edges of the Voronoi diagrams of two maps, and those that determine the translation.
 
 use crate::log::last_maps;
 use crate::results::Results;
@@ -43,7 +43,7 @@ pub(super) fn run(args: &EdgesArgs, results: &mut Results) -> Result<()> {
     let [prepared_a, prepared_b] = [&grid_a, &grid_b].map(|grid| PreparedMap::new(grid, STEPS));
     let a = NamedMap { robot: first, grid: grid_a, prepared: &prepared_a };
     let b = NamedMap { robot: second, grid: grid_b, prepared: &prepared_b };
-    let by_directions = align(&a, &b, &RadonAlignerParameters::default()).context("cannot tell the rotation")?;
+    let by_directions = align(&a, &b, &RadonAlignerParameters::default()).context("cannot estimate the rotation")?;
     let rotation = by_directions.transform_a_b.rotation;
     let parameters = EdgeMatcherParameters::default();
     let [edges_a, edges_b] = [&grid_a, &grid_b]

@@ -51,7 +51,7 @@ enum Experiment {
     Localization(localization::LocalizationArgs),
     /// Merging with few common tags, and whether robots of two buildings are ever merged by chance.
     FewTags(few_tags::FewTagsArgs),
-    /// Merging by the maps alone: random pairs, pairs of two buildings, buildings whose parts are alike, and teams.
+    /// Map-only merges: random pairs, pairs of two buildings, self-similar buildings, and many robots.
     Align(align::AlignArgs),
     /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
     MapPairs(map_pairs::MapPairsArgs),
@@ -61,7 +61,7 @@ enum Experiment {
     Radon(radon::RadonArgs),
     /// The Hough spectra of the maps of a log (Carpin, "Fast and accurate map merging").
     Hough(hough::HoughArgs),
-    /// Which edges of the Voronoi diagrams of two maps tell the translation (Saeedi et al., "Group mapping").
+    /// The edges of the Voronoi diagrams of two maps that determine the translation (Saeedi et al., "Group mapping").
     Edges(edges::EdgesArgs),
     /// How often a merge succeeds as tags, odometry and overlap get worse.
     Noise(noise::NoiseArgs),

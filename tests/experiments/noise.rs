@@ -3,7 +3,7 @@
 //! Two robots explore one simulated building; one property of the world at a time is varied, all others keep the
 //! simulator's defaults. A merge is right below 0.5 m and 1 degree, wrong above, and refused if the robots were not
 //! merged. That is measured against where the robots' map frames are. Where poses drift, maps are bent, and another rigid frame
-//! lays the places that both have driven through nearer to each other: the error against the best such frame is told as well.
+//! aligns the places that both have driven through better: the error against the best such frame is reported as well.
 
 use super::plot::{Axis, Plot, Series, Shape};
 use super::results::Results;
@@ -17,10 +17,10 @@ use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
 
-/// What the experiment `noise` is told.
+/// Arguments of the experiment `noise`.
 #[derive(Debug, Args)]
 pub(super) struct NoiseArgs {
-    /// How many worlds for each value, each with a seed of its own.
+    /// How many worlds for each value, each with its own seed.
     #[arg(long, default_value_t = 50)]
     seeds: u64,
     /// The first seed.
@@ -137,14 +137,14 @@ struct Trial {
     outcome: RobotOutcome,
     error_m: Option<f64>,
     error_deg: Option<f64>,
-    /// The squared error by the covariance that the merge tells.
+    /// The squared error by the covariance that the merge reports.
     normalised: Option<f64>,
-    /// How far apart places lie that both robots have driven through.
+    /// Distances of places that both robots have driven through.
     common: Option<CommonPlaces>,
     reason: String,
 }
 
-/// Of the squared errors in x, y and yaw of merges that tell their covariance rightly, 95 % are below this (chi-squared with
+/// With a correct covariance, 95 % of the squared errors in x, y and yaw are below this (chi-squared with
 /// three degrees of freedom).
 const NORMALISED_95: f64 = 7.815;
 
@@ -273,7 +273,7 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
     results.plot(&name, &plot)
 }
 
-/// Whether places that both robots have driven through lie farther apart by the rigid frames than they must: by half a metre in
+/// Whether places that both robots have driven through are farther apart by the rigid frames than they must be: by half a metre in
 /// the median, or by a metre at 90 %.
 fn is_wrong_by_places(common: &CommonPlaces) -> bool {
     let best = common.from_best.map(|best| best.best);

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 const WIDTH: u32 = 720;
 const HEIGHT: u32 = 440;
-/// Told apart by those who see colours badly as well (Okabe and Ito).
+/// Colours that can also be distinguished with colour vision deficiency (Okabe and Ito).
 const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),

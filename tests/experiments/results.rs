@@ -44,7 +44,7 @@ impl Results {
         Ok(())
     }
 
-    /// Tells which files there are.
+    /// Prints the names of the files.
     pub(super) fn say_where(&self) {
         let names: Vec<String> = self.written.iter().map(|path| path.display().to_string()).collect();
         println!("wrote {}", names.join(", "));

@@ -12,7 +12,7 @@ pub(super) fn standard_deviation(values: &[f64]) -> f64 {
     (squares / (values.len() as f64 - 1.0)).sqrt()
 }
 
-/// The value below which a share of the samples lies, linear between neighbours; no number for no samples.
+/// Quantile of the samples, linear between neighbours; no number for no samples.
 pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

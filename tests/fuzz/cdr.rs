@@ -23,7 +23,7 @@ const MESSAGE: &str = "message.cdr";
 fn every_message_is_decoded_or_refused() {
     let mut seeds = messages();
     for seed in seeds.clone() {
-        // The same in the other byte order, as far as one can tell; what it claims is absurd then.
+        // The same in the other byte order, as far as that is known; its values are absurd then.
         let mut bytes = seed;
         bytes[1] = 0;
         seeds.push(bytes);

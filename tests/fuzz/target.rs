@@ -87,7 +87,7 @@ impl Target {
             Err(TestError::Abort(reason)) => panic!("{reason}"),
             Err(TestError::Fail(reason, input)) => {
                 input.write(&folder, self.files);
-                panic!("{reason}; the input lies in {}", folder.display());
+                panic!("{reason}; the input is in {}", folder.display());
             }
         }
     }

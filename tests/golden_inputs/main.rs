@@ -5,7 +5,7 @@
 //!
 //! What is made up comes out the same whenever the program runs, and the test `golden_inputs` compares it with the
 //! files. A cut is what a stage was given in a merge of a simulated log when it was made: it stays as it is when the
-//! stages before it change, so that a case tells of its own stage alone. A file that holds the right messages already is
+//! stages before it change, so that a case tests only its stage. A file that holds the right messages already is
 //! not touched. What a stage makes of its input is then blessed with `gridweave golden --bless`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]

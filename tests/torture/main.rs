@@ -1,16 +1,16 @@
-//! Does to runs what happens to them in the field, and holds each against what is promised.
+//! Injects the faults that happen in the field in runs, and checks the promises on each.
 //!
 //!     cargo run --release -p gridweave-tests --bin torture -- rounds --rounds 1000 --kills --seed 1
 //!     cargo run --release -p gridweave-tests --bin torture -- soak --minutes 60 --seed 1
 //!
-//! Where the machine allows it, all happens in namespaces of its own: with its own processes and its own /dev/shm, which
-//! go with it, and some runs in further ones, as in containers that share /tmp and /dev/shm.
+//! Where the machine allows it, everything runs in separate namespaces with their own processes and /dev/shm, which end with it, and
+//! some runs in further ones, as in containers that share /tmp and /dev/shm.
 
+mod fault;
 mod processes;
 mod promises;
 mod rounds;
 mod soak;
-mod trouble;
 mod world;
 
 use anyhow::{Context as _, Result};
@@ -20,34 +20,34 @@ use std::process::ExitCode;
 
 #[derive(Debug, Parser)]
 enum Args {
-    /// Runs a small pipeline again and again, each time in other trouble.
+    /// Runs a small pipeline repeatedly, each time with another fault.
     Rounds {
-        /// How many times.
+        /// Number of runs.
         #[arg(long, default_value_t = 100)]
         rounds: u32,
-        /// What happens, and when, is drawn from this.
+        /// Seed of the faults and their times.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// Nothing but kills, at random moments.
+        /// Only kills, at random moments.
         #[arg(long)]
         kills: bool,
-        /// The program to torture: by default the one that lies beside this one.
+        /// The program to test; by default the one beside this one.
         #[arg(long)]
         program: Option<PathBuf>,
     },
-    /// Plays a log into a live pipeline over and over, and kills stages at random.
+    /// Plays a log into a live pipeline repeatedly, and kills stages at random.
     Soak {
-        /// For so long.
+        /// Duration in minutes.
         #[arg(long, default_value_t = 60.0)]
         minutes: f64,
-        /// How much faster than it was recorded: no faster than the machine can follow, as the run is to have nothing left to do
-        /// half a minute after the last message.
+        /// Rate relative to the recording: no faster than the machine can follow, as the run must have no pending work half a minute
+        /// after the last message.
         #[arg(long, default_value_t = 2.0)]
         rate: f64,
-        /// What is killed, and when, is drawn from this.
+        /// Seed of the kills and their times.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// The program to torture: by default the one that lies beside this one.
+        /// The program to test; by default the one beside this one.
         #[arg(long)]
         program: Option<PathBuf>,
     },
@@ -57,7 +57,7 @@ fn main() -> ExitCode {
     match torture(Args::parse()) {
         Ok(code) => code,
         Err(error) => {
-            world::tell(&format!("{error:#}"));
+            world::print_line(&format!("{error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -75,7 +75,7 @@ fn torture(args: Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The command with stages that get into trouble.
+/// Path of the command with stages that can fail.
 fn beside() -> Result<PathBuf> {
     let path = std::env::current_exe()?.with_file_name("troubled_stages");
     path.is_file()

@@ -45,7 +45,7 @@ pub(crate) struct Ended {
 pub(crate) struct Started {
     child: Child,
     printed: fs::File,
-    /// Every process of a run is told this folder.
+    /// Every process of a run gets this folder.
     runs: PathBuf,
     is_contained: bool,
 }
@@ -139,12 +139,12 @@ fn all() -> Vec<Process> {
     ids.filter_map(of_process).collect()
 }
 
-/// The processes that were told a folder of runs.
+/// Finds the processes that were given a folder of runs.
 pub(crate) fn stages(runs: &std::path::Path) -> Vec<u32> {
     let folder = runs.to_string_lossy().into_owned();
-    let is_told = |process: &Process| {
+    let has_folder = |process: &Process| {
         fs::read(format!("/proc/{}/cmdline", process.id))
             .is_ok_and(|line| String::from_utf8_lossy(&line).contains(&folder))
     };
-    all().into_iter().filter(is_told).map(|process| process.id).collect()
+    all().into_iter().filter(has_folder).map(|process| process.id).collect()
 }

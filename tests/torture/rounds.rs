@@ -1,9 +1,9 @@
 //! Rounds: a small pipeline is run, something happens to it, and every promise is looked at.
 
+use crate::fault::Fault;
 use crate::processes::{Ended, Started, stages, wait_for};
 use crate::promises::Outcome;
-use crate::trouble::Trouble;
-use crate::world::{World, tell};
+use crate::world::{World, print_line};
 use anyhow::{Context as _, Result, ensure};
 use gridweave_tests::run_files::part;
 use rand::seq::IndexedRandom;
@@ -47,7 +47,7 @@ inputs = ["join"]
 
 const OUTPUT: &str = "out.mcap";
 const ENGINES: [&str; 4] = ["processes", "processes", "threads-ipc", "threads"];
-/// So many rounds are told of together.
+/// Progress is printed after so many rounds.
 const PROGRESS: u32 = 50;
 /// Processes that lose the one that leads them end within this.
 const END: Duration = Duration::from_secs(30);
@@ -63,15 +63,15 @@ pub(crate) fn torture(program: &Path, rounds: u32, seed: u64, kills: bool) -> Re
     let longest = start.elapsed().mul_f64(1.1);
     let whole = fs::read(world.path(OUTPUT))?;
     ensure!(world.left_over()?.is_empty(), "a run that ended well has left {:?}", world.left_over()?);
-    let (mut done, mut ends): (BTreeMap<Trouble, u32>, BTreeMap<Option<i32>, u32>) = Default::default();
+    let (mut done, mut ends): (BTreeMap<Fault, u32>, BTreeMap<Option<i32>, u32>) = Default::default();
     for number in 0..rounds {
-        let trouble = Trouble::draw(number, kills, &mut random);
-        if matches!(trouble, Trouble::FullDisk | Trouble::FullSharedMemory) && !world.is_isolated {
+        let fault = Fault::draw(number, kills, &mut random);
+        if matches!(fault, Fault::FullDisk | Fault::FullSharedMemory) && !world.is_isolated {
             continue;
         }
-        let engines = if trouble == Trouble::KillStage { &ENGINES[..1] } else { &ENGINES };
+        let engines = if fault == Fault::KillStage { &ENGINES[..1] } else { &ENGINES };
         let round = Round {
-            trouble,
+            fault,
             engine: engines.choose(&mut random).copied().unwrap_or_default(),
             contained: random.random(),
             was_there: random.random(),
@@ -84,9 +84,9 @@ pub(crate) fn torture(program: &Path, rounds: u32, seed: u64, kills: bool) -> Re
                 return Err(error.context(format!("round {number} of seed {seed}, {round:?}, in {}", folder.display())));
             }
         }
-        *done.entry(round.trouble).or_default() += 1;
+        *done.entry(round.fault).or_default() += 1;
         if (number + 1) % PROGRESS == 0 {
-            tell(&format!(
+            print_line(&format!(
                 "{} rounds in {:.0} s, every promise held so far",
                 number + 1,
                 start.elapsed().as_secs_f64()
@@ -95,7 +95,7 @@ pub(crate) fn torture(program: &Path, rounds: u32, seed: u64, kills: bool) -> Re
     }
     let seconds = start.elapsed().as_secs_f64();
     let rounds: u32 = done.values().sum();
-    tell(&format!("{rounds} rounds in {seconds:.0} s, every promise held: {done:?}; ended with {ends:?}"));
+    print_line(&format!("{rounds} rounds in {seconds:.0} s, every promise held: {done:?}; ended with {ends:?}"));
     Ok(())
 }
 
@@ -106,9 +106,9 @@ fn run_args(engine: &'static str, output: &'static str) -> [&'static str; 6] {
 /// A run, and what happens to it.
 #[derive(Debug)]
 struct Round {
-    trouble: Trouble,
+    fault: Fault,
     engine: &'static str,
-    /// Whether it has processes of its own, as in a container.
+    /// Whether it has a separate process namespace, as in a container.
     contained: bool,
     /// Whether there is an output of an earlier run.
     was_there: bool,
@@ -124,16 +124,16 @@ impl Round {
             true => fs::write(&output, whole)?,
             false => drop(fs::remove_file(&output)),
         }
-        let status = match self.trouble {
-            Trouble::FullDisk => self.on_a_full_disk(world)?,
+        let status = match self.fault {
+            Fault::FullDisk => self.on_a_full_disk(world)?,
             _ => {
-                let ended = self.in_trouble(world, random)?;
-                Outcome { path: &output, whole, was_there: self.was_there }.check(self.trouble, &ended)?;
+                let ended = self.with_fault(world, random)?;
+                Outcome { path: &output, whole, was_there: self.was_there }.check(self.fault, &ended)?;
                 ended.status
             }
         };
         ensure!(wait_for(END, || stages(&world.runs()).is_empty()), "its processes have not ended");
-        if !self.trouble.may_leave() {
+        if !self.fault.may_leave() {
             ensure!(world.left_over()?.is_empty(), "it has left {:?}", world.left_over()?);
         }
         clean(world)?;
@@ -146,29 +146,29 @@ impl Round {
     }
 
     /// Starts the run, does to it what is to happen, and gives how it ended.
-    fn in_trouble(&self, world: &mut World, random: &mut ChaCha8Rng) -> Result<Ended> {
+    fn with_fault(&self, world: &mut World, random: &mut ChaCha8Rng) -> Result<Ended> {
         let mut run = world.start(&run_args(self.engine, OUTPUT), self.contained)?;
         wait_for(self.at, || run.has_ended());
         let leader = run.leader();
         let stages: Vec<u32> = run.stages().into_iter().filter(|stage| Some(*stage) != leader).collect();
         let all = || stages.iter().copied().chain(leader);
-        match self.trouble {
-            Trouble::KillStage => stages.choose(random).into_iter().for_each(|stage| Started::signal(*stage, "KILL")),
-            Trouble::KillLeader => leader.into_iter().for_each(|leader| Started::signal(leader, "KILL")),
-            Trouble::KillAll => all().for_each(|process| Started::signal(process, "KILL")),
-            Trouble::Signal(name) => leader.into_iter().for_each(|leader| Started::signal(leader, name)),
-            Trouble::HaltAll | Trouble::HaltOne => {
-                let halted: Vec<u32> = match self.trouble {
-                    Trouble::HaltAll => all().collect(),
+        match self.fault {
+            Fault::KillStage => stages.choose(random).into_iter().for_each(|stage| Started::signal(*stage, "KILL")),
+            Fault::KillLeader => leader.into_iter().for_each(|leader| Started::signal(leader, "KILL")),
+            Fault::KillAll => all().for_each(|process| Started::signal(process, "KILL")),
+            Fault::Signal(name) => leader.into_iter().for_each(|leader| Started::signal(leader, name)),
+            Fault::HaltAll | Fault::HaltOne => {
+                let halted: Vec<u32> = match self.fault {
+                    Fault::HaltAll => all().collect(),
                     _ => all().collect::<Vec<_>>().choose(random).copied().into_iter().collect(),
                 };
                 halted.iter().for_each(|process| Started::signal(*process, "STOP"));
                 wait_for(self.at, || false);
                 halted.iter().for_each(|process| Started::signal(*process, "CONT"));
             }
-            Trouble::Twice => return self.twice(run, world),
-            Trouble::FullSharedMemory => return full_shared_memory(run),
-            Trouble::FullDisk => {}
+            Fault::Twice => return self.twice(run, world),
+            Fault::FullSharedMemory => return full_shared_memory(run),
+            Fault::FullDisk => {}
         }
         run.wait()
     }
@@ -183,7 +183,7 @@ impl Round {
         Ok(if is_refused(&first) && second.status == Some(0) { second } else { first })
     }
 
-    /// Runs on a file system of its own that is too small.
+    /// Runs on a separate file system that is too small.
     fn on_a_full_disk(&self, world: &mut World) -> Result<Option<i32>> {
         let disk = world.path("disk");
         fs::create_dir_all(&disk)?;
@@ -196,8 +196,8 @@ impl Round {
         mount(Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(&disk))?;
         let ended = world.start(&run_args(self.engine, "disk/out.mcap"), self.contained).and_then(Started::wait);
         let checked = ended.and_then(|ended| {
-            let is_told = ended.status == Some(1) && ended.text.contains("no room left");
-            ensure!(ended.status == Some(0) || is_told, "a full disk is not told: {ended:?}");
+            let is_reported = ended.status == Some(1) && ended.text.contains("no room left");
+            ensure!(ended.status == Some(0) || is_reported, "a full disk is not reported: {ended:?}");
             Ok(ended.status)
         });
         mount(Command::new("umount").arg("-l").arg(&disk))?;
@@ -228,7 +228,8 @@ fn full_shared_memory(run: Started) -> Result<Ended> {
     fs::remove_file(&filling)?;
     filled?;
     let ended = ended?;
-    let is_told = ended.status == Some(1) && (ended.text.contains("/dev/shm") || ended.text.contains("No space left"));
-    ensure!(ended.status == Some(0) || is_told, "full shared memory is not told: {ended:?}");
+    let is_reported =
+        ended.status == Some(1) && (ended.text.contains("/dev/shm") || ended.text.contains("No space left"));
+    ensure!(ended.status == Some(0) || is_reported, "full shared memory is not reported: {ended:?}");
     Ok(ended)
 }

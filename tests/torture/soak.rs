@@ -1,7 +1,7 @@
 //! A soak: a log is played into a live pipeline over and over while stages are killed, and nothing grows or goes missing.
 
 use crate::processes::{Started, stages, wait_for, with_text};
-use crate::world::{World, tell};
+use crate::world::{World, print_line};
 use anyhow::{Context as _, Result, ensure};
 use gridweave_logs::reader::{LogFile, LogReader};
 use gridweave_tests::run_files::run_name;
@@ -40,7 +40,7 @@ pub(crate) fn soak(program: &Path, minutes: f64, rate: f64, seed: u64) -> Result
     let mut world = World::new(program)?;
     ensure!(
         world.is_isolated,
-        "a soak needs namespaces of its own: what others do with shared memory is not to be counted"
+        "a soak needs separate namespaces, as the shared memory of other programs must not be counted"
     );
     world.run(&["simulate", "-o", "in.mcap", "--robots", "2"])?;
     let run = world.start(&["run", "live", "-o", "out.mcap", "--summary", "summary.json"], false)?;
@@ -72,7 +72,7 @@ pub(crate) fn soak(program: &Path, minutes: f64, rate: f64, seed: u64) -> Result
 
     let accounts = Accounts::of(&world)?;
     let seconds = start.elapsed().as_secs_f64();
-    tell(&format!("{seconds:.0} s, kills: {kills:?}"));
+    print_line(&format!("{seconds:.0} s, kills: {kills:?}"));
     accounts.check(sent, &kills)?;
     check_growth(&usages)
 }
@@ -118,7 +118,10 @@ fn check_growth(usages: &[Usage]) -> Result<()> {
     for (name, value) in values {
         let (before, after) =
             (mean(&usages[quarter..2 * quarter], value), mean(&usages[usages.len() - quarter..], value));
-        tell(&format!("{name}: {before:.0} in the second quarter, {after:.0} in the last, of {} looks", usages.len()));
+        print_line(&format!(
+            "{name}: {before:.0} in the second quarter, {after:.0} in the last, of {} looks",
+            usages.len()
+        ));
         if after > before * (1.0 + GROWTH) + value(&SLACK) {
             grown.push(name);
         }
@@ -168,7 +171,7 @@ impl Accounts {
     fn check(&self, sent: u64, kills: &BTreeMap<&str, u64>) -> Result<()> {
         let maps = self.written("/map");
         let written = maps + self.written("/pose") + self.written("/tag_ranges");
-        tell(&format!("{sent} messages were played, and {written} of them written"));
+        print_line(&format!("{sent} messages were played, and {written} of them written"));
         let mut wrong = Vec::new();
         if sent != written + self.number("output", "dropped") {
             wrong.push("the output".to_owned());
@@ -177,7 +180,9 @@ impl Accounts {
         {
             let (taken, dropped) = (self.number(stage, "messages_in"), self.number(stage, "dropped"));
             let restarts = self.number(stage, "restarts");
-            tell(&format!("{stage}: {given} were sent to it, {taken} given, {dropped} dropped, {restarts} restarts"));
+            print_line(&format!(
+                "{stage}: {given} were sent to it, {taken} given, {dropped} dropped, {restarts} restarts"
+            ));
             // What a process had taken off its links dies with it, and the last of each topic is given again.
             let topics = 2 * (1 + kills.get(stage).copied().unwrap_or_default());
             if (taken + dropped).abs_diff(given) > topics {

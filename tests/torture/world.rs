@@ -1,4 +1,4 @@
-//! Where the torture happens: a folder, a folder for the files of runs, and shared memory, with things of others in them.
+//! Environment of the test: a folder, a folder for the files of runs, and shared memory, with files of others in them.
 
 use crate::processes::{Started, with_text};
 use anyhow::{Context as _, Result, ensure};
@@ -10,18 +10,18 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use tempfile::TempDir;
 
-/// Set for the program that is in namespaces of its own.
+/// Set for the program in separate namespaces.
 const INSIDE: &str = "GRIDWEAVE_TORTURE_INSIDE";
 const SHARED_MEMORY: &str = "/dev/shm";
-/// Namespaces whose processes end with the first, and which have a /proc of their own.
+/// Namespaces whose processes end with the first, with a separate /proc.
 const OWN_PROCESSES: [&str; 4] = ["--pid", "--fork", "--kill-child", "--mount-proc"];
 
-/// Writes a line to standard error; whoever does not listen misses it.
-pub(crate) fn tell(text: &str) {
+/// Writes a line to standard error; a closed one is ignored.
+pub(crate) fn print_line(text: &str) {
     writeln!(std::io::stderr(), "{text}").ok();
 }
 
-/// Runs this program in namespaces of its own, and gives how it ended. None if it is there, or cannot be.
+/// Runs this program in separate namespaces, and returns its exit code. `None` if it is in them already, or they are not allowed.
 pub(crate) fn isolate() -> Result<Option<ExitCode>> {
     if std::env::var_os(INSIDE).is_some() {
         return Ok(None);
@@ -34,22 +34,22 @@ pub(crate) fn isolate() -> Result<Option<ExitCode>> {
     let mount = "mount -t tmpfs -o size=512m tmpfs /dev/shm";
     let can = unshare(mount).stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
     if !can {
-        tell("this machine allows no namespaces: without full disks, full shared memory and containers");
+        print_line("this machine allows no namespaces: without full disks, full shared memory and containers");
         return Ok(None);
     }
-    // The shell stays, and takes leave of processes that lose their parent.
+    // The shell stays as the parent of orphaned processes.
     let mut inside = unshare(&format!("{mount} && \"$0\" \"$@\"; exit $?"));
     let status = inside.arg(std::env::current_exe()?).args(std::env::args_os().skip(1)).env(INSIDE, "1").status()?;
     Ok(Some(if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE }))
 }
 
-/// The place of the torture.
+/// The environment of the test.
 pub(crate) struct World {
     folder: TempDir,
     program: PathBuf,
-    /// Whether the namespaces are its own.
+    /// Whether it has separate namespaces.
     pub(crate) is_isolated: bool,
-    /// Files that are nobody's business here, and what they hold.
+    /// Files of others, which must not be touched, with their contents.
     strangers: BTreeMap<PathBuf, Vec<u8>>,
     /// The processes that runs were started as.
     runs: Vec<u32>,
@@ -79,12 +79,12 @@ impl World {
         self.folder.path().join(name)
     }
 
-    /// The folder of the files of runs, as every process of a run is told it.
+    /// The folder of the files of runs, which every process of a run gets.
     pub(crate) fn runs(&self) -> PathBuf {
         self.path("runs")
     }
 
-    /// Starts `gridweave`; as in a container of its own if `contained`, where that can be.
+    /// Starts `gridweave`, with `contained` as in a separate container where that is possible.
     pub(crate) fn start(&mut self, args: &[&str], contained: bool) -> Result<Started> {
         let is_contained = contained && self.is_isolated;
         let mut command = match is_contained {
@@ -101,7 +101,7 @@ impl World {
         Ok(started)
     }
 
-    /// Runs `gridweave` to its end, which must be a good one, and gives what it has printed.
+    /// Runs `gridweave`, which must succeed, and returns its output.
     pub(crate) fn run(&mut self, args: &[&str]) -> Result<String> {
         let ended = self.start(args, false)?.wait()?;
         ensure!(

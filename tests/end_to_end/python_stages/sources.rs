@@ -75,7 +75,7 @@ impl Python {
         self.gridweave(&["kinds", "circle.py"]).assert(0, &["Sends the poses of a robot", "seconds = 60"]);
     }
 
-    fn whatever_happens_to_a_source_is_told_and_nothing_is_left(&self) {
+    fn failures_of_a_source_are_reported_and_nothing_is_left(&self) {
         let cases: [(&str, &[&str]); 5] = [
             ("raise", &["ValueError: it was told so", "Traceback", "troubled_source.py\", line", "in do_raise"]),
             (
@@ -115,5 +115,5 @@ fn python_stages_may_be_sources() {
     fs::write(python.file("sources.toml"), SOURCES).unwrap();
     python.sources_give_the_same_bytes_on_every_engine_and_their_messages_by_log_time();
     python.a_pipeline_may_have_no_log();
-    python.whatever_happens_to_a_source_is_told_and_nothing_is_left();
+    python.failures_of_a_source_are_reported_and_nothing_is_left();
 }

@@ -68,7 +68,7 @@ impl Cases {
         self.golden(&["--partial", "--bless"])
     }
 
-    /// Checks that the cases fail and that all of `words` are told.
+    /// Checks that the cases fail and that all of `words` are reported.
     #[track_caller]
     pub(crate) fn assert_fails(&self, words: &[&str]) -> Ended {
         let ended = self.golden(&["--partial"]);

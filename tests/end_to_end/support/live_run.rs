@@ -55,7 +55,7 @@ pub(crate) const SUMMARY: &str = "summary.json";
 pub(crate) const LOG: &str = "in.mcap";
 pub(crate) const POSES: &str = "/robot1/pose";
 
-/// A run in a folder of its own.
+/// A run in a separate folder.
 pub(crate) struct Run {
     pub(crate) run: Running,
     pub(crate) folder: TempDir,

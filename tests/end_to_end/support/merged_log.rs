@@ -59,8 +59,8 @@ pub(crate) fn merged_log(path: &std::path::Path) {
         let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0), (4.0, 4.0)];
         let node = |(x, y)| DeformationNode { x, y, dx: 0.05, dy: 0.02, ..Default::default() };
         let nodes = corners.map(node).to_vec();
-        let bend = MapDeformation { robot: of_robot(), spacing: 4.0, nodes, ..Default::default() };
-        log.message(10.0, &format!("/{robot}/elastic/deformation"), &bend);
+        let deformation = MapDeformation { robot: of_robot(), spacing: 4.0, nodes, ..Default::default() };
+        log.message(10.0, &format!("/{robot}/elastic/deformation"), &deformation);
         let pose =
             |x: f64| PoseStamped { pose: Pose::from(Isometry2::new(Vector2::new(x, 1.0), 0.0)), ..Default::default() };
         let path = Path { poses: vec![pose(1.0), pose(2.0)], ..Default::default() };

@@ -22,7 +22,7 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// What `simulate` is told for a small building, mapped with exact poses, in which two robots share most of what they see.
+/// Arguments of `simulate` for a small building, mapped with exact poses, in which two robots share most of what they see.
 pub(crate) const SMALL_BUILDING: [&str; 14] = [
     "--robots",
     "2",
@@ -132,7 +132,7 @@ fn lines_of(text: &[u8]) -> usize {
 /// What a program prints, as it prints it.
 struct Printed {
     text: Arc<(Mutex<Vec<u8>>, Condvar)>,
-    /// Ends when nobody prints any more.
+    /// Ends when no process prints any more.
     reader: Option<JoinHandle<()>>,
 }
 
@@ -156,7 +156,7 @@ impl Printed {
         !more.wait_timeout_while(text, WATCHDOG, |text| lines_of(text) < count).unwrap().1.timed_out()
     }
 
-    /// All of it, once nobody prints any more.
+    /// All of it, once no process prints any more.
     fn all(&mut self) -> String {
         self.reader.take().unwrap().join().unwrap();
         String::from_utf8_lossy(&self.text.0.lock().unwrap()).into_owned()

@@ -39,7 +39,7 @@ impl SimulatedWorld {
         serde_json::from_slice(&fs::read(self.folder.path().join("summary.json")).unwrap()).unwrap()
     }
 
-    /// How far from the truth robot 2 was laid, metres.
+    /// Error of the pose of robot 2, metres.
     pub(crate) fn error(&self) -> f64 {
         let (truth, found) = (self.truth(), self.summary().frames["robot2"]);
         (truth.x - found.x).hypot(truth.y - found.y)

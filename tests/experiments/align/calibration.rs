@@ -55,14 +55,14 @@ impl Calibration {
             points.push((middle, right as f64 / judged.len() as f64));
             band.push((middle, low, high));
         }
-        let told = (-40..=40).map(|tenth| 0.1 * f64::from(tenth)).map(|odds| (odds, 1.0 / (1.0 + 10f64.powf(-odds))));
+        let exact = (-40..=40).map(|tenth| 0.1 * f64::from(tenth)).map(|odds| (odds, 1.0 / (1.0 + 10f64.powf(-odds))));
         let plot = Plot {
             title: "How often the best hypothesis is right".to_owned(),
-            x: Axis::new("odds that the verifier tells, power of ten"),
+            x: Axis::new("odds that the verifier reports, power of ten"),
             y: Axis::new("share that is right, with the 95 % interval").range(0.0, 1.0),
             shape: Shape::Lines(vec![
                 Series::new("measured", points).with_band(band),
-                Series::new("if the odds were exact", told.collect()),
+                Series::new("if the odds were exact", exact.collect()),
             ]),
         };
         results.plot("align_score", &plot)

@@ -11,8 +11,8 @@
 
 mod calibration;
 pub(crate) mod kinds;
+mod many_robots;
 mod pairs;
-mod team;
 mod trial;
 pub(crate) mod worlds;
 
@@ -27,7 +27,7 @@ use std::path::PathBuf;
 use trial::PairTrial;
 use worlds::Seeds;
 
-/// What the experiment `align` is told.
+/// Arguments of the experiment `align`.
 #[derive(Debug, Args)]
 pub(super) struct AlignArgs {
     /// Random pairs of one building.
@@ -92,7 +92,7 @@ pub(super) fn run(args: &AlignArgs, registry: &Registry, results: &mut Results) 
         let judged: Vec<&PairTrial> = sets.iter().flat_map(|(_, trials)| trials.iter()).collect();
         Calibration::of(&judged).report(results)?;
     }
-    team::run(&args.teams, seeds, &args.pipeline, registry, results)
+    many_robots::run(&args.teams, seeds, &args.pipeline, registry, results)
 }
 
 /// Pairs of one building of any kind, and of two.

@@ -38,7 +38,7 @@ pub(super) struct PairTrial {
     pub(super) error_m: Option<f64>,
     pub(super) error_deg: Option<f64>,
     reason: String,
-    /// Share of the smaller map's known area that the other map knows, too; none if the truth does not tell.
+    /// Share of the smaller map's known area that the other map knows, too; none if the truth does not contain it.
     pub(super) overlap: Option<f64>,
     pub(super) drift: Option<f64>,
     /// The kind of building, where there are many.
@@ -111,8 +111,8 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
     Ok(robots.into_iter().map(trial).collect())
 }
 
-/// Whether two robots lie to each other as they should: places that both have seen lie within 0.5 m of each other in the median,
-/// and nine of ten within 1 m. Where the truth knows none, the second robot lies within 0.5 m and 3 degrees of its place, as drift turns
+/// Whether the relative pose of two robots is right: places that both have seen are within 0.5 m of each other in the median,
+/// and nine of ten within 1 m. Where the truth lists none, the second robot is within 0.5 m and 3 degrees of its true pose, as drift turns
 /// maps by that.
 fn is_place_right(evaluation: &Evaluation) -> bool {
     let is_near =
@@ -125,12 +125,12 @@ fn is_place_right(evaluation: &Evaluation) -> bool {
 }
 
 impl PairWorld {
-    /// Whether robot b lies rightly to robot a at `T_a_b`, by the world's truth.
+    /// Whether `T_a_b` is right by the world's truth.
     pub(crate) fn is_right(&self, robots: [&str; 2], transform_a_b: &Pose2) -> Result<bool> {
         Ok(is_place_right(&self.evaluation(robots, transform_a_b)?))
     }
 
-    /// How near robot b lies to its place by robot a at `T_a_b`, by the world's truth.
+    /// Error of `T_a_b` by the world's truth.
     pub(crate) fn closeness(&self, robots: [&str; 2], transform_a_b: &Pose2) -> Result<Closeness> {
         let evaluation = self.evaluation(robots, transform_a_b)?;
         let is_near = match &evaluation.common {
@@ -156,7 +156,7 @@ impl PairWorld {
     }
 }
 
-/// What the verifier has said of the only pair, and whether its best hypothesis is right, even where it was refused.
+/// The verdict on the only pair, and whether its best hypothesis is right, even where it was refused.
 fn judged(pair: &PairWorld, summary: &Summary) -> Result<Option<Judged>> {
     let mut last = None;
     read_messages(&pair.world.output(), Evidence::NAME, |_, data| last = decode::<Evidence>(data).ok())?;

@@ -38,8 +38,8 @@ const SECOND_BUILDING: u64 = 2;
 const ALIKE: u64 = 3;
 /// Kind of the worlds of many kinds.
 const VARIED: u64 = 5;
-/// Kind of the worlds of teams.
-pub(super) const TEAM: u64 = 4;
+/// Kind of the worlds with many robots.
+pub(super) const MANY_ROBOTS: u64 = 4;
 
 /// The two robots of simulated worlds.
 pub(crate) const ROBOTS: [&str; 2] = ["robot1", "robot2"];

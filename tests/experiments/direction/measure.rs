@@ -65,8 +65,8 @@ pub(super) fn over_stage_seeds(case: Case, seeds: u64, settings: &Settings) -> V
     (0..seeds).filter_map(|seed| measure(case, &map, 0, seed, settings)).collect()
 }
 
-/// Maps at several angles, degrees, each with a seed of its own: the errors at each angle. Runs go side by side, so their
-/// times tell nothing.
+/// Maps at several angles, degrees, each with its own seed: the errors at each angle. Runs go side by side, so their
+/// times are not comparable.
 pub(super) fn over_rotations(walls: WallStyle, degrees: &[f64], maps: u64, settings: &Settings) -> Vec<Vec<f64>> {
     let at = |(index, &degrees): (usize, &f64)| {
         let case = Case { walls, degrees };
@@ -77,7 +77,7 @@ pub(super) fn over_rotations(walls: WallStyle, degrees: &[f64], maps: u64, setti
     degrees.par_iter().enumerate().map(at).collect()
 }
 
-/// One run. `None` for a map that is no grid, which no map that was drawn is.
+/// Measures one run. `None` for a map that is not a grid, which does not happen for drawn maps.
 fn measure(case: Case, map: &SnapshotMap, map_seed: u64, stage_seed: u64, settings: &Settings) -> Option<Run> {
     let grid = Grid::new(map.geometry, &map.cells).ok()?;
     let start = Instant::now();

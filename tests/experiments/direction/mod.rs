@@ -27,7 +27,7 @@ const STYLES: [(WallStyle, &str); 5] = [
     (WallStyle::Scanned, "scanned"),
 ];
 
-/// What the experiment `direction` is told.
+/// Arguments of the experiment `direction`.
 #[derive(Debug, Args)]
 pub(super) struct DirectionArgs {
     /// How many maps of each style of walls are made, and with how many seeds one map of each is searched.

@@ -59,8 +59,8 @@ pub(super) fn accuracy(series: &[Series], results: &mut Results) -> Result<()> {
         ]);
     }
     // What section 5.1 says; its mean of the directions is -45.0497 degrees, the true one -45.
-    let said = ["as printed in the paper", "1", "", "", "", "", "", "-0.0497", "0.5598", "938.67 (mean)", ""];
-    table.row(said.map(str::to_owned));
+    let paper = ["as printed in the paper", "1", "", "", "", "", "", "-0.0497", "0.5598", "938.67 (mean)", ""];
+    table.row(paper.map(str::to_owned));
     results.table("direction", "Direction of a map's walls", &table)
 }
 

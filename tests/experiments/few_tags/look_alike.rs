@@ -6,11 +6,11 @@ use nalgebra::Vector2;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Tags farther apart than this in one map than in the other are told apart by that, metres.
+/// Tags farther apart than this in one map than in the other are distinguished by that, metres.
 const SAME_LENGTH: f64 = 0.15;
 /// And tags whose rotation differs by more than this from that of the directions, radians.
 const SAME_ROTATION: f64 = 0.03;
-/// Tags nearer to each other tell no rotation, metres.
+/// Tags nearer to each other determine no rotation, metres.
 const LEAST_LENGTH: f64 = 2.5;
 /// The certainty of tags that are surely in use.
 const CERTAIN: f64 = 0.9;

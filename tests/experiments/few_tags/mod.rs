@@ -7,7 +7,7 @@
 //!   directions agree. Wherever the merge is right, the walls have mended it.
 //! - **unrelated**: robots of two buildings in which two, three or five tags bear the same ids.
 //! - **look-alike**: robots of two buildings in which two tags bear the same ids, are as far apart, and are turned against
-//!   each other as the walls are. Nothing but the walls can tell them apart; few unrelated pairs get so far.
+//!   each other as the walls are. Only the walls can distinguish them; few unrelated pairs get so far.
 //!
 //! A pair is wrong if it is so in the end, and "ever wrong" if it was merged wrongly at any time of the run.
 
@@ -40,7 +40,7 @@ const SHARED: [usize; 3] = [2, 3, 5];
 /// How far two tags are moved alike, metres.
 const MOVED: [f64; 3] = [1.0, 2.0, 3.0];
 
-/// What the experiment `few-tags` is told.
+/// Arguments of the experiment `few-tags`.
 #[derive(Debug, Args)]
 pub(super) struct FewTagsArgs {
     /// How many buildings with each number of tags.

@@ -40,7 +40,7 @@ fn each_two<T: Copy>(things: &[T]) -> Vec<[T; 2]> {
     things.iter().enumerate().flat_map(later).collect()
 }
 
-/// In each pair of a building's robots, choices of two of the tags that both have heard of.
+/// In each pair of a building's robots, choices of two of their common tags.
 pub(super) fn two_tags(buildings: &[Building], choices: usize) -> Vec<Trial<'_>> {
     let mut trials = Vec::new();
     for building in buildings {

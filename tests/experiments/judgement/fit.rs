@@ -202,9 +202,10 @@ fn choices_of_aliases(example: &Example, places: &Linear) -> Vec<Choice> {
         return Vec::new();
     };
     let is_right = |closeness: Closeness| closeness != Closeness::Wrong && best.closeness == Closeness::Wrong;
-    let told =
+    let terms_and_closeness =
         example.aliases.iter().filter(|(_, closeness)| best.closeness != Closeness::Wrong || is_right(*closeness));
-    told.map(|(terms, closeness)| Choice { weight: 1.0, alternatives: vec![(terms.to_vec(), is_right(*closeness))] })
+    terms_and_closeness
+        .map(|(terms, closeness)| Choice { weight: 1.0, alternatives: vec![(terms.to_vec(), is_right(*closeness))] })
         .collect()
 }
 

@@ -16,7 +16,7 @@ use clap::Args;
 use gridweave_runtime::stage::Registry;
 use std::path::PathBuf;
 
-/// What the experiment `fit-judgement` is told.
+/// Arguments of the experiment `fit-judgement`.
 #[derive(Debug, Args)]
 pub(super) struct FitJudgementArgs {
     /// Folders of map files and of logs, as those of `map-pairs`.
@@ -36,7 +36,7 @@ pub(super) struct FitJudgementArgs {
     /// Pairs of maps of different simulated worlds.
     #[arg(long, default_value_t = 1000)]
     simulated: u64,
-    /// What pairs, parts and turns are drawn from.
+    /// Seed of the pairs, parts and rotations.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Into so many parts are the places dealt for the cross-validation.

@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// How far a tag can be heard, metres (Tsardoulias et al., section 3).
+/// Range of a tag, metres (Tsardoulias et al., section 3).
 pub(super) const REACH: f64 = 3.0;
 /// A drive has so many readings, as many as figure 4 shows at most.
 pub(super) const READINGS: usize = 300;

@@ -1,7 +1,7 @@
 //! How certain a tag's place is, and how wrong (Tsardoulias et al., section 3 and figure 4).
 //!
 //! A robot drives 3 m past a tag, straight, along a quarter of a circle, or once round a small circle, and reads it every
-//! centimetre. The tag lies anywhere within reach. The paper's likelihood is compared with the localizer's defaults, then
+//! centimetre. The tag is anywhere within range. The paper's likelihood is compared with the localizer's defaults, then
 //! readings and poses are made worse.
 
 mod calibration;
@@ -18,10 +18,10 @@ use super::results::Results;
 use anyhow::Result;
 use clap::Args;
 
-/// What the experiment `localization` is told.
+/// Arguments of the experiment `localization`.
 #[derive(Debug, Args)]
 pub(super) struct LocalizationArgs {
-    /// How many drives for each point, each with a seed of its own.
+    /// How many drives for each point, each with its own seed.
     #[arg(long, default_value_t = 200)]
     seeds: u64,
 }

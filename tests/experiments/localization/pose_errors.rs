@@ -18,19 +18,19 @@ pub(super) fn run(seeds: u64, results: &mut Results) -> Result<()> {
     let mut curves = Vec::new();
     let parameters = Likelihood::Default.parameters(Readout::Window);
     for pose_error in PoseError::ALL {
-        for is_told in [false, true] {
-            let told = if is_told { "told" } else { "not told" };
+        for is_known in [false, true] {
+            let known = if is_known { "told" } else { "not told" };
             for drive in [Drive::Curved, Drive::Straight] {
                 let mut points = Vec::new();
                 for pose_stddev in STDDEVS {
-                    let conditions = Conditions { pose_error, pose_stddev, is_told, ..Default::default() };
+                    let conditions = Conditions { pose_error, pose_stddev, is_known, ..Default::default() };
                     let score = Score::new(&final_outcomes(drive, &conditions, &parameters, seeds));
-                    let names = [pose_error.name(), told, drive.name()].map(str::to_owned);
+                    let names = [pose_error.name(), known, drive.name()].map(str::to_owned);
                     table.row(names.into_iter().chain([format!("{pose_stddev:.2}")]).chain(score.cells()));
                     points.push((pose_stddev, score.in_ellipse));
                 }
                 if drive == Drive::Curved {
-                    curves.push(Series::new(format!("{}, {told}", pose_error.name()), points));
+                    curves.push(Series::new(format!("{}, {known}", pose_error.name()), points));
                 }
             }
         }

@@ -96,7 +96,7 @@ pub(super) struct Conditions {
     /// Standard deviation of the poses along each axis, metres; of drifting ones at the end of the drive.
     pub(super) pose_stddev: f64,
     /// Whether the poses come with their covariance.
-    pub(super) is_told: bool,
+    pub(super) is_known: bool,
 }
 
 /// What the localizer says of a tag, against the truth.
@@ -159,10 +159,10 @@ impl Recording {
                 PoseError::Shared => (shared, 1.0),
                 PoseError::Drifting => (walk, (way + SPACING) / WAY),
             };
-            let told = if conditions.is_told { conditions.pose_stddev.powi(2) * variance } else { 0.0 };
+            let known = if conditions.is_known { conditions.pose_stddev.powi(2) * variance } else { 0.0 };
             let position = Position {
                 place: place + error * conditions.pose_stddev,
-                covariance: Matrix2::from_diagonal_element(told),
+                covariance: Matrix2::from_diagonal_element(known),
                 yaw: 0.0,
                 yaw_variance: 0.0,
             };
@@ -175,7 +175,7 @@ impl Recording {
         Self { scene, readings }
     }
 
-    /// Gives the readings to a localizer one by one. `after` is told how many it has been given.
+    /// Gives the readings to a localizer one by one. `after` is called with their number so far.
     pub(super) fn replay(&self, parameters: &TagLocalizerParameters, mut after: impl FnMut(usize, &mut TagLocalizer)) {
         let mut localizer = TagLocalizer::new(parameters.clone());
         for (index, (position, range)) in self.readings.iter().enumerate() {
@@ -188,7 +188,7 @@ impl Recording {
     }
 }
 
-/// What comes of many drives of one shape, each with a seed of its own: for each of `counts` readings, which must rise,
+/// What comes of many drives of one shape, each with its own seed: for each of `counts` readings, which must rise,
 /// the outcomes by seed.
 pub(super) fn outcomes(
     drive: Drive,
@@ -239,7 +239,7 @@ mod tests {
         assert!((170..250).contains(&same), "{same} of 300");
         assert_eq!(plain.scene.tag, reflected.scene.tag);
         for pose_error in PoseError::ALL {
-            let wrong = record(Conditions { pose_error, pose_stddev: 0.1, is_told: true, ..Default::default() });
+            let wrong = record(Conditions { pose_error, pose_stddev: 0.1, is_known: true, ..Default::default() });
             let off: Vec<Vector2<f64>> =
                 wrong.readings.iter().zip(&plain.readings).map(|(a, b)| a.0.place - b.0.place).collect();
             let steps = off.windows(2).filter(|pair| (pair[1] - pair[0]).norm() > 1e-12).count();

@@ -8,7 +8,7 @@ use gridweave_stages::shared::geometry::{Grid, Pose2};
 
 /// The outcome for a pair.
 pub(super) struct Judged {
-    /// Where map b lies, if the maps are merged.
+    /// The pose `T_a_b`, if the maps are merged.
     merged: Option<Pose2>,
     /// The probability of the best hypothesis.
     pub(super) probability: f64,

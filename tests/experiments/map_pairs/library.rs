@@ -154,7 +154,7 @@ impl Library {
         Ok(Self { maps })
     }
 
-    /// The maps of simulated worlds, each of which is a building of its own.
+    /// The maps of simulated worlds, each of another building.
     pub(crate) fn of_worlds(pairs: Vec<SimulatedPair>) -> Self {
         Self { maps: pairs.into_iter().flat_map(|pair| pair.maps).collect() }
     }
@@ -198,7 +198,7 @@ impl SimulatedPair {
         self.world.closeness(worlds::ROBOTS, transform_a_b).unwrap_or(Closeness::Wrong)
     }
 
-    /// Whether `T_a_b` lays what both robots have seen on each other.
+    /// Whether `T_a_b` aligns the places that both robots have seen.
     pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
         self.world.is_right(worlds::ROBOTS, transform_a_b).unwrap_or(false)
     }

@@ -23,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// What the experiment `map-pairs` is told.
+/// Arguments of the experiment `map-pairs`.
 #[derive(Debug, Args)]
 pub(super) struct MapPairsArgs {
     /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a `LOG.truth.json` that names
@@ -45,7 +45,7 @@ pub(super) struct MapPairsArgs {
     /// Pairs of maps of different simulated worlds.
     #[arg(long, default_value_t = 0)]
     simulated: u64,
-    /// What pairs, parts and turns are drawn from.
+    /// Seed of the pairs, parts and rotations.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Leave out the pairs with a truth.

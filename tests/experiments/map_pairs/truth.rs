@@ -8,8 +8,8 @@ use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A place within this of the truth, metres, is the right one, but not exactly: maps that drift lie so far beside each other. Places
-/// that are alike lie farther from each other.
+/// A hypothesis within this of the truth, metres, is the right one, but not exact: maps that drift differ so much. Hypotheses at
+/// similar places are farther from each other.
 pub(crate) const NEAR: f64 = 1.5;
 /// And turned by less than this, degrees.
 pub(crate) const NEAR_DEGREES: f64 = 5.0;
@@ -27,7 +27,7 @@ pub(crate) enum Closeness {
 #[derive(Debug)]
 pub(crate) struct Pair {
     pub(crate) name: String,
-    /// How sure the truth is, if that is said.
+    /// Confidence of the truth, if it is given.
     pub(crate) quality: Option<String>,
     pub(crate) maps: [MapOfBuilding; 2],
     truth: Truth,
@@ -38,7 +38,7 @@ pub(crate) struct Pair {
 struct Truth {
     /// In map b and in map a: x and y of each, metres.
     common: Vec<[f64; 4]>,
-    /// What the best rigid transform leaves there, as the maps are bent: the median and the 90th percentile, metres.
+    /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th percentile, metres.
     #[serde(default)]
     rigid_median: f64,
     #[serde(default)]
@@ -83,7 +83,7 @@ pub(crate) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
     Ok(pairs)
 }
 
-/// The truth of a log, which has common places where its maps are bent.
+/// The truth of a log, which has common places where its maps are deformed.
 #[derive(Debug, Deserialize)]
 struct TruthOfLog {
     common: Option<Vec<[f64; 4]>>,
@@ -111,7 +111,7 @@ impl Pair {
         self.truth.common.is_empty()
     }
 
-    /// Whether `T_a_b` lays the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond what the
+    /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond what the
     /// best rigid transform leaves.
     pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
         let Truth { rigid_median, rigid_p90, .. } = &self.truth;
@@ -129,7 +129,7 @@ impl Pair {
         }
     }
 
-    /// How far `T_a_b` lays the common places from each other, metres.
+    /// Distances of the common places by `T_a_b`, metres.
     fn errors(&self, transform_a_b: &Pose2) -> Vec<f64> {
         let error = |[x_b, y_b, x_a, y_a]: &[f64; 4]| {
             (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm()

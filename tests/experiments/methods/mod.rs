@@ -36,10 +36,10 @@ const METHODS: [&str; 3] = ["tag_only", "tag_direction", "tag_merge"];
 /// a deviation of 5 cm. The rest is the simulator's default.
 const WORLD: [&str; 6] = ["robots=2", "width=14", "height=12", "resolution=[0.02]", "tag_reach=3", "tag_noise=0.05"];
 
-/// What the experiment `methods` is told.
+/// Arguments of the experiment `methods`.
 #[derive(Debug, Args)]
 pub(super) struct MethodsArgs {
-    /// How many simulated worlds of each kind, each with a seed of its own.
+    /// How many simulated worlds of each kind, each with its own seed.
     #[arg(long, default_value_t = 50)]
     seeds: u64,
     /// A folder with recorded logs to merge as well: LOG.mcap, each with its LOG.truth.json. A log without a truth counts

@@ -140,7 +140,7 @@ fn parameters<P: DeserializeOwned>(pipeline: &Pipeline, kind: &str) -> Result<Op
     Ok(Some((parameters, pipeline.context(index).seed)))
 }
 
-/// What the tag filter has said last of each pair of robots, in a log that a merge has written.
+/// The last decision of the tag filter on each pair of robots, in a log that a merge has written.
 pub(super) fn last_common_tags(log: &Path) -> Result<BTreeMap<(String, String), CommonTags>> {
     let mut last = BTreeMap::new();
     let mut broken = None;

@@ -7,7 +7,7 @@ use gridweave::evaluate::{RobotOutcome, RobotResult};
 use gridweave::table::Table;
 use gridweave_stages::shared::geometry::{Grid, Pose2, pose};
 
-/// The stages whose time is told, by their names in the pipelines.
+/// The stages whose time is reported, by their names in the pipelines.
 pub(super) const STAGES: [&str; 10] =
     ["log", "tags", "common_tags", "lines", "quadrants", "icp", "verifier", "frames", "fuser", "output"];
 
@@ -24,7 +24,7 @@ pub(super) struct Record {
     pub(super) outcome: RobotOutcome,
     /// Why it is not merged.
     reason: String,
-    /// How wrong it lies; none if it is not merged, or the truth does not know it.
+    /// Its errors; none if it is not merged, or not in the truth.
     pub(super) error: Option<PlaceError>,
     /// The time of one alignment with the reference robot; none if the tags give none.
     pub(super) alignment: Option<AlignmentTime>,
@@ -34,7 +34,7 @@ pub(super) struct Record {
     pub(super) busy: [f64; STAGES.len()],
 }
 
-/// How wrong a robot's map lies.
+/// Errors of the pose of a robot's map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PlaceError {
     /// Mean square error over the occupied cells, square metres.
@@ -45,9 +45,9 @@ pub(super) struct PlaceError {
     pub(super) metres: f64,
     /// Degrees.
     pub(super) degrees: f64,
-    /// How far its walls lie from those of the reference robot, metres.
+    /// Distance of its walls from those of the reference robot, metres.
     pub(super) walls: f64,
-    /// How far they would lie from them at the true place, metres.
+    /// Their distance at the true pose, metres.
     pub(super) true_walls: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How far the walls of two maps lie apart.
+//! Distance of the walls of two maps.
 
 use super::one_alignment::PairMaps;
 use gridweave_stages::shared::geometry::Pose2;
@@ -30,7 +30,7 @@ mod tests {
     use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose};
 
     #[test]
-    fn walls_that_lie_apart_are_measured_and_others_left_out() {
+    fn distances_of_walls_are_measured_and_others_left_out() {
         // A wall of twenty cells along x, and in map b another one that map a has not.
         let geometry = GridGeometry { width: 20, height: 30, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
         let row = |cells: &mut [i8], row: usize| cells[row * 20..(row + 1) * 20].fill(100);

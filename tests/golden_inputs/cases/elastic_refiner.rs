@@ -1,4 +1,4 @@
-//! Inputs of `elastic_refiner`: maps of one building, and where they lie.
+//! Inputs of `elastic_refiner`: maps of one building and their poses.
 
 use super::Case;
 use super::drawing::FloorPlan;

@@ -1,4 +1,4 @@
-//! Inputs of `grid_fuser`: maps, and where they lie.
+//! Inputs of `grid_fuser`: maps and their poses.
 
 use super::Case;
 use super::drawing::{FloorPlan, View};
@@ -90,7 +90,7 @@ fn grid(width: u32, cells: &[i8]) -> TestMap {
     TestMap { cells: cells.to_vec(), ..TestMap::filled(width, cells.len() as u32 / width, 1.0, 0) }
 }
 
-/// Where robots lie in the map of robot1.
+/// Poses of robots in the map of robot1.
 pub(super) fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]) {
     let frame = |(robot, transform): &(&str, Pose2)| RobotFrame {
         robot: (*robot).into(),
@@ -112,7 +112,7 @@ pub(super) fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]
 
 /// The 25 points 98 to 102 squared, turned by 30 degrees about (200, 200) and moved to (300, 300).
 ///
-/// The paper's points are whole numbers, and a grid's are the middles of its cells. Values of 10 and 20 in turn tell a
+/// The paper's points are whole numbers, and a grid's are the middles of its cells. Values of 10 and 20 in turn distinguish a
 /// cell that was carried over from a hole that was filled with a mean. The reference's map, one cell that lies apart,
 /// makes the cells of the output those of whole numbers.
 fn equations_14_and_15(log: &mut LogBuilder) {

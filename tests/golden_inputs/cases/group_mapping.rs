@@ -147,7 +147,7 @@ fn left() -> View {
     View::of([-0.2, -0.2], [11.0, 10.2], CELL)
 }
 
-/// What robot2 sees, in a map frame of its own.
+/// What robot2 sees, in its own map frame.
 fn right() -> View {
     View { transform_building_map: truth(), ..View::of([2.0, -0.2], [14.2, 10.2], CELL) }
 }
@@ -167,7 +167,7 @@ fn row_of(cells: &[i8]) -> TestMap {
     TestMap { cells: cells.to_vec(), ..TestMap::filled(cells.len() as u32, 1, 1.0, 0) }
 }
 
-/// Where robots lie in the map of robot1, with the standard deviations of x, y and yaw.
+/// Poses of robots in the map of robot1, with the standard deviations of x, y and yaw.
 fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2, [f64; 3])]) {
     let frame = |(robot, transform, deviations): &(&str, Pose2, [f64; 3])| RobotFrame {
         robot: (*robot).into(),

@@ -1,4 +1,4 @@
-//! Inputs of `icp_refiner`: maps of two robots, and a first guess of how they lie to each other.
+//! Inputs of `icp_refiner`: maps of two robots, and an initial guess of their relative pose.
 
 use super::Case;
 use super::drawing::{FloorPlan, View};
@@ -94,7 +94,7 @@ pub(super) fn left() -> View {
     View::of([-0.2, -0.2], [11.0, 10.2], CELL)
 }
 
-/// What robot2 sees, in a map frame of its own.
+/// What robot2 sees, in its own map frame.
 pub(super) fn right() -> View {
     View { transform_building_map: truth(), ..View::of([3.0, -0.2], [14.2, 10.2], CELL) }
 }

@@ -33,7 +33,7 @@ pub(super) fn cases() -> Vec<Case> {
 /// `std_msgs/msg/String`: "hello".
 const STRING: &[u8] = b"\x00\x01\x00\x00\x06\x00\x00\x00hello\x00";
 
-/// Maps, poses of three types, transforms, readings of tags, and a type that nobody knows.
+/// Maps, poses of three types, transforms, range measurements, and an unknown type.
 fn every_kind(log: &mut LogBuilder) {
     log.message(0.0, "/tf_static", &transform(0.0, "robot1/base_link", "robot1/antenna", 0.2));
     log.map(0.1, "robot1", &TestMap::filled(4, 3, 0.05, 0));
@@ -77,7 +77,7 @@ fn map_updates(log: &mut LogBuilder) {
 }
 
 /// Robots without topics for their poses: one with a chain of transforms, one with odometry in the frame of its map, one with
-/// odometry that is in a frame of its own.
+/// odometry in another frame.
 fn no_pose_topic(log: &mut LogBuilder) {
     log.message(0.0, "/tf_static", &transform(0.0, "robot1/base_footprint", "robot1/base_link", 0.25));
     for robot in ["robot1", "robot2", "robot3"] {
@@ -121,7 +121,7 @@ fn tag_messages(log: &mut LogBuilder) {
     log.raw(4.0, "/robot1/tag_ranges", "sensor_msgs/msg/Range", b"cut");
 }
 
-/// The topics of a fleet that has names of its own.
+/// The topics of a fleet with other names.
 fn other_topics(log: &mut LogBuilder) {
     every_kind(log);
     log.message(5.0, "/fleet/r7/slam/pose", &odometry(5.0, 3.0));

@@ -80,7 +80,7 @@ pub(super) fn left() -> View {
     View::of([-0.2, -0.2], [11.5, 10.2], CELL)
 }
 
-/// What robot2 sees, in a map frame of its own.
+/// What robot2 sees, in its own map frame.
 pub(super) fn right() -> View {
     View { transform_building_map: truth(), ..View::of([2.0, -0.2], [14.2, 10.2], CELL) }
 }

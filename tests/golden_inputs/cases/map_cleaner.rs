@@ -11,7 +11,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("legs_and_rays", |log| {
             let mut map = FloorPlan::office().draw(&left());
             let width = map.info.width as usize;
-            // A speck in every hundred free cells, and a ray of two cells into what nobody has seen.
+            // A speck in every hundred free cells, and a ray of two cells into unknown space.
             for (index, cell) in map.cells.iter_mut().enumerate() {
                 let (column, row) = (index % width, index / width);
                 if *cell == 0 && (column * 31 + row * 17) % 97 == 0 {

@@ -1,4 +1,4 @@
-//! Inputs of `merge_verifier`: maps of two robots, and what was proposed for how they lie to each other.
+//! Inputs of `merge_verifier`: maps of two robots, and hypotheses of their relative pose.
 
 use super::Case;
 use super::drawing::{FloorPlan, View};

@@ -1,6 +1,6 @@
 //! The made-up inputs of golden cases, a file for each stage kind, and one for those of group mapping, which share their maps.
 //!
-//! Topics are those of the pipeline `tag_merge`, so that a case is fed by the same patterns as a cut of a log.
+//! Topics are those of the pipeline `tag_merge`, so that the patterns of a case also match a cut of a log.
 
 mod drawing;
 mod elastic_refiner;

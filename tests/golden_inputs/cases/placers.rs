@@ -1,4 +1,4 @@
-//! Inputs of `map_placer` and `path_placer`: a room, a drive through it, and how it lies and is bent.
+//! Inputs of `map_placer` and `path_placer`: a room, a path through it, its pose and its deformation.
 
 use super::Case;
 use super::grid_fuser::place;
@@ -11,7 +11,7 @@ pub(super) fn cases() -> Vec<Case> {
         Case::new("map_placer", "bent_map", |log| {
             log.map(1.0, "robot1", &TestMap::room()).map(1.0, "robot2", &TestMap::room());
             log.map(1.0, "robot3", &TestMap::room());
-            bend(log, 2.0);
+            deformation(log, 2.0);
             place(log, 2.0, &placed(pose(5.0, 1.0, 0.3)));
         }),
         Case::new("map_placer", "absurd_frames", |log| {
@@ -20,7 +20,7 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         Case::new("path_placer", "bent_map", |log| {
             drive(log, 0.0);
-            bend(log, 2.0);
+            deformation(log, 2.0);
             place(log, 2.0, &placed(pose(5.0, 1.0, 0.3)));
         }),
         Case::new("path_placer", "frames_that_change", |log| {
@@ -33,7 +33,7 @@ pub(super) fn cases() -> Vec<Case> {
     ]
 }
 
-/// Both robots; nothing is known of where robot3 lies.
+/// Both robots; the pose of robot3 is unknown.
 fn placed(transform_1_2: Pose2) -> [(&'static str, Pose2); 2] {
     [("robot1", Pose2::identity()), ("robot2", transform_1_2)]
 }
@@ -48,7 +48,7 @@ fn drive(log: &mut LogBuilder, start: f64) {
 }
 
 /// The map of robot2 is 20 cm longer along x than it should be over 8 m, and turned where y is great.
-fn bend(log: &mut LogBuilder, seconds: f64) {
+fn deformation(log: &mut LogBuilder, seconds: f64) {
     let node = |(column, row): (i32, i32)| DeformationNode {
         x: 4.0 * f64::from(column),
         y: 4.0 * f64::from(row),
@@ -57,12 +57,12 @@ fn bend(log: &mut LogBuilder, seconds: f64) {
         ..Default::default()
     };
     let vertices = (-1..=2).flat_map(|row| (-1..=2).map(move |column| (column, row)));
-    let bend = MapDeformation {
+    let deformation = MapDeformation {
         header: header(seconds, "robot2/map"),
         robot: "robot2".into(),
         spacing: 4.0,
         nodes: vertices.map(node).collect(),
         ..Default::default()
     };
-    log.message(seconds, "/robot2/elastic/deformation", &bend);
+    log.message(seconds, "/robot2/elastic/deformation", &deformation);
 }

@@ -6,7 +6,7 @@ use gridweave_stages::shared::geometry::{Point2, Pose2, pose};
 use gridweave_tests::{LogBuilder, header};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// How the map of robot2 lies to that of robot1, where it matters.
+/// Relative pose of the map of robot2 to that of robot1, where it matters.
 const TRUTH: (f64, f64, f64) = (4.0, -2.0, 2.5);
 
 pub(super) fn cases() -> Vec<Case> {
@@ -142,21 +142,21 @@ fn furniture(log: &mut LogBuilder) {
     refused(log, 2.0, "robot1", "robot2");
 }
 
-/// Three tags that tell a rotation of `theta_hat`: the best two lie at one end, the third 4 m away.
-fn tags_that_tell(cosine: f64, sine: f64) -> Vec<CommonTag> {
+/// Three tags that give a rotation of `theta_hat`: the best two lie at one end, the third 4 m away.
+fn tags_with_rotation(cosine: f64, sine: f64) -> Vec<CommonTag> {
     let turned = |x: f64, y: f64| Point2::new(cosine * x - sine * y, sine * x + cosine * y);
     let places = [(0.0, -1.0), (0.0, 1.0), (4.0, 0.0)];
     places.iter().enumerate().map(|(index, &(x, y))| tag(index, turned(x, y), Point2::new(x, y))).collect()
 }
 
-/// Maps whose walls all run along the axes, and pairs of robots whose tags tell a rotation at the middle of every
+/// Maps whose walls all run along the axes, and pairs of robots whose tags give a rotation at the middle of every
 /// quadrant, at its borders and near them, and between a printed border and the right one.
 fn equation_7(log: &mut LogBuilder) {
     send(log, 0.0, "robot1", &room(0.0));
     let mut seconds = 1.0;
     let mut pair = |name: &str, cosine: f64, sine: f64| {
         send(log, seconds, name, &room(0.0));
-        common(log, seconds + 0.5, "robot1", name, &tags_that_tell(cosine, sine));
+        common(log, seconds + 0.5, "robot1", name, &tags_with_rotation(cosine, sine));
         seconds += 1.0;
     };
     for middle in [0, 90, 180, 270] {
@@ -180,7 +180,7 @@ fn equation_7(log: &mut LogBuilder) {
     }
 }
 
-/// Two maps whose directions differ by 60 degrees, and tags that tell each of the four rotations that align them.
+/// Two maps whose directions differ by 60 degrees, and tags that give each of the four rotations that align them.
 fn corrected_kappa(log: &mut LogBuilder) {
     send(log, 0.0, "robot1", &room(30.0));
     for turns in 0..4 {
@@ -199,7 +199,7 @@ fn angles_at_the_wrap(log: &mut LogBuilder) {
         send(log, seconds, &a, &room(degrees_a));
         send(log, seconds + 0.1, &b, &room(degrees_b));
         let (sine, cosine) = f64::to_radians(rotation).sin_cos();
-        common(log, seconds + 0.2, &a, &b, &tags_that_tell(cosine, sine));
+        common(log, seconds + 0.2, &a, &b, &tags_with_rotation(cosine, sine));
     }
 }
 

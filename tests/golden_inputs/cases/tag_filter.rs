@@ -128,7 +128,7 @@ fn not_a_number(log: &mut LogBuilder) {
     robots(log, &with(&bad), &with(&also_good[..5]));
 }
 
-/// A robot whose name only the topic tells, and estimates of which nothing tells whose they are.
+/// A robot that is named only by the topic, and estimates without the name of a robot.
 fn without_a_robot(log: &mut LogBuilder) {
     let estimates = |seconds, frame_id: &str| {
         let header = header(seconds, frame_id);

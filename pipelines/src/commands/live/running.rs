@@ -76,7 +76,9 @@ pub(super) fn find_run_with(
                 _ => bail!("no run of processes is in progress: start one with `gridweave run live`"),
             },
             _ => {
-                return Err(BadUse(format!("several runs are in progress: {in_progress}; choose one with --run")).into());
+                return Err(
+                    BadUse(format!("several runs are in progress: {in_progress}; choose one with --run")).into()
+                );
             }
         }
     }

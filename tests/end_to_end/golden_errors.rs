@@ -1,10 +1,10 @@
-//! `gridweave golden` says what is wrong with a case that cannot be run, and never panics.
+//! `gridweave golden` reports errors in a case that cannot be run, and never panics.
 
 use crate::support::golden_cases::{Cases, TAGS, change, estimates};
 use std::fs;
 
 #[test]
-fn a_mistake_in_stage_toml_is_shown_with_the_right_name() {
+fn an_error_in_stage_toml_is_shown_with_the_right_name() {
     for (from, to, says) in [
         ("tag_filter", "tag_filtre", "did you mean `tag_filter`?"),
         ("kind = \"tag_filter\"", "kind = \"grid_fuser\"", "in the folder of the kind `tag_filter`"),
@@ -83,7 +83,7 @@ fn a_stage_that_fails_fails_its_case_with_the_reason() {
 }
 
 #[test]
-fn an_expected_log_that_is_damaged_is_told_and_can_be_blessed() {
+fn a_damaged_expected_log_is_reported_and_can_be_blessed() {
     let cases = Cases::four_tags(TAGS);
     cases.bless();
     change(&cases.expected("tag_filter/four_tags"), |bytes| bytes.truncate(bytes.len() - 20));

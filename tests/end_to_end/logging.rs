@@ -1,4 +1,4 @@
-//! What the command tells beside its results, and what it knows of itself.
+//! Suggestions, log lines, traces, completions and manual pages of the command.
 
 use crate::support::{SMALL_BUILDING, gridweave, simulate};
 use serde_json::Value;
@@ -18,7 +18,7 @@ fn a_name_that_is_mistyped_gets_a_suggestion() {
 }
 
 #[test]
-fn every_pipeline_that_ships_is_listed_and_its_file_passes_the_check() {
+fn every_shipped_pipeline_is_listed_and_its_file_passes_the_check() {
     let folder = TempDir::new().unwrap();
     let list = gridweave(folder.path(), &["pipelines"]);
     list.assert(0, &["auto_merge", "map-only merge"]);
@@ -32,25 +32,25 @@ fn every_pipeline_that_ships_is_listed_and_its_file_passes_the_check() {
 }
 
 #[test]
-fn what_the_stages_do_is_told_if_asked_for_on_any_engine() {
+fn the_work_of_the_stages_is_logged_on_demand_on_any_engine() {
     let folder = TempDir::new().unwrap();
     simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
     for engine in ["single", "processes"] {
         let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "--engine", engine];
-        let told = gridweave(folder.path(), &[&merge[..], &["-v"]].concat());
+        let logged = gridweave(folder.path(), &[&merge[..], &["-v"]].concat());
         for stage in STAGES {
-            assert!(told.stderr.contains(&format!("stage {stage} (")), "{}", told.stderr);
-            assert!(told.stderr.contains(&format!("stage {stage} ends: ")), "{}", told.stderr);
+            assert!(logged.stderr.contains(&format!("stage {stage} (")), "{}", logged.stderr);
+            assert!(logged.stderr.contains(&format!("stage {stage} ends: ")), "{}", logged.stderr);
         }
         let silent = gridweave(folder.path(), &merge);
         assert!(!silent.stderr.contains("stage fuser"), "{}", silent.stderr);
     }
     for engine in ["threads", "processes"] {
         let merge = ["run", "map_merge", "--input", "in.mcap", "--output", "out.mcap", "--engine", engine];
-        let told = gridweave(folder.path(), &[&merge[..], &["-vv", "--log-format", "json"]].concat());
-        let lines: Vec<Value> = told.stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let logged = gridweave(folder.path(), &[&merge[..], &["-vv", "--log-format", "json"]].concat());
+        let lines: Vec<Value> = logged.stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
         let receives = |line: &&Value| line["level"] == "DEBUG" && line["span"]["stage"] == "fuser";
-        assert!(lines.iter().any(|line| receives(&line)), "{}", told.stderr);
+        assert!(lines.iter().any(|line| receives(&line)), "{}", logged.stderr);
     }
 }
 
@@ -77,7 +77,7 @@ fn a_trace_has_a_span_for_each_stage_and_message() {
 }
 
 #[test]
-fn shells_and_man_are_told_of_every_command() {
+fn completions_and_manual_pages_cover_every_command() {
     let folder = TempDir::new().unwrap();
     for shell in ["bash", "zsh", "fish"] {
         gridweave(folder.path(), &["shell", "completions", shell]).assert(0, &["merge", "--summary"]);

@@ -1,6 +1,6 @@
 //! Many robots in one building: time and accuracy.
 
-use super::worlds::{Seeds, TEAM};
+use super::worlds::{MANY_ROBOTS, Seeds};
 use crate::results::Results;
 use crate::statistics::{median, quantile};
 use crate::trial::World;
@@ -16,7 +16,7 @@ const HEIGHT: f64 = 28.0;
 /// The building is made higher, not wider, beyond this width, metres.
 const WIDEST: f64 = 80.0;
 
-/// Merges teams of so many robots, each in a building that grows with it, and reports time and accuracy.
+/// Merges the maps of so many robots, in a building that grows with their number, and reports time and accuracy.
 pub(super) fn run(
     teams: &[u32],
     seeds: Seeds,
@@ -57,7 +57,7 @@ pub(super) fn run(
             "snapshots=1".to_owned(),
             "overlap=0.8".to_owned(),
         ];
-        let world = World::simulate(&settings, seeds.seed(TEAM, u64::from(robots)), registry)?;
+        let world = World::simulate(&settings, seeds.seed(MANY_ROBOTS, u64::from(robots)), registry)?;
         let merge = world.merge(pipeline, &[], registry)?;
         let all = &merge.evaluation.robots;
         let count = |outcome: RobotOutcome| all.iter().filter(|robot| robot.outcome == outcome).count().to_string();

@@ -1,24 +1,24 @@
-//! What happens to a run.
+//! Faults that are injected in runs.
 
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// What happens to a run, at a moment that is drawn.
+/// A fault, injected at a random moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Trouble {
-    /// One process of a stage is killed.
+pub(crate) enum Fault {
+    /// A process of a stage is killed.
     KillStage,
-    /// The process that leads the run is killed.
+    /// The supervisor of the run is killed.
     KillLeader,
     /// All processes are killed at once.
     KillAll,
-    /// It is told to end.
+    /// The run is sent a signal to end.
     Signal(&'static str),
-    /// All of its processes are halted for a moment.
+    /// All its processes are halted for a moment.
     HaltAll,
     /// One of its processes is halted for a moment.
     HaltOne,
-    /// Another one is started with the same output.
+    /// Another run is started with the same output.
     Twice,
     /// The disk has too little room for its output.
     FullDisk,
@@ -26,13 +26,12 @@ pub(crate) enum Trouble {
     FullSharedMemory,
 }
 
-const KILLS: [Trouble; 3] = [Trouble::KillStage, Trouble::KillLeader, Trouble::KillAll];
+const KILLS: [Fault; 3] = [Fault::KillStage, Fault::KillLeader, Fault::KillAll];
 const SIGNALS: [&str; 6] = ["INT", "TERM", "HUP", "QUIT", "USR1", "ALRM"];
-const OTHERS: [Trouble; 5] =
-    [Trouble::HaltAll, Trouble::HaltOne, Trouble::Twice, Trouble::FullDisk, Trouble::FullSharedMemory];
+const OTHERS: [Fault; 5] = [Fault::HaltAll, Fault::HaltOne, Fault::Twice, Fault::FullDisk, Fault::FullSharedMemory];
 
-impl Trouble {
-    /// What happens in a round. Each happens as often as the others, but for chance at the end.
+impl Fault {
+    /// The fault of a round. All faults are equally frequent.
     pub(crate) fn draw(round: u32, kills: bool, random: &mut ChaCha8Rng) -> Self {
         let kinds = KILLS.len() + if kills { 0 } else { OTHERS.len() + 1 };
         let number = round as usize % kinds;
@@ -49,7 +48,7 @@ impl Trouble {
         matches!(self, Self::KillLeader | Self::KillAll)
     }
 
-    /// Whether it must end well all the same.
+    /// Whether the run must succeed.
     pub(crate) fn is_harmless(self) -> bool {
         matches!(self, Self::HaltAll | Self::HaltOne | Self::Twice)
     }
