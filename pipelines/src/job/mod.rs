@@ -89,7 +89,7 @@ impl Job<'_> {
         let bag = self.bag()?;
         let mut pipeline = shipped::load(self.pipeline, &self.overrides(bag.as_ref())?, self.registry)?;
         if self.output == Output::MapOnly {
-            pipeline.take_out(LOG_SINK);
+            pipeline.remove_sinks(LOG_SINK);
         }
         outputs::check(&pipeline, self.options)?;
         provenance::record(&mut pipeline);

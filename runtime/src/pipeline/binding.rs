@@ -1,4 +1,4 @@
-//! Which input port of a stage an output feeds.
+//! Assignment of outputs to the input ports of a stage.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
@@ -8,7 +8,7 @@ use super::stage_section::Draft;
 use super::values::{text, wrong_type};
 use crate::stage::{InputPort, PortType, Registry, StageKind};
 
-/// What feeds an input port, and where the file says so.
+/// The output that feeds an input port, and its location in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Input {
     pub(super) port: usize,
@@ -16,29 +16,29 @@ pub(super) struct Input {
     pub(super) at: Location,
 }
 
-/// One stage names another in its inputs, whether or not that can be wired.
+/// A reference of a stage to another in its inputs, whether or not it can be wired.
 #[derive(Clone, Debug)]
 pub(super) struct Mention {
     pub(super) from: usize,
     pub(super) to: usize,
     pub(super) at: Location,
-    /// Whether the name is wrong, and this is what was probably meant.
+    /// Whether the name is wrong, and `from` is the stage that was probably meant.
     pub(super) guessed: bool,
 }
 
-/// Wires the inputs of one stage.
+/// Assigns the inputs of one stage.
 pub(super) struct Binder<'a> {
     drafts: &'a [Draft<'a>],
     stage: usize,
     inputs: Vec<Input>,
-    /// Entries that could not be wired: the port they were for, if the file names it.
+    /// The ports of the entries that could not be wired, if the file names them.
     failed: Vec<Option<usize>>,
     mentions: &'a mut Vec<Mention>,
     problems: &'a mut Problems,
 }
 
 impl<'a> Binder<'a> {
-    /// No wires yet for the stage of the given index. All that it names is added to `mentions`.
+    /// A binder for the stage with the given index. All its references are added to `mentions`.
     pub(super) fn new(
         drafts: &'a [Draft<'a>],
         stage: usize,
@@ -48,7 +48,7 @@ impl<'a> Binder<'a> {
         Self { drafts, stage, inputs: Vec::new(), failed: Vec::new(), mentions, problems }
     }
 
-    /// The wires, by port and then in the order of the file. Reports what is missing.
+    /// Returns the wires, by port and then in the order of the file, and reports missing ones.
     pub(super) fn finish(mut self, registry: &Registry) -> Vec<Input> {
         if let Some(kind) = self.drafts[self.stage].kind {
             self.check_missing(kind, registry);
@@ -63,7 +63,7 @@ impl<'a> Binder<'a> {
         (draft.name, draft.kind.map(|kind| kind.inputs.as_slice()).unwrap_or_default())
     }
 
-    /// Takes in what stands in `inputs`.
+    /// Reads the value of `inputs`.
     pub(super) fn read(&mut self, inputs: &Item) {
         if let Some(kind) = self.drafts[self.stage].kind
             && kind.inputs.is_empty()
@@ -104,7 +104,7 @@ impl<'a> Binder<'a> {
         }
     }
 
-    /// One entry, for the given port or for the first that it fits.
+    /// Reads one entry, for the given port or for the first that fits.
     fn read_entry(&mut self, item: &Item, port: Option<usize>) {
         let Some(text) = text("inputs", item, self.problems) else {
             self.failed.push(port);
@@ -134,7 +134,7 @@ impl<'a> Binder<'a> {
         }
     }
 
-    /// Wires one output: to the given port, or else to the first that it fits.
+    /// Wires one output to the given port, or to the first that fits.
     fn bind(&mut self, from: Output, all: bool, port: Option<usize>, at: &Location) -> Result<(), Diagnostic> {
         let name = from.name(self.drafts);
         let given = self.inputs.iter().find(|input| input.from == from && port.is_none_or(|port| input.port == port));
@@ -152,57 +152,58 @@ impl<'a> Binder<'a> {
             return Err(self.wrong_port(from, port, at));
         }
         let ros_type = port_type.name();
-        if declaration.port_type == port_type && self.is_defined_otherwise(from, ros_type) {
+        if declaration.port_type == port_type && self.is_defined_differently(from, ros_type) {
             let reader = self.reader().0;
-            let label = format!("it gives {ros_type}, which `{reader}` defines otherwise");
-            let problem = Diagnostic::new(format!("`{name}` and `{reader}` mean two types by one name")).at(at, label);
-            return Err(problem.help("let both take the definition from one module".to_owned()));
+            let label = format!("its type is {ros_type}, which `{reader}` defines differently");
+            let problem =
+                Diagnostic::new(format!("`{name}` and `{reader}` have two types of the same name")).at(at, label);
+            return Err(problem.help("let both import the definition from one module".to_owned()));
         }
-        if !self.has_room(port, all) {
-            return Err(self.no_room(from, all, port, at));
+        if !self.has_capacity(port, all) {
+            return Err(self.too_many(from, all, port, at));
         }
         self.inputs.push(Input { port, from, at: at.clone() });
         Ok(())
     }
 
-    /// Whether the stage that an output belongs to defines a type, and the reader defines it in another way.
-    fn is_defined_otherwise(&self, from: Output, ros_type: &str) -> bool {
+    /// Whether the stage of an output and the reader define a type differently.
+    fn is_defined_differently(&self, from: Output, ros_type: &str) -> bool {
         let definition = |stage: usize| self.drafts.get(stage)?.kind?.definition(ros_type);
         let (given, taken) = (definition(from.stage), definition(self.stage));
         given.is_some() && taken.is_some() && given != taken
     }
 
-    /// The first port that has room and is of exactly this type or, failing that, of any type.
+    /// The first port with capacity of exactly this type or, if there is none, of any type.
     fn choose(&self, port_type: PortType, all: bool) -> Option<usize> {
         let (_, ports) = self.reader();
-        let room = || (0..ports.len()).filter(|&port| self.has_room(port, all));
-        let of_type = |wanted| room().find(|&port| ports[port].port_type == wanted);
+        let free = || (0..ports.len()).filter(|&port| self.has_capacity(port, all));
+        let of_type = |wanted| free().find(|&port| ports[port].port_type == wanted);
         of_type(port_type).or_else(|| of_type(PortType::Any))
     }
 
-    /// Whether a port takes another output; with `all`, any number of others.
-    fn has_room(&self, port: usize, all: bool) -> bool {
+    /// Whether a port accepts another output, or with `all` any number of outputs.
+    fn has_capacity(&self, port: usize, all: bool) -> bool {
         let many = self.reader().1.get(port).is_some_and(|port| port.many);
         many || (!all && self.inputs.iter().all(|input| input.port != port))
     }
 
-    /// An output fits no port that has room.
+    /// The error of an output that fits no port with capacity.
     fn no_port(&self, from: Output, all: bool, at: &Location) -> Diagnostic {
         let (reader, ports) = self.reader();
         let port_type = from.port_type(self.drafts);
         if let Some(port) = ports.iter().position(|port| accepts(port, port_type)) {
-            return self.no_room(from, all, port, at);
+            return self.too_many(from, all, port, at);
         }
         if ports.len() == 1 {
             return self.wrong_port(from, 0, at);
         }
         let inputs = ports.iter().map(|port| format!("`{}` takes {}", port.name, type_text(port.port_type)));
         Diagnostic::new(format!("`{}` fits no input of `{reader}`", from.name(self.drafts)))
-            .at(at, format!("it gives {}", type_text(port_type)))
+            .at(at, format!("its type is {}", type_text(port_type)))
             .note(format!("its inputs: {}", inputs.collect::<Vec<_>>().join(", ")))
     }
 
-    /// An output has not the type that the port takes.
+    /// The error of an output whose type does not match the port.
     fn wrong_port(&self, from: Output, port: usize, at: &Location) -> Diagnostic {
         let (reader, ports) = self.reader();
         let (name, expected) = ports.get(port).map_or(("", PortType::Any), |port| (port.name, port.port_type));
@@ -212,8 +213,8 @@ impl<'a> Binder<'a> {
             .help(self.suggest_feeders(port))
     }
 
-    /// The port takes one output, and has one or is given several.
-    fn no_room(&self, from: Output, all: bool, port: usize, at: &Location) -> Diagnostic {
+    /// The error of a second output for a port that takes one.
+    fn too_many(&self, from: Output, all: bool, port: usize, at: &Location) -> Diagnostic {
         let (reader, ports) = self.reader();
         let name = ports.get(port).map_or("", |port| port.name);
         let problem = Diagnostic::new(format!("the input `{name}` of `{reader}` takes one output"));
@@ -227,7 +228,7 @@ impl<'a> Binder<'a> {
         })
     }
 
-    /// Reports every input that must be wired and is not, unless an entry that was to feed it has been reported.
+    /// Reports every required input that is not wired, except for entries that were reported already.
     fn check_missing(&mut self, kind: &StageKind, registry: &Registry) {
         let mut excused = self.failed.iter().filter(|port| port.is_none()).count();
         for (index, port) in kind.inputs.iter().enumerate() {
@@ -247,13 +248,13 @@ impl<'a> Binder<'a> {
                 let gives = |kind: &&StageKind| kind.outputs.iter().any(|output| output.port_type == port.port_type);
                 let kinds: Vec<&str> = registry.kinds().filter(gives).map(|kind| kind.name).collect();
                 let list = quoted_list(&kinds);
-                (!kinds.is_empty()).then(|| format!("no stage here gives that; add one of kind {list}"))
+                (!kinds.is_empty()).then(|| format!("no stage here has such an output; add one of kind {list}"))
             });
             self.problems.push(Diagnostic::new(title).at(at, label).help(help));
         }
     }
 
-    /// The outputs of the pipeline that could feed an input port of the stage.
+    /// The help that lists the outputs of the pipeline that could feed an input port.
     fn suggest_feeders(&self, port: usize) -> Option<String> {
         let port = self.reader().1.get(port)?;
         let names = outputs_of_type(port.port_type, self.stage, self.drafts);

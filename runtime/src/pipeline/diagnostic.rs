@@ -1,13 +1,13 @@
-//! What is wrong with a pipeline, shown where it is wrong.
+//! The errors of a pipeline file, shown at their locations.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
 
-/// A stretch of one of the texts that a pipeline is made of.
+/// A span of one of the texts of a pipeline.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Location {
-    /// Which text: 0 is the pipeline file, the rest are settings of the command line.
+    /// The index of the text: 0 is the pipeline file, the others are settings of the command line.
     source: usize,
     start: usize,
     end: usize,
@@ -18,8 +18,8 @@ impl Location {
         Self { source, start: span.start, end: span.end.max(span.start) }
     }
 
-    /// The place of a part of the text value that stands here. The whole value where the two differ in length, which
-    /// means that the value is written with escapes.
+    /// The location of a part of the string value at this location; the whole value if it contains escapes, because then the
+    /// offsets differ.
     pub(super) fn part(&self, value: &str, part: Range<usize>) -> Self {
         let quoted = self.end - self.start == value.len() + 2;
         let inside = part.start < part.end && part.end <= value.len();
@@ -30,18 +30,18 @@ impl Location {
     }
 }
 
-/// A text that a pipeline is made of, and what it is called.
+/// A text of a pipeline, and its name in errors.
 #[derive(Clone, Debug)]
 struct SourceText {
     name: String,
     text: String,
 }
 
-/// One error: what is wrong, where, and what would mend it.
+/// An error: what is wrong, where, and what would fix it.
 #[derive(Clone, Debug)]
 pub(super) struct Diagnostic {
     title: String,
-    /// The places that it is about, each with its label: first the one that is wrong.
+    /// The locations with their labels: the wrong one first.
     marks: Vec<(Location, String)>,
     notes: Vec<String>,
     helps: Vec<String>,
@@ -53,43 +53,43 @@ impl Diagnostic {
         Self { title: title.into(), marks: Vec::new(), notes: Vec::new(), helps: Vec::new() }
     }
 
-    /// Underlines the place, with what is wrong with it or what was expected there.
+    /// Sets the wrong location, with what is wrong or what was expected there.
     pub(super) fn at(mut self, location: &Location, label: impl Into<String>) -> Self {
         self.marks.insert(0, (location.clone(), label.into()));
         self
     }
 
-    /// Underlines another place that has to do with it.
+    /// Adds another location that is related.
     pub(super) fn context(mut self, location: &Location, label: impl Into<String>) -> Self {
         self.marks.push((location.clone(), label.into()));
         self
     }
 
-    /// Adds a fact.
+    /// Adds a note.
     pub(super) fn note(mut self, text: impl Into<String>) -> Self {
         self.notes.push(text.into());
         self
     }
 
-    /// Adds what would mend it, if there is something.
+    /// Adds what would fix it, if known.
     pub(super) fn help(mut self, text: impl Into<Option<String>>) -> Self {
         self.helps.extend(text.into());
         self
     }
 }
 
-/// Everything that is wrong with a pipeline so far.
+/// The errors of a pipeline collected so far.
 #[derive(Debug)]
 pub(super) struct Problems(PipelineErrors);
 
 impl Problems {
-    /// None yet, with the pipeline file.
+    /// No errors yet, for a pipeline file.
     pub(super) fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let file = SourceText { name: name.into(), text: text.into() };
         Self(PipelineErrors { sources: vec![file], list: Vec::new() })
     }
 
-    /// Adds a text that is no file, such as a setting of the command line. Gives its number, for [`Location`].
+    /// Adds another text, such as a setting of the command line. Returns its index, for [`Location`].
     pub(super) fn add_source(&mut self, name: impl Into<String>, text: impl Into<String>) -> usize {
         self.0.sources.push(SourceText { name: name.into(), text: text.into() });
         self.0.sources.len() - 1
@@ -105,13 +105,13 @@ impl Problems {
 
     /// The errors in the order of the file.
     pub(super) fn into_errors(mut self) -> PipelineErrors {
-        let place = |diagnostic: &Diagnostic| diagnostic.marks.first().map(|(location, _)| location.clone());
-        self.0.list.sort_by_cached_key(place);
+        let location = |diagnostic: &Diagnostic| diagnostic.marks.first().map(|(location, _)| location.clone());
+        self.0.list.sort_by_cached_key(location);
         self.0
     }
 }
 
-/// Everything that is wrong with a pipeline: one error or more, in the order of the file.
+/// All errors of a pipeline, one or more, in the order of the file.
 #[derive(Clone, Debug)]
 pub struct PipelineErrors {
     sources: Vec<SourceText>,
@@ -119,20 +119,20 @@ pub struct PipelineErrors {
 }
 
 impl PipelineErrors {
-    /// One error of a pipeline as a whole, which is called `name`.
+    /// A single error without a location, of the pipeline called `name`.
     pub fn of_whole(name: &str, problem: impl Into<String>) -> Self {
         let mut problems = Problems::new(name, "");
         problems.push(Diagnostic::new(problem.into()));
         problems.into_errors()
     }
 
-    /// How many errors there are.
+    /// The number of errors.
     pub fn count(&self) -> usize {
         self.list.len()
     }
 
-    /// The errors as text: for each what is wrong, the line it is in with the place underlined, what was expected, and
-    /// the nearest right name. `color` adds the escape codes of a terminal.
+    /// The errors as text: for each the problem, its line with the wrong part underlined, what was expected, and the most
+    /// similar valid name. `color` adds the escape codes of a terminal.
     pub fn render(&self, color: bool) -> String {
         let renderer = if color { Renderer::styled() } else { Renderer::plain() };
         let mut text = String::new();
@@ -155,7 +155,7 @@ impl PipelineErrors {
         let mut group = Group::with_title(Level::ERROR.primary_title(diagnostic.title.as_str()));
         let kinds = std::iter::once(AnnotationKind::Primary).chain(std::iter::repeat(AnnotationKind::Context));
         let marks: Vec<_> = diagnostic.marks.iter().zip(kinds).collect();
-        // The text that holds the primary mark comes first.
+        // The text with the primary mark comes first.
         let mut order: Vec<usize> = marks.iter().map(|((location, _), _)| location.source).collect();
         let mut seen = std::collections::BTreeSet::new();
         order.retain(|&source| seen.insert(source));
@@ -174,12 +174,12 @@ impl PipelineErrors {
     }
 }
 
-/// Names come from the file, and a terminal must not obey what stands in it.
+/// Replaces control characters: names come from the file, and must not control the terminal.
 fn printable(text: &str) -> String {
     text.chars().map(|char| if char.is_control() && char != '\n' { '\u{fffd}' } else { char }).collect()
 }
 
-/// The part of a place that lies in its first line, on whole characters.
+/// The part of a location in its first line, at character boundaries.
 fn within_one_line(text: &str, location: &Location) -> Range<usize> {
     let boundary = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
     let start = boundary(location.start);

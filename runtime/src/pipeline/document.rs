@@ -1,10 +1,10 @@
-//! TOML text as a tree in which every key and value knows its place.
+//! TOML text as a tree in which every key and value has its location.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A value and its place.
+/// A value and its location.
 #[derive(Clone, Debug)]
 pub(super) struct Item {
     pub(super) at: Location,
@@ -59,7 +59,7 @@ impl Item {
         }
     }
 
-    /// The same value without places.
+    /// The same value without locations.
     pub(super) fn to_toml(&self) -> toml::Value {
         match &self.value {
             Value::Table(entries) => {
@@ -70,7 +70,7 @@ impl Item {
         }
     }
 
-    /// What it is, for "expected a number, found ...".
+    /// The type in words, for "expected a number, found ...".
     pub(super) fn describe(&self) -> &'static str {
         match &self.value {
             Value::Table(_) => "a table",
@@ -84,12 +84,12 @@ impl Item {
     }
 }
 
-/// The tables of a pipeline file; nothing if it is not TOML.
+/// The tables of a pipeline file; none if it is not TOML.
 pub(super) fn parse(text: &str, problems: &mut Problems) -> Option<Vec<Entry>> {
     let (table, errors) = DeTable::parse_recoverable(text);
-    let place = Place { source: 0, offset: 0 };
+    let origin = Origin { source: 0, offset: 0 };
     if errors.is_empty() {
-        return Some(place.entries(table.into_inner()));
+        return Some(origin.entries(table.into_inner()));
     }
     for error in errors {
         let span = error.span().unwrap_or(text.len()..text.len());
@@ -98,19 +98,19 @@ pub(super) fn parse(text: &str, problems: &mut Problems) -> Option<Vec<Entry>> {
     None
 }
 
-/// The value that stands in text `source` from byte `offset` on; nothing if it is not TOML.
+/// The value in text `source` at byte `offset`; none if it is not TOML.
 pub(super) fn parse_value(text: &str, source: usize, offset: usize) -> Option<Item> {
     let value = DeValue::parse(text).ok()?;
-    Some(Place { source, offset }.item(value))
+    Some(Origin { source, offset }.item(value))
 }
 
-/// Where the text that is being read stands.
-struct Place {
+/// The location of the text that is being parsed.
+struct Origin {
     source: usize,
     offset: usize,
 }
 
-impl Place {
+impl Origin {
     fn location<T>(&self, spanned: &Spanned<T>) -> Location {
         let span = spanned.span();
         Location::new(self.source, self.offset + span.start..self.offset + span.end)
@@ -138,7 +138,7 @@ impl Place {
             DeValue::Datetime(value) => Value::Plain(toml::Value::Datetime(value)),
             DeValue::Integer(number) => Value::Plain(integer(number.as_str(), number.radix())),
             DeValue::Float(number) => {
-                // The parser has checked the form, so what does not parse is no number at all.
+                // The parser has checked the syntax, so only `nan` variants fail to parse.
                 Value::Plain(toml::Value::Float(number.as_str().parse().unwrap_or(f64::NAN)))
             }
         };
@@ -146,7 +146,7 @@ impl Place {
     }
 }
 
-/// A whole number; as a number with a fraction if it is beyond those of TOML.
+/// An integer; a float if it is out of the range of TOML.
 fn integer(text: &str, radix: u32) -> toml::Value {
     match i64::from_str_radix(text, radix) {
         Ok(number) => toml::Value::Integer(number),

@@ -6,12 +6,12 @@ use super::text_layout::{push_filled, push_table};
 use crate::stage::{Registry, StageKind};
 use serde_json::{Value, json};
 
-/// All kinds, each in full, in lines of at most `width` characters.
+/// The descriptions of all kinds, wrapped at `width` characters.
 pub fn kinds_text(registry: &Registry, width: usize) -> String {
     registry.kinds().map(|kind| kind_text(kind, width)).collect::<Vec<_>>().join("\n")
 }
 
-/// A kind in full, in lines of at most `width` characters: what it does, its inputs, outputs and parameters.
+/// The description of a kind, wrapped at `width` characters: summary, inputs, outputs and parameters.
 pub fn kind_text(kind: &StageKind, width: usize) -> String {
     let mut page = format!("{}\n", kind.name);
     push_filled(&mut page, 2, width, kind.summary);
@@ -63,7 +63,7 @@ fn push_parameter(page: &mut String, width: usize, parameter: &ParameterInfo) {
     }
 }
 
-/// A JSON value as it would stand in a pipeline file.
+/// A JSON value in the syntax of a pipeline file.
 pub(super) fn toml_text(value: &Value) -> String {
     match value {
         Value::Array(items) => format!("[{}]", items.iter().map(toml_text).collect::<Vec<_>>().join(", ")),
@@ -76,7 +76,7 @@ pub(super) fn toml_text(value: &Value) -> String {
     }
 }
 
-/// All kinds as JSON, for programs: a list of what [`kind_text`] shows, with the JSON schema of the parameters.
+/// All kinds as JSON, for programs: a list with the contents of [`kind_text`] and the JSON schema of the parameters.
 pub fn kinds_json(registry: &Registry) -> Value {
     registry.kinds().map(kind_json).collect()
 }

@@ -1,12 +1,12 @@
-//! The links of a run that a user names.
+//! Selection of links of a run by name.
 
 use super::suggest;
 
-/// Those of the links, each a stage and its output, that a text names, by index: `STAGE.PORT`, or `STAGE` for all of the stage. `run`
-/// is what to call the run.
+/// The indexes of the links, given as (stage, output), that match a name: `STAGE.PORT`, or `STAGE` for all outputs of the stage.
+/// Errors call the run `run`.
 ///
 /// # Errors
-/// There is none, for people: with the name that is near, or all there are.
+/// No link matches; the text suggests a similar name, or lists all.
 pub fn named_links(name: &str, run: &str, links: &[(&str, &str)]) -> Result<Vec<usize>, String> {
     let names: Vec<String> = links.iter().map(|(stage, port)| format!("{stage}.{port}")).collect();
     let is_named = |&index: &usize| names[index] == name || links[index].0 == name;
@@ -19,10 +19,10 @@ pub fn named_links(name: &str, run: &str, links: &[(&str, &str)]) -> Result<Vec<
     Ok(named)
 }
 
-/// The same where one is meant.
+/// The index of the only link that matches a name.
 ///
 /// # Errors
-/// There is none, or the stage has several.
+/// No link matches, or the stage has several.
 pub fn named_link(name: &str, run: &str, links: &[(&str, &str)]) -> Result<usize, String> {
     let named = named_links(name, run, links)?;
     match named.as_slice() {
@@ -42,14 +42,14 @@ mod tests {
     const LINKS: [(&str, &str); 3] = [("robots", "map"), ("robots", "pose"), ("fuser", "map")];
 
     #[test]
-    fn a_stage_or_one_of_its_outputs_is_named() {
+    fn a_name_is_a_stage_or_one_of_its_outputs() {
         assert_eq!(named_links("robots", "the run", &LINKS), Ok(vec![0, 1]));
         assert_eq!(named_links("robots.pose", "the run", &LINKS), Ok(vec![1]));
         assert_eq!(named_link("fuser", "the run", &LINKS), Ok(2));
     }
 
     #[test]
-    fn a_name_of_no_link_or_of_several_is_told_with_what_there_is() {
+    fn the_error_of_an_unknown_or_ambiguous_name_lists_the_choices() {
         let error = named_link("robots", "the run", &LINKS).unwrap_err();
         assert_eq!(error, "`robots` has several outputs: choose one of robots.map, robots.pose");
         let error = named_link("robots.poes", "the run", &LINKS).unwrap_err();

@@ -1,4 +1,4 @@
-//! What a pipeline says of running live.
+//! The settings of live pipelines.
 
 use super::diagnostic::{Diagnostic, Problems};
 use super::document::{Entry, Item, Value};
@@ -6,65 +6,65 @@ use super::nearest::{did_you_mean, quoted_list};
 use super::values::{entries, text, wrong_type};
 use crate::stage::StageKind;
 
-/// In which order stages take their inputs, and when a run ends.
+/// The mode of a run: the order in which stages take their inputs, and the end of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// By log time, to the end of the logs. The same input gives the same output.
+    /// In order of log time, until the logs end. The same input gives the same output.
     #[default]
     Replay,
-    /// As they arrive, until the user ends the run.
+    /// In order of arrival, until the user ends the run.
     Live,
 }
 
-/// What becomes of a message in a live pipeline for which a reader has no room.
+/// What a live pipeline does with a message for which a reader has granted no credit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overflow {
-    /// The sender waits until there is room.
+    /// The sender waits for credit.
     #[default]
     Wait,
-    /// The oldest message that waits for this reader is dropped, and counted.
+    /// The oldest pending message of this reader is dropped, and counted.
     DropOldest,
 }
 
-/// What becomes of a stage of a live pipeline that has failed.
+/// What a live pipeline does when a stage fails.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Restart {
     /// The run ends.
     #[default]
     Never,
-    /// Its process is started again after a while, and the run goes on.
+    /// The process of the stage is restarted after a delay, and the run continues.
     OnFailure,
 }
 
-/// A setting that is one of a few words.
-pub(super) trait Word: Copy + PartialEq + 'static {
-    /// All of them.
-    const WORDS: &'static [(&'static str, Self)];
+/// A setting with a fixed set of keywords.
+pub(super) trait Keyword: Copy + PartialEq + 'static {
+    /// All keywords and their values.
+    const KEYWORDS: &'static [(&'static str, Self)];
 
-    /// The word for this one.
-    fn word(self) -> &'static str {
-        Self::WORDS.iter().find(|(_, value)| *value == self).map_or("", |(word, _)| word)
+    /// The keyword of this value.
+    fn keyword(self) -> &'static str {
+        Self::KEYWORDS.iter().find(|(_, value)| *value == self).map_or("", |(word, _)| word)
     }
 }
 
-impl Word for Mode {
-    const WORDS: &'static [(&'static str, Self)] = &[("replay", Self::Replay), ("live", Self::Live)];
+impl Keyword for Mode {
+    const KEYWORDS: &'static [(&'static str, Self)] = &[("replay", Self::Replay), ("live", Self::Live)];
 }
 
-impl Word for Overflow {
-    const WORDS: &'static [(&'static str, Self)] = &[("wait", Self::Wait), ("drop_oldest", Self::DropOldest)];
+impl Keyword for Overflow {
+    const KEYWORDS: &'static [(&'static str, Self)] = &[("wait", Self::Wait), ("drop_oldest", Self::DropOldest)];
 }
 
-impl Word for Restart {
-    const WORDS: &'static [(&'static str, Self)] = &[("never", Self::Never), ("on_failure", Self::OnFailure)];
+impl Keyword for Restart {
+    const KEYWORDS: &'static [(&'static str, Self)] = &[("never", Self::Never), ("on_failure", Self::OnFailure)];
 }
 
-/// The word that `key` is set to; none, and an error, if it is none of those that it may be.
-pub(super) fn read_word<T: Word>(key: &str, item: &Item, problems: &mut Problems) -> Option<T> {
+/// Reads the keyword that `key` is set to. Reports an error and returns none if it is not valid.
+pub(super) fn read_keyword<T: Keyword>(key: &str, item: &Item, problems: &mut Problems) -> Option<T> {
     let word = text(key, item, problems)?;
-    let found = T::WORDS.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
+    let found = T::KEYWORDS.iter().find(|(known, _)| *known == word).map(|(_, value)| *value);
     if found.is_none() {
-        let words: Vec<&str> = T::WORDS.iter().map(|(word, _)| *word).collect();
+        let words: Vec<&str> = T::KEYWORDS.iter().map(|(word, _)| *word).collect();
         let problem = Diagnostic::new(format!("wrong value of `{key}`"));
         let label = format!("expected one of {}", quoted_list(&words));
         problems.push(problem.at(&item.at, label).help(did_you_mean(word, words)));
@@ -72,8 +72,8 @@ pub(super) fn read_word<T: Word>(key: &str, item: &Item, problems: &mut Problems
     found
 }
 
-/// What the outputs of a stage of `kind` do for which a reader has no room: `overflow = "WORD"` for all of them, or
-/// `overflow = { PORT = "WORD" }`.
+/// Reads the overflow settings of the outputs of a stage: `overflow = "KEYWORD"` for all of them, or
+/// `overflow = { PORT = "KEYWORD" }`.
 pub(super) fn read_overflow(kind: &StageKind, item: Option<&Item>, problems: &mut Problems) -> Vec<Overflow> {
     let mut ports = vec![Overflow::default(); kind.outputs.len()];
     let Some(item) = item else { return ports };
@@ -87,16 +87,16 @@ pub(super) fn read_overflow(kind: &StageKind, item: Option<&Item>, problems: &mu
                     problems.push(problem.at(key_at, label).help(did_you_mean(key, names)));
                     continue;
                 };
-                ports[port] = read_word(key, item, problems).unwrap_or_default();
+                ports[port] = read_keyword(key, item, problems).unwrap_or_default();
             }
         }
-        _ if item.as_str().is_some() => ports.fill(read_word("overflow", item, problems).unwrap_or_default()),
+        _ if item.as_str().is_some() => ports.fill(read_keyword("overflow", item, problems).unwrap_or_default()),
         _ => problems.push(wrong_type("overflow", item, "text in quotes, or a table by output port")),
     }
     ports
 }
 
-/// A setting that only a live pipeline has stands in one that is not live.
+/// Reports a setting for live pipelines in a replay.
 pub(super) fn check_is_live(mode: Mode, entry: Option<&Entry>, problems: &mut Problems) {
     let Some(entry) = entry.filter(|_| mode == Mode::Replay) else { return };
     let problem = Diagnostic::new(format!("`{}` is for live pipelines", entry.key));

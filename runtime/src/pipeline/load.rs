@@ -1,4 +1,4 @@
-//! From the text of a pipeline file to a checked pipeline.
+//! Loading of a pipeline file: parsing and checking.
 
 use super::binding::{Input, Mention};
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
@@ -21,7 +21,7 @@ impl Pipeline {
     ///
     /// # Errors
     ///
-    /// Everything that is wrong with it, or that it cannot be read.
+    /// The file cannot be read, or it has errors, all of which are returned.
     pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
         let name = path.display().to_string();
         match input_file::read_text(path) {
@@ -30,11 +30,11 @@ impl Pipeline {
         }
     }
 
-    /// Checks the text of a pipeline file; errors call it `source_name`.
+    /// Parses and checks the text of a pipeline file; errors call it `source_name`.
     ///
     /// # Errors
     ///
-    /// Everything that is wrong with it.
+    /// The text has errors, all of which are returned.
     pub fn parse(
         source_name: &str,
         text: &str,
@@ -63,12 +63,12 @@ impl Pipeline {
     }
 }
 
-/// The folder that a file lies in.
+/// The folder of a file.
 pub(super) fn folder_of(file: &str) -> &Path {
     Path::new(file).parent().unwrap_or(Path::new(""))
 }
 
-/// Reads the sections, the stages by name.
+/// Reads the sections. The stages are sorted by name.
 fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<Entry>, problems: &mut Problems) {
     const SECTIONS: [&str; 3] = ["pipeline", "robots", "stages"];
     for Entry { key, key_at, item } in sections {
@@ -84,7 +84,7 @@ fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<E
         }
     }
     stages.sort_by(|a, b| a.key.cmp(&b.key));
-    // Where the stages are misspelt or no table, that has been said.
+    // A misspelt section or one that is no table has been reported already.
     let reported = |section: &Entry| {
         section.key.starts_with("stage") && !matches!(&section.item.value, Value::Table(entries) if entries.is_empty())
     };
@@ -94,22 +94,22 @@ fn read_sections(sections: &[Entry], settings: &mut Settings, stages: &mut Vec<E
     }
 }
 
-/// The order of the stages, each behind those that feed it; if there are circles they are reported.
+/// The topological order of the stages, each after those that feed it. Cycles are reported.
 fn check_order(drafts: &[Draft<'_>], mentions: &[Mention], problems: &mut Problems) -> Vec<usize> {
     let certain = mentions.iter().filter(|mention| !mention.guessed);
     let edges: BTreeSet<(usize, usize)> = certain.map(|mention| (mention.from, mention.to)).collect();
-    order(drafts.len(), &edges).unwrap_or_else(|circles| {
-        for circle in circles {
-            problems.push(describe_circle(&circle, drafts, mentions));
+    order(drafts.len(), &edges).unwrap_or_else(|cycles| {
+        for cycle in cycles {
+            problems.push(describe_cycle(&cycle, drafts, mentions));
         }
         Vec::new()
     })
 }
 
-fn describe_circle(circle: &[usize], drafts: &[Draft<'_>], mentions: &[Mention]) -> Diagnostic {
-    let closed: Vec<usize> = circle.iter().chain(circle.first()).copied().collect();
+fn describe_cycle(cycle: &[usize], drafts: &[Draft<'_>], mentions: &[Mention]) -> Diagnostic {
+    let closed: Vec<usize> = cycle.iter().chain(cycle.first()).copied().collect();
     let path: Vec<&str> = closed.iter().map(|&stage| drafts[stage].name).collect();
-    let mut problem = Diagnostic::new(format!("these stages feed each other in a circle: {}", path.join(" -> ")));
+    let mut problem = Diagnostic::new(format!("these stages feed each other in a cycle: {}", path.join(" -> ")));
     let mut marked = false;
     for step in closed.windows(2) {
         let [from, to] = *step else { continue };
@@ -121,15 +121,18 @@ fn describe_circle(circle: &[usize], drafts: &[Draft<'_>], mentions: &[Mention])
     problem
 }
 
-/// Puts a pipeline without errors together; `order` tells which draft comes where.
+/// Builds a pipeline without errors. `order` lists the indexes of the drafts.
 fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: &[usize]) -> Pipeline {
-    let mut place = vec![0; drafts.len()];
-    order.iter().enumerate().for_each(|(new, &old)| place[old] = new);
+    let mut new_index = vec![0; drafts.len()];
+    order.iter().enumerate().for_each(|(new, &old)| new_index[old] = new);
     let mut stages: Vec<(usize, StageSpec)> = Vec::with_capacity(drafts.len());
     for (index, draft) in drafts.into_iter().enumerate() {
         let Some(kind) = draft.kind else { continue };
-        let wire =
-            |input: &Input| Wire { port: input.port, from_stage: place[input.from.stage], from_port: input.from.port };
+        let wire = |input: &Input| Wire {
+            port: input.port,
+            from_stage: new_index[input.from.stage],
+            from_port: input.from.port,
+        };
         let spec = StageSpec {
             name: draft.name.to_owned(),
             kind: kind.clone(),
@@ -141,9 +144,9 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
             overflow: draft.overflow,
             restart: draft.restart,
         };
-        stages.push((place[index], spec));
+        stages.push((new_index[index], spec));
     }
-    stages.sort_by_key(|(place, _)| *place);
+    stages.sort_by_key(|(index, _)| *index);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
     let Settings { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, initial_poses, .. } =
         settings;

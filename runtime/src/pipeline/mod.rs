@@ -1,61 +1,61 @@
-//! Pipelines: which stages there are, and which output feeds which input.
+//! Pipelines: the stages, and the wires from outputs to inputs.
 //!
 //! A pipeline is a TOML file:
 //!
 //! ```toml
 //! [pipeline]
 //! name = "walls"
-//! reference = "robot1"            # whose map frame is the world; the first robot by name if left out
-//! seed = 7                        # seeds all randomness; 0 if left out
-//! depth = 16                      # how many samples an input may hold before the sender waits
-//! batch = true                    # gather small messages in one sample; false sends each at once
-//! stall_timeout = 60.0            # a stage that works for so long on one message hangs, seconds; 0 waits for ever
-//! memory_limit = 2_000_000_000    # how much memory a process may take, bytes; 0 sets no limit
+//! reference = "robot1"            # the robot whose map frame is the world; default: the first by name
+//! seed = 7                        # the seed of all randomness; default: 0
+//! depth = 16                      # the samples that an input can queue before the sender waits
+//! batch = true                    # send small messages in batches; false sends each at once
+//! stall_timeout = 60.0            # the maximum time of a stage for one message, seconds; 0: unlimited
+//! memory_limit = 2_000_000_000    # the maximum memory of a process, bytes; 0: unlimited
 //!
-//! [robots]                        # how topics are told apart; `{robot}` is any one part of a path
+//! [robots]                        # the topics of the robots; `{robot}` matches one part of a path
 //! map = "/{robot}/map"
 //!
-//! [robots.robot2]                 # what is known of one robot
-//! initial = { x = 5.0, y = 3.0, yaw = 1.57, stddev = 1.0, yaw_stddev = 0.2 }  # where its map frame lies, about
+//! [robots.robot2]                 # settings of one robot
+//! initial = { x = 5.0, y = 3.0, yaw = 1.57, stddev = 1.0, yaw_stddev = 0.2 }  # the approximate pose of its map frame
 //!
 //! [stages.log]
 //! kind = "mcap_source"
-//! files = ["a.mcap"]              # any key that this page does not name is a parameter
+//! files = ["a.mcap"]              # every key that is not in this example is a parameter
 //!
 //! [stages.lines]
 //! kind = "line_extractor"
-//! inputs = ["log.map"]            # STAGE.PORT, or STAGE where it has one output only
+//! inputs = ["log.map"]            # STAGE.PORT, or STAGE if it has only one output
 //! topics = { segments = "/{robot}/walls" }
-//! process = "geometry"            # stages of one name share a process; by default each has its own
+//! process = "geometry"            # stages with the same name share a process; by default each has its own
 //!
 //! [stages.out]
 //! kind = "mcap_sink"
-//! inputs = { in = ["log.*", "lines"] }    # by port; `*` is all outputs
+//! inputs = { in = ["log.*", "lines"] }    # by port; `*` means all outputs
 //! ```
 //!
-//! A pipeline with `mode = "live"` in `[pipeline]` takes messages as they arrive, until the user ends it. Its stages may
-//! say more:
+//! A pipeline with `mode = "live"` in `[pipeline]` handles messages as they arrive, until the user ends it. Its stages have
+//! more settings:
 //!
 //! ```toml
 //! [stages.robots]
 //! kind = "live_source"
-//! overflow = { pose = "drop_oldest" }     # what an output does that a reader has no room for; "wait" if left out
+//! overflow = { pose = "drop_oldest" }     # what an output does without credit of a reader; default: "wait"
 //!
 //! [stages.lines]
 //! kind = "line_extractor"
 //! inputs = ["robots.map"]
-//! overflow = "drop_oldest"                # of all outputs
-//! restart = "on_failure"                  # start it again when it fails; "never" ends the run, and is the default
+//! overflow = "drop_oldest"                # for all outputs
+//! restart = "on_failure"                  # restart it when it fails; the default "never" ends the run
 //! ```
 //!
-//! In a list of inputs each entry feeds the first input port that is still free and of exactly its type or, failing
-//! that, of any type. [`Pipeline::load`] checks all of it and shows everything that is wrong at once.
+//! In a list of inputs each entry feeds the first free input port of exactly its type or, if there is none, of any type.
+//! [`Pipeline::load`] checks the whole file and reports all errors at once.
 
 mod attach;
 mod binding;
 mod diagnostic;
+mod diagrams;
 mod document;
-mod drawing;
 mod initial_poses;
 mod kinds;
 mod link_names;
@@ -95,72 +95,71 @@ pub use text_layout::{TEXT_WIDTH, fill};
 use crate::stage::{Context, InitialPoses, InputWire, RobotTopics, StageKind};
 use std::time::Duration;
 
-/// A pipeline that has passed every check: each stage's kind exists, each wire's ends exist and agree in type, and
-/// there is no cycle.
+/// A valid pipeline: the kind of each stage exists, the two ends of each wire exist and have the same type, and there is no
+/// cycle.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
-    /// Its name.
+    /// The name of the pipeline.
     pub name: String,
     /// Whether it replays logs or runs live.
     pub mode: Mode,
-    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
     pub reference: Option<String>,
-    /// Seeds all randomness.
+    /// The seed of all randomness.
     pub seed: u64,
-    /// Whether small messages are gathered and sent together. It saves wake-ups where many are sent at a time; without
-    /// it each is on its way at once.
+    /// Whether small messages are sent in batches. This saves wake-ups; without it each message is sent at once.
     pub batch: bool,
-    /// A stage that works for longer on one message hangs, which ends the run: on the engine `processes`, as a thread
-    /// cannot be ended. None waits for ever.
+    /// The maximum time of a stage for one message; none if unlimited. A stage that exceeds it hangs, which ends the run. Only
+    /// on the engine `processes`, because a thread cannot be killed.
     pub stall_timeout: Option<Duration>,
-    /// How much memory each process may take for itself on the engine `processes`, bytes; none sets no limit.
+    /// The maximum private memory of each process on the engine `processes`, bytes; none if unlimited.
     pub memory_limit: Option<u64>,
-    /// How topics are told apart.
+    /// The topic patterns of the robots.
     pub robots: RobotTopics,
-    /// Where the user knows the maps of robots to lie; where there are any, that of the reference among them.
+    /// The poses of robots' maps that the user knows; if there are any, that of the reference is among them.
     pub initial_poses: InitialPoses,
-    /// The stages, each behind those that feed it; among those that could be next, by name.
+    /// The stages in topological order, each after those that feed it; ties are broken by name.
     pub stages: Vec<StageSpec>,
 }
 
-/// One stage of a pipeline.
+/// A stage of a pipeline.
 #[derive(Clone, Debug)]
 pub struct StageSpec {
     /// Its name.
     pub name: String,
     /// Its kind.
     pub kind: StageKind,
-    /// Its parameters, those of them that are given.
+    /// The given parameters.
     pub parameters: toml::Table,
-    /// Its inputs, by input port and, within a port that takes many, in the order of the file. The place in this list
-    /// breaks ties between messages of one log time.
+    /// Its inputs, by input port and, within a port, in the order of the file. The index in this list breaks ties between
+    /// messages with the same log time.
     pub inputs: Vec<Wire>,
-    /// For every output port of the kind: the topic of its messages in a log, with `{robot}` for the robot's name.
+    /// The topic of each output port's messages in a log, with `{robot}` for the robot's name.
     pub topics: Vec<String>,
-    /// How many samples each of its inputs may hold before the sender waits.
+    /// The samples that each of its inputs can queue before the sender waits.
     pub depth: usize,
-    /// The process that it runs in, on the engine `processes`. Stages that name the same one share it.
+    /// The process that it runs in, on the engine `processes`. Stages with the same one share it.
     pub process: String,
-    /// For every output port of the kind: what becomes of a message for which a reader has no room. A live pipeline
-    /// only: a replay waits.
+    /// What each output port does with a message for which a reader has granted no credit. Only for a live pipeline: a replay
+    /// waits.
     pub overflow: Vec<Overflow>,
-    /// What becomes of the run when the stage fails. A live pipeline only.
+    /// What happens when the stage fails. Only for a live pipeline.
     pub restart: Restart,
 }
 
-/// What feeds one input of a stage.
+/// A wire from an output to an input of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wire {
     /// The input port, as an index among the kind's input ports.
     pub port: usize,
-    /// The stage that it comes from, as an index among the pipeline's stages.
+    /// The sending stage, as an index among the pipeline's stages.
     pub from_stage: usize,
     /// The output port of that stage, as an index among its kind's output ports.
     pub from_port: usize,
 }
 
 impl Pipeline {
-    /// The processes that the stages are placed in, in the order of their first stages.
+    /// The processes of the stages, in the order of their first stages.
     pub fn processes(&self) -> Vec<String> {
         let mut processes: Vec<String> = Vec::new();
         for stage in &self.stages {
@@ -171,13 +170,13 @@ impl Pipeline {
         processes
     }
 
-    /// The indexes of the stages that are placed in a process.
+    /// The indexes of the stages of a process.
     pub fn stages_of(&self, process: &str) -> Vec<usize> {
         let placed = self.stages.iter().enumerate().filter(|(_, stage)| stage.process == process);
         placed.map(|(index, _)| index).collect()
     }
 
-    /// What the stage with the given index is told when it is made.
+    /// The context of the stage with the given index.
     pub fn context(&self, stage: usize) -> Context {
         let spec = &self.stages[stage];
         Context {
@@ -193,7 +192,7 @@ impl Pipeline {
         }
     }
 
-    /// What a stage is told of a wire to it.
+    /// The description of a wire in the context of the reading stage.
     fn input_wire(&self, spec: &StageSpec, wire: &Wire) -> InputWire {
         let from = &self.stages[wire.from_stage];
         let topic = match from.kind.inputs.is_empty() {
@@ -208,7 +207,8 @@ impl Pipeline {
     }
 }
 
-/// The seed of a stage: FNV-1a over the pipeline's seed and the stage's name, so that adding a stage changes no other.
+/// The seed of a stage: FNV-1a over the pipeline's seed and the stage's name, so that adding a stage does not change the seeds
+/// of others.
 fn stage_seed(seed: u64, name: &str) -> u64 {
     let bytes = seed.to_le_bytes().into_iter().chain(name.bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))

@@ -1,11 +1,11 @@
-//! The right name nearest to a wrong one.
+//! Suggestions for misspelt names.
 
-/// The name among `names` that `wrong` was probably meant to be, if one is near enough; of equally near ones the first.
+/// The name among `names` that is most similar to `wrong`, if one is similar enough; the first of equally similar ones.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = wrong.to_lowercase();
     let near = names.into_iter().filter_map(|name| {
         let similarity = strsim::normalized_damerau_levenshtein(&lower, &name.to_lowercase());
-        // A short form, such as `lines` for `line_extractor`, is far by distance and yet clear.
+        // A prefix, such as `lines` for `line_extractor`, has a large edit distance, but is probably meant.
         let starts_alike = strsim::jaro_winkler(&lower, &name.to_lowercase());
         (similarity >= 0.6 || starts_alike >= 0.85).then_some((similarity.max(starts_alike), name))
     });
@@ -13,18 +13,18 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
     best.map(|(_, name)| name)
 }
 
-/// "did you mean `...`?", if a name is near enough.
+/// "did you mean `...`?", if a name is similar enough.
 pub(super) fn did_you_mean<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<String> {
     nearest(wrong, names).map(|name| format!("did you mean `{name}`?"))
 }
 
-/// "did you mean `...`?", or else what there is to choose from.
+/// "did you mean `...`?", or a list of the choices, introduced by `what`.
 pub fn suggest(wrong: &str, names: &[&str], what: &str) -> Option<String> {
     let list = || (!names.is_empty()).then(|| format!("{what}: {}", quoted_list(names)));
     did_you_mean(wrong, names.iter().copied()).or_else(list)
 }
 
-/// "`a`, `b`, `c`", cut after the first few.
+/// "`a`, `b`, `c`", truncated after the first few.
 pub fn quoted_list<S: AsRef<str>>(names: &[S]) -> String {
     const MOST: usize = 12;
     let mut list: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", name.as_ref())).collect();
@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slip_of_the_keys_finds_its_name() {
+    fn a_misspelt_name_is_found() {
         let names = ["min_length", "max_length", "mean"];
         assert_eq!(nearest("min_lenght", names), Some("min_length"));
         assert_eq!(nearest("Mean", names), Some("mean"));
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_is_like_no_other_gets_the_list() {
+    fn for_a_name_without_a_similar_one_the_choices_are_listed() {
         let names = ["map", "pose"];
         assert_eq!(nearest("certainty", names), None);
         assert_eq!(suggest("certainty", &names, "its inputs").as_deref(), Some("its inputs: `map`, `pose`"));

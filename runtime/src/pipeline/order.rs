@@ -1,4 +1,4 @@
-//! The order of stages: each behind those that feed it.
+//! The topological order of stages: each after those that feed it.
 
 use petgraph::Direction;
 use petgraph::algo::tarjan_scc;
@@ -6,11 +6,12 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-/// Sorts the stages 0 to `count` so that each comes behind those that feed it, and among those that could be next the
-/// least comes first. `edges` go from a stage to one that reads it.
+/// Sorts the stages 0 to `count` topologically, such that each comes after those that feed it; ties are broken by index.
+/// `edges` go from a stage to its readers.
 ///
-/// Errors with circles if there are any, one for each group of stages that feed each other: each starts with its least
-/// stage and does not repeat it at the end.
+/// # Errors
+/// There are cycles: the shortest one of each strongly connected component, starting with its least stage, which is not
+/// repeated at the end.
 pub(super) fn order(count: usize, edges: &BTreeSet<(usize, usize)>) -> Result<Vec<usize>, Vec<Vec<usize>>> {
     let mut graph = DiGraph::with_capacity(count, edges.len());
     let nodes: Vec<NodeIndex> = (0..count).map(|_| graph.add_node(())).collect();
@@ -29,36 +30,36 @@ pub(super) fn order(count: usize, edges: &BTreeSet<(usize, usize)>) -> Result<Ve
             }
         }
     }
-    if sorted.len() == count { Ok(sorted) } else { Err(circles(&graph)) }
+    if sorted.len() == count { Ok(sorted) } else { Err(cycles(&graph)) }
 }
 
 fn readers(graph: &DiGraph<(), ()>, stage: usize) -> BTreeSet<usize> {
     graph.neighbors(NodeIndex::new(stage)).map(NodeIndex::index).collect()
 }
 
-fn circles(graph: &DiGraph<(), ()>) -> Vec<Vec<usize>> {
+fn cycles(graph: &DiGraph<(), ()>) -> Vec<Vec<usize>> {
     let groups = tarjan_scc(graph).into_iter().map(|group| group.into_iter().map(NodeIndex::index).collect());
-    let mut circles: Vec<Vec<usize>> = groups.filter_map(|group| shortest_circle(graph, &group)).collect();
-    circles.sort();
-    circles
+    let mut cycles: Vec<Vec<usize>> = groups.filter_map(|group| shortest_cycle(graph, &group)).collect();
+    cycles.sort();
+    cycles
 }
 
-/// The shortest way from the least stage of a group back to itself.
-fn shortest_circle(graph: &DiGraph<(), ()>, group: &BTreeSet<usize>) -> Option<Vec<usize>> {
+/// The shortest cycle through the least stage of a strongly connected component.
+fn shortest_cycle(graph: &DiGraph<(), ()>, group: &BTreeSet<usize>) -> Option<Vec<usize>> {
     let &start = group.first()?;
     let mut came_from = BTreeMap::new();
     let mut queue = VecDeque::from([start]);
     while let Some(stage) = queue.pop_front() {
         let readers: BTreeSet<usize> = readers(graph, stage).intersection(group).copied().collect();
         if readers.contains(&start) {
-            let mut circle: Vec<usize> =
+            let mut cycle: Vec<usize> =
                 std::iter::successors(Some(stage), |stage| came_from.get(stage).copied()).collect();
-            circle.reverse();
-            return Some(circle);
+            cycle.reverse();
+            return Some(cycle);
         }
         for reader in readers {
-            if let Entry::Vacant(place) = came_from.entry(reader) {
-                place.insert(stage);
+            if let Entry::Vacant(entry) = came_from.entry(reader) {
+                entry.insert(stage);
                 queue.push_back(reader);
             }
         }
@@ -71,20 +72,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stage_comes_behind_those_that_feed_it_and_ties_go_by_name() {
+    fn a_stage_comes_after_those_that_feed_it_and_ties_are_broken_by_index() {
         let edges = BTreeSet::from([(3, 0), (3, 1), (0, 2), (1, 2)]);
         assert_eq!(order(5, &edges), Ok(vec![3, 0, 1, 2, 4]));
         assert_eq!(order(0, &BTreeSet::new()), Ok(vec![]));
     }
 
     #[test]
-    fn every_circle_is_found_and_what_hangs_on_it_is_not_blamed() {
+    fn every_cycle_is_found_without_the_stages_that_only_read_from_it() {
         let edges = BTreeSet::from([(0, 1), (1, 2), (2, 1), (2, 3), (5, 4), (4, 6), (6, 5)]);
         assert_eq!(order(7, &edges), Err(vec![vec![1, 2], vec![4, 6, 5]]));
     }
 
     #[test]
-    fn the_shortest_circle_is_shown() {
+    fn the_shortest_cycle_is_reported() {
         let edges = BTreeSet::from([(0, 1), (1, 2), (2, 3), (3, 0), (1, 3)]);
         assert_eq!(order(4, &edges), Err(vec![vec![0, 1, 3]]));
     }

@@ -1,29 +1,29 @@
-//! What the command line sets of a pipeline.
+//! Settings of a pipeline on the command line.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{self, Entry, Item, Value};
 use super::nearest::{quoted_list, suggest};
 
-/// What the command line sets: it goes before what the pipeline file says, and is checked like it.
+/// The settings of the command line. They take precedence over the pipeline file, and are checked in the same way.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
     /// The robot whose map frame is the world.
     pub reference: Option<String>,
-    /// Seeds all randomness.
+    /// The seed of all randomness.
     pub seed: Option<u64>,
-    /// Where the map frame of a robot lies, as `ROBOT=X,Y,YAW[,STDDEV[,YAW_STDDEV]]`.
+    /// The poses of robots' map frames, as `ROBOT=X,Y,YAW[,STDDEV[,YAW_STDDEV]]`.
     pub initial_poses: Vec<String>,
     settings: Vec<Setting>,
 }
 
-/// One parameter of one stage.
+/// The value of a parameter of a stage.
 #[derive(Clone, Debug)]
 struct Setting {
     stage: Target,
     parameter: String,
-    /// The setting as it is shown in an error: `STAGE.PARAMETER=VALUE`.
+    /// The setting in errors: `STAGE.PARAMETER=VALUE`.
     text: String,
-    /// Where the value starts in the text.
+    /// The offset of the value in the text.
     value: usize,
 }
 
@@ -33,27 +33,29 @@ enum Target {
     OnlyOfKind(String),
 }
 
-/// A setting that has not the form `STAGE.PARAMETER=VALUE`.
+/// A setting without the form `STAGE.PARAMETER=VALUE`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
     /// No stage, no parameter or no `=`.
-    #[error("`{0}` sets nothing: write STAGE.PARAMETER=VALUE, such as lines.min_length=0.6")]
+    #[error("`{0}` is not a setting: write STAGE.PARAMETER=VALUE, such as lines.min_length=0.6")]
     Form(String),
     /// The value is neither TOML nor a single word.
     #[error("`{value}` is not a TOML value: {problem}; text needs quotes, such as '{setting}=\"...\"'")]
     Value {
-        /// What it was to set: stage and parameter.
+        /// The stage and the parameter.
         setting: String,
         /// The text of the value.
         value: String,
-        /// What the TOML parser says of it.
+        /// The error of the TOML parser.
         problem: String,
     },
 }
 
 impl Overrides {
-    /// Sets a parameter of a stage, from `STAGE.PARAMETER=VALUE`. The value is TOML; a single word may go without
-    /// quotes.
+    /// Adds a setting of the form `STAGE.PARAMETER=VALUE`. The value is TOML; a single word needs no quotes.
+    ///
+    /// # Errors
+    /// The setting has another form, or its value is not TOML.
     pub fn set(&mut self, setting: &str) -> Result<(), SettingError> {
         let form = || SettingError::Form(setting.to_owned());
         let (name, value) = setting.split_once('=').ok_or_else(form)?;
@@ -74,8 +76,8 @@ impl Overrides {
         Ok(())
     }
 
-    /// Sets a parameter of the only stage of a kind, such as the files that the only source of logs reads. When the
-    /// pipeline is loaded it is an error if there is no such stage, or more than one.
+    /// Sets a parameter of the only stage of a kind, such as the files of the only source of logs. Loading the pipeline fails if
+    /// there is no such stage, or more than one.
     pub fn set_for_kind(&mut self, kind: &str, parameter: &str, value: impl Into<toml::Value>) {
         let stage = Target::OnlyOfKind(kind.to_owned());
         self.push(stage, parameter, parameter, &value.into().to_string());
@@ -87,7 +89,7 @@ impl Overrides {
         self.settings.push(setting);
     }
 
-    /// Puts the settings into the stages' tables, as though the file said so.
+    /// Inserts the settings into the tables of the stages, as if they were in the file.
     pub(super) fn apply(&self, stages: &mut [Entry], problems: &mut Problems) {
         for setting in &self.settings {
             let source = problems.add_source("command line", setting.text.as_str());
@@ -107,7 +109,7 @@ impl Overrides {
     }
 }
 
-/// Whether it is a word or a path that needs no quotes to be understood, and no number gone wrong.
+/// Whether a value is an unquoted word or path, and not a malformed number.
 fn is_word(value: &str) -> bool {
     let starts = value.starts_with(|first: char| first.is_alphabetic() || "/._~".contains(first));
     starts && value.chars().all(|char| char.is_alphanumeric() || "/._~-:".contains(char))
@@ -138,7 +140,7 @@ impl Setting {
             Target::OnlyOfKind(kind) => {
                 let names: Vec<&str> = found.iter().map(|&index| stages[index].key.as_str()).collect();
                 let first = names.first().copied().unwrap_or_default();
-                Diagnostic::new(format!("it is not clear which `{kind}` is to get `{parameter}`"))
+                Diagnostic::new(format!("it is ambiguous which `{kind}` gets `{parameter}`"))
                     .at(at, format!("the pipeline has {} of them", names.len()))
                     .note(format!("stages of this kind: {}", quoted_list(&names)))
                     .help(format!("give it in the file, or for each with `--set {first}.{parameter}=...`"))

@@ -1,23 +1,23 @@
-//! What the JSON schema of a stage kind says of its parameters, in words.
+//! Descriptions of the parameters of a stage kind, from its JSON schema.
 
 use crate::stage::StageKind;
 use crate::stage::range::Range;
 use serde_json::{Map, Value};
 
-/// A parameter of a stage kind, as its users see it.
+/// The description of a parameter of a stage kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterInfo {
-    /// Its name; a parameter within a table has the table's name and a dot before its own.
+    /// Its name; a parameter within a table is prefixed by the table's name and a dot.
     pub name: String,
-    /// What it may be, such as `number` or `"blocks" | "window"`.
+    /// Its type in words, such as `number` or `"blocks" | "window"`.
     pub type_text: String,
-    /// Whether it may be left without any value.
+    /// Whether it may have no value.
     pub optional: bool,
-    /// Its value where the pipeline gives none.
+    /// Its default.
     pub default: Option<Value>,
-    /// What it means, from the doc comment of the code.
+    /// Its documentation, from the doc comment in the code.
     pub doc: String,
-    /// Where only some values are allowed: each, with what it means.
+    /// The allowed values with their documentation, if they can be listed.
     pub values: Vec<(String, String)>,
 }
 
@@ -29,8 +29,8 @@ pub fn parameters_of(kind: &StageKind) -> Vec<ParameterInfo> {
     parameters
 }
 
-/// Tables in tables are shown to this depth.
-const DEEPEST: usize = 3;
+/// The maximum depth of nested tables that are described.
+const MAX_DEPTH: usize = 3;
 
 fn collect(root: &Value, table: &Value, prefix: &str, depth: usize, parameters: &mut Vec<ParameterInfo>) {
     for (name, property) in table.get("properties").and_then(Value::as_object).into_iter().flatten() {
@@ -41,13 +41,13 @@ fn collect(root: &Value, table: &Value, prefix: &str, depth: usize, parameters: 
         let default = property.get("default").cloned();
         let type_text = type_text(root, schema);
         parameters.push(ParameterInfo { name: name.clone(), type_text, optional, default, doc, values });
-        if depth < DEEPEST {
+        if depth < MAX_DEPTH {
             collect(root, schema, &format!("{name}."), depth + 1, parameters);
         }
     }
 }
 
-/// A schema behind its references, and whether null is allowed besides.
+/// A schema with resolved references, and whether null is allowed.
 struct Resolved<'a> {
     schema: &'a Value,
     optional: bool,
@@ -55,7 +55,7 @@ struct Resolved<'a> {
 
 fn resolve<'a>(root: &'a Value, mut schema: &'a Value) -> Resolved<'a> {
     let mut optional = false;
-    // A reference to itself must not hang us, and no schema nests this deep.
+    // The limit ends cyclic references; no valid schema nests this deep.
     for _ in 0..16 {
         let target = schema.get("$ref").and_then(Value::as_str).and_then(|path| path.strip_prefix('#'));
         let either = schema.get("anyOf").and_then(Value::as_array);
@@ -77,7 +77,7 @@ fn is_null(schema: &Value) -> bool {
     schema.get("type").and_then(Value::as_str) == Some("null")
 }
 
-/// What a schema allows, in words that can follow "expected": `number`, `list of whole numbers`, `"a" | "b"`.
+/// The type of a schema in words: `number`, `list of whole numbers`, `"a" | "b"`.
 fn type_text(root: &Value, schema: &Value) -> String {
     let schema = resolve(root, schema).schema;
     if let Some(choices) = choices(schema) {
@@ -97,7 +97,7 @@ fn type_text(root: &Value, schema: &Value) -> String {
     }
 }
 
-/// The range of a number, to follow it.
+/// The range of a number, as a suffix of its type.
 fn range(schema: &Value) -> String {
     match Range::of(schema).to_string() {
         limits if limits.is_empty() => limits,
@@ -122,7 +122,7 @@ fn list_text(root: &Value, schema: &Value) -> String {
     }
 }
 
-/// The values that are allowed, with their docs, where they can be counted.
+/// The allowed values with their documentation, if they can be listed.
 fn choices(schema: &Value) -> Option<Vec<(String, String)>> {
     let plain = |schema: &Value| -> Option<Vec<(String, String)>> {
         let values = schema.get("enum")?.as_array()?;
@@ -145,7 +145,7 @@ fn choices(schema: &Value) -> Option<Vec<(String, String)>> {
     Some(values)
 }
 
-/// The doc comment, with a space for a line's end and paragraphs kept.
+/// The doc comment, with line breaks replaced by spaces, except between paragraphs.
 fn description(schema: &Value) -> Option<String> {
     let text = schema.get("description")?.as_str()?;
     let paragraphs = text.split("\n\n").map(|lines| lines.split_whitespace().collect::<Vec<_>>().join(" "));
@@ -153,7 +153,7 @@ fn description(schema: &Value) -> Option<String> {
 }
 
 impl ParameterInfo {
-    /// What is expected, with its article: `a number`, `text`, `"blocks" or "window"`.
+    /// The type with its article, to follow "expected": `a number`, `text`, `"blocks" or "window"`.
     pub(super) fn expected(&self) -> String {
         let choices: Vec<String> = self.values.iter().map(|(value, _)| format!("\"{value}\"")).collect();
         match choices.split_last() {
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn types_are_put_in_words() {
+    fn types_are_described_in_words() {
         let cases = [
             (json!({ "type": "number" }), "number"),
             (json!({ "type": ["number", "null"], "exclusiveMinimum": 0 }), "number above 0"),
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_schema_that_names_itself_comes_to_an_end() {
+    fn a_cyclic_schema_ends() {
         let root = json!({ "properties": { "a": { "$ref": "#/properties/a" }, "b": { "$ref": "#" } } });
         assert!(shown(&root).len() < 100);
     }

@@ -1,4 +1,4 @@
-//! The parameters of a stage, each checked by itself so that every wrong one is shown.
+//! Reading of the parameters of a stage. Each is checked separately, so that all errors are reported.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
@@ -6,7 +6,7 @@ use super::nearest::{nearest, quoted_list};
 use super::parameter_schema::{ParameterInfo, parameters_of};
 use crate::stage::{ParameterError, RESERVED_KEYS, StageKind};
 
-/// Reads the parameters of a stage of `kind` whose name stands at `stage_at`. Wrong ones are reported and left out.
+/// Reads the parameters of a stage of `kind` whose name is at `stage_at`. Wrong ones are reported and omitted.
 pub(super) fn read_parameters(
     kind: &StageKind,
     given: &[&Entry],
@@ -35,19 +35,18 @@ pub(super) fn read_parameters(
             }
         }
         Err(error) => {
-            let title = format!("these parameters do not go together in `{}`", kind.name);
+            let title = format!("this combination of parameters of `{}` is invalid", kind.name);
             problems.push(Diagnostic::new(title).at(stage_at, error.message()));
         }
     }
     table
 }
 
-/// A value of a parameter that its type allows and its meaning does not: `what` says so in general, the error in particular. What
-/// the error says in further lines stands below.
+/// The diagnostic of an invalid value: `what` is its title, the first line of the error its label, and further lines a note.
 pub(super) fn out_of_range(error: &ParameterError, given: &[&Entry], stage_at: &Location, what: &str) -> Diagnostic {
     let title = format!("`{}` {what}", error.field);
     let (problem, more) = error.problem.split_once('\n').unwrap_or((&error.problem, ""));
-    // A nested value is named with dots, and stands at its table.
+    // The name of a nested value has dots; its location is that of the table.
     let field = error.field.split('.').next().unwrap_or_default();
     let diagnostic = match given.iter().find(|entry| entry.key == field) {
         Some(entry) => Diagnostic::new(title).at(&entry.item.at, problem),
@@ -91,7 +90,7 @@ fn wrong_value(kind: &StageKind, entry: &Entry, info: Option<&ParameterInfo>, me
             let near = text.and_then(|text| nearest(text, info.values.iter().map(|(value, _)| value.as_str())));
             let problem = problem.at(&entry.item.at, format!("expected {expected}, found {found}"));
             let problem = problem.help(near.map(|value| format!("did you mean \"{value}\"?")));
-            // A whole number of which the schema does not say why it is wrong is too large.
+            // An integer that the schema allows, but the type does not, is too large.
             let too_large = entry.item.as_integer().is_some_and(|number| number > i64::from(u8::MAX));
             if too_large { problem.note(message) } else { problem }
         }

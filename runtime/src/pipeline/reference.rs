@@ -1,4 +1,4 @@
-//! What an entry of `inputs` names: `STAGE.PORT`, `STAGE` or `STAGE.*`.
+//! Resolution of an entry of `inputs`: `STAGE.PORT`, `STAGE` or `STAGE.*`.
 
 use super::diagnostic::{Diagnostic, Location};
 use super::nearest::{nearest, quoted_list, suggest};
@@ -28,22 +28,22 @@ impl Output {
     }
 }
 
-/// What an entry names.
+/// The outputs that an entry refers to.
 #[derive(Debug, Default)]
 pub(super) struct Resolved {
-    /// The stage that is named, or probably meant.
+    /// The stage of the entry, or the one that was probably meant.
     pub(super) stage: Option<usize>,
-    /// Whether there is no stage of the name, so that the stage is a guess.
+    /// Whether there is no stage of that name, so that the stage is a guess.
     pub(super) guessed: bool,
-    /// Its outputs that are named; none if that went wrong.
+    /// The outputs; none after an error.
     pub(super) outputs: Vec<Output>,
-    /// Whether all outputs of the stage are meant.
+    /// Whether the entry refers to all outputs of the stage.
     pub(super) all: bool,
-    /// What is wrong, unless it has been reported where the stage is.
+    /// The error, unless it has been reported for the stage itself.
     pub(super) problem: Option<Diagnostic>,
 }
 
-/// Looks up what `text`, which stands at `at` in the inputs of stage `reader`, names.
+/// Resolves the entry `text` at `at` in the inputs of stage `reader`.
 pub(super) fn resolve(text: &str, at: &Location, reader: usize, drafts: &[Draft<'_>]) -> Resolved {
     let (name, port) = match text.split_once('.') {
         Some((name, port)) => (name, Some(port)),
@@ -71,7 +71,7 @@ pub(super) fn resolve(text: &str, at: &Location, reader: usize, drafts: &[Draft<
     }
     let problem = match (port, kind.outputs.as_slice()) {
         (_, []) => Diagnostic::new(format!("`{name}` has no outputs")).at(at, format!("it is a `{}`", kind.name)),
-        (None, outputs) => Diagnostic::new(format!("it is not clear which output of `{name}` is meant"))
+        (None, outputs) => Diagnostic::new(format!("it is ambiguous which output of `{name}` is meant"))
             .at(at, format!("`{}` has {} outputs", kind.name, outputs.len()))
             .help(format!("name one: {several}")),
         (Some("*"), _) => {
@@ -107,7 +107,7 @@ fn unknown_stage(name: &str, port: Option<&str>, at: &Location, reader: usize, d
     Resolved { stage, guessed: true, problem: Some(problem), ..Resolved::default() }
 }
 
-/// The outputs of other stages that have the given type, by name.
+/// The names of the outputs of other stages with the given type.
 pub(super) fn outputs_of_type(port_type: PortType, reader: usize, drafts: &[Draft<'_>]) -> Vec<String> {
     let mut names = Vec::new();
     for (stage, draft) in drafts.iter().enumerate().filter(|&(stage, _)| stage != reader) {

@@ -3,7 +3,7 @@
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
 use super::initial_poses::{complete, read_robot, read_typed};
-use super::live::{Mode, read_word};
+use super::live::{Mode, read_keyword};
 use super::overrides::Overrides;
 use super::tag_fields::read_tag_fields;
 use super::values::{entries, text, unknown_key, wrong_type};
@@ -11,16 +11,16 @@ use crate::message::{FixedText, LONGEST_ROBOT_NAME};
 use crate::stage::{InitialPoses, RobotTopics, TfFrames};
 use std::time::Duration;
 
-/// How many samples an input may hold where the pipeline does not say.
+/// The default for the samples that an input can queue.
 pub const DEFAULT_DEPTH: usize = 16;
 
-/// The most samples that an input may hold.
+/// The maximum for the samples that an input can queue.
 pub const MAX_DEPTH: usize = 4096;
 
-/// How long a stage may work on one message where the pipeline does not say.
+/// The default for the maximum time of a stage for one message.
 const DEFAULT_STALL_TIMEOUT: Duration = Duration::from_secs(300);
 
-/// What stands in `[pipeline]` and `[robots]`.
+/// The settings of `[pipeline]` and `[robots]`.
 #[derive(Debug)]
 pub(super) struct Settings {
     pub(super) name: String,
@@ -36,7 +36,7 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// A pipeline called `name` that says nothing of itself.
+    /// The default settings of a pipeline called `name`.
     pub(super) fn new(name: &str) -> Self {
         let robots = RobotTopics::default();
         let stall_timeout = Some(DEFAULT_STALL_TIMEOUT);
@@ -54,7 +54,7 @@ impl Settings {
         }
     }
 
-    /// Takes in the section `[pipeline]`.
+    /// Reads the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
         const KEYS: [&str; 8] =
             ["name", "mode", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
@@ -65,7 +65,7 @@ impl Settings {
                     Some(name) => self.name = name.to_owned(),
                     None => {}
                 },
-                "mode" => self.mode = read_word(key, item, problems).unwrap_or_default(),
+                "mode" => self.mode = read_keyword(key, item, problems).unwrap_or_default(),
                 "reference" => {
                     if let Some(robot) = text(key, item, problems) {
                         check_reference(robot, &item.at, problems);
@@ -94,7 +94,7 @@ impl Settings {
         }
     }
 
-    /// Takes in the section `[robots]`.
+    /// Reads the section `[robots]`.
     pub(super) fn read_robots(&mut self, section: &Item, problems: &mut Problems) {
         const KEYS: [&str; 6] = ["map", "pose", "tags", "topology", "scan", "tf"];
         for Entry { key, key_at, item } in entries(section, "[robots]", problems) {
@@ -127,13 +127,13 @@ impl Settings {
             check_pattern(pattern, &item.at, problems);
             if !pattern.starts_with('/') {
                 let label = "a topic starts with `/`";
-                problems.push(Diagnostic::new("this pattern fits no topic").at(&item.at, label));
+                problems.push(Diagnostic::new("this pattern matches no topic").at(&item.at, label));
             }
             pattern.clone_into(topic);
         }
     }
 
-    /// Takes in what the command line sets.
+    /// Applies the settings of the command line.
     pub(super) fn override_with(&mut self, overrides: &Overrides, problems: &mut Problems) {
         if let Some(robot) = &overrides.reference {
             let text = format!("reference = \"{robot}\"");
@@ -155,7 +155,7 @@ fn read_seconds(item: &Item) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds).ok()
 }
 
-/// TOML has no whole numbers above 2^63, so a larger seed stands in quotes.
+/// Reads a seed. TOML has no integers above 2^63, so a larger seed is a string.
 fn read_seed(item: &Item) -> Option<u64> {
     match item.as_str() {
         Some(text) => text.parse().ok(),
@@ -190,20 +190,18 @@ fn read_frames(item: &Item, key_at: &Location, problems: &mut Problems) -> Optio
     Some(TfFrames { map_frame: map_frame?, base_frame: base_frame? })
 }
 
-/// A robot is told by the one part of the path where `{robot}` stands.
+/// Checks that a pattern contains `{robot}` exactly once, and no other placeholder.
 fn check_pattern(pattern: &str, at: &Location, problems: &mut Problems) {
     let count = pattern.matches("{robot}").count();
     let others = pattern.replace("{robot}", "");
-    let place = others.find(['{', '}']).map(|_| pattern.find('{').unwrap_or_default());
     if count != 1 {
         let label =
             format!("expected `{{robot}}` once, found it {}", if count == 0 { "nowhere" } else { "twice or more" });
-        let problem = Diagnostic::new("this pattern does not tell the robots apart").at(at, label);
-        problems
-            .push(problem.help("write `{robot}` where the name of the robot stands, as in `/{robot}/map`".to_owned()));
-    } else if place.is_some() {
-        let label = "only `{robot}` may stand in braces";
-        problems.push(Diagnostic::new("this pattern holds an unknown placeholder").at(at, label));
+        let problem = Diagnostic::new("this pattern does not distinguish the robots").at(at, label);
+        problems.push(problem.help("write `{robot}` for the name of the robot, as in `/{robot}/map`".to_owned()));
+    } else if others.contains(['{', '}']) {
+        let label = "the only placeholder is `{robot}`";
+        problems.push(Diagnostic::new("this pattern has an unknown placeholder").at(at, label));
     }
 }
 
@@ -215,17 +213,17 @@ fn check_reference(robot: &str, at: &Location, problems: &mut Problems) {
         problems.push(Diagnostic::new("the name of the reference robot is too long").at(at, error.to_string()));
     } else if robot.contains('/') {
         let label = "a robot's name is one part of a path";
-        problems.push(Diagnostic::new("the reference is no robot's name").at(at, label));
+        problems.push(Diagnostic::new("the reference is not a robot's name").at(at, label));
     }
 }
 
-/// The number of samples that an input may hold.
+/// Reads the number of samples that an input can queue.
 pub(super) fn depth(item: &Item, problems: &mut Problems) -> Option<usize> {
     let depth = item.as_integer().and_then(|depth| usize::try_from(depth).ok());
     let depth = depth.filter(|depth| (1..=MAX_DEPTH).contains(depth));
     if depth.is_none() {
         let problem = wrong_type("depth", item, &format!("a whole number from 1 to {MAX_DEPTH}"));
-        problems.push(problem.note("`depth` is how many samples an input may hold before the sender waits"));
+        problems.push(problem.note("`depth` is the number of samples that an input can queue before the sender waits"));
     }
     depth
 }

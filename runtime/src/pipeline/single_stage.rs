@@ -1,4 +1,4 @@
-//! A stage by itself, as a file describes it: for runs of one stage outside of any pipeline.
+//! The description of a single stage in a file, for running it outside of a pipeline.
 
 use super::diagnostic::{Diagnostic, PipelineErrors, Problems};
 use super::document::{self, Entry};
@@ -9,38 +9,38 @@ use super::settings::Settings;
 use super::stage_section::read_stage;
 use crate::stage::{InitialPoses, Registry, RobotTopics, StageKind};
 
-/// A stage, and what a pipeline would tell it. All of it has been checked as that of a pipeline is.
+/// A single stage with its settings, checked in the same way as those of a pipeline.
 #[derive(Clone, Debug)]
 pub struct SingleStage {
-    /// Its name: that of its kind, with `_` for every character that the name of a stage cannot have.
+    /// Its name: that of its kind, with `_` for characters that are not allowed.
     pub name: String,
     /// Its kind.
     pub kind: StageKind,
-    /// Its parameters, those of them that are given.
+    /// The given parameters.
     pub parameters: toml::Table,
-    /// For every output port of the kind: the topic of its messages in a log, with `{robot}` for the robot's name.
+    /// The topic of each output port's messages in a log, with `{robot}` for the robot's name.
     pub topics: Vec<String>,
-    /// How many samples each input may hold before the sender waits.
+    /// The samples that each input can queue before the sender waits.
     pub depth: usize,
-    /// The robot whose map frame is the world; if none is given, the first by name when the first two are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
     pub reference: Option<String>,
-    /// Seeds all randomness.
+    /// The seed of all randomness.
     pub seed: u64,
-    /// Whether small messages are gathered and sent together.
+    /// Whether small messages are sent in batches.
     pub batch: bool,
-    /// How topics are told apart.
+    /// The topic patterns of the robots.
     pub robots: RobotTopics,
-    /// Where the user knows the maps of robots to lie.
+    /// The poses of robots' maps that the user knows.
     pub initial_poses: InitialPoses,
 }
 
 impl SingleStage {
-    /// Reads the sections `[stage]`, `[pipeline]` and `[robots]` of a TOML text; errors call it `source_name`. Sections
-    /// whose names are in `others` are for somebody else, and any other is an error.
+    /// Reads the sections `[stage]`, `[pipeline]` and `[robots]` of a TOML text; errors call it `source_name`. Sections whose
+    /// names are in `others` are ignored, and any other is an error.
     ///
     /// # Errors
     ///
-    /// Everything that is wrong with these sections.
+    /// The sections have errors, all of which are returned.
     pub fn parse(source_name: &str, text: &str, registry: &Registry, others: &[&str]) -> Result<Self, PipelineErrors> {
         let mut problems = Problems::new(source_name, text);
         let Some(sections) = document::parse(text, &mut problems) else { return Err(problems.into_errors()) };
@@ -75,7 +75,7 @@ impl SingleStage {
         let draft = read_stage(&entry, &settings, folder_of(source_name), registry, &mut problems);
         if let Some(inputs) = draft.inputs {
             let problem =
-                Diagnostic::new("a stage by itself names no other stages").at(&inputs.at, "expected no inputs");
+                Diagnostic::new("a single stage has no other stages as inputs").at(&inputs.at, "expected no inputs");
             problems.push(problem);
         }
         match draft.kind {
@@ -96,7 +96,7 @@ impl SingleStage {
     }
 }
 
-/// The name of a stage that is called by its kind.
+/// The name of a stage that is named after its kind.
 fn stage_name(kind: &str) -> String {
     let allowed = |char: char| char.is_ascii_lowercase() || char.is_ascii_digit() || char == '_' || char == '-';
     kind.to_ascii_lowercase().chars().map(|char| if allowed(char) { char } else { '_' }).collect()
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_is_read_with_what_its_pipeline_says() {
+    fn a_stage_is_read_with_the_settings_of_its_pipeline() {
         let stage = parse(TEXT).unwrap();
         assert_eq!((stage.name.as_str(), stage.kind.name, stage.seed), ("line_extractor", "line_extractor", 3));
         assert_eq!(stage.parameters["min_length"].as_float(), Some(0.5));
@@ -122,13 +122,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_shown_in_its_place() {
+    fn errors_are_shown_at_their_locations() {
         for (from, to, says) in [
             ("min_length", "min_lenght", "did you mean `min_length`?"),
             ("line_extractor", "line_extracter", "did you mean `line_extractor`?"),
             ("[inputs]", "[input]", "did you mean `inputs`?"),
             ("[stage]", "[stages]", "there is no section `[stage]`"),
-            ("min_length = 0.5", "inputs = [\"a.b\"]", "names no other stages"),
+            ("min_length = 0.5", "inputs = [\"a.b\"]", "has no other stages as inputs"),
             ("seed = 3", "seed = -3", "at least 0"),
         ] {
             let text = parse(&TEXT.replacen(from, to, 1)).unwrap_err().render(false);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kind_may_have_any_name() {
+    fn characters_that_are_not_allowed_are_replaced() {
         assert_eq!(stage_name("Corner Finder"), "corner_finder");
     }
 }

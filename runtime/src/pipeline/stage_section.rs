@@ -2,16 +2,16 @@
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item, Value};
-use super::live::{Mode, Overflow, Restart, check_is_live, read_overflow, read_word};
+use super::live::{Mode, Overflow, Restart, check_is_live, read_keyword, read_overflow};
 use super::nearest::suggest;
 use super::parameters::{out_of_range, read_parameters};
 use super::settings::{Settings, depth};
 use super::topics::{Topic, read_topics};
 use super::values::text;
-use crate::stage::{ResolvedStage, RESERVED_KEYS, Registry, StageKind};
+use crate::stage::{RESERVED_KEYS, Registry, ResolvedStage, StageKind};
 use std::path::Path;
 
-/// The longest name of a stage, in bytes. It is part of the names of topics and of links.
+/// The maximum length of a stage's name, bytes. It is part of the names of topics and links.
 const LONGEST_NAME: usize = 64;
 
 /// A stage whose inputs are not wired yet.
@@ -19,24 +19,24 @@ const LONGEST_NAME: usize = 64;
 pub(super) struct Draft<'a> {
     /// Its name.
     pub(super) name: &'a str,
-    /// Where its name stands.
+    /// The location of its name.
     pub(super) at: &'a Location,
-    /// Its kind; nothing if that was wrong, which has been reported.
+    /// Its kind; none after an error, which has been reported.
     pub(super) kind: Option<&'a StageKind>,
     pub(super) parameters: toml::Table,
-    /// What stands in `inputs`.
+    /// The value of `inputs`.
     pub(super) inputs: Option<&'a Item>,
-    /// For every output port of the kind its topic.
+    /// The topic of each output port of the kind.
     pub(super) topics: Vec<Topic>,
     pub(super) depth: usize,
-    /// The process it is placed in.
+    /// The process that it runs in.
     pub(super) process: &'a str,
-    /// For every output port of the kind.
+    /// The overflow setting of each output port of the kind.
     pub(super) overflow: Vec<Overflow>,
     pub(super) restart: Restart,
 }
 
-/// Reads a stage of a pipeline with the given settings, whose file lies in `folder`.
+/// Reads a stage of a pipeline with the given settings, whose file is in `folder`.
 pub(super) fn read_stage<'a>(
     stage: &'a Entry,
     settings: &Settings,
@@ -66,7 +66,8 @@ pub(super) fn read_stage<'a>(
     let find = |key: &str| entries.iter().find(|entry| entry.key == key);
     let given: Vec<&Entry> = entries.iter().filter(|entry| !RESERVED_KEYS.contains(&entry.key.as_str())).collect();
     draft.kind = read_kind(stage, find("kind"), registry, problems);
-    let resolved = draft.kind.filter(|kind| kind.is_dynamic()).and_then(|kind| resolve(stage, kind, &given, folder, problems));
+    let resolved =
+        draft.kind.filter(|kind| kind.is_dynamic()).and_then(|kind| resolve(stage, kind, &given, folder, problems));
     if draft.kind.is_some_and(StageKind::is_dynamic) {
         draft.kind = resolved.as_ref().map(|resolved| resolved.kind);
     }
@@ -81,7 +82,8 @@ pub(super) fn read_stage<'a>(
     for key in ["overflow", "restart"] {
         check_is_live(settings.mode, find(key), problems);
     }
-    draft.restart = find("restart").and_then(|entry| read_word("restart", &entry.item, problems)).unwrap_or_default();
+    draft.restart =
+        find("restart").and_then(|entry| read_keyword("restart", &entry.item, problems)).unwrap_or_default();
     if let Some(kind) = draft.kind {
         check_mode(stage, kind, settings.mode, problems);
         draft.overflow = read_overflow(kind, find("overflow").map(|entry| &entry.item), problems);
@@ -92,14 +94,20 @@ pub(super) fn read_stage<'a>(
     draft
 }
 
-/// Finds out what a stage is whose kind leaves that to it. What is wrong is reported.
-fn resolve(stage: &Entry, kind: &StageKind, given: &[&Entry], folder: &Path, problems: &mut Problems) -> Option<ResolvedStage> {
+/// Resolves a stage of a dynamic kind. Errors are reported.
+fn resolve(
+    stage: &Entry,
+    kind: &StageKind,
+    given: &[&Entry],
+    folder: &Path,
+    problems: &mut Problems,
+) -> Option<ResolvedStage> {
     let table = given.iter().map(|entry| (entry.key.clone(), entry.item.to_toml())).collect();
     let resolved = kind.resolve(&table, folder)?;
     resolved.map_err(|error| problems.push(out_of_range(&error, given, &stage.key_at, "cannot be used"))).ok()
 }
 
-/// A kind whose messages come from outside of the run has nobody to wait for in a replay.
+/// Reports a kind for live pipelines in a replay.
 fn check_mode(stage: &Entry, kind: &StageKind, mode: Mode, problems: &mut Problems) {
     if kind.is_live_only() && mode == Mode::Replay {
         let problem = Diagnostic::new(format!("`{}` is for live pipelines", kind.name));
@@ -110,7 +118,7 @@ fn check_mode(stage: &Entry, kind: &StageKind, mode: Mode, problems: &mut Proble
 
 fn check_name(what: &str, name: &str, at: &Location, problems: &mut Problems) {
     let allowed = |char: char| char.is_ascii_lowercase() || char.is_ascii_digit() || char == '_' || char == '-';
-    let problem = Diagnostic::new(format!("`{name}` is no name for a {what}"));
+    let problem = Diagnostic::new(format!("`{name}` is not a valid name for a {what}"));
     if name.len() > LONGEST_NAME {
         let label = format!("expected at most {LONGEST_NAME} characters, found {}", name.len());
         problems.push(Diagnostic::new(format!("the name of this {what} is too long")).at(at, label));

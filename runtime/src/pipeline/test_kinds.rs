@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 type Grid = OccupancyGrid<'static>;
 
-/// Stands for every stage: it does nothing.
+/// A stage that does nothing.
 struct Idle;
 
 impl Source for Idle {

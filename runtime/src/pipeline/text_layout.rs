@@ -1,16 +1,16 @@
-//! Plain text for a terminal.
+//! Text wrapping and tables for a terminal.
 
-/// The width that text is filled to where nothing says how wide a line may be, characters.
+/// The default line width, characters.
 pub const TEXT_WIDTH: usize = 100;
 
-/// The last column of a table is filled beside the others if so much is left for it; otherwise it stands below them.
+/// The minimum width of the last column of a table, characters; with less space it is placed below the others.
 const LEAST_COLUMN: usize = 24;
 
-/// Behind these a word that is longer than a line is broken: they part topics, names of types and lists.
-const JOINTS: [char; 6] = ['/', '_', '-', ',', '.', '='];
+/// The separators after which a word that is longer than a line is broken: those of topics, type names and lists.
+const SEPARATORS: [char; 6] = ['/', '_', '-', ',', '.', '='];
 
-/// Words as lines of at most `width` characters, broken at spaces. A word that is longer than a line is broken behind the last
-/// joint of a topic or a list that fits, or else where the line ends. Paragraphs run into each other.
+/// Wraps text into lines of at most `width` characters, at spaces. A word that is longer than a line is broken after the last
+/// separator that fits, or at the end of the line. Paragraphs are joined.
 pub fn fill(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let mut lines = vec![String::new()];
@@ -37,17 +37,17 @@ pub fn fill(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// Where a word that is longer than a line is broken: the length of its first part in bytes.
+/// The offset at which a word that is longer than a line is broken, bytes.
 fn break_of(word: &str, width: usize) -> usize {
-    let end = word.char_indices().nth(width).map_or(word.len(), |(place, _)| place);
-    match word[..end].rfind(JOINTS) {
-        // All joints are a byte long.
-        Some(joint) => joint + 1,
+    let end = word.char_indices().nth(width).map_or(word.len(), |(offset, _)| offset);
+    match word[..end].rfind(SEPARATORS) {
+        // All separators are one byte long.
+        Some(separator) => separator + 1,
         None => end,
     }
 }
 
-/// Appends `text`, its lines filled with words up to `width` and indented. Paragraphs stay apart.
+/// Appends `text`, wrapped at `width` and indented. Paragraphs stay separate.
 pub(super) fn push_filled(page: &mut String, indent: usize, width: usize, text: &str) {
     for (number, paragraph) in text.split("\n\n").enumerate() {
         if number > 0 {
@@ -59,13 +59,13 @@ pub(super) fn push_filled(page: &mut String, indent: usize, width: usize, text: 
     }
 }
 
-/// Appends rows, each column as wide as its widest cell. The last is filled up to `width`: beside the others or, where too
-/// little is left there, below them.
+/// Appends a table whose columns are as wide as their widest cells. The last column is wrapped at `width`, next to the others
+/// or, with too little space, below them.
 pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width: usize, rows: &[[String; N]]) {
     let widest = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
     let widths: [usize; N] = std::array::from_fn(widest);
     let before = indent + widths.iter().take(N - 1).map(|width| width + 2).sum::<usize>();
-    let is_beside = N == 1 || before + widths[N - 1] <= width || before + LEAST_COLUMN <= width;
+    let fits_beside = N == 1 || before + widths[N - 1] <= width || before + LEAST_COLUMN <= width;
     let mut push = |line: &str| match line.trim_end() {
         "" => {}
         line => {
@@ -77,7 +77,7 @@ pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width
         let cells = row.iter().zip(widths).take(N - 1);
         let mut line: String = cells.map(|(cell, width)| format!("{cell:<width$}  ")).collect();
         let mut at = before;
-        if !is_beside {
+        if !fits_beside {
             for (number, part) in fill_cells(&line, width.saturating_sub(indent + 2)).iter().enumerate() {
                 push(&format!("{:indent$}{part}", "", indent = indent + if number == 0 { 0 } else { 2 }));
             }
@@ -90,7 +90,7 @@ pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width
     }
 }
 
-/// Cells that stand beside each other, as they are if they fit.
+/// Wraps the cells before the last column, if they do not fit.
 fn fill_cells(cells: &str, width: usize) -> Vec<String> {
     match cells.trim_end().chars().count() <= width {
         true => vec![cells.to_owned()],
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_filled_and_paragraphs_stay_apart() {
+    fn text_is_wrapped_and_paragraphs_stay_separate() {
         let mut page = String::new();
         push_filled(&mut page, 2, 100, &format!("{}\n\nlast", "word ".repeat(25)));
         let lines: Vec<&str> = page.lines().collect();
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_longer_than_a_line_is_broken_behind_a_joint_or_where_the_line_ends() {
+    fn a_word_longer_than_a_line_is_broken_after_a_separator_or_at_the_end_of_the_line() {
         assert_eq!(fill("see gridweave_msgs/msg/Alignment", 16), ["see", "gridweave_msgs/", "msg/Alignment"]);
         assert_eq!(fill("abcdefg hi", 3), ["abc", "def", "g", "hi"]);
         assert_eq!(fill("ööööö", 2), ["öö", "öö", "ö"]);
@@ -121,14 +121,14 @@ mod tests {
     }
 
     #[test]
-    fn columns_line_up() {
+    fn columns_are_aligned() {
         let mut page = String::new();
         push_table(&mut page, 1, 100, &[["a".into(), "b".into()], ["long".into(), String::new()]]);
         assert_eq!(page, " a     b\n long\n");
     }
 
     #[test]
-    fn the_last_column_is_filled_beside_the_others_or_below_them() {
+    fn the_last_column_is_wrapped_next_to_the_others_or_below_them() {
         let row = [["map".to_owned(), "nav_msgs/msg/OccupancyGrid".to_owned(), "word ".repeat(12)]];
         let table = |width: usize| {
             let mut page = String::new();

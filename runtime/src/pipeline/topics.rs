@@ -1,4 +1,4 @@
-//! The topics that the outputs of stages get in a log.
+//! The topics of stages' outputs in a log.
 
 use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item};
@@ -7,15 +7,15 @@ use super::values::{entries, text};
 use crate::message::{LONGEST_ROBOT_NAME, LONGEST_TOPIC};
 use crate::stage::{OutputPort, StageKind};
 
-/// The topic of an output port, and where it was given.
+/// The topic of an output port, and its location in the file.
 #[derive(Debug)]
 pub(super) struct Topic {
     pub(super) template: String,
     pub(super) at: Location,
 }
 
-/// The topics of the outputs of a stage that is told none: the port's own, or else `/{robot}/STAGE/PORT`.
-pub(super) fn standard_topics(kind: &StageKind, stage: &str) -> Vec<String> {
+/// The default topics of a stage's outputs: those of the ports, or `/{robot}/STAGE/PORT`.
+pub(super) fn default_topics(kind: &StageKind, stage: &str) -> Vec<String> {
     let topic = |port: &OutputPort| match port.topic {
         Some(own) => own.replace("{stage}", stage),
         None => format!("/{{robot}}/{stage}/{}", port.name),
@@ -23,8 +23,7 @@ pub(super) fn standard_topics(kind: &StageKind, stage: &str) -> Vec<String> {
     kind.outputs.iter().map(topic).collect()
 }
 
-/// The topics of a stage's outputs: the one given in `topics`, or else the port's own, or else
-/// `/{robot}/STAGE/PORT`.
+/// The topics of a stage's outputs: those given in `topics`, or the default ones.
 pub(super) fn read_topics(
     stage: &Entry,
     kind: &StageKind,
@@ -32,8 +31,8 @@ pub(super) fn read_topics(
     problems: &mut Problems,
 ) -> Vec<Topic> {
     let own = |topic: &str| topic.replace("{stage}", &stage.key);
-    let standard = standard_topics(kind, &stage.key).into_iter();
-    let mut topics: Vec<Topic> = standard.map(|template| Topic { template, at: stage.key_at.clone() }).collect();
+    let defaults = default_topics(kind, &stage.key).into_iter();
+    let mut topics: Vec<Topic> = defaults.map(|template| Topic { template, at: stage.key_at.clone() }).collect();
     for Entry { key, key_at, item } in given.map(|item| entries(item, "topics", problems)).unwrap_or_default() {
         let port = kind.outputs.iter().position(|port| port.name == key);
         let Some(topic) = port.and_then(|port| topics.get_mut(port)) else {
@@ -69,13 +68,13 @@ fn check_form(topic: &Topic, problems: &mut Problems) {
     } else if template.ends_with('/') || template.contains("//") {
         "a part of this path is empty"
     } else if parts.iter().any(|part| *part != "{robot}" && part.contains(['{', '}'])) {
-        "only `{robot}` and `{stage}` may stand in braces, and `{robot}` is a part of the path by itself"
+        "the only placeholders are `{robot}` and `{stage}`, and `{robot}` is a whole part of the path"
     } else if robots > 1 || template == "/{robot}" {
         "expected a path with `{robot}` in it at most once, and more than that"
     } else {
         return;
     };
-    problems.push(Diagnostic::new("this is no topic").at(&topic.at, wrong));
+    problems.push(Diagnostic::new("this is not a valid topic").at(&topic.at, wrong));
 }
 
 fn check_length(topic: &Topic, port: &str, problems: &mut Problems) {

@@ -1,4 +1,4 @@
-//! Which output feeds which input.
+//! The wires from outputs to inputs.
 
 use super::binding::{Binder, Input, Mention};
 use super::diagnostic::{Diagnostic, Problems};
@@ -11,9 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The wires of a pipeline.
 #[derive(Debug, Default)]
 pub(super) struct Wiring {
-    /// For every stage its inputs, by port and then in the order of the file.
+    /// The inputs of each stage, by port and then in the order of the file.
     pub(super) inputs: Vec<Vec<Input>>,
-    /// All that is named.
+    /// All references of stages to others.
     pub(super) mentions: Vec<Mention>,
 }
 
@@ -38,7 +38,7 @@ impl Wiring {
     }
 }
 
-/// A stage that has outputs of which none is read works for nothing: a wire was forgotten.
+/// Reports stages whose outputs are all unread: probably a wire was forgotten.
 pub(super) fn check_used(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut Problems) {
     let used: BTreeSet<usize> = wiring.mentions.iter().map(|mention| mention.from).collect();
     for (stage, draft) in drafts.iter().enumerate() {
@@ -52,12 +52,12 @@ pub(super) fn check_used(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut P
             _ => format!("no output of `{}` is used", draft.name),
         };
         let name = if outputs.len() == 1 { draft.name.to_owned() } else { format!("{}.{}", draft.name, first.name) };
-        let problem = Diagnostic::new(title).at(draft.at, "no stage names it in its inputs");
-        problems.push(problem.help(format!("add \"{name}\" to the inputs of another stage, or take this stage out")));
+        let problem = Diagnostic::new(title).at(draft.at, "no stage has it as an input");
+        problems.push(problem.help(format!("add \"{name}\" to the inputs of another stage, or remove this stage")));
     }
 }
 
-/// Two outputs that are read and have one topic would mix in a log.
+/// Reports outputs with the same topic, whose messages would be mixed in a log.
 pub(super) fn check_topics_differ(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut Problems) {
     let mut first: BTreeMap<&str, (&Draft<'_>, &str, &Topic)> = BTreeMap::new();
     for (stage, draft) in drafts.iter().enumerate() {
@@ -73,14 +73,16 @@ pub(super) fn check_topics_differ(drafts: &[Draft<'_>], wiring: &Wiring, problem
             let (name, port, template) = (draft.name, output.name, topic.template.as_str());
             let other_name = other.name;
             let problem =
-                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic"))
-                    .at(&topic.at, format!("`{name}.{port}` goes to `{template}`, where it would mix with the other"));
+                Diagnostic::new(format!("`{other_name}.{other_port}` and `{name}.{port}` have the same topic")).at(
+                    &topic.at,
+                    format!("`{name}.{port}` goes to `{template}`, where its messages would mix with the other's"),
+                );
             let problem = match topic.at == other_topic.at {
                 true => problem,
                 false => problem.context(&other_topic.at, format!("`{other_name}.{other_port}` goes there too")),
             };
             let own = format!("/{name}/{port}");
-            problems.push(problem.help(format!("give one a topic of its own: `topics = {{ {port} = \"{own}\" }}`")));
+            problems.push(problem.help(format!("give one another topic: `topics = {{ {port} = \"{own}\" }}`")));
         }
     }
 }

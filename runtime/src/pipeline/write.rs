@@ -1,18 +1,18 @@
-//! A pipeline as a file in which nothing is left to defaults, overrides or the order of inputs.
+//! Serialization of a pipeline as a file that does not depend on defaults, overrides or the order of inputs.
 
-use super::live::Word;
+use super::live::Keyword;
 use super::{Mode, Pipeline};
 use crate::stage::{InitialPose, InitialPoses, RobotTopics, TagFields};
 use toml::{Table, Value};
 
 impl Pipeline {
-    /// The text of a pipeline file that gives this same pipeline without any overrides: to hand it to another process,
-    /// or to keep it with its results.
+    /// The text of a pipeline file that loads as the same pipeline without any overrides: for passing it to another process, or
+    /// storing it with the results.
     pub fn to_toml(&self) -> String {
         let seed = i64::try_from(self.seed).map_or_else(|_| Value::from(self.seed.to_string()), Value::from);
         let mut pipeline = Table::from_iter([
             ("name".to_owned(), Value::from(self.name.as_str())),
-            ("mode".into(), self.mode.word().into()),
+            ("mode".into(), self.mode.keyword().into()),
             ("seed".into(), seed),
             ("batch".into(), self.batch.into()),
             ("stall_timeout".into(), self.stall_timeout.map_or(0.0, |timeout| timeout.as_secs_f64()).into()),
@@ -40,9 +40,9 @@ impl Pipeline {
         table.insert("depth".into(), Value::Integer(i64::try_from(stage.depth).unwrap_or(i64::MAX)));
         table.insert("process".into(), stage.process.as_str().into());
         if self.mode == Mode::Live {
-            table.insert("restart".into(), stage.restart.word().into());
+            table.insert("restart".into(), stage.restart.keyword().into());
             let overflow = stage.kind.outputs.iter().zip(&stage.overflow);
-            let overflow = Table::from_iter(overflow.map(|(port, it)| (port.name.to_owned(), it.word().into())));
+            let overflow = Table::from_iter(overflow.map(|(port, it)| (port.name.to_owned(), it.keyword().into())));
             table.insert("overflow".into(), overflow.into());
         }
         let mut inputs = Table::new();

@@ -41,7 +41,7 @@ impl Python {
             assert!(*first.get_or_insert_with(|| bytes.clone()) == bytes, "{engine}");
         }
         let summary = fs::read_to_string(self.file("summary.json")).unwrap();
-        assert!(!summary.contains("without a definition"), "{summary}");
+        assert!(!summary.contains("has no definition"), "{summary}");
         let ended = self.gridweave(&["cat", "out.mcap", "--topics", "/rooms"]);
         ended.assert(0, &["\"rooms_msgs/msg/Rooms\"", "\"hall 1\"", "\"hall 3\"", "\"corners\""]);
         self.gridweave(&["cat", "out.mcap", "--topics", "/{robot}/finder/room"]).assert(0, &["\"hall\"", "\"size\""]);
@@ -53,7 +53,7 @@ impl Python {
         fs::write(self.file("other_rooms.py"), other).unwrap();
         fs::write(self.file("wrong.toml"), OWN_TYPES.replacen("rooms.py:Gatherer", "other_rooms.py:Gatherer", 1))
             .unwrap();
-        let words = ["wrong.toml", "mean two types by one name", "which `gatherer` defines otherwise"];
+        let words = ["wrong.toml", "have two types of the same name", "which `gatherer` defines differently"];
         self.gridweave(&["check", "wrong.toml"]).assert(2, &words);
         fs::write(self.file("bad.py"), "from gridweave.msg import define\n\ndefine(\"a/msg/B\", \"c/D e\")\n").unwrap();
         fs::write(self.file("wrong.toml"), OWN_TYPES.replacen("rooms.py:Gatherer", "bad.py", 1)).unwrap();

@@ -1,4 +1,4 @@
-//! Every error is shown where it is, with what was expected and the nearest right name.
+//! Every error is shown at its location, with what was expected and the most similar valid name.
 
 use super::*;
 use std::path::Path;
@@ -9,7 +9,7 @@ fn the_valid_pipeline_has_no_errors() {
 }
 
 #[test]
-fn text_that_is_no_toml_is_underlined_where_it_breaks() {
+fn a_toml_syntax_error_is_underlined() {
     assert_error(("seed = 7", "seed = 7 8"), "5:8", "7 8", &["this is not TOML"]);
     let errors = parse("a = \nb = \"x\n[c]\nd = 1\nd = 2\n").unwrap_err();
     let places: Vec<String> = shown(&errors).into_iter().map(|error| error.place).collect();
@@ -17,7 +17,7 @@ fn text_that_is_no_toml_is_underlined_where_it_breaks() {
 }
 
 #[test]
-fn an_unknown_section_or_key_names_the_nearest() {
+fn for_an_unknown_section_or_key_the_most_similar_is_suggested() {
     assert_error(("[robots]", "[robot]"), "7:2", "robot", &["unknown section `robot`", "did you mean `robots`?"]);
     assert_error(("reference", "referense"), "4:1", "referense", &["`[pipeline]`", "did you mean `reference`?"]);
     assert_error(("\nmap = ", "\nmaps = "), "8:1", "maps", &["`[robots]`", "did you mean `map`?"]);
@@ -37,7 +37,7 @@ fn limits_of_processes_are_numbers_that_are_not_negative() {
 }
 
 #[test]
-fn an_unknown_kind_names_the_nearest_and_its_stage_is_not_blamed_for_more() {
+fn for_an_unknown_kind_the_most_similar_is_suggested_without_further_errors() {
     let says = ["unknown kind of stage `line_extracter`", "did you mean `line_extractor`?"];
     assert_error(("\"line_extractor\"", "\"line_extracter\""), "15:8", "\"line_extracter\"", &says);
     let says = ["there are: `aligner`, `fuser`, `line_extractor`, `mcap_sink`, `mcap_source`"];
@@ -46,7 +46,7 @@ fn an_unknown_kind_names_the_nearest_and_its_stage_is_not_blamed_for_more() {
 }
 
 #[test]
-fn an_unknown_parameter_names_the_nearest() {
+fn for_an_unknown_parameter_the_most_similar_is_suggested() {
     let says = ["`line_extractor` has no such parameter", "did you mean `min_length`?"];
     assert_error(("min_length", "min_lenght"), "17:1", "min_lenght", &says);
     assert_error(("min_length", "dept"), "17:1", "dept", &["did you mean `depth`?"]);
@@ -55,7 +55,7 @@ fn an_unknown_parameter_names_the_nearest() {
 }
 
 #[test]
-fn a_value_of_the_wrong_type_says_what_was_expected() {
+fn the_error_of_a_wrong_type_states_what_was_expected() {
     let cases = [
         ("min_length = \"long\"", "14", "\"long\"", "expected a number above 0, found text"),
         ("iterations = 1.5", "14", "1.5", "expected a whole number of at least 1, found a number"),
@@ -100,7 +100,7 @@ fn a_value_out_of_range_is_underlined() {
 }
 
 #[test]
-fn an_unknown_stage_or_port_names_the_nearest() {
+fn for_an_unknown_stage_or_port_the_most_similar_is_suggested() {
     let says = ["unknown stage `lgo`", "did you mean `log.map`?"];
     assert_error(("[\"log.map\"]", "[\"lgo.map\"]"), "16:12", "lgo", &says);
     let says = ["`log` has no output `mop`", "did you mean `map`?"];
@@ -112,7 +112,7 @@ fn an_unknown_stage_or_port_names_the_nearest() {
 
 #[test]
 fn a_stage_with_several_outputs_needs_its_port_named() {
-    let says = ["not clear which output of `log`", "name one: `log.map`, `log.pose`, `log.other`, or `log.*`"];
+    let says = ["ambiguous which output of `log`", "name one: `log.map`, `log.pose`, `log.other`, or `log.*`"];
     assert_error(("[\"log.map\"]", "[\"log\"]"), "16:11", "\"log\"", &says);
     assert_error(
         ("\"fuse.map\"", "\"fuse.map\", \"fuse.map\""),
@@ -123,7 +123,7 @@ fn a_stage_with_several_outputs_needs_its_port_named() {
 }
 
 #[test]
-fn a_type_that_does_not_fit_is_shown_beside_the_one_expected() {
+fn a_wrong_type_is_shown_with_the_expected_one() {
     let says = [
         "`log.pose` does not fit the input `map` of `lines`",
         "expected nav_msgs/msg/OccupancyGrid, found geometry_msgs/msg/PoseStamped",
@@ -132,7 +132,7 @@ fn a_type_that_does_not_fit_is_shown_beside_the_one_expected() {
     assert_error(("[\"log.map\"]", "[\"log.pose\"]"), "16:11", "\"log.pose\"", &says);
     let says = ["`lines.segments` does not fit the input `map` of `fuse`", "found gridweave_msgs/msg/Segments"];
     assert_error(("{ map = \"log.map\"", "{ map = \"lines\""), "25:18", "\"lines\"", &says);
-    let says = ["`log.other` fits no input of `align`", "it gives any type", "`segments` takes gridweave_msgs"];
+    let says = ["`log.other` fits no input of `align`", "its type is any type", "`segments` takes gridweave_msgs"];
     assert_error(
         ("[\"log.map\", \"lines\"]", "[\"log.other\", \"lines\", \"log.map\"]"),
         "21:11",
@@ -142,7 +142,7 @@ fn a_type_that_does_not_fit_is_shown_beside_the_one_expected() {
 }
 
 #[test]
-fn a_port_that_takes_one_output_is_not_given_two() {
+fn two_outputs_for_a_port_that_takes_one_are_an_error() {
     let says = ["the input `map` of `align` takes one output", "`fuse.map` is one too many", "fed by `log.map`"];
     let text = changed("\"lines\"]", "\"lines\", \"fuse.map\"]").replace("\"align.alignment\"", "");
     let errors = parse(&text).unwrap_err().render(false);
@@ -165,9 +165,9 @@ fn a_stage_cannot_be_wired_to_itself() {
 }
 
 #[test]
-fn a_circle_is_shown_with_its_whole_path() {
+fn a_cycle_is_shown_with_its_whole_path() {
     let says = [
-        "these stages feed each other in a circle: align -> fuse -> lines -> align",
+        "these stages feed each other in a cycle: align -> fuse -> lines -> align",
         "`fuse` reads `align`",
         "`lines` reads `fuse`",
         "`align` reads `lines`",
@@ -176,7 +176,7 @@ fn a_circle_is_shown_with_its_whole_path() {
 }
 
 #[test]
-fn an_input_that_is_not_wired_names_what_could_feed_it() {
+fn for_an_unwired_input_the_outputs_that_could_feed_it_are_listed() {
     let says = [
         "the input `segments` of `align` is not wired",
         "expected an output of type gridweave_msgs/msg/Segments",
@@ -185,7 +185,7 @@ fn an_input_that_is_not_wired_names_what_could_feed_it() {
     assert_error(("[\"log.map\", \"lines\"]", "[\"log.map\"]"), "21:10", "[\"log.map\"]", &says);
     assert_error(("inputs = [\"log.map\"]\n", ""), "14:9", "lines", &["the input `map` of `lines` is not wired"]);
     let error = only_error("[stages.out]\nkind = \"mcap_sink\"\n");
-    assert!(error.text.contains("no stage here gives that; add one of kind `mcap_source`"), "{}", error.text);
+    assert!(error.text.contains("no stage here has such an output; add one of kind `mcap_source`"), "{}", error.text);
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn inputs_are_a_list_or_a_table() {
 }
 
 #[test]
-fn a_stage_whose_outputs_nobody_reads_was_forgotten() {
+fn a_stage_without_readers_is_an_error() {
     let spare = "[stages.spare]\nkind = \"line_extractor\"\ninputs = [\"log.map\"]\n\n[stages.out]";
     let says = ["the output of `spare` is not used", "add \"spare\" to the inputs of another stage"];
     assert_error(("[stages.out]", spare), "28:9", "spare", &says);
@@ -228,8 +228,8 @@ fn a_topic_is_a_path_of_bounded_length() {
     let cases = [
         ("walls", "a topic starts with `/`"),
         ("/walls/", "a part of this path is empty"),
-        ("/r_{robot}/walls", "`{robot}` is a part of the path by itself"),
-        ("/{robot}/{name}", "only `{robot}` and `{stage}` may stand in braces"),
+        ("/r_{robot}/walls", "`{robot}` is a whole part of the path"),
+        ("/{robot}/{name}", "the only placeholders are `{robot}` and `{stage}`"),
         ("/{robot}/a/{robot}", "at most once"),
         ("/{robot}", "and more than that"),
         (&long, "up to 129 bytes"),
@@ -278,7 +278,7 @@ fn the_reference_is_the_name_of_a_robot() {
 }
 
 #[test]
-fn an_initial_pose_has_a_place_and_a_direction() {
+fn an_initial_pose_has_a_position_and_a_yaw() {
     let with = |initial: &str| format!("[robots.robot2]\ninitial = {initial}\n\n[stages.log]");
     let errors = |initial: &str, place: &str, underlined: &str, says: &[&str]| {
         assert_error(("[stages.log]", &with(initial)), place, underlined, says);
@@ -297,13 +297,13 @@ fn an_initial_pose_has_a_place_and_a_direction() {
 }
 
 #[test]
-fn a_pattern_tells_robots_apart() {
+fn a_pattern_has_one_placeholder_for_the_robot() {
     let topic = "\"/{robot}/map\"\n";
     assert_error((topic, "\"/map\"\n"), "8:7", "\"/map\"", &["expected `{robot}` once, found it nowhere"]);
     let twice = "\"/{robot}/{robot}\"";
     assert_error((topic, &format!("{twice}\n")), "8:7", twice, &["found it twice or more"]);
     let other = "\"/{robot}/{id}\"";
-    assert_error((topic, &format!("{other}\n")), "8:7", other, &["only `{robot}` may stand in braces"]);
+    assert_error((topic, &format!("{other}\n")), "8:7", other, &["the only placeholder is `{robot}`"]);
     assert_error((topic, "\"{robot}/map\"\n"), "8:7", "\"{robot}/map\"", &["a topic starts with `/`"]);
     let frames = format!("{topic}tf = {{ map_frame = \"{{robot}}/map\" }}\n");
     assert_error((topic, &frames), "9:1", "tf", &["`tf` has no `base_frame`", "base_frame = \"{robot}/base_link\""]);

@@ -1,8 +1,8 @@
 //! Tests of pipeline files as a whole.
 
+mod diagrams;
 mod errors;
 mod overrides;
-mod pictures;
 mod properties;
 mod wires;
 
@@ -13,20 +13,20 @@ fn parse(text: &str) -> Result<Pipeline, PipelineErrors> {
     Pipeline::parse("walls.toml", text, &registry(), &Overrides::default())
 }
 
-/// The valid pipeline with one text put in the place of another.
+/// The valid pipeline with one text replaced by another.
 fn changed(from: &str, to: &str) -> String {
     assert!(VALID.contains(from), "{from} is not in the valid pipeline");
     VALID.replacen(from, to, 1)
 }
 
-/// An error as it is shown.
+/// A rendered error.
 struct Shown {
     title: String,
-    /// `LINE:COLUMN` of its place.
+    /// `LINE:COLUMN` of its location.
     place: String,
-    /// What is underlined with `^`.
+    /// The text underlined with `^`.
     underlined: String,
-    /// All of it.
+    /// The whole rendered text.
     text: String,
 }
 
@@ -61,7 +61,7 @@ fn only_error(text: &str) -> Shown {
     shown(&errors).remove(0)
 }
 
-/// Checks the one error that a change to the valid pipeline makes: its place, what is underlined, and what it says.
+/// Checks the one error that a change to the valid pipeline causes: its location, the underlined text, and its wording.
 #[track_caller]
 fn assert_error((from, to): (&str, &str), place: &str, underlined: &str, says: &[&str]) {
     let error = only_error(&changed(from, to));

@@ -75,7 +75,7 @@ fn a_kind_that_no_stage_or_more_than_one_has_cannot_be_set() {
     let two = two.replace("[\"log.*\"", "[\"log.*\", \"log2.*\"");
     let parse = |text: &str| Pipeline::parse("walls.toml", text, &registry(), &overrides);
     let errors = parse(&two).unwrap_err().to_string();
-    assert!(errors.contains("it is not clear which `mcap_source` is to get `files`"), "{errors}");
+    assert!(errors.contains("it is ambiguous which `mcap_source` gets `files`"), "{errors}");
     assert!(
         errors.contains("stages of this kind: `log`, `log2`") && errors.contains("`--set log.files=...`"),
         "{errors}"

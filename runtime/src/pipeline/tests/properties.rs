@@ -1,17 +1,17 @@
-//! What holds for every file.
+//! Properties of every file.
 
 use super::*;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
-/// The valid pipeline cut into its head and its stages.
+/// The valid pipeline, split into its head and its stages.
 fn sections() -> (String, Vec<String>) {
     let mut parts = VALID.split("[stages.").map(str::to_owned);
     let head = parts.next().unwrap();
     (head, parts.map(|part| format!("[stages.{part}")).collect())
 }
 
-/// One change of a text: what is taken out, and what is put in.
+/// A change of a text: a removed part and its replacement.
 #[derive(Clone, Debug)]
 struct Mutation {
     at: Index,
@@ -72,7 +72,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_it_panic(mutations in prop::collection::vec(mutation(), 1..6)) {
+    fn no_text_causes_a_panic(mutations in prop::collection::vec(mutation(), 1..6)) {
         let text = mutations.iter().fold(VALID.to_owned(), |text, mutation| apply(&text, mutation));
         match parse(&text) {
             Ok(pipeline) => prop_assert!(!pipeline.to_text(100).is_empty()),
@@ -81,7 +81,7 @@ proptest! {
     }
 
     #[test]
-    fn any_text_at_all_is_answered(text in any::<String>(), setting in any::<String>()) {
+    fn any_text_gives_a_pipeline_or_errors(text in any::<String>(), setting in any::<String>()) {
         let mut overrides = Overrides::default();
         let _ = overrides.set(&setting);
         let _ = overrides.set(&format!("log.files={setting}"));
@@ -91,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn any_setting_is_answered(setting in any::<String>()) {
+    fn any_setting_gives_a_pipeline_or_errors(setting in any::<String>()) {
         let mut overrides = Overrides::default();
         let _ = overrides.set(&format!("log.files={setting}"));
         let _ = overrides.set(&format!("lines.{setting}"));

@@ -1,4 +1,4 @@
-//! Which output feeds which input.
+//! The assignment of outputs to inputs.
 
 use super::*;
 

@@ -8,8 +8,8 @@ use super::{Pipeline, StageSpec, Wire};
 use serde_json::Value;
 
 impl Pipeline {
-    /// A list of the stages in their order, in lines of at most `width` characters where they can be broken: what each is, where
-    /// its inputs come from, and which of its parameters are not the default ones.
+    /// A list of the stages in order: kind, inputs, and parameters that differ from their defaults. Lines are wrapped at
+    /// `width` characters where possible.
     pub fn to_text(&self, width: usize) -> String {
         let count = match self.stages.len() {
             1 => "1 stage".to_owned(),
@@ -53,7 +53,7 @@ impl Pipeline {
 
     /// A digraph in the language of Graphviz.
     pub fn to_dot(&self) -> String {
-        // A name may come from a file's name, and the quotes must hold.
+        // The name may be that of a file, so it must be escaped.
         let name = self.name.replace('\\', "\\\\").replace('"', "\\\"");
         let mut page = format!("digraph \"{name}\" {{\n    rankdir=LR;\n    node [shape=box];\n");
         for stage in &self.stages {
@@ -68,7 +68,7 @@ impl Pipeline {
         page
     }
 
-    /// All wires, each with the stage it leads to.
+    /// All wires, each with the index of the reading stage.
     fn wires(&self) -> impl Iterator<Item = (usize, &Wire)> {
         self.stages.iter().enumerate().flat_map(|(index, stage)| stage.inputs.iter().map(move |wire| (index, wire)))
     }
@@ -92,7 +92,7 @@ impl Pipeline {
     }
 }
 
-/// The parameters that are given and are not the default ones, as in the pipeline file.
+/// The given parameters that differ from their defaults, as in the pipeline file.
 fn changed_parameters(stage: &StageSpec) -> impl Iterator<Item = String> {
     let known = parameters_of(&stage.kind);
     stage.parameters.iter().filter_map(move |(name, value)| {
@@ -103,7 +103,7 @@ fn changed_parameters(stage: &StageSpec) -> impl Iterator<Item = String> {
     })
 }
 
-/// Whether two values are equal, whole numbers being equal to numbers without a fraction.
+/// Whether two values are equal; an integer can equal a float.
 fn same_value(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Number(a), Value::Number(b)) => a == b || a.as_f64() == b.as_f64(),
