@@ -1,5 +1,5 @@
-//! Hypotheses from tags: where each robot has seen tags, which of them two robots have in common, and, from those and the
-//! direction of the walls, a first estimate of the relative pose of two maps.
+//! Hypotheses from tags: positions of tags in each robot's map, the tags that two robots have in common, and, from
+//! those and the direction of the walls, a first guess of the relative pose of two maps.
 
 pub mod line_extractor;
 pub mod quadrant_classifier;
@@ -8,7 +8,7 @@ pub mod tag_localizer;
 
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![line_extractor::kind(), quadrant_classifier::kind(), tag_filter::kind(), tag_localizer::kind()]
 }

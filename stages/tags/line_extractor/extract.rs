@@ -1,4 +1,4 @@
-//! From an occupancy grid to its straight walls: section 4.1.1 of Tsardoulias et al.
+//! Extracts the straight walls of an occupancy grid: section 4.1.1 of Tsardoulias et al.
 
 use super::faces::{Offset, fit_faces};
 use super::line::{Line, Stretch};
@@ -15,18 +15,17 @@ use gridweave_runtime::ros::Segment;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// How often a segment is fitted to all cells near it.
+/// Number of fits of a segment to all cells near it.
 const FINAL_FITS: usize = 3;
-/// How often a segment is fitted to its faces, at most, and when it is good enough: its ends have moved by less than this,
-/// in cells.
+/// Most fits of a segment to its faces, and the motion of its ends, in cells, below which it has converged.
 const FACE_FITS: usize = 4;
 const ENOUGH: f64 = 0.25;
-/// Where the surroundings of a wall are cut off, it is left out of the fit if at least this share of the wall is left.
+/// Least share of a wall away from the border of the grid for the rest to be left out of the fit.
 const LEAST_INSIDE: f64 = 0.5;
-/// The last fits leave out cells farther from the line than this many standard deviations: what stands at a wall.
+/// Outlier bound of the last fits, standard deviations from the line: what stands at a wall is left out.
 const OUTLIER_DEVIATIONS: f64 = 2.5;
 
-/// The straight walls of a grid, the best supported first, in metres of the map frame.
+/// Extracts the straight walls of a grid, the best supported first, in metres of the map frame.
 ///
 /// The same grid, parameters and seed give the same walls.
 pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, seed: u64) -> Vec<Segment> {
@@ -57,7 +56,7 @@ pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, s
     segments
 }
 
-/// `count` of the points, drawn at random, or all if there are no more.
+/// A random sample of `count` points, or all if there are no more.
 fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Point2> {
     let mut sample = points.to_vec();
     if count < sample.len() {
@@ -70,7 +69,7 @@ fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Poi
     sample
 }
 
-/// Fits a wall to all cells near it. Gives the stretch and the number of cells.
+/// Fits a wall to all cells near it. Returns the stretch and the number of cells.
 fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
     let stretch = match fit {
         Fit::Faces => fit_to_faces(index, wall.stretch, scale),
@@ -81,11 +80,11 @@ fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option
     (count > 0).then_some((stretch, count))
 }
 
-/// The part of a stretch that tells its direction.
+/// The part of a stretch that determines its direction.
 ///
-/// Where walls meet, cells of the other wall lie on one side of this one and would turn it. And where a thick wall leaves
-/// the grid, a wedge of it is left, whose middle runs along half way between the wall and the border: it would turn the
-/// wall towards the border.
+/// Where walls meet, cells of the other wall are on one side of this one and would turn it. And where a thick wall
+/// leaves the grid, a wedge of it remains, whose centre line is half way between the wall and the border: it would
+/// turn the wall towards the border.
 fn inner(index: &PointIndex, stretch: &Stretch, scale: &Scale) -> Stretch {
     let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
     let inner = Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin };
@@ -126,7 +125,7 @@ fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scal
         visit_along(index, &inner(index, &stretch, scale), reach, |point| near.push(point));
         let cells = near.iter().copied();
         let Some(fitted) = fit_stretch(fit, &stretch.line, cells.clone()) else { break };
-        // The cells at the ends took no part in the fit, but they belong to the wall.
+        // The cells at the ends were not fitted, but they belong to the wall.
         let [first, last] = stretch.ends();
         stretch = Stretch::between_farthest(fitted.line, cells.clone().chain([first, last]))?;
         if fit == Fit::Ends {
@@ -171,7 +170,7 @@ mod tests {
 
     const GEOMETRY: (usize, usize, f64) = (240, 240, 0.05);
 
-    /// A room of 8 m by 5 m with walls of single cells, turned by `angle`, in a grid with an origin of its own.
+    /// A room of 8 m by 5 m with walls of single cells, turned by `angle`, in a grid with its own origin.
     fn room(angle: f64) -> (GridGeometry, Vec<i8>) {
         let (width, height, resolution) = GEOMETRY;
         let geometry = GridGeometry { width, height, resolution, origin: pose(-3.0, 7.0, 0.4) };
@@ -189,7 +188,7 @@ mod tests {
         (geometry, cells)
     }
 
-    /// A solid wall of 7.5 cells across a grid of 700 x 600 cells of 0.02 m, through a place in cells.
+    /// A solid wall of 7.5 cells across a grid of 700 x 600 cells of 0.02 m, through a point in cells.
     fn thick_wall(angle: f64, through: [f64; 2]) -> (GridGeometry, Vec<i8>) {
         let (width, height) = (700, 600);
         let across = |cell: usize| {

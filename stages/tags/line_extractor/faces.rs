@@ -1,34 +1,34 @@
-//! The direction of one wall from all cells near it, be it a line of cells, a solid band, or two faces side by side.
+//! Direction of one wall from all cells near it: a line of cells, a solid band, or two parallel faces.
 //!
-//! One least squares line through everything near a wall is turned by what is seen of one face only, and by what stands
-//! at the wall. So the wall is first turned until its profile, the histogram of the cells' distances from its line, is
-//! sharpest: the sum of its squares is greatest when each face falls into few bins. The profile is then cut at its
-//! valleys into faces, and all faces are fitted at once: one slope for all and a place for each, where cells far from
-//! their face count little or nothing (Tukey's biweight).
+//! A least squares line through all cells near a wall is turned by partly seen faces, and by what stands at the wall.
+//! So the wall is first turned until its profile, the histogram of the cells' distances from its line, is sharpest:
+//! the sum of its squares is greatest when each face is in few bins. The profile is then split at its valleys into
+//! faces, and all faces are fitted at once: one slope for all and an offset for each, where cells far from their face
+//! have little or no weight (Tukey's biweight).
 
-/// Bins of the profile in a cell.
+/// Bins of the profile per cell.
 const BINS_A_CELL: f64 = 2.0;
-/// Bins to either side that no cell falls into, for smoothing.
+/// Empty bins to either side, for smoothing.
 const MARGIN: usize = 5;
-/// A valley parts two faces if it is at most this share of the lower of the two peaks beside it.
+/// Largest height of a valley between two faces, as a share of the lower of the two peaks beside it.
 const VALLEY: f64 = 0.6;
-/// What holds less than this share of the cells of the greatest face is no face, but what stands at the wall.
+/// Least share of the cells of the greatest face for another face; less is what stands at the wall.
 const LEAST_SHARE: f64 = 0.2;
-/// The least standard deviation of the cells of a face, in cells. A straight line of single cells has 0.3, and the cells of
-/// walls that begin a cell beside it do not count.
+/// Least standard deviation of the cells of a face, in cells. A straight line of single cells has 0.3, and the cells
+/// of walls that begin a cell beside it do not count.
 const LEAST_DEVIATION: f64 = 0.33;
-/// Cells farther from their face than this many standard deviations do not count.
+/// Outlier bound of cells, standard deviations from their face.
 const OUTLIER_DEVIATIONS: f64 = 3.0;
-/// What weighting by the biweight takes from the variance of a normal distribution.
+/// Variance of a normal distribution that is left after weighting by the biweight.
 const VARIANCE_LEFT: f64 = 0.6364;
-/// How often all faces are fitted.
+/// Number of fits of all faces.
 const FITS: usize = 3;
-/// Slopes tried, at most, to either side.
+/// Most slopes tried to either side.
 const MOST_TURNS: f64 = 12.0;
-/// About as many cells are looked at to find the sharpest profile.
+/// Approximate number of cells by which the sharpest profile is found.
 const SAMPLE: usize = 150;
 
-/// A cell as a wall sees it.
+/// A cell in the coordinates of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Offset {
     /// Along the wall, from its middle, in cells.
@@ -37,18 +37,18 @@ pub(super) struct Offset {
     pub(super) across: f64,
 }
 
-/// How a wall's line is put right.
+/// Correction of a wall's line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Correction {
-    /// The tangent of the angle to turn by, about the wall's middle.
+    /// Tangent of the angle to turn by, about the wall's middle.
     pub(super) slope: f64,
-    /// How far to move across, in cells.
+    /// Offset across, in cells.
     pub(super) across: f64,
 }
 
-/// Fits all faces of a wall at once. The cells lie within `half_length` along and `reach` across, in cells.
+/// Fits all faces of a wall at once. The cells are within `half_length` along and `reach` across, in cells.
 ///
-/// `None` if they tell no direction.
+/// `None` if they do not determine a direction.
 pub(super) fn fit_faces(cells: &[Offset], half_length: f64, reach: f64) -> Option<Correction> {
     let (mut slope, profile) = sharpest(cells, half_length, reach);
     let mut faces: Vec<Face> = profile.faces();
@@ -88,7 +88,7 @@ fn sharpest(cells: &[Offset], half_length: f64, reach: f64) -> (f64, Profile) {
     let stride = cells.len().div_ceil(SAMPLE).max(1);
     let mut profile = Profile::new(reach + turns + 1.0);
     let mut best = (0.0, f64::NEG_INFINITY);
-    // From the middle outwards: of slopes that are alike the least is taken.
+    // From the middle outwards: of equal slopes the least is taken.
     for step in 0..=2 * turns as i32 {
         let slope = turn * f64::from(if step % 2 == 0 { step / 2 } else { -(step + 1) / 2 });
         profile.fill(cells.iter().step_by(stride), slope);
@@ -101,9 +101,9 @@ fn sharpest(cells: &[Offset], half_length: f64, reach: f64) -> (f64, Profile) {
     (best.0, profile)
 }
 
-/// How many cells lie at which distance from a line.
+/// Histogram of the distances of cells from a line.
 struct Profile {
-    /// The distance at which the first bin begins, and the counts.
+    /// Distance at which the first bin begins, and the counts.
     low: f64,
     bins: Vec<f64>,
     smooth: Vec<f64>,
@@ -116,8 +116,8 @@ impl Profile {
         Self { low: -(bins as f64) / (2.0 * BINS_A_CELL), bins: vec![0.0; bins], smooth: vec![0.0; bins] }
     }
 
-    /// Counts the cells' distances from a line of the given slope. The counts are smoothed, so that rows of cells that a
-    /// line crosses do not look like faces.
+    /// Counts the cells' distances from a line of the given slope. The counts are smoothed, so that rows of cells
+    /// that a line crosses do not look like faces.
     fn fill<'a>(&mut self, cells: impl Iterator<Item = &'a Offset>, slope: f64) {
         self.bins.fill(0.0);
         let last = self.bins.len() - MARGIN - 1;
@@ -135,7 +135,7 @@ impl Profile {
         self.bins.iter().map(|count| count * count).sum()
     }
 
-    /// Cuts the profile at its valleys, and leaves out what is too small to be a face.
+    /// Splits the profile at its valleys, and leaves out what is too small to be a face.
     fn faces(&self) -> Vec<Face> {
         let mut faces = Vec::new();
         // The greatest count since the last border, and the bin of the least count since then.
@@ -187,18 +187,18 @@ fn smooth(from: &[f64], to: &mut [f64]) {
 /// One side of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Face {
-    /// What lies across from here belongs to the next face.
+    /// Offset across at which the next face begins.
     high: f64,
-    /// Where it lies across the wall.
+    /// Offset of the face across the wall.
     place: f64,
-    /// The variance of its cells across the wall.
+    /// Variance of its cells across the wall.
     variance: f64,
-    /// The sum of its cells' weights.
+    /// Sum of its cells' weights.
     members: f64,
 }
 
 impl Face {
-    /// How much a cell counts: the biweight.
+    /// Weight of a cell: the biweight.
     fn weight(&self, across: f64) -> f64 {
         let offset = across - self.place;
         let share = 1.0 - offset * offset / (self.variance * OUTLIER_DEVIATIONS * OUTLIER_DEVIATIONS);
@@ -248,8 +248,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Cells of lines at the given distances across, with a slope, from `from` to `to` along. Since cells have whole
-    /// places, a line tells its slope only to about three quarters of a cell over half its length.
+    /// Cells of lines at the given offsets across, with a slope, from `from` to `to` along. Since cells have integer
+    /// coordinates, a line determines its slope only to about three quarters of a cell over half its length.
     fn faces(slope: f64, faces: &[(f64, f64, f64)]) -> Vec<Offset> {
         let face = |&(across, from, to): &(f64, f64, f64)| {
             let steps = (to - from) as usize;
@@ -263,7 +263,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn one_line_of_cells_tells_its_slope_and_its_place(slope in -0.04..0.04, across in -1.5..1.5) {
+        fn one_line_of_cells_determines_its_slope_and_offset(slope in -0.04..0.04, across in -1.5..1.5) {
             let correction = fit_faces(&faces(slope, &[(across, -60.0, 60.0)]), 60.0, 4.0).unwrap();
             prop_assert!((correction.slope - slope).abs() < 0.8 / 60.0, "{correction:?}");
             prop_assert!((correction.across - across).abs() < 0.55, "{correction:?}");
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_one_place_and_no_cells_tell_nothing() {
+    fn cells_at_one_position_and_no_cells_determine_nothing() {
         assert_eq!(fit_faces(&[], 10.0, 4.0), None);
         assert_eq!(fit_faces(&[Offset { along: 1.0, across: 0.5 }; 9], 10.0, 4.0), None);
     }

@@ -12,14 +12,14 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The line through two points. `None` if they are one place.
+    /// The line through two points. `None` if they coincide.
     pub(super) fn through(a: &Point2, b: &Point2) -> Option<Self> {
         let direction = (b - a).try_normalize(f64::MIN_POSITIVE)?;
         direction.iter().all(|v| v.is_finite()).then_some(Self { point: *a, direction })
     }
 
-    /// The line with the least sum of squared distances to the points (total least squares). `None` for points that
-    /// tell no direction.
+    /// The line with the least sum of squared distances to the points (total least squares). `None` if the points do
+    /// not determine a direction.
     pub(super) fn least_squares(points: impl Iterator<Item = Point2> + Clone) -> Option<Self> {
         // Sums about one of the points keep their digits however far from the origin the points are.
         let reference = points.clone().next()?;
@@ -50,7 +50,7 @@ impl Line {
         self.point
     }
 
-    /// The unit direction; its sign means nothing.
+    /// The unit direction; its sign is arbitrary.
     pub(super) fn direction(&self) -> Vector2<f64> {
         self.direction
     }
@@ -63,22 +63,22 @@ impl Line {
         direction.iter().all(|v| v.is_finite()).then_some(Self { point, direction })
     }
 
-    /// How far to the left of the line a point is.
+    /// Signed distance of a point to the left of the line.
     pub(super) fn across(&self, point: &Point2) -> f64 {
         self.direction.perp(&(point - self.point))
     }
 
-    /// How far from the line a point is: equation 3 of Tsardoulias et al.
+    /// Distance of a point from the line: equation 3 of Tsardoulias et al.
     pub(super) fn distance(&self, point: &Point2) -> f64 {
         self.across(point).abs()
     }
 
-    /// The place along the line that is nearest to a point, as a signed distance from [`point`](Self::point).
+    /// Position along the line that is nearest to a point, as a signed distance from [`point`](Self::point).
     pub(super) fn along(&self, point: &Point2) -> f64 {
         self.direction.dot(&(point - self.point))
     }
 
-    /// The point at a place along the line.
+    /// The point at a position along the line.
     pub(super) fn at(&self, along: f64) -> Point2 {
         self.point + self.direction * along
     }
@@ -89,14 +89,14 @@ impl Line {
 pub(super) struct Stretch {
     /// The line.
     pub(super) line: Line,
-    /// Where the stretch begins along the line.
+    /// Start of the stretch along the line.
     pub(super) start: f64,
-    /// Where it ends, at or after `start`.
+    /// End of the stretch, at or after `start`.
     pub(super) end: f64,
 }
 
 impl Stretch {
-    /// The stretch of `line` between its two farthest members. `None` if there are no members.
+    /// The stretch of `line` between its two farthest members. `None` without members.
     pub(super) fn between_farthest(line: Line, members: impl Iterator<Item = Point2>) -> Option<Self> {
         let (start, end) = members
             .map(|point| line.along(&point))
@@ -104,7 +104,7 @@ impl Stretch {
         (start <= end).then_some(Self { line, start, end })
     }
 
-    /// The part along which all that is within `reach` of the line lies in the plane from (0, 0) to `size`. `None` if
+    /// The part along which everything within `reach` of the line is in the plane from (0, 0) to `size`. `None` if
     /// there is no such part.
     pub(super) fn inside(&self, size: &Vector2<f64>, reach: f64) -> Option<Self> {
         let (point, direction) = (self.line.point.coords, self.line.direction);
@@ -114,7 +114,7 @@ impl Stretch {
         }
         let (mut start, mut end) = (self.start, self.end);
         for axis in 0..2 {
-            // Where the line passes the two borders. A line along them passes them infinitely far away.
+            // Where the line crosses the two borders. A line along them crosses them infinitely far away.
             let low = (margin[axis] - point[axis]) / direction[axis];
             let high = (size[axis] - margin[axis] - point[axis]) / direction[axis];
             start = start.max(low.min(high));
@@ -123,7 +123,7 @@ impl Stretch {
         (start < end).then_some(Self { line: self.line, start, end })
     }
 
-    /// The length of the stretch.
+    /// Length of the stretch.
     pub(super) fn length(&self) -> f64 {
         self.end - self.start
     }
@@ -133,7 +133,7 @@ impl Stretch {
         [self.line.at(self.start), self.line.at(self.end)]
     }
 
-    /// How far from the stretch a point is.
+    /// Distance of a point from the stretch.
     pub(super) fn distance(&self, point: &Point2) -> f64 {
         let nearest = self.line.at(self.line.along(point).clamp(self.start, self.end));
         (point - nearest).norm()
@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(inside([5.0, 2.0], [30.0, 2.0], 3.0), None);
         assert_eq!(inside([38.0, 20.0], [38.0, 2.0], 3.0), None);
         assert_eq!(inside([0.0, 15.0], [40.0, 16.0], 25.0), None);
-        // A line at 45 degrees that leaves the plane at (30, 30): the border beside it is passed a reach earlier.
+        // A line at 45 degrees that leaves the plane at (30, 30): the border beside it is crossed a reach earlier.
         let end = inside([10.0, 10.0], [30.0, 30.0], 2.0_f64.sqrt()).unwrap()[1];
         assert!((end - Point2::new(29.0, 29.0)).norm() < 1e-9, "{end}");
     }

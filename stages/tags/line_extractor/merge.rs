@@ -1,4 +1,4 @@
-//! Merging of segments that stand for one wall (section 4.1.1).
+//! Merging of segments of one wall (section 4.1.1).
 
 use super::line::Line;
 use super::parameters::LineExtractorParameters;
@@ -6,9 +6,9 @@ use super::scale::Scale;
 use super::wall::Wall;
 use crate::shared::geometry::Point2;
 
-/// Makes one of any two walls that are nearly parallel, have ends near each other, and fit one line.
+/// Merges any two walls that are nearly parallel, have ends near each other, and fit one line.
 ///
-/// The first of the two grows; this goes on until no two can be merged.
+/// The first of the two grows, until no two can be merged.
 pub(super) fn merge_walls(
     points: &[Point2],
     mut walls: Vec<Wall>,
@@ -31,7 +31,7 @@ pub(super) fn merge_walls(
                 None => first += 1,
             }
         }
-        // A wall that has grown may have come near one before it.
+        // A wall that has grown may be near one before it.
         if walls.len() == before {
             return walls;
         }

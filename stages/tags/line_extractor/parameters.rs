@@ -1,33 +1,33 @@
-//! The parameters of the line extractor.
+//! Parameters of the line extractor.
 
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the two points are drawn that make a line.
+/// How the two points of a line are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
-    /// The second near the first, so that both are likely to lie on the same wall.
+    /// The second near the first, so that both are likely to be on the same wall.
     #[default]
     Local,
     /// Both anywhere (the paper).
     Uniform,
 }
 
-/// When a line counts as a wall.
+/// Which lines count as walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scoring {
-    /// When a stretch of it without a gap holds `min_points` points and is `min_length` long. Only these points are
-    /// taken out.
+    /// Those with a stretch without a gap of `min_points` points and a length of `min_length`. Only these points are
+    /// removed.
     #[default]
     Points,
-    /// When it holds `min_share` of all points, all of which are taken out (the paper).
+    /// Those with `min_share` of all points, all of which are removed (the paper).
     Percentage,
 }
 
-/// How the final line of a segment is found.
+/// How the final line of a segment is fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
@@ -40,59 +40,59 @@ pub enum Fit {
     Ends,
 }
 
-/// The parameters of `line_extractor`. The paper's cell (px) is 0.02 m.
+/// Parameters of `line_extractor`. The paper's cell (px) is 0.02 m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LineExtractorParameters {
-    /// How the two points are drawn that make a line: `local` (the second near the first) or `uniform` (the paper).
+    /// How the two points of a line are drawn: `local` (the second near the first) or `uniform` (the paper).
     pub sampling: Sampling,
-    /// How far apart the two points of `local` sampling may be, metres.
+    /// Largest distance of the two points of `local` sampling, metres.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub sampling_radius: f64,
-    /// When a line counts as a wall: `points` or `percentage` (the paper).
+    /// Which lines count as walls: `points` or `percentage` (the paper).
     pub scoring: Scoring,
-    /// How the final line of a segment is found: `faces`, `least_squares` or `ends` (the paper).
+    /// How the final line of a segment is fitted: `faces`, `least_squares` or `ends` (the paper).
     pub fit: Fit,
-    /// Of more occupied cells than these a random part is searched for lines (the set P); the lines found are then
-    /// fitted to all cells.
+    /// Most occupied cells that are searched for lines (the set P): of more, a random sample; the lines found are
+    /// then fitted to all cells.
     #[schemars(range(min = 2))]
     pub max_points: usize,
-    /// Cells nearer to a line than this are its members (D_line), metres; never less than three quarters of a cell,
-    /// which a straight wall of single cells takes up. Paper: 2 px.
+    /// Largest distance of inliers from a line (D_line), metres; never less than three quarters of a cell, the width
+    /// of a straight wall of single cells. Paper: 2 px.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub inlier_distance: f64,
-    /// Points that a wall must hold under `points` scoring.
+    /// Least number of points of a wall under `points` scoring.
     #[schemars(range(min = 2))]
     pub min_points: usize,
-    /// Share of all points that a line must hold under `percentage` scoring (T_perc). Paper: 0.15.
+    /// Least share of all points on a line under `percentage` scoring (T_perc). Paper: 0.15.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_share: f64,
     /// The search ends when less than this share of the points is left (T_final). Paper: 0.5.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub stop_share: f64,
-    /// Lines drawn to choose the best of, each time. Paper: 1, the first that suffices is taken.
+    /// Number of lines of which the best is chosen, each time. Paper: 1, the first that suffices is taken.
     #[schemars(range(min = 1))]
     pub candidates: usize,
-    /// The search ends after this many choices in a row that gave no wall (`points` scoring).
+    /// The search ends after this many choices in a row without a wall (`points` scoring).
     #[schemars(range(min = 1))]
     pub patience: usize,
-    /// Lines drawn in all, at most. Under `percentage` scoring the best line so far is kept when they are spent.
+    /// Most lines drawn in all. Under `percentage` scoring the best line so far is then kept.
     #[schemars(range(min = 1))]
     pub max_iterations: usize,
-    /// A line is broken where neighbouring members are farther apart than this (D_s), metres. Paper: 30 px.
+    /// Largest distance of neighbouring inliers; a line is broken at larger gaps (D_s), metres. Paper: 30 px.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_gap: f64,
-    /// Segments whose directions differ by less than this may be merged (T_theta), radians. The paper gives no value.
+    /// Largest angle between segments that may be merged (T_theta), radians. The paper gives no value.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub merge_angle: f64,
-    /// Segments whose nearest ends are nearer than this may be merged (T_j), metres; they are if one line then has
-    /// both within `inlier_distance`. 0 merges none. The paper gives no value.
+    /// Largest distance of the nearest ends of segments that may be merged (T_j), metres; they are merged if one line
+    /// then has both within `inlier_distance`. 0 merges none. The paper gives no value.
     #[schemars(range(min = 0.0))]
     pub merge_distance: f64,
-    /// Shorter segments are dropped (T_len), metres. Paper: 30 px.
+    /// Least length of a segment (T_len), metres. Paper: 30 px.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_length: f64,
-    /// Segments whose mean occupancy is below this are dropped. Paper: 0.6.
+    /// Least mean occupancy of a segment. Paper: 0.6.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_reliability: f64,
 }

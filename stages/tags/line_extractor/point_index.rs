@@ -1,4 +1,4 @@
-//! Points in square buckets: which of them lie near a line, and near each other.
+//! Points in square buckets, to find those near a line and near each other.
 
 use super::line::{Line, Stretch};
 use crate::shared::geometry::{Buckets, Point2, PointIndex as BucketIndex};
@@ -6,17 +6,17 @@ use nalgebra::Vector2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
 
-/// How often a neighbour is drawn before the search for one is given up.
+/// Number of draws before the search for a neighbour is given up.
 const DRAWS: usize = 8;
-/// How many rows of buckets may lie within four sides of a point, both ways.
+/// Most rows of buckets within four sides of a point, both ways.
 const BANDS: usize = 9;
 
 /// Points of a plane that begins at (0, 0), sorted into square buckets.
 ///
-/// A point is named by its place in [`points`](Self::points), which is sorted by bucket.
+/// A point is identified by its index in [`points`](Self::points), which is sorted by bucket.
 #[derive(Clone, Debug)]
 pub(super) struct PointIndex {
-    /// The extent of the plane.
+    /// Extent of the plane.
     size: Vector2<f64>,
     sorted: BucketIndex,
 }
@@ -31,7 +31,7 @@ impl PointIndex {
         Self { size: Vector2::new(width as f64, height as f64), sorted }
     }
 
-    /// The extent of the plane, which begins at (0, 0).
+    /// Extent of the plane, which begins at (0, 0).
     pub(super) fn size(&self) -> Vector2<f64> {
         self.size
     }
@@ -41,11 +41,10 @@ impl PointIndex {
         self.sorted.points()
     }
 
-    /// Hands the names of points within `reach` of the line to `visit`, which says whether they are wanted.
+    /// Calls `visit` with the indices of points within `reach` of the line; it returns whether they are wanted.
     ///
     /// The search begins at `from`, a point near the line, and goes along the line both ways, each until a stretch of
-    /// `max_gap` or more without points that are wanted; so what lies beyond a larger gap may be missing, and nothing
-    /// else.
+    /// `max_gap` or more without wanted points; so only points beyond a larger gap may be missing.
     pub(super) fn near_line(
         &self,
         line: &Line,
@@ -73,8 +72,8 @@ impl PointIndex {
         }
     }
 
-    /// Hands the names of all points within `reach` of the line of a stretch to `visit` that lie along the stretch, and of
-    /// some that lie beyond its ends.
+    /// Calls `visit` with the indices of all points within `reach` of the line of a stretch that are along the
+    /// stretch, and of some beyond its ends.
     pub(super) fn near_stretch(&self, stretch: &Stretch, reach: f64, mut visit: impl FnMut(usize)) {
         let strip = Strip::new(&self.sorted, &stretch.line, reach);
         let beyond = |along: f64| strip.slice(&stretch.line.at(along));
@@ -87,8 +86,8 @@ impl PointIndex {
         }
     }
 
-    /// Draws a point at `min_distance` to `max_distance` from the point `id` for which `wanted` holds. `None` if a few
-    /// draws find none. `max_distance` is at most four times the side of a bucket.
+    /// Draws a point at `min_distance` to `max_distance` from the point `id` for which `wanted` holds. `None` if a
+    /// few draws find none. `max_distance` is at most four times the side of a bucket.
     pub(super) fn draw_neighbour(
         &self,
         id: usize,
@@ -118,8 +117,8 @@ impl PointIndex {
         })
     }
 
-    /// The points of the buckets within `distance` of a point: a run for each row, since a row's buckets follow each
-    /// other.
+    /// The points of the buckets within `distance` of a point: a run for each row, since a row's buckets are
+    /// contiguous.
     fn bands_around(&self, point: &Point2, distance: f64) -> [Range<usize>; BANDS] {
         let buckets = self.sorted.buckets();
         let (left, right) = (buckets.column(point.x - distance), buckets.column(point.x + distance));
@@ -131,15 +130,15 @@ impl PointIndex {
     }
 }
 
-/// The buckets that a strip of a plane runs through, cut into slices across its greater axis.
+/// The buckets that a strip of the plane intersects, cut into slices across its longer axis.
 struct Strip<'a> {
     index: &'a BucketIndex,
     /// Whether the strip runs along y rather than x.
     is_steep: bool,
-    /// Where the line crosses the lower border of the first slice, and how far it moves aside within a slice.
+    /// Where the line crosses the lower border of the first slice, and its offset per slice.
     start: f64,
     step: f64,
-    /// Half the width of the strip across its greater axis.
+    /// Half the width of the strip across its longer axis.
     margin: f64,
     /// The line in its normal form, and half the width of the strip.
     normal: [f64; 3],
@@ -178,7 +177,7 @@ impl<'a> Strip<'a> {
         ((place / self.index.buckets().side) as usize).min(self.slices - 1)
     }
 
-    /// Hands the points of a slice to `visit`. Gives whether one was wanted.
+    /// Calls `visit` with the points of a slice. Returns whether one was wanted.
     fn visit(&self, slice: usize, visit: &mut impl FnMut(usize) -> bool) -> bool {
         let (first, last) = (self.start + slice as f64 * self.step, self.start + (slice + 1) as f64 * self.step);
         let (low, high) = (first.min(last) - self.margin, first.max(last) + self.margin);

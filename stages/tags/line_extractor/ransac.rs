@@ -1,4 +1,4 @@
-//! RANSAC for lines: draw two points, count who lies near the line through them, take out what holds enough.
+//! RANSAC for lines: draw two points, count the inliers of the line through them, remove those of a good line.
 
 use super::line::Line;
 use super::parameters::{LineExtractorParameters, Sampling, Scoring};
@@ -7,7 +7,7 @@ use super::scale::Scale;
 use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
 
-/// How often a line is fitted to its members, and these are counted again.
+/// Number of refits of a line to its inliers, after which these are counted again.
 const REFITS: usize = 1;
 
 /// Finds the walls among the points of the index, in the order they are found. No point belongs to two.
@@ -24,14 +24,14 @@ pub(super) fn find_walls(
     }
 }
 
-/// The points that no wall has taken.
+/// The points that belong to no wall so far.
 struct Pool {
     ids: Vec<usize>,
-    /// For every point its place in `ids`, or [`TAKEN`].
+    /// For every point its index in `ids`, or [`TAKEN`].
     places: Vec<usize>,
 }
 
-/// The place of a point that is not in the pool.
+/// Index of a point that is not in the pool.
 const TAKEN: usize = usize::MAX;
 
 impl Pool {
@@ -59,11 +59,11 @@ struct Candidate {
     line: Line,
     /// One of the two points.
     from: usize,
-    /// How many members the line has.
+    /// Number of inliers.
     count: usize,
 }
 
-/// A line with its members.
+/// A line with its inliers.
 struct Found {
     line: Line,
     members: Vec<usize>,
@@ -76,7 +76,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Takes the longest unbroken walls first, and only what belongs to them.
+    /// Takes the longest unbroken walls first, with only their own inliers.
     fn by_points(&self, random: &mut impl Rng) -> Vec<Wall> {
         let mut pool = Pool::new(self.index.points().len());
         let (mut walls, mut iterations, mut misses) = (Vec::new(), 0, 0);
@@ -97,7 +97,7 @@ impl Search<'_> {
         walls
     }
 
-    /// The loop of section 4.1.1: a line is taken with all its members once it holds enough of all points.
+    /// The loop of section 4.1.1: a line is taken with all its inliers once it has enough of all points.
     fn by_percentage(&self, random: &mut impl Rng) -> Vec<Wall> {
         let mut pool = Pool::new(self.index.points().len());
         let enough = self.parameters.min_share * self.index.points().len() as f64;
@@ -123,7 +123,7 @@ impl Search<'_> {
         pool.ids.len() >= 2 && pool.ids.len() as f64 >= self.parameters.stop_share * self.index.points().len() as f64
     }
 
-    /// Draws a few lines and gives the one with most members.
+    /// Draws a few lines and returns the one with most inliers.
     fn best_candidate(&self, pool: &Pool, iterations: &mut usize, random: &mut impl Rng) -> Option<Candidate> {
         let draws = self.parameters.candidates.min(self.parameters.max_iterations - *iterations);
         *iterations += draws;
@@ -154,8 +154,8 @@ impl Search<'_> {
         Some(Candidate { line, from: first, count })
     }
 
-    /// Visits the points left that lie near a line. Under `points` scoring only what is tied to `from` counts: the search
-    /// ends at a gap.
+    /// Visits the remaining points near a line. Under `points` scoring only those connected with `from` count: the
+    /// search ends at a gap.
     fn visit_members(&self, pool: &Pool, line: &Line, from: usize, mut visit: impl FnMut(usize)) {
         let max_gap = match self.parameters.scoring {
             Scoring::Points => self.scale.max_gap,
@@ -177,7 +177,7 @@ impl Search<'_> {
         members
     }
 
-    /// The members of a line; then it is fitted to them, and they are counted again (the recount of section 4.1.1).
+    /// Fits a line to its inliers, and counts these again (the recount of section 4.1.1).
     fn recounted(&self, pool: &Pool, candidate: &Candidate) -> Found {
         let mut found = Found { line: candidate.line, members: self.members(pool, &candidate.line, candidate.from) };
         for _ in 0..REFITS {

@@ -1,19 +1,19 @@
-//! How much of a segment really is wall.
+//! Reliability of a segment: its mean occupancy.
 
 use super::line::Stretch;
 use crate::shared::geometry::{Cell, Grid, Point2};
 use nalgebra::Vector2;
 
-/// The mean occupancy along a stretch, 0 to 1; the stretch is in cells of the grid.
+/// Mean occupancy along a stretch, 0 to 1; the stretch is in cells of the grid.
 ///
-/// At every cell's length along the stretch the greatest occupancy within `reach` across it counts, so that a wall that
-/// is thicker or thinner than a cell, or wavers by less than `reach`, is as reliable as a drawn one. What is unknown or
-/// off the grid counts as 0.
+/// For every cell's length along the stretch the greatest occupancy within `reach` across it counts, so a wall that
+/// is thicker or thinner than a cell, or wavers by less than `reach`, is as reliable as a perfect one. Unknown cells
+/// and those off the grid count as 0.
 pub(super) fn reliability(grid: &Grid<'_>, stretch: &Stretch, reach: f64) -> f64 {
     let steps = (stretch.length().ceil() as usize).max(1);
     let across = Vector2::new(-stretch.line.direction().y, stretch.line.direction().x);
     let half = reach.min(grid.geometry.cell_count() as f64).ceil();
-    // Not more than a cell apart, and as far as the reach to both sides.
+    // Samples at most a cell apart, up to the reach on both sides.
     let spacing = reach / half;
     let half = half as i64;
     let mut sum = 0.0;
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_free_or_unknown_or_off_the_grid_counts_nothing() {
+    fn free_and_unknown_cells_and_those_off_the_grid_count_nothing() {
         let half = |other: i8| move |column: usize, row: usize| if row == 10 && column < 20 { 100 } else { other };
         for other in [0, -1, i8::MIN] {
             let share = reliability_of(half(other), [0.5, 10.5], [39.5, 10.5]);

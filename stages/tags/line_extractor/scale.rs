@@ -2,10 +2,10 @@
 
 use super::parameters::LineExtractorParameters;
 
-/// A straight wall of single cells at any angle lies within this many cells of a line.
+/// A straight wall of single cells at any angle is within this many cells of a line.
 const LEAST_REACH: f64 = 0.75;
 
-/// The lengths of the parameters in cells.
+/// Lengths of the parameters in cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     /// See [`LineExtractorParameters::inlier_distance`].
@@ -18,7 +18,7 @@ pub(super) struct Scale {
     pub(super) min_length: f64,
     /// See [`LineExtractorParameters::merge_distance`].
     pub(super) merge_distance: f64,
-    /// The side of the buckets that the cells are sorted into: a quarter of the sampling radius.
+    /// Side of the buckets of cells: a quarter of the sampling radius.
     pub(super) bucket_side: f64,
 }
 

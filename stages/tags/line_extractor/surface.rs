@@ -1,15 +1,15 @@
-//! Which occupied cells may show a wall: those on the surface of what is occupied.
+//! Reduces solids to their surface.
 //!
-//! Through the inside of a solid, such as a pillar that is drawn filled, or a map that is occupied all over, there are
-//! lines of every direction, and none of them is a wall.
+//! Through the inside of a solid, such as a filled pillar or a map that is occupied all over, there are lines of
+//! every direction, and none of them is a wall.
 
 use crate::shared::geometry::{Cell, Grid, is_occupied};
 
-/// A surface is at most this many cells deep, whatever the size of a cell.
+/// Largest depth of a surface in cells, whatever the cell size.
 const MOST_DEPTH: f64 = 10.0;
 
-/// The occupied cells, row by row, but for those that lie deeper inside a solid than `reach` cells. What is off the
-/// grid counts as solid: the edge of a map is no wall.
+/// The occupied cells, row by row, without those deeper inside a solid than `reach` cells. Cells off the grid count
+/// as solid: the edge of a map is no wall.
 pub(super) fn surface_cells(grid: &Grid<'_>, reach: f64) -> Vec<Cell> {
     let depth = reach.ceil().clamp(1.0, MOST_DEPTH) as usize;
     grid.occupied().filter(|cell| !is_inside(grid, *cell, depth)).collect()
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_of_any_size_makes_no_endless_search() {
+    fn a_cell_of_any_size_ends_the_search() {
         let geometry = GridGeometry { width: 200, height: 200, resolution: 1e-9, origin: Pose2::identity() };
         assert_eq!(surface_cells(&Grid::new(geometry, &[100; 40_000]).unwrap(), 1e6), []);
     }

@@ -1,4 +1,4 @@
-//! Walls in the making: a stretch of a line and the points that make it up.
+//! A wall under construction: a stretch of a line and its points.
 
 use super::line::{Line, Stretch};
 use super::parameters::Fit;
@@ -9,22 +9,22 @@ use crate::shared::geometry::Point2;
 pub(super) struct Wall {
     /// The line between its two farthest members.
     pub(super) stretch: Stretch,
-    /// The names of its points.
+    /// Indices of its points.
     pub(super) members: Vec<usize>,
 }
 
 impl Wall {
-    /// The wall that the members make up, which lie near `line`. `None` if they tell no direction.
+    /// The wall of some members near `line`. `None` if they do not determine a direction.
     pub(super) fn of_members(points: &[Point2], members: Vec<usize>, line: &Line, fit: Fit) -> Option<Self> {
         let stretch = fit_stretch(fit, line, members.iter().map(|&id| points[id]))?;
         Some(Self { stretch, members })
     }
 }
 
-/// The stretch of the line through points that lie near `line`.
+/// The stretch of the line through points near `line`.
 pub(super) fn fit_stretch(fit: Fit, line: &Line, points: impl Iterator<Item = Point2> + Clone) -> Option<Stretch> {
     let line = match fit {
-        // Faces are told apart once the wall is whole.
+        // Faces are separated once the wall is complete.
         Fit::Faces | Fit::LeastSquares => Line::least_squares(points.clone())?,
         Fit::Ends => {
             let along = |a: &Point2, b: &Point2| line.along(a).total_cmp(&line.along(b));
@@ -59,7 +59,7 @@ mod tests {
         let line = Line::through(&points[1], &points[0]).unwrap();
         let members: Vec<usize> = (0..points.len()).collect();
         let parts = break_down(&points, &members, &line, 5.0);
-        assert_eq!(parts, [vec![1, 2, 3, 4, 5, 0], vec![6]], "a gap of the limit itself is none");
+        assert_eq!(parts, [vec![1, 2, 3, 4, 5, 0], vec![6]], "a gap equal to the limit is none");
         assert_eq!(break_down(&points, &members, &line, 4.9).len(), 3);
         assert!(break_down(&points, &[], &line, 5.0).is_empty());
     }

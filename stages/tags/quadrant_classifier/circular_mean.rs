@@ -1,29 +1,29 @@
-//! The mean of directions that are known up to quarter turns, robust against walls at an angle.
+//! Mean of directions that are known up to quarter turns, robust against walls at an angle.
 
 use super::walls::WallDirection;
 use crate::shared::geometry::turn_difference;
 use std::f64::consts::FRAC_PI_2;
 
-/// How often walls are weighted anew by their distance from the mean.
+/// Number of reweightings of walls by their distance from the mean.
 const REWEIGHTINGS: usize = 10;
-/// Walls farther from the mean than this many times their deviation and the scatter do not count.
+/// Outlier bound of walls, in multiples of their deviation and the scatter.
 const OUTLIER_DEVIATIONS: f64 = 4.0;
-/// The standard deviation of a normal distribution by the median of the distances from its mean.
+/// Ratio of the standard deviation of a normal distribution to the median of the distances from its mean.
 const NORMAL_MEDIAN: f64 = 1.4826;
 
-/// The weighted circular mean of the walls near the mode, and these walls with the weights they had in it.
+/// Weighted circular mean of the walls near the mode, with these walls and their final weights.
 ///
-/// Walls are weighted by Tukey's biweight of their distance from the mean, so that a furnishing at an angle has no say
-/// and none falls in or out at a border: first within `tolerance`, then within what the walls scatter by.
+/// Walls are weighted by Tukey's biweight of their distance from the mean, so that a wall at an angle has no weight
+/// and none is included or excluded abruptly: first within `tolerance`, then within the scatter of the walls.
 pub(super) fn circular_mean(walls: &[WallDirection], tolerance: f64) -> Option<(f64, Vec<WallDirection>)> {
     let (mean, _) = mean_of_near(walls, mode(walls, tolerance)?, |_| tolerance)?;
     let scatter = scatter(walls, mean, tolerance);
     mean_of_near(walls, mean, |wall| tolerance.min(OUTLIER_DEVIATIONS * scatter * wall.deviation))
 }
 
-/// How much the walls' directions scatter about a mean, by what each is known by, from 1 on: 1 if not more than that.
+/// Scatter of the walls' directions about a mean, relative to their own deviations; at least 1.
 ///
-/// The weighted median of the walls within `tolerance`, so that no outlier has a say.
+/// It is the weighted median of the walls within `tolerance`, so outliers have no influence.
 pub(super) fn scatter(walls: &[WallDirection], mean: f64, tolerance: f64) -> f64 {
     let mut ratios: Vec<(f64, f64)> = walls
         .iter()
@@ -35,9 +35,9 @@ pub(super) fn scatter(walls: &[WallDirection], mean: f64, tolerance: f64) -> f64
     (NORMAL_MEDIAN * weighted_median(&ratios)).max(1.0)
 }
 
-/// The weighted median of rising values with their weights; 0 for none.
+/// Weighted median of rising values with their weights; 0 for none.
 ///
-/// Each value stands at the middle of its weight, and between neighbours the median is linear, so that it does not jump
+/// Each value is at the middle of its weight, and between neighbours the median is linear, so that it is continuous
 /// where half of the weight is reached exactly.
 fn weighted_median(values: &[(f64, f64)]) -> f64 {
     let half = values.iter().map(|(_, weight)| weight).sum::<f64>() / 2.0;
@@ -57,7 +57,7 @@ fn weighted_median(values: &[(f64, f64)]) -> f64 {
     before.map_or(0.0, |(value, _)| value)
 }
 
-/// The weighted circular mean of the walls within `limit` of it, from a first guess.
+/// Weighted circular mean of the walls within `limit` of it, from an initial guess.
 fn mean_of_near(
     walls: &[WallDirection],
     mut mean: f64,
@@ -87,7 +87,7 @@ fn weighted_near(walls: &[WallDirection], direction: f64, limit: impl Fn(&WallDi
         .collect()
 }
 
-/// The middle of the window of twice `tolerance` that holds most weight, among angles up to quarter turns.
+/// Middle of the window of twice `tolerance` with most weight, among angles up to quarter turns.
 fn mode(walls: &[WallDirection], tolerance: f64) -> Option<f64> {
     let mut folded: Vec<(f64, f64)> =
         walls.iter().map(|wall| (wall.angle.rem_euclid(FRAC_PI_2), wall.weight)).collect();
@@ -119,7 +119,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn the_median_lies_where_half_of_the_weight_is_on_either_side() {
+    fn the_median_has_half_of_the_weight_on_either_side() {
         assert_eq!(weighted_median(&[]), 0.0);
         assert_eq!(weighted_median(&[(3.0, 2.0)]), 3.0);
         assert_eq!(weighted_median(&[(1.0, 1.0), (2.0, 1.0), (9.0, 1.0)]), 2.0);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn walls_that_scatter_as_they_are_known_have_a_scatter_of_one_and_bent_ones_more() {
+    fn consistent_walls_have_a_scatter_of_one_and_inconsistent_ones_more() {
         let walls = |degrees: f64| -> Vec<WallDirection> {
             (0..40).map(|i| wall(degrees * (f64::from(i) * 2.4).sin() + 90.0 * f64::from(i % 4), 4.0)).collect()
         };
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_wall_at_an_odd_angle_has_no_say_among_walls_that_agree() {
+    fn a_long_wall_at_an_odd_angle_has_no_weight_among_walls_that_agree() {
         let mut walls: Vec<WallDirection> = (0..10).map(|i| wall(10.0 + 0.02 * f64::from(i % 3), 4.0)).collect();
         walls.push(wall(12.0, 6.0));
         let (mean, members) = circular_mean(&walls, 0.09).unwrap();
@@ -156,7 +156,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_median_is_one_of_the_values_or_lies_between_two(
+        fn the_median_is_one_of_the_values_or_between_two(
             mut values in prop::collection::vec((0.0..9.0f64, 0.1..3.0f64), 1..20),
         ) {
             values.sort_by(|a, b| a.0.total_cmp(&b.0));

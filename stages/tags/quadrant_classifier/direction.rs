@@ -1,4 +1,4 @@
-//! The direction of a map's walls.
+//! Direction of a map's walls.
 
 use super::circular_mean::{circular_mean, scatter};
 use super::grouping::{bisector, group_directions};
@@ -8,7 +8,7 @@ use crate::shared::geometry::turn_difference;
 use gridweave_runtime::ros::Segment;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-/// The direction that the walls of a map share.
+/// The common direction of the walls of a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Direction {
     /// Radians, in `(-pi / 4, pi / 4]`, known up to quarter turns.
@@ -17,13 +17,13 @@ pub struct Direction {
     pub deviation: f64,
     /// Directions of the two groups of walls, radians.
     pub groups: [f64; 2],
-    /// Share of the wall length that follows the direction or stands across it, 0 to 1.
+    /// Share of the wall length along the direction or across it, 0 to 1.
     pub agreement: f64,
-    /// Whether there are walls enough that agree.
+    /// Whether enough walls agree.
     pub valid: bool,
 }
 
-/// The direction of the walls of a map. Without walls it is not valid, and zero.
+/// Direction of the walls of a map. Without walls it is not valid, and zero.
 pub fn map_direction(segments: &[Segment], parameters: &QuadrantClassifierParameters) -> Direction {
     let walls = wall_directions(segments, parameters);
     let Some((angle, members)) = (match parameters.mean {
@@ -50,18 +50,18 @@ pub fn map_direction(segments: &[Segment], parameters: &QuadrantClassifierParame
     }
 }
 
-/// The paper's direction, turned from between the groups to the walls.
+/// The paper's direction, turned from the bisector of the groups to the walls.
 fn mean_of_groups(walls: &[WallDirection]) -> Option<(f64, Vec<WallDirection>)> {
     let groups = group_directions(walls)?;
     Some((bisector(groups) - FRAC_PI_4, walls.to_vec()))
 }
 
-/// The standard deviation of the weighted mean of the walls' directions: from how they scatter, from how well each
-/// wall's direction is known, and from what all walls of a map may share.
+/// Standard deviation of the weighted mean of the walls' directions: from their scatter, from the deviation of each,
+/// and from the common error of all walls of a map.
 ///
-/// Walls that scatter by more than they are known by are those of a bent map. Neighbours are then turned together, and
-/// the error of their mean shrinks with their number by far less than that of walls that each err alone; so it is taken to
-/// be greater by the ratio of the two once more, up to what the walls scatter by.
+/// Walls that scatter by more than their deviations are those of a deformed map. The errors of neighbours are then
+/// correlated, and the error of their mean shrinks with their number by far less than that of independent walls; so
+/// it is multiplied by the ratio of the two once more, up to the scatter of the walls.
 fn deviation(walls: &[WallDirection], mean: f64, scatter: f64, min_deviation: f64) -> f64 {
     let weight: f64 = walls.iter().map(|wall| wall.weight).sum();
     let (mut of_mean, mut of_one) = (0.0, 0.0);
@@ -89,7 +89,7 @@ mod tests {
         Segment { x1: 1.0, y1: 2.0, x2, y2, reliability: 0.9, inliers: 10 }
     }
 
-    /// Circular mean and mean of the groups, each with the three ways to weigh walls.
+    /// Circular mean and mean of the groups, each with the three weightings.
     fn modes() -> Vec<QuadrantClassifierParameters> {
         let modes = [Weighting::Length, Weighting::Precision, Weighting::Equation4].map(|weighting| {
             [Mean::Circular, Mean::Groups].map(|mean| QuadrantClassifierParameters {
@@ -139,12 +139,12 @@ mod tests {
             assert_eq!(map_direction(&[], &parameters), Direction::default());
             let broken = [Segment { x1: f64::NAN, ..wall(3.0, 1.0) }, wall(3.0, 0.0)];
             assert_eq!(map_direction(&broken, &parameters), Direction::default());
-            assert!(!map_direction(&[wall(3.0, 1.5)], &parameters).valid, "one short wall does not tell");
+            assert!(!map_direction(&[wall(3.0, 1.5)], &parameters).valid, "one short wall is not enough");
         }
     }
 
     #[test]
-    fn a_bent_map_is_known_worse_than_its_walls_scatter_tells_but_no_worse_than_one_wall() {
+    fn the_direction_of_a_deformed_map_is_less_certain_than_its_scatter_but_no_less_than_one_wall() {
         let deformed = |degrees: f64, count: i32| -> Direction {
             let angle = |i: i32| 90.0 * f64::from(i % 4) + degrees * f64::from(i - count / 2) / f64::from(count);
             let walls: Vec<Segment> = (0..count).map(|i| wall(angle(i), 5.0)).collect();
@@ -153,14 +153,14 @@ mod tests {
         let (straight, scattered) =
             (deformed(0.2, 40).deviation.to_degrees(), deformed(4.0, 40).deviation.to_degrees());
         assert!(straight < 0.15, "{straight}");
-        // The walls lie within 2 degrees to either side: 1.2 degrees in the mean.
+        // The walls are within 2 degrees to either side: 1.2 degrees in the mean.
         assert!(scattered > 0.4 && scattered < 1.3, "{scattered}");
         let few = deformed(4.0, 4).deviation.to_degrees();
         assert!(few > scattered && few < 1.8, "{few}");
     }
 
     #[test]
-    fn one_wall_alone_is_known_as_well_as_its_ends() {
+    fn one_wall_is_as_certain_as_its_ends() {
         let direction = map_direction(&[wall(3.0, 10.0)], &QuadrantClassifierParameters::default());
         assert!(direction.deviation > 0.002 && direction.deviation < 0.01);
     }
@@ -207,7 +207,7 @@ mod tests {
         }
 
         #[test]
-        fn the_direction_is_always_a_number(
+        fn the_direction_is_always_finite(
             segments in prop::collection::vec(prop::array::uniform5(prop::num::f64::ANY), 0..20),
         ) {
             let segments: Vec<Segment> = segments

@@ -1,4 +1,4 @@
-//! How two maps lie to each other, from their directions and their common tags: sections 4.1.3 and 4.2.
+//! First guess of the relative pose of two maps, from their directions and their common tags: sections 4.1.3 and 4.2.
 
 use super::direction::Direction;
 use super::parameters::{QuadrantClassifierParameters, RotationFrom};
@@ -17,80 +17,84 @@ pub struct FirstGuess {
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
     pub covariance: Matrix3<f64>,
-    /// The least common precision of the tags, 0 to 1.
+    /// Least common precision of the tags, 0 to 1.
     pub score: f64,
     /// `tags+directions`, `tags`, `few tags+directions`, or `one tag+directions`.
     pub method: &'static str,
-    /// What the guess rests on.
+    /// Reason for the user.
     pub reason: String,
 }
 
 /// Why common tags give no alignment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GuessError {
-    /// There are too few tags, or they lie in one place.
+    /// There are too few tags, or all are at one position.
     #[error(
-        "{0} common tags do not tell the rotation: it takes two or more in different places, and three for the paper's \
-         triplet"
+        "{0} common tags do not determine the rotation: it takes two or more at different positions, and three for the \
+         paper's triplet"
     )]
     NoRotation(usize),
-    /// The rotation is known too badly.
-    #[error("the {count} common tags lie too near each other: they tell the rotation to {degrees:.1} degrees only")]
+    /// The rotation is too uncertain.
+    #[error(
+        "the {count} common tags are too near each other: they determine the rotation to {degrees:.1} degrees only"
+    )]
     WeakRotation {
-        /// Tags there are.
+        /// Number of tags.
         count: usize,
         /// Standard deviation of the rotation, degrees.
         degrees: f64,
     },
-    /// The tags do not suffice by themselves, and there are no directions to confirm them.
+    /// The tags do not suffice alone, and there are no directions to confirm them.
     #[error("the directions of both maps must confirm {count} common tags, but {missing}")]
     NoDirections {
-        /// Tags there are.
+        /// Number of tags.
         count: usize,
         /// What is missing.
         missing: MissingDirection,
     },
-    /// The tags do not suffice by themselves, and too many rotations would be confirmed.
+    /// The tags do not suffice alone, and the directions are too uncertain to confirm them.
     #[error(
-        "the directions of both maps must confirm {count} common tags, but together they tell the rotation to {limit:.1} \
-         degrees only, and {most:.1} are allowed"
+        "the directions of both maps must confirm {count} common tags, but both determine the rotation to {limit:.1} degrees \
+         only, and {most:.1} are allowed (max_confirming_angle)"
     )]
     VagueDirections {
-        /// Tags there are.
+        /// Number of tags.
         count: usize,
-        /// By how much the two rotations could differ, degrees.
+        /// Bound of the difference of the two rotations, degrees.
         limit: f64,
-        /// What is allowed, degrees.
+        /// Largest bound allowed, degrees.
         most: f64,
     },
-    /// The tags do not suffice by themselves, and the directions say otherwise.
+    /// The tags do not suffice alone, and the directions contradict them.
     #[error(
-        "the directions of both maps must confirm {count} common tags, but tell a rotation {off:.1} degrees off theirs, and \
-         {limit:.1} are allowed"
+        "the directions of both maps must confirm {count} common tags, but differ from their rotation by {off:.1} degrees, \
+         and {limit:.1} are allowed"
     )]
     Unconfirmed {
-        /// Tags there are.
+        /// Number of tags.
         count: usize,
-        /// By how much the two rotations differ, degrees.
+        /// Difference of the two rotations, degrees.
         off: f64,
-        /// What is allowed, degrees.
+        /// Largest difference allowed, degrees.
         limit: f64,
     },
     /// The tags do not fit each other.
-    #[error("the {count} common tags do not fit: they lie {residual:.2} m apart when the maps are aligned")]
+    #[error(
+        "the {count} common tags do not fit: they are {residual:.2} m apart when the maps are aligned (max_residual)"
+    )]
     Residual {
-        /// Tags there are.
+        /// Number of tags.
         count: usize,
-        /// Root mean square of the distances, metres.
+        /// Root mean square of the residuals, metres.
         residual: f64,
     },
 }
 
-/// How map b lies to map a: rotation from the directions of the two maps and the quarter turn that the tags tell, or
-/// from the tags alone; then the translation from the tags.
+/// Estimates the relative pose of two maps: the rotation from the directions of the two maps and the quarter turn of
+/// the tags, or from the tags alone; then the translation from the tags.
 ///
-/// The tags are sorted by falling common precision. Directions that are missing, not valid, or that contradict the tags
-/// are left out, and the reason says so.
+/// The tags are sorted by falling common precision. Directions that are missing, not valid, or that contradict the
+/// tags are ignored, and the reason mentions it.
 pub fn first_guess(
     tags: &[CommonTag],
     direction_a: Option<&Direction>,
@@ -123,7 +127,7 @@ pub fn first_guess(
     })
 }
 
-/// The rotation that the tags tell, if they tell the quarter turn.
+/// The rotation of the tags, if they determine the quarter turn.
 pub(super) fn rotation_of_tags(
     tags: &[CommonTag],
     parameters: &QuadrantClassifierParameters,
@@ -141,7 +145,7 @@ pub(super) fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParam
     tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect()
 }
 
-/// `d_theta + kappa * 90 degrees`, or why the rotation must come from the tags.
+/// `d_theta + kappa * 90 degrees`, or why the rotation must be that of the tags.
 fn by_directions(
     by_tags: &TagRotation,
     a: Option<&Direction>,
@@ -158,7 +162,7 @@ fn by_directions(
     }
 }
 
-/// The mean of two rotations, weighted with the inverse of their variances.
+/// Mean of two rotations, weighted by the inverse of their variances.
 fn mean_rotation(a: &TagRotation, b: &TagRotation) -> TagRotation {
     let (variance_a, variance_b) = (a.deviation * a.deviation, b.deviation * b.deviation);
     let share_b = variance_a / (variance_a + variance_b);
@@ -216,7 +220,7 @@ mod tests {
         }
 
         #[test]
-        fn whatever_comes_in_only_numbers_come_out(
+        fn any_input_gives_finite_numbers(
             values in prop::collection::vec(prop::array::uniform10(prop::num::f64::ANY), 0..6),
         ) {
             let tags: Vec<CommonTag> = values
@@ -255,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rotation_from_both_lies_between_and_is_known_better_than_from_either() {
+    fn the_rotation_from_both_is_between_them_and_more_certain_than_either() {
         let tags = tags(&pose(3.0, 4.0, 2.0));
         let rotation = |rotation: RotationFrom| {
             let parameters = QuadrantClassifierParameters { rotation, ..Default::default() };
@@ -303,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_that_do_not_tell_the_quarter_turn_or_do_not_fit_are_refused() {
+    fn tags_that_do_not_determine_the_quarter_turn_or_do_not_fit_are_refused() {
         let all = tags(&pose(3.0, 4.0, 2.0));
         assert_eq!(guess(&[], None, None), Err(GuessError::NoRotation(0)));
         assert_eq!(guess(&all[..1], None, None), Err(GuessError::NoRotation(1)));

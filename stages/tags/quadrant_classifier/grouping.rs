@@ -4,7 +4,7 @@ use super::walls::WallDirection;
 use crate::shared::geometry::turn_difference;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-/// Which of the two groups a wall belongs to.
+/// The group of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// Within 45 degrees of the first wall, up to half turns.
@@ -15,7 +15,7 @@ pub enum Group {
 
 /// Groups directions, radians, and brings each group to one quadrant by half turns: tables 1 and 2.
 ///
-/// The first direction stays as it is and makes the first group; the second group lies in the quadrant of the first
+/// The first direction is unchanged and starts the first group; the second group is in the quadrant of the first
 /// direction that belongs to it.
 pub fn classify(angles: &[f64]) -> Vec<(Group, f64)> {
     let Some(&first) = angles.first() else { return Vec::new() };
@@ -34,9 +34,9 @@ pub fn classify(angles: &[f64]) -> Vec<(Group, f64)> {
         .collect()
 }
 
-/// The directions of the two groups, radians: equation 4. `None` if no wall has a weight.
+/// Directions of the two groups, radians: equation 4. `None` if no wall has a weight.
 ///
-/// A group without walls stands at a right angle to the other.
+/// A group without walls is at a right angle to the other.
 pub(super) fn group_directions(walls: &[WallDirection]) -> Option<[f64; 2]> {
     let angles: Vec<f64> = walls.iter().map(|wall| wall.angle).collect();
     let classified = classify(&angles);
@@ -54,7 +54,7 @@ pub(super) fn group_directions(walls: &[WallDirection]) -> Option<[f64; 2]> {
     }
 }
 
-/// The mean of the two groups' directions, the paper's direction of a map. It lies halfway between the two, 45 degrees
+/// Mean of the two groups' directions, the paper's direction of a map. It is half way between the two, 45 degrees
 /// from either.
 pub(super) fn bisector(groups: [f64; 2]) -> f64 {
     (groups[0] + groups[1]) / 2.0
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_group_stands_at_a_right_angle_to_the_other() {
+    fn an_empty_group_is_at_a_right_angle_to_the_other() {
         let groups = group_directions(&walls(&[(10.0, 1.0), (-170.0, 1.0)])).unwrap();
         assert!((groups[0].to_degrees() - 10.0).abs() < 1e-9 && (groups[1].to_degrees() - 100.0).abs() < 1e-9);
         let groups = group_directions(&walls(&[(10.0, 0.0), (100.0, 1.0)])).unwrap();

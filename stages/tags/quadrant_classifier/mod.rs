@@ -1,11 +1,11 @@
-//! The direction of a map's walls, and from it and common tags a first guess of how two maps lie to each other.
+//! The direction of a map's walls, and from it and common tags a first guess of the relative pose of two maps.
 //!
-//! After Tsardoulias et al., sections 4.1.2 to 4.2. Walls stand at right angles, so the directions of two maps give
-//! their rotation up to quarter turns, and more precisely than tags do; the tags tell the quarter turn and the
-//! translation. Where a map has no direction, or it contradicts the tags, the rotation comes from the tags. Tags that do not
-//! suffice by themselves, such as two, are refused there.
+//! After Tsardoulias et al., sections 4.1.2 to 4.2. Walls are at right angles, so the directions of two maps
+//! determine their rotation up to quarter turns, and more precisely than tags do; the tags determine the quarter turn
+//! and the translation. Where a map has no direction, or it contradicts the tags, the rotation is that of the tags.
+//! Tags that do not suffice alone, such as two, are refused there.
 //!
-//! Not for buildings without right angles: there every rotation comes from the tags.
+//! Not for buildings without right angles: there every rotation is that of the tags.
 
 mod circular_mean;
 mod direction;

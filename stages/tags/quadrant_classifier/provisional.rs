@@ -1,4 +1,4 @@
-//! A first guess from tags that do not suffice by themselves.
+//! A first guess from tags that do not suffice alone.
 
 use super::GuessError;
 use super::direction::Direction;
@@ -7,11 +7,11 @@ use super::parameters::QuadrantClassifierParameters;
 use super::rotation_by_directions::rotation_by_directions;
 use gridweave_runtime::ros::CommonTag;
 
-/// How map b lies to map a, from two common tags, or from more of which it may be chance that they agree.
+/// Relative pose of two maps from two common tags, or from more that may agree by chance.
 ///
-/// As [`first_guess`], but the directions of the maps must be there and confirm the rotation that the tags tell. That is
-/// worth something only where both are known well: of rotations at random, a share of the allowed difference divided by
-/// 45 degrees would be confirmed. The guess is then still to be verified by the walls of the maps.
+/// As [`first_guess`], but the directions of the maps must be known and confirm the rotation of the tags. That is
+/// evidence only if both are known well: of random rotations, a share of the allowed difference divided by 45 degrees
+/// would be confirmed. The guess is then still to be verified by the walls of the maps.
 pub fn provisional_guess(
     tags: &[CommonTag],
     direction_a: Option<&Direction>,
@@ -86,7 +86,7 @@ mod tests {
             );
             assert!((found.transform_a_b.rotation.angle() - 2.01).abs() < 1e-9, "the directions know it better");
             let middle = found.transform_a_b * Point2::new(5.0, 2.0) - pose(3.0, 4.0, 2.0) * Point2::new(5.0, 2.0);
-            assert!(middle.norm() < 1e-3, "the tags tell the place");
+            assert!(middle.norm() < 1e-3, "the tags determine the position");
         }
     }
 
@@ -113,7 +113,7 @@ mod tests {
         let parameters = QuadrantClassifierParameters::default();
         let tags = tags(&pose(3.0, 4.0, 2.0), 8.0);
         let none = provisional_guess(&tags, None, Some(&good), &parameters).unwrap_err();
-        assert!(none.to_string().contains("a map has not come yet"), "{none}");
+        assert!(none.to_string().contains("a map is missing so far"), "{none}");
         assert_eq!(
             provisional_guess(&tags[..1], Some(&good), Some(&good), &parameters),
             Err(GuessError::NoRotation(1))
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_too_vaguely_confirms_nothing() {
+    fn uncertain_directions_confirm_nothing() {
         let good = direction(0.0, 0.004);
         for vague in [guess(1.6, &direction(2.0, 0.004), &good), guess(8.0, &direction(2.0, 0.05), &good)] {
             assert!(matches!(vague, Err(GuessError::VagueDirections { count: 2, .. })), "{vague:?}");

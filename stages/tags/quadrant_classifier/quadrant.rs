@@ -2,12 +2,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-/// The number of quarter turns, 0 to 3, to be added to the difference of two maps' directions, `d_theta`, so that it
-/// comes nearest to the rotation that the tags tell, `theta_hat`; both radians.
+/// Number of quarter turns, 0 to 3, to add to the difference of two maps' directions, `d_theta`, to be nearest to the
+/// rotation of the tags, `theta_hat`; both radians.
 ///
-/// Equation 7 prints it from `theta_hat` alone, which holds only while `d_theta` is below 45 degrees. For a `d_theta` of
-/// 0 this is its table, but for the printed borders of 215 and 305 degrees, which stand for 225 and 315: a quadrant is
-/// 90 degrees wide.
+/// Equation 7 gives it from `theta_hat` alone, which holds only while `d_theta` is below 45 degrees. For a `d_theta`
+/// of 0 this is its table, except for the printed borders of 215 and 305 degrees, which should be 225 and 315: a
+/// quadrant is 90 degrees wide.
 pub fn quadrant(theta_hat: f64, d_theta: f64) -> u8 {
     ((theta_hat - d_theta) / FRAC_PI_2).round().rem_euclid(4.0) as u8
 }

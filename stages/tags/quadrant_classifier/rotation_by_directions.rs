@@ -1,4 +1,4 @@
-//! The rotation between two maps that their directions tell.
+//! Rotation between two maps from their directions.
 
 use super::direction::Direction;
 use super::parameters::QuadrantClassifierParameters;
@@ -7,36 +7,36 @@ use super::tag_rotation::TagRotation;
 use crate::shared::geometry::{turn_difference, wrap_angle};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Why the directions of two maps tell no rotation.
+/// Why the directions of two maps determine no rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MissingDirection {
-    /// A map is not there.
-    #[error("a map has not come yet")]
+    /// A map is missing.
+    #[error("a map is missing so far")]
     Map,
     /// A map has no direction.
     #[error("the walls of a map have no common direction")]
     Direction,
 }
 
-/// `d_theta + kappa * 90 degrees`, beside what the tags say.
+/// `d_theta + kappa * 90 degrees`, compared with the tags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RotationByDirections {
     /// The rotation of `T_a_b`, radians, and its standard deviation.
     pub(super) rotation: TagRotation,
     /// The tags' rotation less this one, radians.
     pub(super) off: f64,
-    /// How far the two may differ, radians.
+    /// Largest difference allowed, radians.
     pub(super) limit: f64,
 }
 
 impl RotationByDirections {
-    /// Whether the tags say the same.
+    /// Whether the tags agree.
     pub(super) fn agrees(&self) -> bool {
         self.off.abs() <= self.limit
     }
 }
 
-/// The rotation of the directions that is nearest to that of the tags.
+/// The rotation by the directions that is nearest to that of the tags.
 pub(super) fn rotation_by_directions(
     by_tags: &TagRotation,
     a: Option<&Direction>,
@@ -53,7 +53,7 @@ pub(super) fn rotation_by_directions(
     })
 }
 
-/// `d_theta`, the direction of map a less that of map b: the rotation of `T_a_b` but for quarter turns.
+/// `d_theta`, the direction of map a less that of map b: the rotation of `T_a_b` up to quarter turns.
 pub(super) fn difference_of_directions(
     a: Option<&Direction>,
     b: Option<&Direction>,

@@ -11,8 +11,9 @@ use crate::shared::geometry::wrap_angle;
 use gridweave_runtime::ros::CommonTag;
 use std::f64::consts::FRAC_PI_2;
 
-/// How map b may lie to map a if one tag is all that both know: its directions tell the rotation up to quarter turns, and
-/// the tag the place. Each quarter turn is a hypothesis; the maps must tell which of them is right, if any.
+/// Hypotheses of the relative pose of two maps with one common tag: the directions determine the rotation up to
+/// quarter turns, and the tag the position. Each quarter turn is a hypothesis; the maps must decide which of them is
+/// right, if any.
 pub fn single_tag_guesses(
     tag: &CommonTag,
     direction_a: Option<&Direction>,
@@ -47,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_the_quarter_turns_is_right_and_the_tag_lies_on_itself_in_all() {
+    fn one_of_the_quarter_turns_is_right_and_all_align_the_tag() {
         let truth = pose(3.0, 4.0, 2.0);
         let place = truth * Point2::new(5.0, -1.0);
         let covariance = [0.0009, 0.0, 0.0, 0.0009];
@@ -74,6 +75,6 @@ mod tests {
             assert!(guess.covariance.cholesky().is_some() && guess.score == 0.9);
         }
         let none = single_tag_guesses(&tag, None, Some(&direction(0.0)), &parameters).unwrap_err();
-        assert!(none.to_string().contains("a map has not come yet"), "{none}");
+        assert!(none.to_string().contains("a map is missing so far"), "{none}");
     }
 }

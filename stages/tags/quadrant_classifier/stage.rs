@@ -15,19 +15,19 @@ use std::f64::consts::TAU;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "quadrant_classifier",
-        "Finds the direction of each map's walls, and with common tags how two maps lie to each other",
+        "Estimates the direction of each map's walls, and with common tags a first guess of the relative pose of two maps",
         QuadrantClassifier::new,
     )
     .optional_input(
         "segments",
-        "The straight walls of each map; not needed where the rotation comes from the tags alone",
+        "The straight walls of each map; not needed where the rotation is that of the tags only",
         QuadrantClassifier::receive_segments,
     )
     .input("common", "The common tags of each pair of robots", QuadrantClassifier::receive_common)
     .build()
 }
 
-/// What is known of one robot's map.
+/// Direction and frame of one robot's map.
 struct Map {
     direction: Direction,
     frame_id: String,
@@ -38,7 +38,7 @@ struct QuadrantClassifier {
     parameters: QuadrantClassifierParameters,
     maps: BTreeMap<String, Map>,
     common: BTreeMap<RobotPair, CommonTags>,
-    /// What was sent last for a pair, by rank.
+    /// Alignments sent last for a pair, by rank.
     sent: BTreeMap<RobotPair, Vec<Alignment>>,
 }
 
@@ -51,14 +51,14 @@ impl Outputs for Rotations {
     fn declare(ports: &mut OutputPorts) -> Self {
         Self {
             direction: ports.output("direction", "The direction of each map's walls"),
-            alignment: ports.output("alignment", "A first guess of how two maps lie to each other"),
+            alignment: ports.output("alignment", "A first guess of the relative pose of two maps"),
         }
     }
 }
 
 impl QuadrantClassifier {
     fn new(parameters: QuadrantClassifierParameters, context: &Context) -> Result<Self, StageError> {
-        // By itself, as in a test, a stage has no wires at all.
+        // In isolation, as in a test, a stage has no wires at all.
         let is_in_a_pipeline = !context.inputs.is_empty();
         if parameters.rotation != RotationFrom::Tags && is_in_a_pipeline && !context.is_wired("segments") {
             let cause = "its input `segments` is not wired, and the rotation is to come from the walls";
@@ -87,7 +87,7 @@ impl QuadrantClassifier {
         output.direction.send(&robot, &message)?;
         self.maps.insert(robot.clone(), Map { direction, frame_id: header.frame_id });
 
-        // What refines an alignment works on the maps, so each new map calls for it, changed or not.
+        // ICP works on the maps, so each new map needs the alignment again, changed or not.
         let pairs: Vec<RobotPair> = self.common.keys().filter(|pair| pair.concerns(&robot)).cloned().collect();
         for pair in pairs {
             let alignments = self.align(&pair, output);
@@ -115,7 +115,7 @@ impl QuadrantClassifier {
         }
     }
 
-    /// What the common tags of a pair come to: one alignment, or several from a single tag; accepted or refused.
+    /// Alignment of a pair from its common tags, or several from a single tag; accepted or refused.
     fn align(&self, pair: &RobotPair, output: &Output<Rotations>) -> Vec<Alignment> {
         let Some(common) = self.common.get(pair) else { return Vec::new() };
         let (a, b) = (self.maps.get(&pair.a), self.maps.get(&pair.b));
@@ -159,7 +159,7 @@ impl QuadrantClassifier {
         (0..).zip(guesses).map(alignment).collect()
     }
 
-    /// The only common tag of a pair, if it may propose something.
+    /// The only common tag of a pair, if it may give hypotheses.
     fn single_tag<'a>(&self, common: &'a CommonTags) -> Option<&'a CommonTag> {
         let [tag] = common.tags.as_slice() else { return None };
         let is_certain = tag.common_precision() >= self.parameters.single_tag_certainty;

@@ -1,4 +1,4 @@
-//! The stage from outside: messages in, messages out.
+//! The stage as a whole: messages in, messages out.
 
 use super::kind;
 use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
@@ -14,20 +14,20 @@ impl Run {
         Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
-    /// Gives the stage walls, and gives the alignments that it sends.
+    /// Sends walls to the stage, and returns the alignments that it sends.
     fn segments(&mut self, segments: &Segments) -> Vec<Alignment> {
         self.0.give::<Segments>("segments", "", LogTime(7), segments).unwrap();
         self.0.take("alignment").unwrap()
     }
 
-    /// Gives the stage common tags, and gives the alignments that it sends.
+    /// Sends common tags to the stage, and returns the alignments that it sends.
     fn common(&mut self, common: &CommonTags) -> Vec<Alignment> {
         self.0.give::<CommonTags>("common", "", LogTime(7), common).unwrap();
         self.0.take("alignment").unwrap()
     }
 }
 
-/// A room whose walls stand at `angle`.
+/// A room with walls at `angle`.
 fn segments(robot: &str, angle: f64) -> Segments {
     let wall = |(x1, y1, x2, y2): (f64, f64, f64, f64)| {
         let turn = pose(0.0, 0.0, angle);
@@ -97,11 +97,11 @@ fn refused_tags_are_passed_on_with_their_reason() {
     assert!(run.common(&refused).is_empty());
     let together = CommonTags { tags: vec![refused.tags[0].clone(); 3], accepted: true, ..refused };
     let sent = run.common(&together);
-    assert!(!sent[0].accepted && sent[0].reason.contains("do not tell the rotation"), "{}", sent[0].reason);
+    assert!(!sent[0].accepted && sent[0].reason.contains("do not determine the rotation"), "{}", sent[0].reason);
 }
 
 #[test]
-fn walls_may_be_left_unwired_where_the_tags_alone_tell_the_rotation() {
+fn walls_may_be_left_unwired_where_the_rotation_is_from_the_tags() {
     let common = InputWire { port: "common", ..Default::default() };
     let context = Context { inputs: vec![common], ..Default::default() };
     let make = |parameters: &str| StageHarness::with_context(&kind(), parameters, &context).err();
@@ -120,7 +120,7 @@ fn two_tags_wait_for_both_maps_and_stay_provisional() {
     let two = CommonTags { tags: all.tags[..2].to_vec(), provisional: true, ..all.clone() };
     run.segments(&segments("robot1", 2.5));
     let sent = run.common(&two);
-    assert!(!sent[0].accepted && sent[0].reason.contains("a map has not come yet"), "{}", sent[0].reason);
+    assert!(!sent[0].accepted && sent[0].reason.contains("a map is missing so far"), "{}", sent[0].reason);
     let sent = run.segments(&segments("robot2", 0.0));
     assert_eq!((sent[0].accepted, sent[0].provisional), (true, true));
     assert_eq!(sent[0].method, "few tags+directions");

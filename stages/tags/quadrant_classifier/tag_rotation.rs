@@ -1,11 +1,11 @@
-//! The rotation between two maps that their common tags tell.
+//! Rotation between two maps from their common tags.
 
 use super::parameters::TagRotationFrom;
 use crate::shared::geometry::{Point2, PointPair, fit_rigid, wrap_angle};
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix2;
 
-/// A tag in both maps, its values checked.
+/// A validated tag in both maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TagPair {
     /// Position in map a, metres.
@@ -18,14 +18,14 @@ pub(super) struct TagPair {
     pub(super) covariance_b: Matrix2<f64>,
 }
 
-/// The largest coordinate that is believed, metres; it keeps squares finite.
+/// Largest valid coordinate, metres; it keeps squares finite.
 const MAX_COORDINATE: f64 = 1e7;
-/// The largest variance that is believed, square metres.
+/// Largest valid variance, square metres.
 const MAX_VARIANCE: f64 = 1e4;
 
 impl TagPair {
-    /// The pair of a common tag. `None` if its position is no position. `deviation`, metres, is added to what the
-    /// estimates claim; a covariance that is none is left out.
+    /// The pair of a common tag. `None` if its position is invalid. `deviation`, metres, is added to the covariances
+    /// of the estimates; an invalid covariance counts as zero.
     pub(super) fn new(tag: &CommonTag, deviation: f64) -> Option<Self> {
         let usable = tag.a.iter().chain(&tag.b).all(|value| value.abs() <= MAX_COORDINATE);
         let floor = Matrix2::identity() * deviation * deviation;
@@ -38,13 +38,13 @@ impl TagPair {
         })
     }
 
-    /// The variance along one axis of the distance between the two positions, square metres, whatever the rotation.
+    /// Variance along one axis of the distance between the two positions, square metres, for any rotation.
     fn variance(&self) -> f64 {
         (self.covariance_a.trace() + self.covariance_b.trace()) / 2.0
     }
 }
 
-/// A symmetric, positive semi-definite covariance of a believable size.
+/// A valid covariance: symmetric, positive semi-definite and not too large.
 fn believable(values: &[f64; 4]) -> Option<Matrix2<f64>> {
     let [xx, xy, yx, yy] = *values;
     let xy = (xy + yx) / 2.0;
@@ -52,7 +52,7 @@ fn believable(values: &[f64; 4]) -> Option<Matrix2<f64>> {
     good.then(|| Matrix2::new(xx, xy, xy, yy))
 }
 
-/// A rotation and how well it is known.
+/// A rotation with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TagRotation {
     /// Rotation of `T_a_b`, radians.
@@ -61,8 +61,8 @@ pub(super) struct TagRotation {
     pub(super) deviation: f64,
 }
 
-/// The rotation that takes the tags' places in map b to their places in map a. `None` if there are too few tags, or
-/// they lie in one place.
+/// The rotation from the tags' positions in map b to those in map a. `None` if there are too few tags, or all are at
+/// one position.
 pub(super) fn tag_rotation(tags: &[TagPair], from: TagRotationFrom) -> Option<TagRotation> {
     let rotation = match from {
         TagRotationFrom::LeastSquares => least_squares(tags),
@@ -71,14 +71,15 @@ pub(super) fn tag_rotation(tags: &[TagPair], from: TagRotationFrom) -> Option<Ta
     (rotation.angle.is_finite() && rotation.deviation.is_finite()).then_some(rotation)
 }
 
-/// The rotation that makes the weighted sum of squared distances least.
+/// The rotation of the weighted least squares fit.
 fn least_squares(tags: &[TagPair]) -> Option<TagRotation> {
     let pair = |tag: &TagPair| PointPair { a: tag.a, b: tag.b, weight: 1.0 / tag.variance() };
     let fit = fit_rigid(&tags.iter().map(pair).collect::<Vec<_>>())?;
     Some(TagRotation { angle: fit.transform_a_b.rotation.angle(), deviation: fit.yaw_stddev() })
 }
 
-/// `theta_hat` of equations 5 and 6: the direction from the middle of tags 1 and 2 to tag 3, in map a less in map b.
+/// `theta_hat` of equations 5 and 6: the direction from the midpoint of tags 1 and 2 to tag 3, in map a less in map
+/// b.
 fn triplet(tags: &[TagPair]) -> Option<TagRotation> {
     let [first, second, third, ..] = tags else { return None };
     let arm = |place: fn(&TagPair) -> Point2| place(third) - nalgebra::center(&place(first), &place(second));
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_in_one_place_or_too_few_tell_no_rotation() {
+    fn too_few_tags_or_tags_at_one_position_determine_no_rotation() {
         let place = pair(Point2::new(1.0, 2.0), Point2::new(3.0, 4.0));
         for from in [TagRotationFrom::LeastSquares, TagRotationFrom::Triplet] {
             for count in 0..5 {
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_position_is_left_out_and_what_is_no_covariance_is_replaced() {
+    fn an_invalid_position_is_left_out_and_an_invalid_covariance_is_replaced() {
         let good = CommonTag { covariance_a: [0.01, 0.0, 0.0, 0.01], ..Default::default() };
         assert!(TagPair::new(&CommonTag { a: [f64::NAN, 0.0], ..good.clone() }, 0.03).is_none());
         assert!(TagPair::new(&CommonTag { b: [0.0, 1e300], ..good.clone() }, 0.03).is_none());

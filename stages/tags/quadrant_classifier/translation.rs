@@ -14,10 +14,10 @@ pub(super) struct Transform {
     pub(super) covariance: Matrix3<f64>,
 }
 
-/// Turns map b by `rotation` and moves it so that its tags come to lie on those of map a.
+/// Transform of map b with a given `rotation` that aligns its tags with those of map a.
 ///
-/// The translation is a weighted mean of what each tag asks for, `sum A_i (a_i - R b_i)` with the A_i summing to one:
-/// the inverse covariances, the best tag alone (equation 8), or thirds. `None` without tags.
+/// The translation is a weighted mean over the tags, `sum A_i (a_i - R b_i)` with the A_i summing to one: the inverse
+/// covariances, the best tag only (equation 8), or thirds. `None` without tags.
 pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: TranslationFrom) -> Option<Transform> {
     let turn = Rotation2::new(rotation.angle);
     let matrix = *turn.matrix();
@@ -65,7 +65,7 @@ pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: Translat
         .then(|| Transform { transform_a_b: Isometry2::new(translation, rotation.angle), covariance: full })
 }
 
-/// The root mean square of the distances between the tags of map a and those of map b under a transform, metres.
+/// Root mean square of the residuals of the tags under a transform, metres.
 pub(super) fn residual(tags: &[TagPair], transform_a_b: &Pose2) -> f64 {
     let squares: f64 = tags.iter().map(|tag| (tag.a - transform_a_b * tag.b).norm_squared()).sum();
     (squares / tags.len().max(1) as f64).sqrt()
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn equation_8_lays_the_best_tag_on_the_best_tag() {
+    fn equation_8_aligns_the_best_tag() {
         let mut tags = tags(&pose(1.0, 2.0, 0.5));
         tags[1].a.x += 0.4;
         let rotation = TagRotation { angle: 0.6, deviation: 0.01 };

@@ -1,4 +1,4 @@
-//! What the classifier needs of a wall: its direction, its length and how much it counts.
+//! Directions of walls for the classifier, with their weights.
 
 use super::parameters::{QuadrantClassifierParameters, Weighting};
 use gridweave_runtime::ros::Segment;
@@ -7,20 +7,20 @@ use std::f64::consts::FRAC_PI_4;
 /// The direction of one wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WallDirection {
-    /// Radians, in `(-pi, pi]`; a wall's two ends are alike, so it means the same as its opposite.
+    /// Radians, in `(-pi, pi]`, up to half turns.
     pub(super) angle: f64,
-    /// Metres.
+    /// Length, metres.
     pub(super) length: f64,
     /// Standard deviation of the angle, radians.
     pub(super) deviation: f64,
-    /// How much it counts.
+    /// Weight in the mean.
     pub(super) weight: f64,
 }
 
-/// The longest wall that is believed, metres; it keeps sums finite.
+/// Longest valid wall, metres; it keeps sums finite.
 const MAX_LENGTH: f64 = 1e6;
 
-/// The walls' directions. Segments without length, or with values that are no numbers, are left out.
+/// Directions of the walls. Segments without length, or with values that are not finite, are left out.
 pub(super) fn wall_directions(segments: &[Segment], parameters: &QuadrantClassifierParameters) -> Vec<WallDirection> {
     segments
         .iter()
@@ -28,7 +28,7 @@ pub(super) fn wall_directions(segments: &[Segment], parameters: &QuadrantClassif
             let (dx, dy) = (segment.x2 - segment.x1, segment.y2 - segment.y1);
             let length = dx.hypot(dy);
             let usable = length > 0.0 && length <= MAX_LENGTH && (0.0..=1.0).contains(&segment.reliability);
-            // No direction is worse known than one that is anywhere in the quadrant.
+            // The largest deviation is that of a uniform distribution over the quadrant.
             let deviation = (parameters.end_deviation / length).hypot(parameters.wall_deviation).min(FRAC_PI_4);
             let weight = match parameters.weighting {
                 Weighting::Precision => segment.reliability / deviation.powi(2),
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn segments_that_tell_no_direction_are_left_out() {
+    fn segments_without_a_direction_are_left_out() {
         let good = Segment { x2: 1.0, reliability: 1.0, ..Default::default() };
         let bad = [
             Segment { x2: 0.0, ..good },

@@ -1,14 +1,13 @@
-//! How likely tags at random places would agree on a transform.
+//! Probability that tags at random positions agree on a transform.
 
 use super::TagPair;
 use std::f64::consts::PI;
 
-/// The expected number of sets of `agreeing` tags that would agree under one rigid transform, if the tags of map a lay
-/// at random in a disc as large as the one they lie in: an upper bound of the probability that such a set is there
-/// by chance. At most 1.
+/// Expected number of sets of `agreeing` tags that would agree under one rigid transform, if the tags of map a were
+/// at random in a disc of the same size: an upper bound of the probability of such a set by chance. At most 1.
 ///
 /// It is the number of false alarms of Moisan and Stival 2004. A set begins with two tags, whose distance must be the
-/// same in both maps; each further one must then fall into its gate.
+/// same in both maps; each further one must then be in its gate.
 pub fn chance_of_agreement(pairs: &[TagPair], agreeing: usize, gate: f64) -> f64 {
     let count = pairs.len();
     if agreeing < 2 || agreeing > count {
@@ -21,7 +20,8 @@ pub fn chance_of_agreement(pairs: &[TagPair], agreeing: usize, gate: f64) -> f64
     if !(radius > 0.0 && reach.is_finite()) {
         return 1.0;
     }
-    // A gate is an area of pi reach^2 in the disc, and twice `reach * sqrt(2)` among distances up to the disc's width.
+    // A gate is an area of pi reach^2 in the disc, and twice `reach * sqrt(2)` among distances up to the disc's
+    // diameter.
     let in_gate = (PI * reach * reach / (PI * radius * radius)).min(1.0);
     let same_length = (2.0 * std::f64::consts::SQRT_2 * reach / (2.0 * radius)).min(1.0);
     let logarithm =
@@ -29,7 +29,7 @@ pub fn chance_of_agreement(pairs: &[TagPair], agreeing: usize, gate: f64) -> f64
     logarithm.exp().min(1.0)
 }
 
-/// The logarithm of the number of ways to choose `k` of `n`.
+/// Logarithm of the number of ways to choose `k` of `n`.
 fn ln_choose(n: usize, k: usize) -> f64 {
     (0..k.min(n)).map(|index| ((n - index) as f64 / (index + 1) as f64).ln()).sum()
 }
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn two_of_two_agree_by_chance_as_often_as_a_length_falls_into_its_gate() {
+    fn two_of_two_agree_by_chance_as_often_as_a_length_is_in_its_gate() {
         // About 20 m apart, to within 3.5 standard deviations of 0.06 m to either side.
         let chance = chance_of_agreement(&tags(2, 10.0), 2, 3.5);
         assert!(chance > 0.01 && chance < 0.05, "{chance}");
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn more_agreement_is_less_chance_and_less_room_is_more() {
+    fn more_agreeing_tags_or_a_larger_area_are_less_likely_by_chance() {
         let tags_10 = tags(10, 10.0);
         let chances: Vec<f64> = (3..=10).map(|agreeing| chance_of_agreement(&tags_10, agreeing, 3.5)).collect();
         assert!(chances.windows(2).all(|two| two[1] < two[0]), "{chances:?}");
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_chance() {
+    fn invalid_input_counts_as_chance() {
         assert_eq!(chance_of_agreement(&[], 3, 3.5), 1.0);
         assert_eq!(chance_of_agreement(&tags(1, 10.0), 1, 3.5), 1.0);
         assert_eq!(chance_of_agreement(&tags(2, 10.0), 3, 3.5), 1.0);

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 /// The tags with at least the given certainty in both maps, by falling common precision (the lesser of the two
 /// certainties) and then by id (section 4.1.3).
 ///
-/// Estimates that hold a value that is no finite number, or have no id, do not count; of two estimates of one tag the
-/// first does.
+/// Estimates with a value that is not finite, or without an id, are ignored; of two estimates of one tag the first
+/// counts.
 pub fn common_tags(tags_a: &[TagEstimate], tags_b: &[TagEstimate], certainty: f64) -> Vec<CommonTag> {
     let certain = |tags: &'_ [TagEstimate]| {
         let mut by_id: BTreeMap<String, TagEstimate> = BTreeMap::new();
@@ -30,7 +30,7 @@ pub fn common_tags(tags_a: &[TagEstimate], tags_b: &[TagEstimate], certainty: f6
         })
     };
     let mut common: Vec<CommonTag> = certain(tags_a).into_iter().filter_map(pair).collect();
-    // The sort is stable, and the tags come by id.
+    // The sort is stable, and the tags are sorted by id.
     common.sort_by(|one, other| other.common_precision().total_cmp(&one.common_precision()));
     common
 }
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn estimates_that_are_no_numbers_do_not_count() {
+    fn estimates_that_are_not_finite_are_ignored() {
         let good = tag("1", 0.9);
         for bad in [
             TagEstimate { x: f64::NAN, ..good.clone() },

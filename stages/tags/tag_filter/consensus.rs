@@ -1,34 +1,34 @@
-//! The largest set of tags that one rigid transform lays on each other.
+//! The largest set of tags that agree on one rigid transform.
 
 use crate::shared::geometry::{Point2, PointPair, RigidFit, fit_rigid};
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
 
-/// Pairs among the first so many tags are tried as hypotheses; all tags may join a consensus.
+/// Pairs among this many first tags are tried as hypotheses; all tags may join a consensus.
 const MOST_SEEDS: usize = 60;
-/// A set of members that has not settled by then goes to and fro.
+/// Most rounds; a set that still changes then oscillates.
 const MOST_ROUNDS: usize = 20;
 
 /// One tag in two maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagPair {
-    /// Place in map a, metres.
+    /// Position in map a, metres.
     pub a: Point2,
-    /// Place in map b, metres.
+    /// Position in map b, metres.
     pub b: Point2,
-    /// Covariance of `a`, square metres, with that of the map.
+    /// Covariance of `a`, square metres, including that of the map.
     pub covariance_a: Matrix2<f64>,
-    /// Covariance of `b`, square metres, with that of the map.
+    /// Covariance of `b`, square metres, including that of the map.
     pub covariance_b: Matrix2<f64>,
 }
 
 impl TagPair {
-    /// The pair of a common tag; `map_stddev` is the standard deviation that the bends of each map add, metres.
+    /// The pair of a common tag; `map_stddev` is the standard deviation by the deformation of both maps, metres.
     pub fn new(tag: &CommonTag, map_stddev: f64) -> Self {
         let covariance = |[xx, xy, yx, yy]: [f64; 4]| {
             let cross = 0.5 * (xy + yx);
-            // Half of the bends is each map's.
+            // Half of the variance is that of each map.
             Matrix2::new(xx, cross, cross, yy) + Matrix2::from_diagonal_element(0.5 * map_stddev * map_stddev)
         };
         Self {
@@ -44,18 +44,17 @@ impl TagPair {
         self.a - fit.transform_a_b * self.b
     }
 
-    /// Mean variance of `a - T_a_b * b` along an axis, square metres.
+    /// Mean variance of `a - T_a_b * b` over both axes, square metres.
     pub fn variance(&self) -> f64 {
         0.5 * (self.covariance_a.trace() + self.covariance_b.trace())
     }
 
-    /// How far the tag lies from another one, metres: in map a and in map b.
+    /// Distance of the tag from another one, metres: in map a and in map b.
     pub fn lengths(&self, other: &Self) -> [f64; 2] {
         [(self.a - other.a).norm(), (self.b - other.b).norm()]
     }
 
-    /// Whether the two lengths are the same up to `gate` standard deviations, of which only what lies along the line
-    /// through the two tags counts.
+    /// Whether the two lengths are equal up to `gate` standard deviations along the line through the two tags.
     pub fn lengths_agree(&self, other: &Self, gate: f64) -> bool {
         let [length_a, length_b] = self.lengths(other);
         let along = |arm: Vector2<f64>, covariance: Matrix2<f64>| arm.dot(&(covariance * arm)) / arm.norm_squared();
@@ -64,8 +63,8 @@ impl TagPair {
         (length_a - length_b).powi(2) <= gate * gate * variance
     }
 
-    /// The squared distance of `a` from `T_a_b * b` in standard deviations, `extra` being added to the covariance. Not
-    /// finite if the covariance has no inverse.
+    /// Squared Mahalanobis distance of `a` from `T_a_b * b`, with `extra` added to the covariance. Not finite if the
+    /// covariance has no inverse.
     fn mahalanobis_squared(&self, fit: &RigidFit, extra: &Matrix2<f64>) -> f64 {
         let rotation = fit.transform_a_b.rotation.to_rotation_matrix();
         let turned = rotation.matrix() * self.covariance_b * rotation.matrix().transpose();
@@ -80,29 +79,29 @@ impl TagPair {
 /// Tags that agree on a transform.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Consensus {
-    /// Indexes of the tags, rising.
+    /// Indices of the tags, rising.
     pub members: Vec<usize>,
     /// The transform that fits them best.
     pub fit: RigidFit,
-    /// Sum of their squared distances in standard deviations.
+    /// Sum of their squared Mahalanobis distances.
     pub cost: f64,
 }
 
-/// What the search for a consensus has found.
+/// Result of the search for a consensus.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConsensusSearch {
     /// The set with the most tags; of equals the one that fits best.
     pub best: Option<Consensus>,
-    /// The largest set on another transform, one that puts some tag of the two sets elsewhere by more than the rival
-    /// distance.
+    /// The largest set on another transform, one that moves some tag of the two sets by more than the rival distance.
     pub rival: Option<Consensus>,
 }
 
-/// Finds the largest set of tags whose places agree under one rigid transform, each within `gate` standard deviations.
+/// Finds the largest set of tags whose positions agree under one rigid transform, each within `gate` standard
+/// deviations.
 ///
-/// Every two tags whose distance is the same in both maps make a hypothesis, which is fitted to all that agree with
-/// it until the set is settled. So the result depends on no chance, and a set is missed only if no two of
-/// its members lead to it. Two transforms are different when they put a tag more than `rival_distance` metres apart.
+/// Every two tags with the same distance in both maps make a hypothesis, which is fitted to all that agree with it
+/// until the set is stable. So the result is deterministic, and a set is missed only if no two of its members
+/// converge to it. Two transforms are different when they move a tag by more than `rival_distance` metres.
 pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> ConsensusSearch {
     let seeds = pairs.len().min(MOST_SEEDS);
     let mut found: BTreeMap<Vec<usize>, Consensus> = BTreeMap::new();
@@ -134,17 +133,17 @@ pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> Cons
     ConsensusSearch { best, rival }
 }
 
-/// Whether two tags can be as far from each other in map a as in map b, to a bound that lets no pair through the gate
-/// be missed.
+/// Necessary condition that two tags are as far from each other in map a as in map b: a bound that rejects no pair
+/// within the gate.
 fn lengths_may_agree(one: &TagPair, other: &TagPair, gate: f64) -> bool {
     let [length_a, length_b] = one.lengths(other);
     let difference = length_a - length_b;
-    // Along any direction the variance of a place is at most the trace of its covariance.
+    // Along any direction the variance of a position is at most the trace of its covariance.
     let variance = 2.0 * (one.variance() + other.variance());
     difference * difference <= gate * gate * variance
 }
 
-/// Fits the transform of two tags to all that agree with it, until the set does not change.
+/// Fits the transform of two tags to all that agree with it, until the set is stable.
 fn settle(pairs: &[TagPair], first: usize, second: usize, gate: f64) -> Option<Consensus> {
     let mut members = vec![first, second];
     let mut fit = fit_members(pairs, &members)?;
@@ -203,7 +202,7 @@ mod tests {
                 pair.a += Vector2::new(dx, dy);
             }
             for &index in &moved {
-                // Each to a place of its own.
+                // Each to a different position.
                 pairs[index].a = Point2::new(x + 100.0 + 7.0 * (index * index) as f64, y - 3.0 * index as f64);
             }
             let best = find_consensus(&pairs, 3.5, 0.5).best.unwrap();
@@ -223,7 +222,7 @@ mod tests {
         assert!(two[0].lengths_agree(&two[1], 3.5) && !two[0].lengths_agree(&two[1], 3.0));
         let [length_a, length_b] = two[0].lengths(&two[1]);
         assert!((length_a - length_b - 0.2).abs() < 1e-9);
-        // What is vague across the line does not excuse it.
+        // A large variance across the line does not matter.
         two.iter_mut().for_each(|pair| pair.covariance_b.m22 = 1.0);
         assert!(!two[0].lengths_agree(&two[1], 3.0));
         two.iter_mut().for_each(|pair| pair.covariance_b.m11 = 1.0);
@@ -255,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn less_than_two_places_give_nothing() {
+    fn less_than_two_tags_have_no_consensus() {
         assert_eq!(find_consensus(&[], 3.5, 0.5), ConsensusSearch::default());
         for count in [1, 5] {
             let same = vec![(1.0, 1.0); count];

@@ -1,10 +1,10 @@
-//! Tags in maps that drift.
+//! Tags in maps with drift.
 
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Vector2;
 
-/// Tags whose places are as uncertain as those in maps that drift: the farther from the middle of all the more, by `drift`
-/// metres for the root of each metre.
+/// The tags with the uncertainty of maps with drift: it grows with the distance from the centroid of all, by `drift`
+/// metres per square root of a metre.
 pub(super) fn of_deformed_maps(tags: &[CommonTag], drift: f64) -> Vec<CommonTag> {
     let count = tags.len().max(1) as f64;
     let middle = |place: fn(&CommonTag) -> [f64; 2]| {
@@ -28,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_far_from_the_middle_is_known_less_well() {
+    fn the_uncertainty_grows_with_the_distance_from_the_centroid() {
         let tag = |x: f64| CommonTag { a: [x, 0.0], b: [0.0, 2.0 * x], ..Default::default() };
         let drifted = of_deformed_maps(&[tag(-9.0), tag(0.0), tag(9.0)], 0.1);
         for (tag, expected) in drifted.iter().zip([0.09, 0.0, 0.09]) {

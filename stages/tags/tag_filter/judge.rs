@@ -1,4 +1,4 @@
-//! Whether the tags that two robots have in common suffice for a merge.
+//! Decides whether the tags that two robots have in common suffice for a merge.
 
 use super::common::is_usable;
 use super::drift::of_deformed_maps;
@@ -7,10 +7,10 @@ use crate::shared::geometry::RigidFit;
 use gridweave_runtime::ros::{CommonTag, TagEstimate};
 use std::collections::BTreeSet;
 
-/// Of tags that only agree as far as maps drift so many must: two that are about as far apart say next to nothing.
-const LEAST_BENT: usize = 3;
+/// Least number of tags that agree only within drift: two at about the same distance are hardly any evidence.
+const LEAST_AGREEING_WITH_DRIFT: usize = 3;
 
-/// Whether the tags that two robots have in common suffice for a merge, and why.
+/// Verdict on the tags that two robots have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// If accepted, the tags that agree; otherwise all that are certain in both maps. By falling common precision and
@@ -20,7 +20,7 @@ pub struct Judgement {
     pub accepted: bool,
     /// Whether they suffice only if the directions and the walls of the maps confirm the transform.
     pub provisional: bool,
-    /// Why they do not or, if they do, how well they agree and what was left out.
+    /// Why they do not suffice; or how well they agree, and which were left out.
     pub reason: String,
     /// If accepted, the transform that they agree on.
     pub fit: Option<RigidFit>,
@@ -37,30 +37,32 @@ pub struct RobotTags<'a> {
 
 /// Judges whether the tags that two robots have in common suffice for a merge.
 ///
-/// Besides the paper's conditions on certainties, the tags that count must agree on one rigid transform; see the
-/// parameters for what makes an agreement strong enough.
+/// Besides the paper's conditions on certainties, the tags must agree on one rigid transform; the parameters define
+/// how strong the agreement must be.
 ///
-/// The maps of a SLAM drift. Where the places of the tags do not agree as they are, they are compared once more as uncertain
-/// as drift makes them, and that is how they are sent on.
+/// The maps of a SLAM drift. Where the positions of the tags do not agree, they are compared once more with the
+/// uncertainty of drift, and are sent with it.
 ///
-/// Two tags always agree on some transform, up to their distance: it must be the same in both maps. That may be chance, as
-/// may be the agreement of three that lie near to each other. It suffices only where no other common tag contradicts it,
-/// and is provisional.
+/// Two tags always agree on some transform, if their distance is the same in both maps. That may be chance, as may be
+/// the agreement of three near each other. It suffices only if no other common tag contradicts it, and is
+/// provisional.
 pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> Judgement {
     let tags = common_tags(a.tags, b.tags, parameters.certainty);
     let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| {
         let rigid = agreement(&tags, parameters).map(|agreement| (tags.clone(), agreement));
         rigid.or_else(|reason| {
             let tags = of_deformed_maps(&tags, parameters.map_drift);
-            let parameters =
-                TagFilterParameters { min_tags: parameters.min_tags.max(LEAST_BENT), ..parameters.clone() };
+            let parameters = TagFilterParameters {
+                min_tags: parameters.min_tags.max(LEAST_AGREEING_WITH_DRIFT),
+                ..parameters.clone()
+            };
             agreement(&tags, &parameters).map(|agreement| (tags, agreement)).map_err(|_| reason)
         })
     });
     match outcome {
         Ok((tags, Agreement { consensus, doubt })) => {
             let provisional = doubt.is_some();
-            let reason = praise(&tags, &consensus) + &doubt.unwrap_or_default();
+            let reason = summary(&tags, &consensus) + &doubt.unwrap_or_default();
             let members = consensus.members.iter().filter_map(|&index| tags.get(index).cloned()).collect();
             Judgement { tags: members, accepted: true, provisional, reason, fit: Some(consensus.fit) }
         }
@@ -68,7 +70,7 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
     }
 }
 
-/// The paper's conditions: how many tags there are, and how certain they are.
+/// The paper's conditions: the number of tags, and their certainty.
 fn enough_certain(
     a: RobotTags<'_>,
     b: RobotTags<'_>,
@@ -85,7 +87,7 @@ fn enough_certain(
     if shared == 0 {
         let (count_a, count_b) = (in_a.len(), in_b.len());
         return Err(format!(
-            "{name_a} and {name_b} have no tag in common; {name_a} knows {}, {name_b} {count_b}",
+            "{name_a} and {name_b} have no tag in common; {name_a} has located {}, {name_b} {count_b}",
             counted(count_a)
         ));
     }
@@ -113,11 +115,11 @@ fn enough_certain(
 /// Tags that agree.
 struct Agreement {
     consensus: Consensus,
-    /// Why they do not suffice by themselves, to be said after what speaks for them.
+    /// Why they do not suffice alone, as text after the evidence for them.
     doubt: Option<String>,
 }
 
-/// The conditions on the places of the tags.
+/// The conditions on the positions of the tags.
 fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agreement, String> {
     let TagFilterParameters { gate, map_stddev, min_tags, rival_distance, best_certainty, .. } = *parameters;
     let pairs: Vec<TagPair> = tags.iter().map(|tag| TagPair::new(tag, map_stddev)).collect();
@@ -125,8 +127,8 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
     let count = tags.len();
     let Some(best) = search.best.filter(|best| best.members.len() >= min_tags) else {
         return Err(format!(
-            "of the {count} tags in common no {min_tags} lie to each other in one map as in the other; the tags of two \
-             places may bear the same ids"
+            "of the {count} tags in common no {min_tags} have the same relative positions in both maps; tags of two \
+             buildings may have the same ids"
         ));
     };
     let agreeing = best.members.len();
@@ -135,22 +137,22 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
         let [in_a, in_b] = pairs[first].lengths(&pairs[second]);
         if !pairs[first].lengths_agree(&pairs[second], gate) {
             return Err(format!(
-                "the tags in common{names} lie {in_a:.2} m apart in one map and {in_b:.2} m in the other; the tags of two \
-                 places may bear the same ids"
+                "the tags in common{names} are {in_a:.2} m apart in one map and {in_b:.2} m in the other; tags of two \
+                 buildings may have the same ids"
             ));
         }
     }
     if agreeing as f64 <= parameters.min_agreement * count as f64 {
         return Err(format!(
-            "only {agreeing} of the {count} tags in common agree on one transform{names}; the tags of two places may bear \
+            "only {agreeing} of the {count} tags in common agree on one transform{names}; tags of two buildings may have \
              the same ids"
         ));
     }
     let yaw_stddev = best.fit.yaw_stddev();
     if yaw_stddev > parameters.max_yaw_stddev {
         return Err(format!(
-            "the {agreeing} tags in common that agree{names} lie so near to each other that they leave the rotation \
-             uncertain by {:.1} degrees",
+            "the {agreeing} tags in common that agree{names} are so near to each other that the rotation is uncertain \
+             by {:.1} degrees",
             yaw_stddev.to_degrees()
         ));
     }
@@ -168,8 +170,8 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
         let size = rival.members.len();
         if size >= min_tags && size as f64 > parameters.max_rival_share * agreeing as f64 {
             return Err(format!(
-                "{agreeing} of the {count} tags in common agree on one transform{names}, but {size} on another one{}: it \
-                 cannot be told which is right",
+                "{agreeing} of the {count} tags in common agree on one transform{names}, but {size} on another one{}: \
+                 they do not decide which is right",
                 listed(rival.members.iter().filter_map(|&index| tags.get(index)), " (", ")")
             ));
         }
@@ -185,8 +187,8 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
     Ok(Agreement { consensus: best, doubt })
 }
 
-/// What speaks for a consensus, and which tags are not in it by how much.
-fn praise(tags: &[CommonTag], consensus: &Consensus) -> String {
+/// Agreement of a consensus, and the residuals of tags outside of it.
+fn summary(tags: &[CommonTag], consensus: &Consensus) -> String {
     let left_out: Vec<String> = tags
         .iter()
         .enumerate()

@@ -52,7 +52,7 @@ fn a_moved_tag_is_left_out_by_name() {
     assert!(judgement.tags.iter().all(|tag| tag.tag_id != "tag2"));
 }
 
-/// As a map shows places whose west lies too far south and whose east too far north.
+/// Tags in a deformed map: the west is displaced to the south and the east to the north.
 fn deformed(most: f64) -> Vec<TagEstimate> {
     let wide = SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y));
     let mut tags = tags(&pose(-4.0, 0.0, 1.0), &wide);
@@ -64,12 +64,12 @@ fn deformed(most: f64) -> Vec<TagEstimate> {
 }
 
 #[test]
-fn tags_in_bent_maps_agree_as_far_as_maps_drift() {
+fn tags_in_deformed_maps_agree_within_drift() {
     let a = tags(&pose(1.0, 2.0, 3.0), &SHAPE.map(|(x, y)| (3.0 * x, 3.0 * y)));
     let judgement = judged(&a, &deformed(0.4));
     assert!(judgement.accepted && judgement.tags.len() >= 5, "{judgement:?}");
     let far = judgement.tags.iter().map(|tag| tag.covariance_b[0]).fold(0.0, f64::max);
-    assert!(far > 0.03, "what is far from the middle is known less well: {far}");
+    assert!(far > 0.03, "the uncertainty grows with the distance from the centroid: {far}");
     refused(&a, &deformed(3.0), "the same ids");
     let rigid = TagFilterParameters { map_drift: 0.0, ..Default::default() };
     let robot = |robot, tags| RobotTags { robot, tags };
@@ -77,12 +77,12 @@ fn tags_in_bent_maps_agree_as_far_as_maps_drift() {
 }
 
 #[test]
-fn robots_without_a_common_tag_are_told_so() {
+fn robots_without_a_common_tag_are_refused() {
     let a = tags(&pose(1.0, 2.0, 0.0), &SHAPE);
     let mut b = a[..1].to_vec();
     b[0].tag_id = "other".into();
-    refused(&a, &b, "robot1 and robot2 have no tag in common; robot1 knows 6 tags, robot2 1");
-    refused(&a, &[], "robot1 knows 6 tags, robot2 0");
+    refused(&a, &b, "robot1 and robot2 have no tag in common; robot1 has located 6 tags, robot2 1");
+    refused(&a, &[], "robot1 has located 6 tags, robot2 0");
 }
 
 #[test]
@@ -118,10 +118,10 @@ fn a_mirrored_map_is_refused() {
 }
 
 #[test]
-fn tags_near_one_place_are_refused() {
+fn tags_near_one_position_are_refused() {
     let cluster = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1), (0.1, 0.1), (0.05, 0.0)];
     let tags = tags(&pose(0.0, 0.0, 0.0), &cluster);
-    refused(&tags, &tags, "lie so near to each other");
+    refused(&tags, &tags, "are so near to each other");
     let one_place = self::tags(&pose(0.0, 0.0, 0.0), &[(1.0, 1.0); 4]);
     refused(&one_place, &one_place, "");
 }
@@ -151,7 +151,7 @@ fn two_tags_that_are_farther_apart_in_one_map_are_refused() {
     let a = tags(&pose(0.0, 0.0, 0.0), &SHAPE[..2]);
     let mut b = a.clone();
     b[1].x += 0.35;
-    refused(&a, &b, "the tags in common (tag0, tag1) lie 5.10 m apart in one map and 5.44 m in the other");
+    refused(&a, &b, "the tags in common (tag0, tag1) are 5.10 m apart in one map and 5.44 m in the other");
     b[1].x += 2.0;
     refused(&a, &b, "the same ids");
 }
@@ -166,7 +166,7 @@ fn two_tags_that_a_third_contradicts_are_refused() {
 
 #[test]
 fn two_tags_near_each_other_are_refused() {
-    for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "lie so near"), ([(0.0, 0.0), (1.8, 0.5)], "by chance")] {
+    for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "are so near"), ([(0.0, 0.0), (1.8, 0.5)], "by chance")] {
         let tags = tags(&pose(0.0, 0.0, 0.0), &places);
         refused(&tags, &tags, part);
     }
@@ -187,7 +187,7 @@ fn an_agreement_of_three_that_may_be_chance_is_provisional() {
 
 #[test]
 fn two_transforms_with_as_many_tags_are_refused() {
-    // The first tag turns about nothing: it is on both.
+    // The first tag is the centre of the rotation: it is on both.
     let a = tags(&pose(0.0, 0.0, 0.0), &SHAPE[..5]);
     let turned = pose(0.0, 0.0, 2.0);
     let mut b = a.clone();
@@ -195,5 +195,5 @@ fn two_transforms_with_as_many_tags_are_refused() {
         let place = turned * Point2::new(tag.x, tag.y);
         (tag.x, tag.y) = (place.x, place.y);
     }
-    refused(&a, &b, "cannot be told which is right");
+    refused(&a, &b, "they do not decide which is right");
 }

@@ -1,4 +1,4 @@
-//! The parameters of the tag filter.
+//! Parameters of the tag filter.
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
@@ -8,51 +8,51 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TagFilterParameters {
-    /// A common tag needs this certainty in both maps. The paper has 0.75.
+    /// Least certainty of a common tag in both maps. The paper has 0.75.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub certainty: f64,
-    /// At least one common tag needs this certainty in both maps. The paper has 0.90.
+    /// Least certainty of the best common tag in both maps. The paper has 0.90.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub best_certainty: f64,
-    /// So many common tags must agree, 2 or more. The paper has 3. What two say is provisional: the directions and the
-    /// walls of the maps must confirm it.
+    /// Least number of common tags that agree, 2 or more. The paper has 3. Two are provisional: the directions and
+    /// the walls of the maps must confirm them.
     #[schemars(range(min = 2))]
     pub min_tags: usize,
-    /// Two tags agree when they lie within so many standard deviations of each other.
+    /// Gate of two tags, in standard deviations.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub gate: f64,
-    /// Standard deviation of a tag's place that comes from the bends of the maps, metres; it is added to that of the
+    /// Standard deviation of a tag's position by the deformation of the maps, metres; it is added to that of the
     /// readings.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub map_stddev: f64,
-    /// How maps drift, metres for the root of each metre: where tags do not agree, they are compared once more with a
-    /// standard deviation that grows so from the middle of all. 0 does not.
+    /// Drift of maps, metres per square root of a metre: where tags do not agree, they are compared once more with a
+    /// standard deviation that grows with the distance from the centroid of all. 0 does not.
     #[schemars(range(min = 0.0))]
     pub map_drift: f64,
-    /// More than this share of the common tags must agree.
+    /// Least share of the common tags that agree.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_agreement: f64,
-    /// What the tags say is provisional when tags at random places would agree as well with more than this probability;
-    /// and refused if, beside that, some of the common tags do not agree.
+    /// Largest probability that tags at random positions would agree as well. Above it the tags are provisional; and
+    /// refused if, besides, some of the common tags do not agree.
     #[schemars(extend("exclusiveMinimum" = 0), range(max = 1.0))]
     pub max_chance: f64,
-    /// Refused when tags at random places would agree as well with more than this probability, whatever may confirm it.
-    /// With two tags that lie far apart it is about 0.7 m divided by their distance.
+    /// The same bound for provisional tags, above which they are refused. With two tags far apart the probability is
+    /// about 0.7 m divided by their distance.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_provisional_chance: f64,
-    /// Refused when the agreeing tags leave the rotation uncertain by more than this standard deviation, radians:
-    /// they lie too near to each other.
+    /// Largest standard deviation of the rotation by the agreeing tags, radians; greater where they are too near to
+    /// each other.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_yaw_stddev: f64,
-    /// Refused when another transform, which would put a tag elsewhere by more than `rival_distance`, has more than
-    /// this share of the best one's tags.
+    /// Refused when another transform, which moves a tag by more than `rival_distance`, has more than this share of
+    /// the best one's tags.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_rival_share: f64,
-    /// Two transforms are different when they put a tag so far apart, metres.
+    /// Two transforms are different when they move a tag by more than this, metres.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rival_distance: f64,
-    /// While the same tags agree, they are sent again only when one has moved by more than this, metres; what is left is sent
-    /// at the end. 0 sends every change. Each change sent makes later stages align the maps anew.
+    /// While the same tags agree, they are sent again only when one has moved by more than this, metres; the rest is
+    /// sent at the end. 0 sends every change. Each change makes later stages align the maps again.
     #[schemars(range(min = 0.0))]
     pub min_change: f64,
 }

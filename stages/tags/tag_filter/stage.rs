@@ -12,7 +12,7 @@ pub fn kind() -> StageKind {
         "tag_filter",
         "Finds the tags that two robots have in common (Tsardoulias et al., sections 4 and 4.1.3) and leaves out those \
          that do not agree with the others on one rigid transform. Sends the tags of a pair of robots when they change, \
-         and says why they do not suffice for a merge if so.",
+         with the reason if they do not suffice for a merge.",
         |parameters, _| Ok(TagFilter { parameters, robots: BTreeMap::new(), sent: BTreeMap::new() }),
     )
     .input("estimates", "all tags of one robot", TagFilter::receive_estimates)
@@ -22,9 +22,9 @@ pub fn kind() -> StageKind {
 
 struct TagFilter {
     parameters: TagFilterParameters,
-    /// The last estimates of each robot.
+    /// Latest estimates of each robot.
     robots: BTreeMap<String, TagEstimates>,
-    /// What was sent last for each pair.
+    /// Judgement sent last for each pair.
     sent: BTreeMap<RobotPair, Judgement>,
 }
 
@@ -44,14 +44,14 @@ impl TagFilter {
         estimates: Received<'_, TagEstimates>,
         output: &Output<Pairs>,
     ) -> Result<(), StageError> {
-        // The robot's name in the message counts; a program that only fills the header is understood as well.
+        // The robot's name in the message counts; a program that fills the header only is accepted as well.
         let robot = if estimates.robot.is_empty() { estimates.robot() } else { &estimates.robot }.to_owned();
         if robot.is_empty() {
             output.warn("tag estimates without a robot are left out");
             return Ok(());
         }
         for _ in estimates.tags.iter().filter(|tag| !super::common::is_usable(tag)) {
-            output.warn("tag estimates without an id or with a value that is no finite number are left out");
+            output.warn("tag estimates without an id or with a value that is not finite are left out");
         }
         self.robots.insert(robot.clone(), estimates.into_content());
         let others: Vec<String> = self.robots.keys().filter(|other| **other != robot).cloned().collect();
@@ -76,7 +76,7 @@ impl TagFilter {
             RobotTags { robot: &pair.b, tags: &b.tags },
             &self.parameters,
         );
-        if self.sent.get(&pair).is_some_and(|sent| says_the_same(sent, &judgement, min_change)) {
+        if self.sent.get(&pair).is_some_and(|sent| is_same(sent, &judgement, min_change)) {
             return Ok(());
         }
         let message = CommonTags {
@@ -94,8 +94,8 @@ impl TagFilter {
     }
 }
 
-/// Whether two judgements are equal or, if both are accepted alike, name the same tags within `min_change` metres.
-fn says_the_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bool {
+/// Whether two judgements are equal or, if both are accepted alike, have the same tags within `min_change` metres.
+fn is_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bool {
     let near = |one: &[f64; 2], other: &[f64; 2]| (one[0] - other[0]).hypot(one[1] - other[1]) <= min_change;
     let same_tags = sent.tags.len() == judgement.tags.len()
         && sent.tags.iter().all(|one| {
@@ -192,7 +192,7 @@ mod tests {
         bench.send("robot1", &tags());
         let sent = bench.send("robot2", &[]);
         assert_eq!((sent.len(), sent[0].accepted), (1, false));
-        assert_eq!(sent[0].reason, "robot1 and robot2 have no tag in common; robot1 knows 4 tags, robot2 0");
+        assert_eq!(sent[0].reason, "robot1 and robot2 have no tag in common; robot1 has located 4 tags, robot2 0");
     }
 
     #[test]

@@ -1,40 +1,40 @@
-//! Directions in which a tag was perceived, those of one place joined.
+//! Bearings of a tag, averaged by the robot's position.
 
 use super::{Position, Ray};
 use crate::shared::geometry::{Point2, wrap_angle};
 use nalgebra::{Matrix2, Vector2};
 
-/// Two bearings of one place belong together when they differ by less than this many standard deviations.
+/// Largest difference of two bearings of one group, in standard deviations.
 const SAME_BEARING: f64 = 4.0;
-/// A tag is hardly ever nearer, metres: on the way within a place the direction to it turns by the way over this.
+/// Least distance of a tag, metres: it bounds how much the bearing turns while the robot moves within one position.
 const NEAREST: f64 = 0.5;
 
-/// One bearing with the place it was taken at.
+/// One bearing with the pose at which it was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bearing {
-    /// Where the sensor was, and the heading of its robot.
+    /// Position of the sensor, and heading of its robot.
     pub position: Position,
     /// Direction to the tag, radians, map frame.
     pub bearing: f64,
-    /// Standard deviation of the direction as seen from the robot, radians.
+    /// Standard deviation of the direction relative to the robot, radians.
     pub stddev: f64,
 }
 
-/// The bearings of one tag, those of one place joined to their mean.
+/// The bearings of one tag, averaged by position.
 ///
-/// As with [`ReadingGroups`](super::ReadingGroups), what the readings of one place have in common does not average out: the
-/// errors of the pose and of the heading. A bearing that contradicts the others of its place makes a group of its own, which
-/// keeps an outlier from spoiling a mean.
+/// As with [`ReadingGroups`](super::ReadingGroups), the common errors of the readings at one position do not average
+/// out: those of the pose and of the heading. A bearing that contradicts the others at its position makes a separate
+/// group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
 pub struct BearingGroups {
     groups: Vec<Group>,
-    /// Where the groups of the place that the robot is at begin.
+    /// Index of the first group at the robot's present position.
     here: usize,
     bearings: u32,
 }
 
-/// Weighted sums over bearings. Positions and directions are taken from the first one, so that sums lose nothing far from the
-/// origin, and none goes the long way round.
+/// Weighted sums over bearings. Positions and directions are relative to the first one, so that sums lose no digits
+/// far from the origin, and directions do not wrap.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     anchor: Point2,
@@ -47,8 +47,8 @@ struct Group {
 }
 
 impl BearingGroups {
-    /// Adds the next bearing. The robot is at another place than before when it is `min_travel` metres or more away
-    /// from where the last place began.
+    /// Adds a bearing. The robot is at a new position when it is `min_travel` metres or more away from the start of
+    /// the last one.
     pub fn add(&mut self, reading: &Bearing, min_travel: f64) {
         self.bearings = self.bearings.saturating_add(1);
         let Bearing { position, bearing, stddev } = *reading;
@@ -79,15 +79,17 @@ impl BearingGroups {
         group.yaw_variance += position.yaw_variance * weight;
     }
 
-    /// The number of bearings.
+    /// Number of bearings.
     pub fn bearings(&self) -> u32 {
         self.bearings
     }
 
-    /// One ray a group: variance of the mean direction with that of the heading, and the variance of the place.
+    /// One ray for each group: variance of the mean direction including that of the heading, and the variance of the
+    /// position.
     ///
-    /// `pose_stddev`, metres, and `heading_stddev`, radians, are the least that the pose and its heading count with. The pose
-    /// counts with its largest variance, whatever the direction, as in [`ReadingGroups::rings`](super::ReadingGroups::rings).
+    /// `pose_stddev`, metres, and `heading_stddev`, radians, are lower bounds of the deviations of the pose and its
+    /// heading. The pose counts with its largest variance in any direction, as in
+    /// [`ReadingGroups::rings`](super::ReadingGroups::rings).
     pub fn rays(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ray> + '_ {
         self.groups.iter().map(move |group| Ray {
             origin: group.anchor + group.offset / group.weight,
@@ -98,7 +100,7 @@ impl BearingGroups {
         })
     }
 
-    /// The error that the poses may have in common, which moves the tag; see
+    /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, heading_stddev: f64) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn bearings_of_one_place_give_their_mean_and_never_more_than_pose_and_heading_allow() {
+    fn bearings_at_one_position_are_averaged_but_not_better_than_pose_and_heading() {
         // About the direction where angles wrap.
         let many: Vec<_> = (0..10_000).map(|n| bearing(1.0, if n % 2 == 0 { PI - 0.02 } else { 0.04 - PI })).collect();
         let found = rays(&many, 0.02, 0.01);
@@ -151,20 +153,20 @@ mod tests {
     }
 
     #[test]
-    fn a_heading_that_is_known_less_exactly_counts_with_its_variance() {
+    fn the_variance_of_the_heading_is_added() {
         let position = Position { yaw_variance: 0.04, ..Position::new(Point2::origin()) };
         let found = rays(&[Bearing { position, ..bearing(0.0, 1.0) }], 0.0, 0.01);
         assert!((found[0].variance - (0.05f64.powi(2) + 0.04)).abs() < 1e-12, "{found:?}");
     }
 
     #[test]
-    fn a_place_ends_when_the_robot_has_gone_on() {
+    fn a_position_ends_when_the_robot_has_moved_on() {
         let drive: Vec<_> = (0..10).map(|step| bearing(0.06 * f64::from(step), 1.0)).collect();
         assert_eq!(rays(&drive, 0.0, 0.0).len(), 5);
     }
 
     #[test]
-    fn an_outlier_does_not_spoil_the_mean_of_its_place() {
+    fn an_outlier_does_not_spoil_the_mean_of_its_position() {
         for order in [[1.0, 1.02, -2.0, 0.98], [-2.0, 1.0, 1.02, 0.98]] {
             let found = rays(&order.map(|angle| bearing(0.0, angle)), 0.0, 0.0);
             assert_eq!(found.len(), 2, "{found:?}");

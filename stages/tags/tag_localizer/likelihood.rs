@@ -1,9 +1,9 @@
-//! How well a place agrees with all that was heard and seen of one tag.
+//! Likelihood of a tag's position by all of its readings.
 
 use super::{Ray, RayProduct, Ring, RingProduct, largest_variance};
 use crate::shared::geometry::Point2;
 
-/// The product of the rings and the rays of one tag.
+/// Product of the rings and the rays of one tag.
 #[derive(Clone, Debug)]
 pub struct Likelihood {
     rings: RingProduct,
@@ -11,8 +11,8 @@ pub struct Likelihood {
 }
 
 impl Likelihood {
-    /// The product of `rings` and `rays`. `outlier_share` of the readings have any range up to `reach`, in metres, or any direction
-    /// with the same probability.
+    /// The product of `rings` and `rays`. A share `outlier_share` of the readings are uniform, over ranges up to
+    /// `reach`, in metres, or over directions.
     pub fn new(
         rings: impl Iterator<Item = Ring>,
         rays: impl Iterator<Item = Ray>,
@@ -27,26 +27,26 @@ impl Likelihood {
         Self::new(rings, std::iter::empty(), outlier_share, reach)
     }
 
-    /// Whether nothing was heard or seen.
+    /// Whether there are no readings.
     pub fn is_empty(&self) -> bool {
         self.rings.is_empty() && self.rays.is_empty()
     }
 
-    /// The logarithm of the product at a place, not normalised; at most 0. `None` as soon as it is known to be below
+    /// Logarithm of the product at a point, not normalised; at most 0. `None` as soon as it is known to be below
     /// `least`.
     pub fn log_likelihood(&self, place: &Point2, least: f64) -> Option<f64> {
         self.log_likelihood_within(place, 0.0, least)
     }
 
-    /// An upper bound of the logarithm of the product over all places within `radius` of `place`. `None` as soon as it is known to
-    /// be below `least`.
+    /// Upper bound of the logarithm of the product over all points within `radius` of `place`. `None` as soon as it
+    /// is known to be below `least`.
     pub fn log_likelihood_within(&self, place: &Point2, radius: f64, least: f64) -> Option<f64> {
         let rings = self.rings.log_likelihood_within(place, radius, least)?;
         Some(rings + self.rays.log_likelihood_within(place, radius, least - rings)?)
     }
 
-    /// Standard deviation at a place of the tag along the direction in which the readings tell most, metres: from the Fisher
-    /// information of the rings and rays that go through that place.
+    /// Standard deviation of the tag at a point along its most certain direction, metres: from the Fisher information
+    /// of the rings and rays through that point.
     pub fn narrowest_stddev(&self, place: &Point2) -> f64 {
         largest_variance(&(self.rings.information(place) + self.rays.information(place))).sqrt().recip()
     }

@@ -1,4 +1,4 @@
-//! The tags of one robot.
+//! Localization of the tags of one robot.
 
 use super::{
     Bearing, BearingGroups, GridSize, Likelihood, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups,
@@ -13,64 +13,63 @@ use std::fmt;
 
 /// A range that exceeds the reach by less than this many standard deviations is noise.
 const REACH_TOLERANCE: f64 = 4.0;
-/// A tag that was read so lately is not out of reach, seconds: where poses jump to and fro, all tags would else be read
-/// out at every jump, which takes far longer than the drive.
+/// A tag that was read less than this many seconds ago is not out of reach: otherwise poses that jump back and forth
+/// would read out all tags at every jump, which takes far longer than the drive.
 const LEAST_ABSENCE: f64 = 1.0;
-/// No camera tells where a tag is more exactly, metres: a covariance that says so knows nothing of how the camera is mounted.
+/// Least standard deviation of a sighting, metres: a smaller covariance ignores how the camera is mounted.
 const LEAST_SIGHTING_STDDEV: f64 = 0.01;
-/// No camera sees a tag farther off, metres.
+/// Largest distance at which a camera sees a tag, metres.
 const FARTHEST: f64 = 1000.0;
-/// A tag of which nothing but bearings is known is looked for first on a grid that is so many times as wide: they do not say how
-/// far off it is.
+/// Factor by which the first grid of a tag with bearings only is larger, as its distance is unknown.
 const WIDER: f64 = 4.0;
 
-/// Localizes all tags of one robot as its poses and readings come in.
+/// Localizes all tags of one robot from its poses and readings.
 #[derive(Clone, Debug)]
 pub struct TagLocalizer {
     parameters: TagLocalizerParameters,
     track: PoseTrack,
     tags: BTreeMap<String, Tag>,
-    /// Readings that are later than the last pose, by time and then as they came.
+    /// Readings later than the last pose, by time and then in order of arrival.
     pending: BTreeMap<(LogTime, u64), TagReading>,
-    /// How many readings have waited.
+    /// Number of readings that have waited.
     waited: u64,
 }
 
-/// A reading as it comes: when, which tag, and what it says of it.
+/// A reading: its time, its tag, and its measurement.
 #[derive(Clone, Debug, PartialEq)]
 struct TagReading {
     time: LogTime,
     tag_id: String,
-    says: Says,
+    measured: Measured,
     /// Metres.
     stddev: f64,
 }
 
-/// What a reading says of a tag.
+/// A measurement of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Says {
-    /// How far it is, metres.
+enum Measured {
+    /// Distance, metres.
     Range(f64),
-    /// Where it is from the robot: metres ahead, and to the left.
+    /// Position relative to the robot: metres ahead, and to the left.
     Place(Vector2<f64>),
-    /// In which direction it is, radians from straight ahead of the robot, with its standard deviation, seen from the sensor:
-    /// metres ahead of the robot, and to its left.
+    /// Bearing, radians from straight ahead of the robot, with its standard deviation, relative to the sensor: metres
+    /// ahead of the robot, and to its left.
     Bearing { sensor: Vector2<f64>, bearing: f64, stddev: f64 },
 }
 
-/// What is known of one tag.
+/// Readings and estimate of one tag.
 #[derive(Clone, Debug)]
 struct Tag {
-    /// Where the robot was when it heard the tag first, or saw it: the middle of the grid.
+    /// Position of the robot at the first reading: the centre of the grid.
     first_place: Point2,
     groups: ReadingGroups,
     sightings: SightingGroups,
     bearings: BearingGroups,
-    /// When, where and how far off the tag was heard or seen last.
+    /// Time, position and distance of the last reading.
     last: (LogTime, Point2, f64),
-    /// Standard deviation of the most exact reading, metres.
+    /// Standard deviation of the most accurate reading, metres.
     least_stddev: f64,
-    /// Whether readings have come since the last read-out.
+    /// Whether there are readings since the last read-out.
     changed: bool,
     mode: Option<TagMode>,
 }
@@ -80,15 +79,15 @@ struct Tag {
 pub enum ReadingProblem {
     /// The tag has no id.
     NoId,
-    /// The range is not a positive number.
+    /// The range is not positive.
     NoRange,
     /// The position is not finite.
-    NoPlace,
-    /// The bearing, or where its sensor is, is not finite.
+    NoPosition,
+    /// The bearing, or the position of its sensor, is not finite.
     NoBearing,
     /// The range is beyond the reach of a tag.
     TooFar,
-    /// It is older than all poses that are known.
+    /// It is older than all known poses.
     NoPoseBefore,
     /// The last pose before it is older than `max_pose_age`.
     PoseTooOld,
@@ -98,24 +97,24 @@ impl fmt::Display for ReadingProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NoId => "tag readings without a tag id are left out",
-            Self::NoRange => "tag readings whose range is no positive number are left out",
-            Self::NoPlace => "tag readings whose position is no finite number are left out",
-            Self::NoBearing => "tag readings whose bearing is no finite number are left out",
+            Self::NoRange => "tag readings with a range that is not positive are left out",
+            Self::NoPosition => "tag readings with a position that is not finite are left out",
+            Self::NoBearing => "tag readings with a bearing that is not finite are left out",
             Self::TooFar => "tag readings with a range beyond `reach` are left out",
             Self::NoPoseBefore => "tag readings before the robot's first pose are left out",
-            Self::PoseTooOld => "tag readings whose last pose is older than `max_pose_age` are left out",
+            Self::PoseTooOld => "tag readings more than `max_pose_age` after the last pose are left out",
         })
     }
 }
 
 impl TagLocalizer {
-    /// A robot that has heard nothing yet.
+    /// A robot without readings.
     pub fn new(parameters: TagLocalizerParameters) -> Self {
         Self { parameters, track: PoseTrack::default(), tags: BTreeMap::new(), pending: BTreeMap::new(), waited: 0 }
     }
 
-    /// Adds where the robot is, and the readings that waited for it. `false`, and it is left out, if it is older than the
-    /// last one.
+    /// Adds a pose of the robot, and the readings that waited for it. Returns `false`, and ignores it, if it is older
+    /// than the last one.
     pub fn add_pose(&mut self, time: LogTime, position: Position, mut problem: impl FnMut(ReadingProblem)) -> bool {
         if !self.track.add(time, position) {
             return false;
@@ -127,11 +126,11 @@ impl TagLocalizer {
         true
     }
 
-    /// Adds a reading: of which tag, how far, and with which standard deviation (0 or no number if it is not known), in
-    /// metres. One that is later than the last pose waits for the next one, so that its position can be interpolated.
+    /// Adds a range reading of a tag with its standard deviation (0 or not finite if it is unknown), in metres. One
+    /// later than the last pose waits for the next one, so that its position can be interpolated.
     pub fn add_reading(&mut self, time: LogTime, tag_id: &str, range: f64, stddev: f64) -> Result<(), ReadingProblem> {
         let TagLocalizerParameters { reach, range_stddev, .. } = self.parameters;
-        // `max` takes the other value for one that is no number.
+        // `max` returns the other value for NaN.
         let stddev = range_stddev.max(stddev).min(range_stddev.max(reach));
         if tag_id.is_empty() {
             return Err(ReadingProblem::NoId);
@@ -142,11 +141,11 @@ impl TagLocalizer {
         if range > reach + REACH_TOLERANCE * stddev {
             return Err(ReadingProblem::TooFar);
         }
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Range(range), stddev })
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Range(range), stddev })
     }
 
-    /// Adds where a tag was seen from the robot, metres ahead of it and to its left, with its covariance (zeros if it is not
-    /// known). It waits for the next pose as a range does.
+    /// Adds a sighting of a tag, metres ahead of the robot and to its left, with its covariance (zeros if it is
+    /// unknown). It waits for the next pose as a range does.
     pub fn add_sighting(
         &mut self,
         time: LogTime,
@@ -159,18 +158,19 @@ impl TagLocalizer {
         }
         let distance = place.norm();
         if !(distance.is_finite() && distance < FARTHEST) {
-            return Err(ReadingProblem::NoPlace);
+            return Err(ReadingProblem::NoPosition);
         }
         let known = largest_variance(covariance).sqrt();
         let stddev = match known.is_finite() && known > 0.0 {
             true => known.max(LEAST_SIGHTING_STDDEV),
             false => self.parameters.sighting_stddev * distance.max(1.0),
         };
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says: Says::Place(place), stddev })
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Place(place), stddev })
     }
 
-    /// Adds in which direction a tag is: radians, counterclockwise from straight ahead of the robot, with its standard deviation
-    /// (0 or no number if it is not known). `sensor` is where the sensor is, metres ahead of the robot, and to its left.
+    /// Adds a bearing of a tag: radians, counterclockwise from straight ahead of the robot, with its standard
+    /// deviation (0 or not finite if it is unknown). `sensor` is the position of the sensor, metres ahead of the
+    /// robot, and to its left.
     pub fn add_bearing(
         &mut self,
         time: LogTime,
@@ -187,11 +187,11 @@ impl TagLocalizer {
         if !(bearing.is_finite() && distance.is_finite() && distance < FARTHEST) {
             return Err(ReadingProblem::NoBearing);
         }
-        // `max` takes the other value for one that is no number.
+        // `max` returns the other value for NaN.
         let stddev = bearing_stddev.max(stddev).min(bearing_stddev.max(PI));
-        let says = Says::Bearing { sensor, bearing, stddev };
-        // How far off the tag is it does not say: at the most as far as tags are perceived.
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), says, stddev: stddev * reach })
+        let measured = Measured::Bearing { sensor, bearing, stddev };
+        // The distance is unknown: at most as far as tags are perceived.
+        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured, stddev: stddev * reach })
     }
 
     fn place_or_wait(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
@@ -206,7 +206,7 @@ impl TagLocalizer {
         }
     }
 
-    /// Puts the readings that still wait for a pose where the robot was last seen.
+    /// Adds the readings that still wait for a pose at the last pose of the robot.
     pub fn place_pending(&mut self, mut problem: impl FnMut(ReadingProblem)) {
         for reading in std::mem::take(&mut self.pending).into_values() {
             self.place(reading).unwrap_or_else(&mut problem);
@@ -214,20 +214,20 @@ impl TagLocalizer {
     }
 
     fn place(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
-        let TagReading { time, tag_id, says, stddev } = reading;
+        let TagReading { time, tag_id, measured, stddev } = reading;
         let position = self.track.position(time, self.parameters.max_pose_age).map_err(|problem| match problem {
             NoPose::Before => ReadingProblem::NoPoseBefore,
             NoPose::TooOld => ReadingProblem::PoseTooOld,
         })?;
         let seen = |place| position.place + Rotation2::new(position.yaw) * place;
-        let (first_place, range) = match says {
-            Says::Range(range) => (position.place, range),
-            Says::Place(place) => (seen(place), place.norm()),
-            Says::Bearing { sensor, .. } => (seen(sensor), self.parameters.reach),
+        let (first_place, range) = match measured {
+            Measured::Range(range) => (position.place, range),
+            Measured::Place(place) => (seen(place), place.norm()),
+            Measured::Bearing { sensor, .. } => (seen(sensor), self.parameters.reach),
         };
-        // A pose whose rotation is none says nothing of where the robot looks.
+        // A pose with an invalid rotation has no heading.
         if !first_place.iter().all(|value| value.is_finite()) {
-            return Err(ReadingProblem::NoPlace);
+            return Err(ReadingProblem::NoPosition);
         }
         let tag = self.tags.entry(tag_id).or_insert_with(|| Tag {
             first_place,
@@ -240,10 +240,10 @@ impl TagLocalizer {
             mode: None,
         });
         let min_travel = self.parameters.min_travel;
-        match says {
-            Says::Range(range) => tag.groups.add(&Reading { position, range, stddev }, min_travel),
-            Says::Place(place) => tag.sightings.add(&Sighting { position, seen: seen(place), stddev }, min_travel),
-            Says::Bearing { sensor, bearing, stddev } => {
+        match measured {
+            Measured::Range(range) => tag.groups.add(&Reading { position, range, stddev }, min_travel),
+            Measured::Place(place) => tag.sightings.add(&Sighting { position, seen: seen(place), stddev }, min_travel),
+            Measured::Bearing { sensor, bearing, stddev } => {
                 let position = Position { place: seen(sensor), ..position };
                 tag.bearings.add(&Bearing { position, bearing: position.yaw + bearing, stddev }, min_travel);
             }
@@ -254,7 +254,8 @@ impl TagLocalizer {
         Ok(())
     }
 
-    /// Reads out the tags that are out of reach and have changed since their last read-out. Whether there were any.
+    /// Reads out the tags that are out of reach and have changed since their last read-out. Returns whether there
+    /// were any.
     pub fn read_out_lost(&mut self) -> bool {
         let (Some(time), Some(place)) = (self.track.latest_time(), self.track.latest_place()) else {
             return false;
@@ -268,7 +269,7 @@ impl TagLocalizer {
         })
     }
 
-    /// Reads out all tags that have changed since their last read-out. Whether there were any.
+    /// Reads out all tags that have changed since their last read-out. Returns whether there were any.
     pub fn read_out_all(&mut self) -> bool {
         self.read_out_if(|_| true)
     }
@@ -286,7 +287,7 @@ impl TagLocalizer {
         any
     }
 
-    /// The tags that have been read out with the number of their readings, by id.
+    /// The tags that have been read out, with the number of their readings, by id.
     pub fn modes(&self) -> impl Iterator<Item = (&str, &TagMode, u32)> {
         self.tags.iter().filter_map(|(id, tag)| Some((id.as_str(), tag.mode.as_ref()?, tag.readings())))
     }
@@ -309,12 +310,12 @@ impl Tag {
             let wide = GridSize { resolution: WIDER * resolution, ..grid };
             let about = read_out(&Posterior::new(&likelihood, wide)?, readout, window)?.position;
             let edge = 0.5 * (WIDER - 1.0) * grid.cells as f64 * resolution;
-            // Bearings that cross at the edge, or beyond, do not say where.
+            // Bearings that cross at the edge or beyond determine no position.
             if (about - grid.centre).amax() > edge {
                 return None;
             }
             grid.centre = about;
-            // From farther off than the reach a direction says less of the place.
+            // From beyond the reach a bearing is less accurate.
             let nearest = self.bearings.rays(pose_stddev, heading_stddev).map(|ray| (about - ray.origin).norm());
             let farther = nearest.fold(f64::INFINITY, f64::min) / reach;
             window = parameters.window_cells(self.least_stddev * farther.max(1.0));
@@ -327,7 +328,7 @@ impl Tag {
         Some(mode)
     }
 
-    /// The error that the poses of all readings may have in common: the mean over the ways in which the tag was read.
+    /// Common error of the poses of all readings: the mean over the kinds of readings.
     fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
         let ways = [
             (self.groups.readings(), self.groups.shared_covariance(pose_stddev)),

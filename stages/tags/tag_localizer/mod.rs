@@ -1,18 +1,18 @@
-//! Where the radio tags are that a robot has heard, told from ranges alone (Tsardoulias et al., section 3), or where or in which
-//! direction it has seen them.
+//! Positions of radio tags in a robot's map from ranges only (Tsardoulias et al., section 3), and of visual tags from
+//! positions or bearings.
 //!
-//! Every reading says that the tag lies on a ring round the robot. The rings of all readings of one tag are multiplied
-//! on a grid; what is left after a while is one spot or, after a straight drive, two that mirror each other. The share
-//! of the probability in a small window is the **certainty**: near 1 for one spot, about one half for two.
+//! Every range puts the tag on a ring around the robot. The rings of all readings of one tag are multiplied on a
+//! grid; after a while one spot remains or, after a straight drive, two that mirror each other. The share of the
+//! probability in a small window is the **certainty**: near 1 for one spot, about one half for two.
 //!
-//! - [`ReadingGroups`] joins the readings of one place into one ring, for they share the error of the pose.
+//! - [`ReadingGroups`] averages the readings at one position to one ring, as they share the error of the pose.
 //! - [`SightingGroups`] does the same with positions at which a camera has seen the tag: rings of radius 0.
-//! - [`BearingGroups`] does the same with directions in which a tag was perceived: rays.
+//! - [`BearingGroups`] does the same with bearings of a tag: rays.
 //! - [`Likelihood`] is the product of all of them.
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
-//! - [`Posterior`] holds the product on the grid. It looks at cells from coarse to fine and drops what cannot matter.
-//! - [`read_out`] finds the window, and the mode that it lies in.
-//! - [`PoseTrack`] tells where the robot was at the time of a reading, and how exactly that is known.
+//! - [`Posterior`] is the product on the grid, computed from coarse to fine without negligible cells.
+//! - [`read_out`] finds the window, and the mode around it.
+//! - [`PoseTrack`] interpolates the pose of the robot at the time of a reading, with its covariance.
 
 mod bearing_groups;
 mod likelihood;

@@ -1,17 +1,17 @@
-//! The parameters of the tag localizer.
+//! Parameters of the tag localizer.
 
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the certainty of a tag is read from its grid.
+/// How the certainty of a tag is computed from its grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Readout {
-    /// The largest share that a window holds, wherever it lies.
+    /// The largest share in a window at any position.
     #[default]
     Window,
-    /// The largest share of a block of a fixed raster (the paper). A tag on the border of two blocks gets half its
+    /// The largest share in a block of a fixed raster (the paper). A tag on the border of two blocks gets half its
     /// certainty.
     Blocks,
 }
@@ -20,62 +20,62 @@ pub enum Readout {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TagLocalizerParameters {
-    /// Width and height of a tag's grid, metres; its centre is where the robot was at the first reading or, of a tag of which
-    /// nothing but bearings is known, about where they cross. The paper has
-    /// 6 m (300 px), which cuts off tags that are first heard at the full reach along an axis. At least twice `reach`.
+    /// Width and height of a tag's grid, metres; its centre is the robot's position at the first reading or, for a
+    /// tag with bearings only, about where they cross. The paper has 6 m (300 px), which cuts off tags that are first
+    /// read at the full reach along an axis. At least twice `reach`.
     pub grid_size: f64,
     /// Width of a grid cell, metres. The paper has 0.02 m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub resolution: f64,
-    /// How the certainty is read from the grid: `window` or `blocks`.
+    /// How the certainty is computed from the grid: `window` or `blocks`.
     pub readout: Readout,
-    /// Width of the window or block whose share of the probability is the certainty, metres; rounded to whole cells. The
-    /// paper has 0.06 m (3 px).
+    /// Width of the window or block whose share of the probability is the certainty, metres; rounded to whole cells.
+    /// The paper has 0.06 m (3 px).
     pub window: f64,
-    /// The window is at least so many standard deviations of the tag's most exact reading wide. The paper's 0.06 m are
-    /// 1.2 of its 0.05 m; so the certainty says how far the place is the only one, whatever the noise, and the covariance
-    /// says how exact it is. 0 keeps `window` as it is.
+    /// Least width of the window in standard deviations of the tag's most accurate reading. The paper's 0.06 m are
+    /// 1.2 of its 0.05 m; so the certainty is that of a unique position, whatever the noise, and the covariance is
+    /// its accuracy. 0 keeps `window` as it is.
     #[schemars(range(min = 0.0))]
     pub window_deviations: f64,
-    /// How far a tag can be heard, metres. Readings that say more are left out, and a tag is read out when it is out of
-    /// reach. The paper has 3 m.
+    /// Largest distance at which a tag is read, metres. Greater readings are left out, and a tag is read out when it
+    /// is out of reach. The paper has 3 m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
-    /// Least standard deviation of a reading, metres: used where a reading brings none, or a smaller one. The paper has
+    /// Least standard deviation of a reading, metres: used where a reading has none, or a smaller one. The paper has
     /// 0.05 m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_stddev: f64,
-    /// Standard deviation of the robot's position, metres. It is shared by all readings of one place, so many readings
-    /// of a robot that stands still do not make it certain. 0 is the paper's.
+    /// Standard deviation of the robot's position, metres. It is common to all readings at one position, so many
+    /// readings of a robot that stands still do not make a tag certain. 0 is the paper's.
     #[schemars(range(min = 0.0))]
     pub pose_stddev: f64,
-    /// The robot has changed its place when it is this far from where the last place began, metres. Readings of one place
-    /// are averaged. 0 takes every reading by itself, as the paper does.
+    /// Distance at which the robot counts as at a new position, metres. Readings at one position are averaged. 0
+    /// keeps every reading separate, as in the paper.
     #[schemars(range(min = 0.0))]
     pub min_travel: f64,
-    /// Share of readings that say nothing of where the tag is, such as echoes: every ring is mixed with this share of
-    /// an equal chance for every range up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can lead
-    /// astray.
+    /// Share of outliers among readings, such as echoes: every ring is mixed with this share of a uniform
+    /// distribution over ranges up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can mislead.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub outlier_share: f64,
-    /// Standard deviation of a position at which a tag is seen and that brings none, metres at a distance of up to one metre,
-    /// and as much more as the tag is farther off.
+    /// Standard deviation of a sighting without a covariance, metres at a distance of up to one metre, and
+    /// proportionally more at a greater distance.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub sighting_stddev: f64,
-    /// Least standard deviation of a bearing, radians: used where a reading brings none, or a smaller one.
+    /// Least standard deviation of a bearing, radians: used where a reading has none, or a smaller one.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub bearing_stddev: f64,
-    /// Standard deviation of the robot's heading, radians: the farther off a tag is seen, the more it moves it. For bearings it is
-    /// the least: they count with that of the pose where it says more.
+    /// Standard deviation of the robot's heading, radians: it moves a tag in proportion to its distance. For bearings
+    /// it is a lower bound: they count with that of the pose if it is greater.
     #[schemars(range(min = 0.0))]
     pub heading_stddev: f64,
-    /// Least standard deviation of a tag's position, metres: what the grid cannot know, such as the bends of the map.
+    /// Least standard deviation of a tag's position, metres: errors that the grid does not include, such as the
+    /// deformation of the map.
     #[schemars(range(min = 0.0))]
     pub position_stddev: f64,
-    /// A tag of which nothing was heard for so long is out of reach, seconds.
+    /// A tag without readings for so long is out of reach, seconds.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub timeout: f64,
-    /// How old the last pose before a reading may be, seconds. Between two poses the position is interpolated.
+    /// Largest age of the last pose before a reading, seconds. Between two poses the position is interpolated.
     #[schemars(range(min = 0.0))]
     pub max_pose_age: f64,
     /// A tag with fewer readings is not reported.
@@ -106,7 +106,7 @@ impl Default for TagLocalizerParameters {
     }
 }
 
-/// The most cells along a side: beyond, a grid costs more memory than it can be worth.
+/// Most cells along a side: a larger grid would take too much memory.
 const MOST_CELLS: f64 = 4000.0;
 
 impl TagLocalizerParameters {
@@ -115,7 +115,7 @@ impl TagLocalizerParameters {
         (self.grid_size / self.resolution).round().clamp(1.0, MOST_CELLS) as usize
     }
 
-    /// Cells along a side of the window of a tag whose most exact reading has this standard deviation, metres.
+    /// Cells along a side of the window of a tag whose most accurate reading has this standard deviation, metres.
     pub fn window_cells(&self, range_stddev: f64) -> usize {
         let window = self.window.max(self.window_deviations * range_stddev).min(self.grid_size);
         (window / self.resolution).round().clamp(1.0, MOST_CELLS) as usize

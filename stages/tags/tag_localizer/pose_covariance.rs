@@ -1,25 +1,25 @@
-//! How exactly a robot knows its position.
+//! Covariance of a robot's position.
 
 use nalgebra::Matrix2;
 use std::f64::consts::PI;
 
-/// How far rounding may take a covariance away from a true one, relative to its variances.
+/// Largest rounding error of a valid covariance, relative to its variances.
 const ROUNDING: f64 = 1e-6;
 
-/// Why a covariance is not what it should be.
+/// Why a covariance is not used as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CovarianceProblem {
-    /// It is the covariance of nothing: not finite, with a negative variance, or with a correlation above 1.
+    /// It is invalid: not finite, with a negative variance, or with a correlation above 1.
     Impossible,
-    /// The position is known less exactly than a tag can be heard far.
+    /// The position is more uncertain than the reach of a tag.
     Huge,
 }
 
-/// The covariance of a position in the plane, from the rows of x and y in that of a pose over (x, y, z, roll, pitch, yaw)
-/// as messages carry it; square metres, zeros if it is not known.
+/// Covariance of a position in the plane, from the rows of x and y in that of a pose over (x, y, z, roll, pitch, yaw)
+/// as in messages; square metres, zeros if it is unknown.
 ///
-/// One that is impossible counts as not known. Of one that says less than that the robot is within `reach` metres, the
-/// deviations are cut to `reach`: such a pose places no tag. The second value is what was wrong.
+/// An invalid one counts as unknown. Deviations greater than `reach` metres are clamped to `reach`: such a pose
+/// locates no tag. The second value is the problem, if any.
 pub fn position_covariance(rows: &[[f64; 6]; 2], reach: f64) -> (Matrix2<f64>, Option<CovarianceProblem>) {
     let [[xx, xy, ..], [yx, yy, ..]] = *rows;
     let both = 0.5 * (xy + yx);
@@ -40,12 +40,12 @@ pub fn position_covariance(rows: &[[f64; 6]; 2], reach: f64) -> (Matrix2<f64>, O
     }
 }
 
-/// The variance of a heading, square radians; 0 if it is not known, or is none. More than that of any heading says nothing more.
+/// Variance of a heading, square radians; 0 if it is unknown or invalid. It is clamped to that of a uniform heading.
 pub fn heading_variance(variance: f64) -> f64 {
     if variance.is_finite() && variance > 0.0 { variance.min(PI * PI / 3.0) } else { 0.0 }
 }
 
-/// The variance along the direction in which it is largest: the larger eigenvalue.
+/// Variance along the direction in which it is largest: the larger eigenvalue.
 pub fn largest_variance(covariance: &Matrix2<f64>) -> f64 {
     let mean = 0.5 * (covariance.m11 + covariance.m22);
     mean + (0.5 * (covariance.m11 - covariance.m22)).hypot(0.5 * (covariance.m12 + covariance.m21))
@@ -58,7 +58,7 @@ mod tests {
 
     const REACH: f64 = 3.0;
 
-    /// Two rows of which the part over x and y is given, and the rest is large.
+    /// Two rows with a given part over x and y, and a large rest.
     fn covariance(xx: f64, xy: f64, yx: f64, yy: f64) -> [[f64; 6]; 2] {
         let mut rows = [[77.0; 6]; 2];
         (rows[0][0], rows[0][1], rows[1][0], rows[1][1]) = (xx, xy, yx, yy);
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_covariance_counts_as_not_known() {
+    fn an_invalid_covariance_counts_as_unknown() {
         for [xx, xy, yx, yy] in [
             [f64::NAN, 0.0, 0.0, 1.0],
             [1.0, f64::NAN, 0.0, 1.0],
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_huge_covariance_is_cut_to_the_reach() {
+    fn a_huge_covariance_is_clamped_to_the_reach() {
         for huge in [9.1, 1e6, 1e300] {
             let found = position_covariance(&covariance(0.01, 0.0, 0.0, huge), REACH);
             assert_eq!(found, (Matrix2::from_diagonal_element(9.0), Some(CovarianceProblem::Huge)), "{huge}");
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variance_of_a_heading_that_is_none_counts_as_not_known() {
+    fn an_invalid_variance_of_a_heading_counts_as_unknown() {
         for none in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
             assert_eq!(heading_variance(none), 0.0);
         }

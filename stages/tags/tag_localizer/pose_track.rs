@@ -1,36 +1,36 @@
-//! Where a robot was at a time.
+//! Poses of a robot by time.
 
 use crate::shared::geometry::{Point2, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use nalgebra::Matrix2;
 use std::collections::VecDeque;
 
-/// How long poses are kept for readings that come late, seconds.
+/// How long poses are kept for late readings, seconds.
 const HISTORY: f64 = 10.0;
 
-/// Where a robot is, and how exactly that is known.
+/// Pose of a robot with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// Metres, map frame.
+    /// Position, metres, map frame.
     pub place: Point2,
-    /// Covariance of the place, square metres; zeros if it is not known.
+    /// Covariance of the position, square metres; zeros if it is unknown.
     pub covariance: Matrix2<f64>,
-    /// Its heading, radians, map frame.
+    /// Heading, radians, map frame.
     pub yaw: f64,
-    /// Variance of its heading, square radians; 0 if it is not known.
+    /// Variance of the heading, square radians; 0 if it is unknown.
     pub yaw_variance: f64,
 }
 
 impl Position {
-    /// A place of which nothing else is known.
+    /// A position with nothing else known.
     pub fn new(place: Point2) -> Self {
         Self { place, covariance: Matrix2::zeros(), yaw: 0.0, yaw_variance: 0.0 }
     }
 
-    /// The position a share of the way from this one to another.
+    /// Interpolates from this position to another one, where `share` is 0 to 1.
     ///
-    /// The errors of the two have much in common, and how much is not told. The covariances are mixed as the places are,
-    /// which is what errors in common give; without anything in common it would be less.
+    /// The errors of the two are correlated by an unknown amount. The covariances are interpolated as the positions
+    /// are, which is right for full correlation; for independent errors it would be less.
     fn towards(&self, other: &Self, share: f64) -> Self {
         Self {
             place: self.place + (other.place - self.place) * share,
@@ -41,7 +41,7 @@ impl Position {
     }
 }
 
-/// The recent positions of one robot.
+/// Recent positions of one robot.
 #[derive(Clone, Debug, Default)]
 pub struct PoseTrack {
     positions: VecDeque<(LogTime, Position)>,
@@ -50,14 +50,14 @@ pub struct PoseTrack {
 /// Why there is no position for a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPose {
-    /// All poses that are kept are later.
+    /// All stored poses are later.
     Before,
     /// The last pose before it is too old.
     TooOld,
 }
 
 impl PoseTrack {
-    /// Adds a position. `false`, and it is left out, if it is older than the last one.
+    /// Adds a position. Returns `false`, and ignores it, if it is older than the last one.
     pub fn add(&mut self, time: LogTime, position: Position) -> bool {
         if self.latest_time().is_some_and(|latest| time < latest) {
             return false;
@@ -75,13 +75,13 @@ impl PoseTrack {
         self.positions.back().map(|(time, _)| *time)
     }
 
-    /// The last place.
+    /// The last position.
     pub fn latest_place(&self) -> Option<Point2> {
         self.positions.back().map(|(_, position)| position.place)
     }
 
-    /// The position at `time`: between the poses before and after it, or that of the pose before it, which must not be
-    /// older than `max_age` seconds.
+    /// The position at `time`: interpolated between the poses before and after it, or that of the pose before it,
+    /// which must not be older than `max_age` seconds.
     pub fn position(&self, time: LogTime, max_age: f64) -> Result<Position, NoPose> {
         let next = self.positions.partition_point(|(earlier, _)| *earlier <= time);
         let Some((before, here)) = next.checked_sub(1).and_then(|index| self.positions.get(index)) else {
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn after_the_last_pose_it_stands_for_a_while() {
+    fn after_the_last_pose_it_is_valid_for_a_while() {
         assert_eq!(place(&track(), 5.5), Ok(Point2::new(7.0, -7.0)));
         assert_eq!(place(&track(), 5.6), Err(NoPose::TooOld));
         assert_eq!(place(&track(), 4.0), Err(NoPose::TooOld), "a gap between poses");
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_comes_late_is_left_out() {
+    fn a_late_pose_is_ignored() {
         assert!(!track().add(at(4.9), position(0.0, 0.0)));
     }
 

@@ -1,23 +1,23 @@
-//! The probability of a tag's place on its grid.
+//! Probability of a tag's position on its grid.
 
 use super::Likelihood;
 use crate::shared::geometry::Point2;
 use nalgebra::Vector2;
 
-/// Places whose log-likelihood lies this far below the best hold less than a millionth of the probability together.
+/// Positions whose log-likelihood is this far below the best have less than a millionth of the probability together.
 const NEGLIGIBLE: f64 = 20.0;
-/// The first nodes are 2^5 cells wide.
+/// Level of the first nodes, which are 2^5 cells wide.
 const COARSEST: i32 = 5;
-/// A cell is split into parts of 2^-4 of its width at the most.
+/// A cell is split into parts of at least 2^-4 of its width.
 const FINEST: i32 = -4;
-/// The probability is resolved when a place is at most so many standard deviations wide, taken across the mode, where it
-/// is narrowest: then sums over places are right to a hundredth.
+/// The probability is resolved when a part is at most this many standard deviations wide, across the mode, where it
+/// is narrowest: then sums over parts are accurate to a hundredth.
 const RESOLVED: f64 = 2.0;
 
-/// Where a tag's square grid lies.
+/// A tag's square grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSize {
-    /// Its middle, metres, map frame.
+    /// Its centre, metres, map frame.
     pub centre: Point2,
     /// Cells along a side.
     pub cells: usize,
@@ -26,7 +26,7 @@ pub struct GridSize {
 }
 
 impl GridSize {
-    /// The middle of the cells from one column and row to before another, metres, map frame.
+    /// Centre of the cells from one column and row to before another, metres, map frame.
     pub fn middle(&self, columns: (usize, usize), rows: (usize, usize)) -> Point2 {
         let from_centre =
             |(start, end): (usize, usize)| 0.5 * self.resolution * ((start + end) as f64 - self.cells as f64);
@@ -34,27 +34,27 @@ impl GridSize {
     }
 }
 
-/// A place with its share of the probability: a cell of the grid, or a part of one.
+/// A cell of the grid, or a part of one, with its share of the probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leaf {
-    /// Its middle, metres, map frame.
+    /// Its centre, metres, map frame.
     pub place: Point2,
-    /// Column of the cell it lies in.
+    /// Column of its cell.
     pub column: usize,
-    /// Row of the cell it lies in.
+    /// Row of its cell.
     pub row: usize,
-    /// Its share of the probability; all leaves of a posterior together have 1.
+    /// Its share of the probability; the shares of all leaves add up to 1.
     pub mass: f64,
 }
 
-/// The probability of a tag's place. Cells that have next to none are left out.
+/// Probability of a tag's position. Negligible cells are left out.
 #[derive(Clone, Debug)]
 pub struct Posterior {
     /// The grid.
     pub grid: GridSize,
     /// Width of the leaves, metres.
     pub leaf_size: f64,
-    /// The places that share the probability.
+    /// The positions with their shares of the probability.
     pub leaves: Vec<Leaf>,
 }
 
@@ -65,9 +65,9 @@ struct Node {
     row: usize,
 }
 
-/// The best place seen, with its log-likelihood.
+/// The best position so far, with its log-likelihood.
 #[derive(Clone, Copy, Debug)]
-struct Summit {
+struct Peak {
     place: Point2,
     value: f64,
 }
@@ -80,25 +80,25 @@ struct Level {
 }
 
 impl Posterior {
-    /// A likelihood on the grid, normalised.
+    /// The normalised likelihood on the grid.
     ///
-    /// It goes from squares of 32 x 32 cells to single cells by halves. A square is dropped when no place in it can come
-    /// within 20 nats of the best place seen, so no mode is lost. Where the probability is so narrow that single
-    /// cells do not resolve it, it goes on to parts of cells: otherwise the share of a mode would depend on where the
-    /// raster happens to lie. `None` if there is no reading.
+    /// It is computed from squares of 32 x 32 cells to single cells by halves. A square is dropped when no position
+    /// in it can be within 20 nats of the best so far, so no mode is lost. Where the probability is so narrow that
+    /// single cells do not resolve it, cells are divided further: otherwise the share of a mode would depend on its
+    /// position in the raster. `None` without readings.
     pub fn new(likelihood: &Likelihood, grid: GridSize) -> Option<Self> {
         if likelihood.is_empty() || grid.cells == 0 {
             return None;
         }
         let mut level = Level { grid, level: COARSEST };
         let mut nodes = level.all();
-        let mut summit = level.climb(likelihood, &nodes)?;
+        let mut summit = level.coordinate_ascent(likelihood, &nodes)?;
         loop {
             for node in &nodes {
                 if let Some(place) = level.centre_on_grid(*node)
                     && let Some(value) = likelihood.log_likelihood(&place, summit.value)
                 {
-                    summit = Summit { place, value };
+                    summit = Peak { place, value };
                 }
             }
             level.drop_negligible(&mut nodes, likelihood, summit.value);
@@ -115,7 +115,7 @@ impl Posterior {
         Self::normalised(grid, level.size(), level.leaves(likelihood, &nodes))
     }
 
-    /// Turns the log-likelihoods that the leaves carry into shares.
+    /// Turns the log-likelihoods of the leaves into shares.
     fn normalised(grid: GridSize, leaf_size: f64, mut leaves: Vec<Leaf>) -> Option<Self> {
         let best = leaves.iter().map(|leaf| leaf.mass).fold(f64::NEG_INFINITY, f64::max);
         leaves.iter_mut().for_each(|leaf| leaf.mass = (leaf.mass - best).exp());
@@ -137,10 +137,10 @@ impl Level {
         self.grid.resolution * f64::from(self.level).exp2()
     }
 
-    /// The summit near the best of the nodes' centres, found by steps along the axes that are
-    /// halved where none leads up. The better the best that is known, the more can be dropped while nodes are large.
-    /// `None` if no centre lies on the grid.
-    fn climb(&self, likelihood: &Likelihood, nodes: &[Node]) -> Option<Summit> {
+    /// Coordinate ascent from the best of the nodes' centres, with steps along the axes that are halved where none
+    /// improves. The better the best so far, the more can be dropped while nodes are large. `None` if no centre is on
+    /// the grid.
+    fn coordinate_ascent(&self, likelihood: &Likelihood, nodes: &[Node]) -> Option<Peak> {
         let value_at = |place: &Point2| likelihood.log_likelihood(place, f64::NEG_INFINITY);
         let centres = nodes.iter().filter_map(|node| self.centre_on_grid(*node));
         let values = centres.filter_map(|centre| Some((value_at(&centre)?, centre)));
@@ -158,10 +158,10 @@ impl Level {
                 _ => step /= 2.0,
             }
         }
-        Some(Summit { place, value: best })
+        Some(Peak { place, value: best })
     }
 
-    /// Drops the nodes in which no place comes near the best.
+    /// Drops the nodes in which no position is near the best.
     fn drop_negligible(&self, nodes: &mut Vec<Node>, likelihood: &Likelihood, best: f64) {
         let half_diagonal = self.size() * std::f64::consts::FRAC_1_SQRT_2;
         let bound =
@@ -169,8 +169,8 @@ impl Level {
         nodes.retain(|node| bound(node).is_some());
     }
 
-    /// The nodes near the best of them as leaves, which carry their log-likelihood. The summit may be sharper than a node,
-    /// so that only their middles count.
+    /// The nodes near the best of them as leaves, with their log-likelihood. The peak may be narrower than a node, so
+    /// only their centres count.
     fn leaves(&self, likelihood: &Likelihood, nodes: &[Node]) -> Vec<Leaf> {
         let mut best = f64::NEG_INFINITY;
         let leaf = |node: &Node| {
@@ -192,20 +192,20 @@ impl Level {
         Point2::new(place(node.column, self.grid.centre.x), place(node.row, self.grid.centre.y))
     }
 
-    /// The centre, unless it lies beyond the end of the grid, as it may in the last row and column.
+    /// The centre, unless it is beyond the end of the grid, as is possible in the last row and column.
     fn centre_on_grid(&self, node: Node) -> Option<Point2> {
         let limit = self.grid.cells as f64 * self.grid.resolution;
         let on_grid = |index: usize| (index as f64 + 0.5) * self.size() < limit;
         (on_grid(node.column) && on_grid(node.row)).then(|| self.centre(node))
     }
 
-    /// The column and row of the cell that a node of at most a cell's size lies in.
+    /// Column and row of the cell of a node of at most a cell's size.
     fn cell(&self, node: Node) -> (usize, usize) {
         let parts = (-self.level).max(0);
         (node.column >> parts, node.row >> parts)
     }
 
-    /// The next level, and the four quarters of each node as far as they begin on the grid.
+    /// The next level, and the four quarters of each node that begin on the grid.
     fn halved(&self, nodes: &[Node]) -> (Self, Vec<Node>) {
         let next = Self { grid: self.grid, level: self.level - 1 };
         let limit = match next.level >= 0 {
@@ -303,8 +303,8 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_that_is_narrow_and_lies_across_the_raster_is_resolved() {
-        // Seen from far off, the mode is eight times as long as it is wide, and at 45 degrees to the raster.
+    fn a_narrow_mode_across_the_raster_is_resolved() {
+        // Seen from far away, the mode is eight times as long as it is wide, and at 45 degrees to the raster.
         let drive: Vec<_> =
             (0..200).map(|step| 0.0314 * f64::from(step)).map(|a| (0.4 * a.cos(), 0.4 * a.sin())).collect();
         for shift in [0.0, 0.007, 0.013] {
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn no_rings_give_none() {
+    fn no_rings_give_no_posterior() {
         assert!(Posterior::new(&Likelihood::of_rings(std::iter::empty(), 0.0, 3.0), GRID).is_none());
     }
 
@@ -344,7 +344,7 @@ mod tests {
             let product = product(Point2::new(x, y), &positions, &errors, if pure { 0.0 } else { 0.02 });
             let grid = GridSize { centre: Point2::new(0.1, 0.1), cells, resolution: 6.0 / cells as f64 };
             let posterior = Posterior::new(&product, grid).unwrap();
-            // The parts of a cell that the plain evaluation goes through are few enough.
+            // The parts of a cell that the plain evaluation visits are few enough.
             prop_assume!(grid.resolution / posterior.leaf_size * cells as f64 <= 200.0);
             assert_equals_plain(&product, grid);
         }

@@ -1,30 +1,30 @@
-//! The product of the rays of one tag, as a function of the place.
+//! Product of the rays of one tag, as a function of its position.
 
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
-/// A place is not compared with a direction from nearer, metres: there the direction is none.
+/// Least distance of a position from the sensor, metres: at less, the direction is undefined.
 const NEAREST: f64 = 1e-6;
 
-/// "The tag lies in the direction `bearing` from `origin`."
+/// A measurement of the direction `bearing` to the tag from `origin`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where the sensor was, metres, map frame.
+    /// Position of the sensor, metres, map frame.
     pub origin: Point2,
     /// Direction to the tag, radians, map frame.
     pub bearing: f64,
     /// Variance of the direction, square radians.
     pub variance: f64,
-    /// Variance of where the sensor was, along any direction, square metres.
+    /// Variance of the sensor's position, along any direction, square metres.
     pub origin_variance: f64,
 }
 
-/// The product of rays, each mixed with a share of outliers.
+/// Product of rays, each mixed with a share of outliers.
 ///
-/// An error of the sensor's place turns the direction to a tag the more, the nearer the tag is: at distance d the direction has
-/// the variance `v(d) = variance + origin_variance / d^2`. A ray is the density of its direction, relative to the highest that it
-/// can have: `sqrt(variance / v(d)) exp(-error^2 / (2 v(d)))`.
+/// An error of the sensor's position turns the direction to a tag the more, the nearer the tag is: at distance d the
+/// direction has the variance `v(d) = variance + origin_variance / d^2`. A ray is the density of its direction,
+/// relative to its largest value: `sqrt(variance / v(d)) exp(-error^2 / (2 v(d)))`.
 #[derive(Clone, Debug)]
 pub struct RayProduct {
     rays: Vec<(Ray, Vector2<f64>)>,
@@ -32,7 +32,7 @@ pub struct RayProduct {
 }
 
 impl RayProduct {
-    /// The product of `rays`. `outlier_share` of the bearings have any direction with the same probability; 0 is the pure
+    /// The product of `rays`. A share `outlier_share` of the bearings are uniform over directions; 0 is the pure
     /// product.
     pub fn new(rays: impl Iterator<Item = Ray>, outlier_share: f64) -> Self {
         let with_direction = |ray: Ray| (ray, Vector2::new(ray.bearing.cos(), ray.bearing.sin()));
@@ -44,8 +44,8 @@ impl RayProduct {
         self.rays.is_empty()
     }
 
-    /// An upper bound of the logarithm of the product over all places within `radius` of `place`, not normalised; at most 0.
-    /// `None` as soon as it is known to be below `least`.
+    /// Upper bound of the logarithm of the product over all points within `radius` of `place`, not normalised; at
+    /// most 0. `None` as soon as it is known to be below `least`.
     pub fn log_likelihood_within(&self, place: &Point2, radius: f64, least: f64) -> Option<f64> {
         let mut sum = 0.0;
         for (ray, direction) in &self.rays {
@@ -61,7 +61,7 @@ impl RayProduct {
         Some(sum)
     }
 
-    /// The Fisher information at a place of the rays that go through it, over x and y, one over square metres.
+    /// Fisher information at a point of the rays through it, over x and y, one over square metres.
     pub fn information(&self, place: &Point2) -> Matrix2<f64> {
         let mut information = Matrix2::zeros();
         for (ray, direction) in &self.rays {
@@ -80,19 +80,19 @@ impl RayProduct {
         (1.0 - self.outlier_share) * height * exponent.exp()
     }
 
-    /// The chance of an outlier: the density 1 / (2 pi) over the highest of the ray, 1 / (sigma sqrt(2 pi)).
+    /// Density of an outlier: 1 / (2 pi) over the largest value of the ray, 1 / (sigma sqrt(2 pi)).
     fn floor(&self, ray: &Ray) -> f64 {
         self.outlier_share * (ray.variance / TAU).sqrt().min(1.0)
     }
 }
 
 impl Ray {
-    /// Variance of the direction to a place at a distance in metres, square radians.
+    /// Variance of the direction at a distance in metres, square radians.
     fn variance_at(&self, distance: f64) -> f64 {
         self.variance + self.origin_variance / (distance * distance)
     }
 
-    /// The largest height and exponent of the density over all places within `radius` of `place`.
+    /// Largest height and exponent of the density over all points within `radius` of `place`.
     fn bound(&self, direction: &Vector2<f64>, place: &Point2, radius: f64) -> (f64, f64) {
         let offset = place - self.origin;
         let distance = offset.norm();
@@ -101,7 +101,7 @@ impl Ray {
             return (height, 0.0);
         }
         let error = direction.perp(&offset).atan2(direction.dot(&offset)).abs();
-        // Seen from the sensor, the circle round the place spans this much to either side.
+        // From the sensor, the circle around the point spans this angle to either side.
         let error = (error - (radius / distance).asin()).max(0.0);
         (height, -error * error / (2.0 * self.variance_at((distance - radius).max(NEAREST))))
     }
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_from_two_places_cross_where_the_tag_is() {
+    fn rays_from_two_positions_cross_at_the_tag() {
         let tag = Point2::new(2.0, 3.0);
         let ray = |x: f64| {
             let origin = Point2::new(x, 0.0);
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn many_rays_that_miss_do_not_underflow_and_no_place_is_no_number() {
+    fn many_rays_that_miss_do_not_underflow_and_an_invalid_point_is_none() {
         for outlier_share in [0.0, 1e-300, 0.02] {
             let product = RayProduct::new(rays(20).cycle_to(2000), outlier_share);
             for place in [Point2::origin(), Point2::new(-3.0, -3.0), Point2::new(0.1, 0.7f64.sin())] {
@@ -162,7 +162,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_place_within_the_radius_exceeds_the_bound(
+        fn no_point_within_the_radius_exceeds_the_bound(
             x in -2.0..4.0, y in -3.0..3.0, radius in 0.0..2.0, angle in 0.0..7.0, share in 0.0..1.0, pure: bool,
         ) {
             let product = RayProduct::new(rays(20), if pure { 0.0 } else { 0.02 });

@@ -1,30 +1,30 @@
-//! Where the tag is, and how certain that is (equation 2).
+//! Position and certainty of a tag from its posterior (equation 2).
 
 use super::{Posterior, Readout};
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 
-/// A mode ends where the probability is so many nats below its peak: four standard deviations away.
+/// A mode ends where the log-likelihood is this much below its peak: four standard deviations away.
 const END_OF_MODE: f64 = 8.0;
 
-/// The most probable place of a tag.
+/// The most probable position of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TagMode {
     /// Mean of the mode, metres, map frame.
     pub position: Point2,
-    /// Covariance of the mode, square metres. A mode elsewhere, such as the mirror image, does not widen it.
+    /// Covariance of the mode, square metres. Other modes, such as the mirror image, do not widen it.
     pub covariance: Matrix2<f64>,
-    /// Share of the whole probability that lies in the window or block, 0 to 1.
+    /// Share of the whole probability in the window or block, 0 to 1.
     pub certainty: f64,
-    /// The middle of that window or block, metres, map frame.
+    /// Centre of that window or block, metres, map frame.
     pub window: Point2,
-    /// Share of the whole probability that lies in the mode, 0 to 1.
+    /// Share of the whole probability in the mode, 0 to 1.
     pub mass: f64,
 }
 
-/// Finds the window or block of `window` x `window` cells that holds the largest share of the probability, and the mode
-/// it lies in: all cells that are joined to its best one by cells within 8 nats of that one. `None` if the posterior
-/// is empty.
+/// Finds the window or block of `window` x `window` cells with the largest share of the probability, and its mode:
+/// all cells that are connected with its best one by cells within 8 nats of that one. `None` if the posterior is
+/// empty.
 pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Option<TagMode> {
     let masses = CellMasses::new(posterior)?;
     let window = window.clamp(1, posterior.grid.cells);
@@ -39,7 +39,7 @@ pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Optio
     if !(mass > 0.0 && mass.is_finite()) {
         return None;
     }
-    // Sums are taken from one member, so that nothing is lost far from the origin.
+    // Sums are relative to one member, so that no digits are lost far from the origin.
     let anchor = members().next()?.place;
     let mean = members().fold(Vector2::zeros(), |sum, leaf| sum + (leaf.place - anchor) * (leaf.mass / mass));
     let position = anchor + mean;
@@ -47,7 +47,7 @@ pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Optio
         let offset = leaf.place - position;
         sum + offset * offset.transpose() * (leaf.mass / mass)
     });
-    // Within a leaf the place is not known.
+    // The distribution within a leaf is uniform.
     let within = posterior.leaf_size * posterior.leaf_size / 12.0;
     for axis in 0..2 {
         covariance[(axis, axis)] = covariance[(axis, axis)].max(within);
@@ -56,7 +56,7 @@ pub fn read_out(posterior: &Posterior, readout: Readout, window: usize) -> Optio
     Some(TagMode { position, covariance, certainty: found.mass.min(1.0), window, mass: mass.min(1.0) })
 }
 
-/// The mass of each cell in the box that holds all leaves.
+/// Mass of each cell in the bounding box of all leaves.
 struct CellMasses {
     cells: usize,
     first_column: usize,
@@ -66,7 +66,7 @@ struct CellMasses {
     masses: Vec<f64>,
 }
 
-/// The cells of a window or block, and what they hold. The ends are not in it.
+/// The cells of a window or block, and their mass. The ends are excluded.
 struct Found {
     columns: (usize, usize),
     rows: (usize, usize),
@@ -89,7 +89,7 @@ impl CellMasses {
         Some(cells)
     }
 
-    /// The place of a cell of the grid, which must lie in the box, in `masses`.
+    /// Index in `masses` of a cell of the grid, which must be in the box.
     fn index(&self, column: usize, row: usize) -> usize {
         (row - self.first_row) * self.width + (column - self.first_column)
     }
@@ -133,7 +133,7 @@ impl CellMasses {
         best
     }
 
-    /// The best sliding window that lies on the grid.
+    /// The best sliding window on the grid.
     fn best_window(&self, size: usize) -> Found {
         let starts = |first: usize, count: usize| {
             let last = (first + count - 1).min(self.cells - size);
@@ -148,7 +148,7 @@ impl CellMasses {
         self.best(size, starts(self.first_column, self.width), starts(self.first_row, self.height))
     }
 
-    /// Which cells are joined to the best one among the given columns and rows.
+    /// Which cells are connected with the best one among the given columns and rows.
     fn mode_of(&self, columns: (usize, usize), rows: (usize, usize)) -> Vec<bool> {
         let mut in_mode = vec![false; self.masses.len()];
         let range = |(start, end): (usize, usize), first: usize, count: usize| {
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn the_covariance_is_that_of_the_readings() {
-        // Along each axis half of the 100 readings count: 0.05 m / sqrt(50).
+        // Half of the 100 readings count along each axis: 0.05 m / sqrt(50).
         let mode = read_out(&posterior(Point2::new(0.0, 0.0), round_drive()), Readout::Window, 3).unwrap();
         for axis in 0..2 {
             let stddev = mode.covariance[(axis, axis)].sqrt();
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_posterior_gives_none() {
+    fn an_empty_posterior_has_no_mode() {
         let posterior = Posterior { grid: GRID, leaf_size: 0.02, leaves: vec![] };
         assert_eq!(read_out(&posterior, Readout::Window, 3), None);
     }

@@ -1,16 +1,16 @@
-//! Readings of one place, joined.
+//! Range readings of a tag, averaged by the robot's position.
 
 use super::{Position, Ring, largest_variance};
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 
-/// Two readings of one place belong together when they differ by less than this many standard deviations.
+/// Largest difference of two readings of one group, in standard deviations.
 const SAME_RANGE: f64 = 4.0;
 
-/// One range reading with the place it was taken at.
+/// One range reading with the pose at which it was measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Where the robot was.
+    /// Pose of the robot.
     pub position: Position,
     /// Distance to the tag, metres.
     pub range: f64,
@@ -18,20 +18,21 @@ pub struct Reading {
     pub stddev: f64,
 }
 
-/// The readings of one tag, those of one place joined to their mean.
+/// The readings of one tag, averaged by position.
 ///
-/// The noise of readings averages out, the error of the pose does not: readings of one place share it. So a robot
-/// that waits does not make a tag certain. A reading that contradicts the others of its place makes a group of its own, which
-/// keeps an outlier from spoiling a mean.
+/// The noise of readings averages out, the error of the pose does not, as readings at one position share it. So a
+/// robot that waits does not make a tag certain. A reading that contradicts the others at its position makes a
+/// separate group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
 pub struct ReadingGroups {
     groups: Vec<Group>,
-    /// Where the groups of the place that the robot is at begin.
+    /// Index of the first group at the robot's present position.
     here: usize,
     readings: u32,
 }
 
-/// Weighted sums over readings. Positions are taken from the first one, so that sums lose nothing far from the origin.
+/// Weighted sums over readings. Positions are relative to the first one, so that sums lose no digits far from the
+/// origin.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     anchor: Point2,
@@ -42,8 +43,8 @@ struct Group {
 }
 
 impl ReadingGroups {
-    /// Adds the next reading. The robot is at another place than before when it is `min_travel` metres or more away
-    /// from where the last place began.
+    /// Adds a reading. The robot is at a new position when it is `min_travel` metres or more away from the start of
+    /// the last one.
     pub fn add(&mut self, reading: &Reading, min_travel: f64) {
         self.readings = self.readings.saturating_add(1);
         let place = self.groups.get(self.here).map(|group| group.anchor);
@@ -74,17 +75,17 @@ impl ReadingGroups {
         }
     }
 
-    /// The number of readings.
+    /// Number of readings.
     pub fn readings(&self) -> u32 {
         self.readings
     }
 
-    /// One ring a group: variance of the mean range, and that of the pose.
+    /// One ring for each group: variance of the mean range, and that of the pose.
     ///
-    /// An error of the pose changes a distance by its part along the line to the tag. Where on the ring the tag is, and so
-    /// along which line, is what is asked for; and the mirror image lies along another. So the pose counts with its largest
-    /// variance, whatever the direction: that never claims too much, and at most twice the mean over all directions.
-    /// `pose_stddev`, metres, is the least that it counts with.
+    /// An error of the pose changes a distance by its component along the line to the tag. That line is unknown, and
+    /// the mirror image is along another one. So the pose counts with its largest variance in any direction: that is
+    /// never too small, and at most twice the mean over all directions. `pose_stddev`, metres, is a lower bound of
+    /// its deviation.
     pub fn rings(&self, pose_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
         self.groups.iter().map(move |group| Ring {
             centre: group.anchor + group.offset / group.weight,
@@ -93,11 +94,11 @@ impl ReadingGroups {
         })
     }
 
-    /// The error that the poses may have in common, which moves the tag and which no number of places averages out:
-    /// their mean covariance, weighed by what each ring says, square metres. Zeros if it is not known.
+    /// Common error of the poses, which moves the tag and does not average out over positions: their mean covariance,
+    /// weighted by the information of each ring, square metres. Zeros if it is unknown.
     ///
-    /// How much the errors of the poses have in common is not told. If it is all, the error of the tag is theirs; and
-    /// whatever it is, a mean of errors varies by no more than the mean of their variances.
+    /// The correlation of the errors of the poses is unknown. If it is full, the error of the tag is theirs; in any
+    /// case a mean of errors varies by no more than the mean of their variances.
     pub fn shared_covariance(&self, pose_stddev: f64) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         let mut weights = 0.0;
@@ -111,7 +112,7 @@ impl ReadingGroups {
 }
 
 impl Group {
-    /// Variance of the distance between the place and the tag, square metres.
+    /// Variance of the distance between the position and the tag, square metres.
     fn variance(&self, pose_stddev: f64) -> f64 {
         let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
         1.0 / self.weight + pose_variance.max(pose_stddev * pose_stddev)
@@ -133,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_of_a_robot_that_stands_still_never_say_more_than_its_pose() {
+    fn readings_of_a_robot_that_stands_still_are_no_better_than_its_pose() {
         let many = rings(&vec![reading(1.0, 2.0); 10_000], 0.05, 0.02);
         assert_eq!(many.len(), 1);
         assert!((many[0].variance.sqrt() - 0.02).abs() < 1e-4);
@@ -142,14 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn a_place_ends_when_the_robot_has_gone_on() {
+    fn a_position_ends_when_the_robot_has_moved_on() {
         let drive: Vec<_> = (0..10).map(|step| reading(0.03 * f64::from(step), 2.0)).collect();
-        assert_eq!(rings(&drive, 0.05, 0.0).len(), 5, "two readings a place");
-        assert_eq!(rings(&drive, 0.0, 0.0).len(), 10, "every reading by itself");
+        assert_eq!(rings(&drive, 0.05, 0.0).len(), 5, "two readings at each position");
+        assert_eq!(rings(&drive, 0.0, 0.0).len(), 10, "every reading separately");
     }
 
     #[test]
-    fn an_outlier_does_not_spoil_the_mean_of_its_place() {
+    fn an_outlier_does_not_spoil_the_mean_of_its_position() {
         for order in [[2.0, 2.04, 0.7, 1.96], [0.7, 2.0, 2.04, 1.96]] {
             let found = rings(&order.map(|range| reading(0.0, range)), 0.05, 0.0);
             let radii: Vec<_> = found.iter().map(|ring| ring.radius).collect();

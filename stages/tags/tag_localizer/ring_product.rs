@@ -1,20 +1,21 @@
-//! The product of the rings of one tag, as a function of the place.
+//! Product of the rings of one tag, as a function of its position.
 
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 
-/// So many factors are evaluated together, and multiplied before their logarithm is taken: fewer than underflow.
+/// Number of factors that are evaluated together, and multiplied before their logarithm is taken: fewer than
+/// underflow.
 const LANES: usize = 8;
-/// The least factor: the smallest double is about `LEAST_FACTOR` to the power of `LANES`.
+/// Least factor: the smallest double is about `LEAST_FACTOR` to the power of `LANES`.
 const LEAST_FACTOR: f64 = 1e-37;
-/// `exp` of less than this is nothing beside a share of outliers.
+/// `exp` of less than this is negligible beside a share of outliers.
 const NOTHING: f64 = -50.0;
 
-/// "The tag lies about `radius` from `centre`."
+/// A measurement of the distance `radius` to the tag from `centre`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
-    /// Where the robot was, metres, map frame.
+    /// Position of the robot, metres, map frame.
     pub centre: Point2,
     /// Distance to the tag, metres.
     pub radius: f64,
@@ -22,7 +23,7 @@ pub struct Ring {
     pub variance: f64,
 }
 
-/// Some rings, ready to be evaluated together. Lanes that are left over hold factors of 1.
+/// Rings that are evaluated together. Unused lanes hold factors of 1.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     x: [f64; LANES],
@@ -31,7 +32,7 @@ struct Block {
     /// `-1 / (2 variance)`
     scale: [f64; LANES],
     inlier_share: [f64; LANES],
-    /// The chance of an outlier, relative to the height of the ring.
+    /// Density of an outlier, relative to the height of the ring.
     floor: [f64; LANES],
     /// The product far away from all rings.
     all_outliers: f64,
@@ -45,8 +46,8 @@ pub struct RingProduct {
 }
 
 impl RingProduct {
-    /// The product of `rings`. `outlier_share` of the readings have any range up to `reach` with the same probability;
-    /// 0 is the pure product.
+    /// The product of `rings`. A share `outlier_share` of the readings are uniform over ranges up to `reach`; 0 is
+    /// the pure product.
     pub fn new(rings: impl Iterator<Item = Ring>, outlier_share: f64, reach: f64) -> Self {
         let rings: Vec<Ring> = rings.collect();
         let ones = Block {
@@ -58,8 +59,8 @@ impl RingProduct {
             floor: [0.0; LANES],
             all_outliers: 1.0,
         };
-        // Neighbours in the list are neighbours on the drive and say much the same. Dealing them out to different
-        // blocks lets the first blocks tell already that a place is out of the question.
+        // Neighbours in the list are neighbours on the drive and hardly differ. Distributing them over the blocks
+        // lets the first blocks rule out a position.
         let mut blocks = vec![ones; rings.len().div_ceil(LANES)];
         let count = blocks.len().max(1);
         for (index, ring) in rings.iter().enumerate() {
@@ -70,7 +71,7 @@ impl RingProduct {
             block.radius[lane] = ring.radius;
             block.scale[lane] = -0.5 / ring.variance;
             block.inlier_share[lane] = 1.0 - outlier_share;
-            // The density 1 / reach over that of the ring's middle, 1 / (sigma sqrt(2 pi)).
+            // The density 1 / reach over the peak of the ring, 1 / (sigma sqrt(2 pi)).
             block.floor[lane] = outlier_share * ((ring.variance * TAU).sqrt() / reach).clamp(0.0, 1.0);
             block.all_outliers *= block.floor[lane].max(LEAST_FACTOR);
         }
@@ -82,14 +83,14 @@ impl RingProduct {
         self.blocks.is_empty()
     }
 
-    /// The logarithm of the product at a place, not normalised; at most 0. `None` as soon as it is known to be below
+    /// Logarithm of the product at a point, not normalised; at most 0. `None` as soon as it is known to be below
     /// `least`.
     pub fn log_likelihood(&self, place: &Point2, least: f64) -> Option<f64> {
         self.log_likelihood_within(place, 0.0, least)
     }
 
-    /// An upper bound of the logarithm of the product over all places within `radius` of `place`: a distance changes by
-    /// no more than the place is moved. `None` as soon as it is known to be below `least`.
+    /// Upper bound of the logarithm of the product over all points within `radius` of `place`: a distance changes by
+    /// no more than the point moves. `None` as soon as it is known to be below `least`.
     pub fn log_likelihood_within(&self, place: &Point2, radius: f64, least: f64) -> Option<f64> {
         let mut sum = 0.0;
         for block in &self.blocks {
@@ -107,7 +108,7 @@ impl RingProduct {
 }
 
 impl RingProduct {
-    /// The Fisher information at a place of the rings that go through it, over x and y, one over square metres.
+    /// Fisher information at a point of the rings through it, over x and y, one over square metres.
     pub fn information(&self, place: &Point2) -> Matrix2<f64> {
         let mut information = Matrix2::zeros();
         for block in &self.blocks {
@@ -150,7 +151,7 @@ impl Block {
 
 /// `exp` of a value that is at most 0, to 10 digits; below -700 it is that of -700.
 ///
-/// It has no branches, so the compiler does several at once, and it gives the same bits on every machine.
+/// It has no branches, so the compiler vectorises it, and it gives the same bits on every machine.
 #[inline]
 fn exp(value: f64) -> f64 {
     /// Adding it leaves no bits for a fraction: 1.5 * 2^52.
@@ -167,7 +168,7 @@ fn exp(value: f64) -> f64 {
     for divisor in [9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0] {
         power = 1.0 + power * rest * (1.0 / divisor);
     }
-    // The last bits of `rounded` are n: moved to the exponent of a double they make 2^n.
+    // The last bits of `rounded` are n: shifted to the exponent of a double they make 2^n.
     power * f64::from_bits((rounded.to_bits() << 52).wrapping_add(1f64.to_bits()))
 }
 
@@ -184,7 +185,7 @@ mod tests {
         })
     }
 
-    /// The equation as it stands.
+    /// The equation as printed.
     fn plain(place: &Point2, count: usize, outlier_share: f64) -> f64 {
         rings(count)
             .map(|ring| {
@@ -232,7 +233,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_place_within_the_radius_exceeds_the_bound(
+        fn no_point_within_the_radius_exceeds_the_bound(
             x in -2.0..4.0, y in -3.0..3.0, radius in 0.0..1.0, angle in 0.0..7.0, share in 0.0..1.0, pure: bool,
         ) {
             let product = RingProduct::new(rings(20), if pure { 0.0 } else { 0.02 }, 3.0);
@@ -244,7 +245,7 @@ mod tests {
         }
 
         #[test]
-        fn it_gives_up_only_below_the_least(x in -2.0..4.0, y in -3.0..3.0, least in -300.0..0.0) {
+        fn it_stops_early_only_below_the_least(x in -2.0..4.0, y in -3.0..3.0, least in -300.0..0.0) {
             let product = RingProduct::new(rings(20), 0.02, 3.0);
             let place = Point2::new(x, y);
             let value = product.log_likelihood(&place, f64::NEG_INFINITY).unwrap();

@@ -1,36 +1,37 @@
-//! Positions at which a tag was seen, those of one place joined.
+//! Sightings of a tag, averaged by the robot's position.
 
 use super::{Position, Ring, largest_variance};
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 
-/// A tag that was seen at a position, as a camera sees it.
+/// A sighting of a tag by a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
-    /// Where the robot was.
+    /// Pose of the robot.
     pub position: Position,
-    /// Where the tag was seen, map frame, metres.
+    /// Position of the tag, map frame, metres.
     pub seen: Point2,
-    /// Standard deviation of where it was seen from there, metres.
+    /// Standard deviation of the measurement, metres.
     pub stddev: f64,
 }
 
-/// The sightings of one tag, those of one place joined to their mean.
+/// The sightings of one tag, averaged by position.
 ///
-/// As with [`ReadingGroups`](super::ReadingGroups), what the readings of one place have in common does not average out: the
-/// error of the pose and, the farther off the tag is seen the more, that of the heading.
+/// As with [`ReadingGroups`](super::ReadingGroups), the common errors of the sightings at one position do not average
+/// out: that of the pose and, in proportion to the distance of the tag, that of the heading.
 #[derive(Clone, Debug, Default)]
 pub struct SightingGroups {
     groups: Vec<Group>,
     sightings: u32,
 }
 
-/// Weighted sums over sightings. Positions are taken from the first one, so that sums lose nothing far from the origin.
+/// Weighted sums over sightings. Positions are relative to the first one, so that sums lose no digits far from the
+/// origin.
 #[derive(Clone, Copy, Debug)]
 struct Group {
-    /// Where the robot was at the first sighting.
+    /// Position of the robot at the first sighting.
     robot: Point2,
-    /// Where the tag was at the first sighting.
+    /// Position of the tag at the first sighting.
     anchor: Point2,
     weight: f64,
     offset: Vector2<f64>,
@@ -38,8 +39,8 @@ struct Group {
 }
 
 impl SightingGroups {
-    /// Adds the next sighting. The robot is at another place than before when it is `min_travel` metres or more away
-    /// from where the last place began.
+    /// Adds a sighting. The robot is at a new position when it is `min_travel` metres or more away from the start of
+    /// the last one.
     pub fn add(&mut self, sighting: &Sighting, min_travel: f64) {
         self.sightings = self.sightings.saturating_add(1);
         let Sighting { position, seen, stddev } = *sighting;
@@ -59,14 +60,15 @@ impl SightingGroups {
         group.pose_covariance += position.covariance * weight;
     }
 
-    /// The number of sightings.
+    /// Number of sightings.
     pub fn sightings(&self) -> u32 {
         self.sightings
     }
 
-    /// One ring a group, of radius 0: the chance of a place falls with its distance from where the tag was seen.
+    /// One ring of radius 0 for each group: the likelihood of a position falls with its distance from the sighting.
     ///
-    /// `pose_stddev`, metres, is the least that the pose counts with; `heading_stddev`, radians, what its heading does.
+    /// `pose_stddev`, metres, is a lower bound of the deviation of the pose; `heading_stddev`, radians, that of its
+    /// heading.
     pub fn rings(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
         self.groups.iter().map(move |group| Ring {
             centre: group.seen(),
@@ -75,7 +77,7 @@ impl SightingGroups {
         })
     }
 
-    /// The error that the poses may have in common, which moves the tag; see
+    /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
@@ -94,7 +96,7 @@ impl Group {
         self.anchor + self.offset / self.weight
     }
 
-    /// Variance of where the tag was seen, along any direction, square metres.
+    /// Variance of the sighting along any direction, square metres.
     fn variance(&self, pose_stddev: f64, heading_stddev: f64) -> f64 {
         let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
         let across = heading_stddev * (self.seen() - self.robot).norm();
@@ -118,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn sightings_of_one_place_give_their_mean_and_never_more_than_pose_and_heading_allow() {
+    fn sightings_at_one_position_are_averaged_but_not_better_than_pose_and_heading() {
         let many: Vec<_> = (0..10_000).map(|n| sighting(1.0, (3.0 + 0.1 * f64::from(n % 2), 5.0))).collect();
         let found = rings(&many);
         assert_eq!((found.len(), found[0].radius), (1, 0.0));
@@ -128,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_ends_when_the_robot_has_gone_on() {
+    fn a_position_ends_when_the_robot_has_moved_on() {
         let drive: Vec<_> = (0..10).map(|step| sighting(0.06 * f64::from(step), (3.0, 5.0))).collect();
         assert_eq!(rings(&drive).len(), 5);
     }

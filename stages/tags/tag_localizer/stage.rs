@@ -21,7 +21,7 @@ pub fn kind() -> StageKind {
     )
     .inputs(
         "pose",
-        "poses of the robots in their maps; a covariance of zeros is not known",
+        "poses of the robots in their maps; a covariance of zeros counts as unknown",
         TagLocalizerStage::receive_pose,
     )
     .input("tags", "range readings of tags", TagLocalizerStage::receive_reading)
@@ -46,7 +46,7 @@ struct TagLocalizerStage {
 
 struct Robot {
     localizer: TagLocalizer,
-    /// How far a tag can be heard, metres.
+    /// Largest distance at which a tag is read, metres.
     reach: f64,
     frame_id: Option<String>,
     sent: bool,
@@ -107,7 +107,7 @@ impl TagLocalizerStage {
         Ok(())
     }
 
-    /// The robot of a name, new if nothing has come from it yet. There must be a name.
+    /// The robot of a name, created at its first message. There must be a name.
     fn robot(&mut self, name: &str, output: &Output<Estimates>) -> Option<&mut Robot> {
         if name.is_empty() {
             output.warn("poses and tag readings without a robot are left out");
@@ -151,17 +151,17 @@ impl Robot {
         let position = pose.pose.pose.position;
         let place = Point2::new(position.x, position.y);
         if !place.iter().all(|value| value.is_finite()) {
-            output.warn("poses with a value that is no finite number are left out");
+            output.warn("poses with a value that is not finite are left out");
             return Ok(());
         }
         let [x, y, .., [.., yaw_variance]] = pose.pose.covariance;
         let (covariance, problem) = position_covariance(&[x, y], self.reach);
         match problem {
-            Some(CovarianceProblem::Impossible) => output.warn(format!(
-                "covariances of poses of {name} that are no covariances (not finite, or below 0) are taken as not known"
-            )),
+            Some(CovarianceProblem::Impossible) => {
+                output.warn(format!("invalid covariances of poses of {name} (not finite, or below 0) count as unknown"))
+            }
             Some(CovarianceProblem::Huge) => output.warn(format!(
-                "poses of {name} are known less exactly than `reach`: readings there say next to nothing"
+                "poses of {name} are more uncertain than `reach`: readings there are hardly any evidence"
             )),
             None => {}
         }
@@ -217,14 +217,14 @@ impl Robot {
                 readings,
             })
             .collect();
-        // The sort is stable, and the tags come by id.
+        // The sort is stable, and the tags are sorted by id.
         tags.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
         let header = Header::new(output.log_time(), self.frame_id.clone().unwrap_or_default());
         output.estimates.send(name, &TagEstimates { header, robot: name.to_owned(), tags })
     }
 }
 
-/// The time that a message tells of: that of its header or, where it has none, when it was logged.
+/// Time of a message: that of its header or, if it has none, its log time.
 pub(crate) fn time_of(stamp: Time, log_time: LogTime) -> LogTime {
     match LogTime::from(stamp) {
         LogTime::MIN => log_time,

@@ -1,11 +1,11 @@
-//! The stage from outside: messages in, messages out.
+//! The stage as a whole: messages in, messages out.
 
 use super::kind;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, Pose, PoseStamped, PoseWithCovarianceStamped, TagEstimates, TagRange};
 use gridweave_runtime::stage::StageHarness;
 
-/// The stage, fed with messages about `robot1`.
+/// The stage with messages of `robot1`.
 struct Bench {
     stage: StageHarness,
     seconds: f64,
@@ -38,7 +38,7 @@ impl Bench {
         self.stage.give::<TagRange>("tags", "robot1", at(self.seconds), reading).unwrap();
     }
 
-    /// Round the tags, one turn in 20 s.
+    /// Around the tags, one turn in 20 s.
     fn drive(&mut self, tags: &[(&str, f64, f64)], from: f64) {
         for step in 0..200 {
             let (x, y) = ((0.0314 * f64::from(step)).cos(), (0.0314 * f64::from(step)).sin());
@@ -68,7 +68,7 @@ fn at(seconds: f64) -> LogTime {
 }
 
 #[test]
-fn all_tags_are_sent_when_one_gets_out_of_reach() {
+fn all_tags_are_sent_when_one_is_out_of_reach() {
     let mut bench = Bench::new("");
     bench.drive(&[("far", 0.3, 2.0), ("near", 0.0, 0.1)], 0.0);
     assert_eq!(bench.take(), vec![], "both are in reach");
@@ -89,7 +89,7 @@ fn all_tags_are_sent_when_one_gets_out_of_reach() {
 }
 
 #[test]
-fn a_tag_that_is_met_again_goes_on_gathering_readings() {
+fn a_tag_that_is_read_again_goes_on_gathering_readings() {
     let mut bench = Bench::new("");
     bench.drive(&[("tag", 0.3, 2.0)], 0.0);
     bench.pose(30.0, 0.0, 0.0);
@@ -104,7 +104,7 @@ fn a_tag_is_out_of_reach_when_the_robot_has_gone_too_far() {
     let mut bench = Bench::new("timeout = 1000.0");
     bench.drive(&[("tag", 0.3, 2.0)], 0.0);
     bench.pose(20.0, 4.0, 0.0);
-    assert_eq!(bench.take().len(), 0, "3 m from the last place, where the tag was 2 m away");
+    assert_eq!(bench.take().len(), 0, "3 m from the last position, where the tag was 2 m away");
     bench.pose(20.5, 9.0, 0.0);
     assert_eq!(bench.take().len(), 0, "it was read a moment ago");
     bench.pose(21.0, 9.0, 0.0);
@@ -112,7 +112,7 @@ fn a_tag_is_out_of_reach_when_the_robot_has_gone_too_far() {
 }
 
 #[test]
-fn poses_that_jump_to_and_fro_do_not_have_the_tags_read_out_at_every_jump() {
+fn poses_that_jump_back_and_forth_do_not_read_out_the_tags_at_every_jump() {
     let mut bench = Bench::new("");
     for step in 0..100 {
         let seconds = 0.1 * f64::from(step);
@@ -125,7 +125,7 @@ fn poses_that_jump_to_and_fro_do_not_have_the_tags_read_out_at_every_jump() {
 }
 
 #[test]
-fn a_robot_without_tags_is_told_of_at_the_end() {
+fn a_robot_without_tags_is_reported_at_the_end() {
     let mut bench = Bench::new("");
     bench.pose(0.0, 0.0, 0.0);
     bench.finish();
@@ -177,7 +177,7 @@ fn poses_in_another_frame_are_left_out() {
 }
 
 #[test]
-fn a_reading_without_a_stamp_is_placed_at_its_log_time() {
+fn a_reading_without_a_stamp_is_located_at_its_log_time() {
     let mut bench = Bench::new("min_readings = 1");
     bench.pose(0.0, 0.0, 0.0);
     bench.seconds = 0.3;

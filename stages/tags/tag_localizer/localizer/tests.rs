@@ -13,7 +13,7 @@ fn at(seconds: f64) -> LogTime {
     LogTime(1_000_000_000).plus_seconds(seconds)
 }
 
-/// Drives along the path and reads the tag ten times a second with noise; a share of readings is any range.
+/// Drives along the path and reads the tag ten times a second with noise; a share of readings are uniform outliers.
 fn locate(parameters: TagLocalizerParameters, outliers: f64, path: impl Iterator<Item = (f64, f64)>) -> TagMode {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let noise = Normal::new(0.0, 0.05).unwrap();
@@ -37,7 +37,7 @@ fn corner() -> impl Iterator<Item = (f64, f64)> {
 }
 
 #[test]
-fn readings_with_noise_give_the_place_within_its_covariance() {
+fn the_position_from_noisy_readings_is_within_its_covariance() {
     let mode = locate(TagLocalizerParameters::default(), 0.0, corner());
     let error = mode.position - TAG;
     let squared = error.dot(&(mode.covariance.try_inverse().unwrap() * error));
@@ -45,7 +45,7 @@ fn readings_with_noise_give_the_place_within_its_covariance() {
 }
 
 #[test]
-fn a_fifth_of_outliers_does_not_lead_astray() {
+fn a_fifth_of_outliers_does_no_harm() {
     let mode = locate(TagLocalizerParameters::default(), 0.2, corner());
     assert!((mode.position - TAG).norm() < 0.05 && mode.certainty > 0.75, "{mode:?}");
 }
@@ -88,13 +88,13 @@ fn a_reading_between_two_poses_waits_for_the_second() {
     let ignore = |_| ();
     localizer.add_pose(at(0.0), position(0.0, 0.0), ignore);
     localizer.add_reading(at(0.25), "tag", 1.0, 0.05).unwrap();
-    assert!(!localizer.read_out_all(), "it has no place yet");
+    assert!(!localizer.read_out_all(), "it has no position yet");
     localizer.add_pose(at(0.5), position(1.0, 0.0), ignore);
     assert_eq!(localizer.tags["tag"].first_place, Point2::new(0.5, 0.0));
     assert!(localizer.read_out_all());
 }
 
-/// Drives past the tag, and sees it with noise in the frame of the robot, which turns; hears it as well if `ranges`.
+/// Drives past the tag, and sees it with noise in the frame of the robot, which turns; also reads ranges if `ranges`.
 fn look(ranges: bool, wrong: usize) -> TagMode {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let noise = Normal::new(0.0, 0.1).unwrap();
@@ -131,30 +131,30 @@ fn a_tag_that_is_seen_is_where_it_is_and_a_straight_drive_leaves_no_mirror_image
 }
 
 #[test]
-fn sightings_that_are_wrong_do_not_lead_astray() {
+fn wrong_sightings_do_no_harm() {
     let mode = look(false, 5);
     assert!((mode.position - TAG).norm() < 0.1, "{mode:?}");
 }
 
 #[test]
-fn a_sighting_that_is_none_is_told() {
+fn an_invalid_sighting_is_reported() {
     let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
     let mut add = |id: &str, x: f64| localizer.add_sighting(at(0.0), id, Vector2::new(x, 0.0), &Matrix2::zeros());
     assert_eq!(add("", 1.0), Err(ReadingProblem::NoId));
     for x in [f64::NAN, f64::INFINITY, 1e200] {
-        assert_eq!(add("tag", x), Err(ReadingProblem::NoPlace));
+        assert_eq!(add("tag", x), Err(ReadingProblem::NoPosition));
     }
     let odd = Matrix2::new(f64::NAN, 0.0, 0.0, -1.0);
     assert_eq!(localizer.add_sighting(at(0.0), "tag", Vector2::zeros(), &odd), Ok(()));
 }
 
-/// Drives past the tag, and perceives the direction to it, on a way from 0.2 m ahead of its middle; a share of the directions are
-/// any.
+/// Drives past the tag, and reads its bearing, on a path from 0.2 m ahead of its middle; a share of the bearings are
+/// uniform outliers.
 fn take_bearings(tag: Point2, outliers: f64, ranges: bool, way: f64) -> Option<TagMode> {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let noise = Normal::new(0.0, 0.05).unwrap();
     let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
-    // One that goes round with the robot sees from several places.
+    // A sensor that turns with the robot measures from several positions.
     let sensor = Vector2::new(if way > 0.0 { 0.2 } else { 0.0 }, 0.0);
     for step in 0..60 {
         let (time, yaw) = (at(0.1 * f64::from(step)), 0.3 * f64::from(step));
@@ -176,7 +176,7 @@ fn take_bearings(tag: Point2, outliers: f64, ranges: bool, way: f64) -> Option<T
 
 #[test]
 fn bearings_alone_locate_a_tag_and_a_straight_drive_leaves_no_mirror_image() {
-    // The second lies farther off than the first place's grid goes.
+    // The second is beyond the grid of the first position.
     for tag in [TAG, Point2::new(2.0, 6.0)] {
         let mode = take_bearings(tag, 0.0, false, 4.0).unwrap();
         let error = mode.position - tag;
@@ -190,19 +190,19 @@ fn bearings_alone_locate_a_tag_and_a_straight_drive_leaves_no_mirror_image() {
 }
 
 #[test]
-fn a_fifth_of_bearings_that_are_wrong_does_not_lead_astray() {
+fn a_fifth_of_wrong_bearings_does_no_harm() {
     let mode = take_bearings(TAG, 0.2, false, 4.0).unwrap();
     assert!((mode.position - TAG).norm() < 0.1 && mode.certainty > 0.75, "{mode:?}");
 }
 
 #[test]
-fn bearings_from_one_place_do_not_say_where_a_tag_is() {
+fn bearings_from_one_position_determine_no_position_of_the_tag() {
     let mode = take_bearings(TAG, 0.0, false, 0.0);
     assert!(mode.is_none_or(|mode| mode.certainty < 0.3), "{mode:?}");
 }
 
 #[test]
-fn a_bearing_that_is_none_is_told() {
+fn an_invalid_bearing_is_reported() {
     let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
     localizer.add_pose(at(0.0), position(0.0, 0.0), |_| ());
     let mut add = |id: &str, x: f64, bearing: f64, stddev: f64| {
@@ -220,7 +220,7 @@ fn a_bearing_that_is_none_is_told() {
 }
 
 #[test]
-fn a_standard_deviation_that_is_no_number_is_replaced() {
+fn an_invalid_standard_deviation_is_replaced() {
     let mut localizer = TagLocalizer::new(TagLocalizerParameters { min_readings: 1, ..Default::default() });
     localizer.add_pose(at(0.0), position(0.0, 0.0), |_| ());
     for stddev in [f64::NAN, -1.0, 0.0, f64::INFINITY, 1e300] {
