@@ -1,9 +1,9 @@
-//! What the value of an occupancy grid's cell says: -1 unknown, 0 free to 100 occupied.
+//! The meaning of an occupancy grid's cell values: -1 unknown, 0 free to 100 occupied.
 //!
-//! The thresholds are those of nav2's map server, 65 % and 25 %. What lies between them is known, and neither occupied
-//! nor free; values that are none of these are taken as unknown.
+//! The thresholds are those of nav2's map server, 65 % and 25 %. A value between them is known, but neither occupied nor free;
+//! any other value counts as unknown.
 
-/// The value of a cell that nobody has seen.
+/// The value of an unobserved cell.
 pub const UNKNOWN: i8 = -1;
 /// The least value of an occupied cell.
 const OCCUPIED_FROM: i8 = 65;
@@ -12,19 +12,19 @@ const FREE_BELOW: i8 = 25;
 /// The greatest value of a known cell.
 const MOST: i8 = 100;
 
-/// Whether a cell's value says anything.
+/// Whether a cell value is known.
 #[inline]
 pub fn is_known(value: i8) -> bool {
     (0..=MOST).contains(&value)
 }
 
-/// Whether a cell's value stands for an obstacle.
+/// Whether a cell value means occupied.
 #[inline]
 pub fn is_occupied(value: i8) -> bool {
     (OCCUPIED_FROM..=MOST).contains(&value)
 }
 
-/// Whether a cell's value stands for free space.
+/// Whether a cell value means free.
 #[inline]
 pub fn is_free(value: i8) -> bool {
     (0..FREE_BELOW).contains(&value)

@@ -9,11 +9,11 @@ const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 /// A message could not be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    /// The bytes do not begin as CDR does.
-    #[error("the message does not begin with a CDR encapsulation (its first bytes are {0:02x?})")]
+    /// The bytes do not start with a CDR encapsulation.
+    #[error("the message does not start with a CDR encapsulation (its first bytes are {0:02x?})")]
     Encapsulation(Vec<u8>),
-    /// The fields could not be read: the bytes are cut, or the type is another one.
-    #[error("the message's bytes do not fit its type: {0}")]
+    /// The fields could not be read: the bytes are truncated, or the type is wrong.
+    #[error("the message's bytes do not match its type: {0}")]
     Fields(String),
 }
 

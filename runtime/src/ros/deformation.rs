@@ -1,55 +1,55 @@
-//! `gridweave_msgs`: how maps are bent. The `.msg` texts lie in `logs/msg/gridweave_msgs/`.
+//! `gridweave_msgs`: deformations of maps. The `.msg` texts are in `logs/msg/gridweave_msgs/`.
 
 use super::{Header, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// A node of the lattice that says how a map is bent. What lies around it moves with it.
+/// A node of the deformation lattice of a map. The map around it moves with it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DeformationNode {
-    /// Where it stands in the map as it came, metres.
+    /// Its position in the undeformed map, x, metres.
     pub x: f64,
-    /// Metres.
+    /// Its position in the undeformed map, y, metres.
     pub y: f64,
-    /// By how much it is displaced, metres.
+    /// Its displacement along x, metres.
     pub dx: f64,
-    /// Metres.
+    /// Its displacement along y, metres.
     pub dy: f64,
-    /// By how much what lies around it is turned, radians.
+    /// The local rotation, radians.
     pub dyaw: f64,
     /// Covariance of (dx, dy, dyaw), 3 x 3.
     pub covariance: [f64; 9],
 }
 
-/// How one robot's map is bent: where each place of it belongs, before the map is placed in the world as a whole.
+/// The deformation field of one robot's map, applied before the rigid transform to the world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapDeformation {
     /// Time, and the robot's map frame.
     pub header: Header,
-    /// Whose map.
+    /// The robot of the map.
     pub robot: String,
-    /// From node to node along x and along y, metres.
+    /// The distance between nodes along x and along y, metres.
     pub spacing: f64,
-    /// The nodes, on a lattice through the origin of the map frame, row by row. Between them the displacement is bilinear.
+    /// The nodes, on a lattice through the origin of the map frame, row by row. The displacement is interpolated bilinearly.
     pub nodes: Vec<DeformationNode>,
-    /// The length of its walls that were laid on walls of others, metres.
+    /// The length of its walls that were matched with walls of other maps, metres.
     pub wall_matched: f64,
-    /// How the walls that others show as well lie on theirs, as the rigid frames have them.
+    /// The sharpness of the matched walls with the rigid transforms.
     pub sharpness_rigid: Sharpness,
-    /// The same, as the maps are bent.
+    /// The sharpness of the matched walls with the deformations.
     pub sharpness: Sharpness,
-    /// How it was found to bend: standard deviation of the displacement of two places against each other, metres for the root
-    /// of each metre between them; 0 if that is not known.
+    /// The estimated deformation: standard deviation of the relative displacement of two points, metres per square root of the
+    /// distance in metres; 0 if unknown.
     pub bend: f64,
-    /// The same of the turn of two places against each other, radians for the root of each metre.
+    /// The standard deviation of the relative rotation of two points, radians per square root of the distance in metres.
     pub turn: f64,
 }
 
-/// How well walls that several maps show come out as one.
+/// The sharpness of walls that several maps show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sharpness {
-    /// The mean distance of one drawing of a wall from the other, across the wall, metres.
+    /// The mean distance between the two images of a wall, perpendicular to it, metres.
     pub apart: f64,
-    /// The share of the walls whose two drawings lie so far apart that they look like two walls, 0 to 1.
+    /// The double-wall ratio: the share of the walls whose two images look like two walls, 0 to 1.
     pub doubled: f64,
 }
 

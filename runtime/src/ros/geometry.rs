@@ -39,13 +39,13 @@ impl Default for Quaternion {
 }
 
 impl Quaternion {
-    /// A turn about the vertical axis, radians.
+    /// The rotation about the vertical axis by `yaw` radians.
     pub fn from_yaw(yaw: f64) -> Self {
         Self { x: 0.0, y: 0.0, z: (yaw / 2.0).sin(), w: (yaw / 2.0).cos() }
     }
 
-    /// The turn about the vertical axis, radians in `(-pi, pi]`. Four zeros, which many programs write for "no turn",
-    /// give 0.
+    /// The rotation about the vertical axis, radians in `(-pi, pi]`. It is 0 for four zeros, which many programs write for "no
+    /// rotation".
     pub fn yaw(&self) -> f64 {
         let sine = 2.0 * (self.w * self.z + self.x * self.y);
         let cosine = self.w * self.w + self.x * self.x - self.y * self.y - self.z * self.z;
@@ -62,7 +62,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose in the plane: height, roll and pitch are left out.
+    /// The pose in the plane: height, roll and pitch are ignored.
     pub fn planar(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.position.x, self.position.y), self.orientation.yaw())
     }
@@ -94,7 +94,7 @@ pub struct PoseWithCovariance {
     pub covariance: [[f64; 6]; 6],
 }
 
-/// `geometry_msgs/msg/PoseWithCovarianceStamped`. A covariance of zeros alone says that it is not known.
+/// `geometry_msgs/msg/PoseWithCovarianceStamped`. A covariance of zeros only means that it is unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct PoseWithCovarianceStamped {
@@ -103,7 +103,7 @@ pub struct PoseWithCovarianceStamped {
 }
 
 impl From<PoseStamped> for PoseWithCovarianceStamped {
-    /// The pose with a covariance that is not known.
+    /// The pose with an unknown covariance.
     fn from(PoseStamped { header, pose }: PoseStamped) -> Self {
         Self { header, pose: PoseWithCovariance { pose, ..Default::default() } }
     }
@@ -118,7 +118,7 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// The transform in the plane: height, roll and pitch are left out.
+    /// The transform in the plane: height, roll and pitch are ignored.
     pub fn planar(&self) -> Isometry2<f64> {
         Isometry2::new(Vector2::new(self.translation.x, self.translation.y), self.rotation.yaw())
     }

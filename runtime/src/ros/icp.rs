@@ -1,9 +1,9 @@
-//! `gridweave_msgs`: how ICP went. The `.msg` texts lie in `logs/msg/gridweave_msgs/`.
+//! `gridweave_msgs`: the convergence of ICP. The `.msg` texts are in `logs/msg/gridweave_msgs/`.
 
 use super::{Header, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// How far the walls of two maps lay apart in each iteration of ICP, from one first guess.
+/// The distance between the walls of two maps in each iteration of ICP, from one initial guess.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct IcpErrors {
     /// Time, and the frame of map a.
@@ -12,14 +12,14 @@ pub struct IcpErrors {
     pub a: String,
     /// The robot whose map is moved.
     pub b: String,
-    /// What the first guess was found from, such as `tags` or `maps`.
+    /// The source of the initial guess, such as `tags` or `maps`.
     pub source: String,
-    /// Its place among the hypotheses for the pair: 0 for the best.
+    /// The rank of the hypothesis among those for the pair: 0 for the best.
     pub rank: u32,
-    /// Whether the place that was found may be used.
+    /// Whether the result may be used.
     pub accepted: bool,
-    /// The root of the weighted mean of the squared distances of walls that were paired, metres, before each iteration's step.
-    /// The first iterations pair a sample of the points, and walls that lie farther apart than the last ones do.
+    /// The weighted root mean square distance of the matched walls before each iteration, metres. The first iterations match a
+    /// sample of the points, with a larger maximum distance.
     pub errors: Vec<f64>,
 }
 

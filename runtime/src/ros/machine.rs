@@ -1,43 +1,43 @@
-//! `gridweave_msgs`: what a machine does. The `.msg` texts lie in `logs/msg/gridweave_msgs/`.
+//! `gridweave_msgs`: the state of a machine. The `.msg` texts are in `logs/msg/gridweave_msgs/`.
 
 use super::{Header, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// What the stages of a run on a machine do, told again and again.
+/// The progress of the stages of a run on a machine, sent periodically.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MachineStages {
-    /// The time of the message that was sent before it. There is no frame.
+    /// The time of the message that was sent before this one. There is no frame.
     pub header: Header,
-    /// What the machine is called.
+    /// The name of the machine.
     pub machine: String,
-    /// In about so many seconds it is told again.
+    /// The approximate time to the next message, seconds.
     pub interval: f64,
     /// The stages, in the order of the pipeline.
     pub stages: Vec<StageProgress>,
 }
 
-/// What a stage has done.
+/// The progress of a stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageProgress {
-    /// Its name in the pipeline.
+    /// The name of the stage in the pipeline.
     pub name: String,
-    /// How it stands: `absent`, `starting`, `running` or `ended`.
+    /// Its state: `absent`, `starting`, `running` or `ended`.
     pub state: String,
-    /// Messages that it was given.
+    /// Messages that it has received.
     pub messages_in: u64,
     /// Messages that it has sent.
     pub messages_out: u64,
-    /// Messages a second that it was given since it was told last.
+    /// Messages per second that it has received since the previous report.
     pub in_per_s: f64,
-    /// Messages a second that it has sent since then.
+    /// Messages per second that it has sent since the previous report.
     pub out_per_s: f64,
-    /// The share of the time since then that it has worked, 0 to 1.
+    /// The share of the time since the previous report that it has worked, 0 to 1.
     pub busy: f64,
-    /// Messages that were dropped on their way to it because there was no room.
+    /// Messages to it that were dropped because it had not granted credit for them.
     pub dropped: u64,
-    /// How often it was started again after a failure.
+    /// How often it was restarted after a failure.
     pub restarts: u64,
-    /// How often it has warned of something.
+    /// The number of its warnings.
     pub warnings: u64,
 }
 

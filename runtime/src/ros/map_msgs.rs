@@ -3,14 +3,14 @@
 use super::{Header, RosMessage};
 use serde::{Deserialize, Serialize};
 
-/// `map_msgs/msg/OccupancyGridUpdate`: other cells for a part of the last map, its cells borrowed.
+/// `map_msgs/msg/OccupancyGridUpdate`: the changed cells of a part of the last map, borrowed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OccupancyGridUpdate<'a> {
     /// Time, and the map's frame.
     pub header: Header,
-    /// The column of the map in which the part begins.
+    /// The first column of the part in the map.
     pub x: i32,
-    /// The row of the map in which the part begins.
+    /// The first row of the part in the map.
     pub y: i32,
     /// Columns of the part.
     pub width: u32,

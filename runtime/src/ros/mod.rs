@@ -1,7 +1,7 @@
 //! The ROS 2 messages that stages exchange, and their encoding (CDR).
 //!
-//! The types mirror the `.msg` files field by field. Units are SI, angles radians, and a frame is named in the header.
-//! [`OccupancyGrid`] borrows its cells; the others are small and own their parts.
+//! The types mirror the `.msg` files field by field. Units are SI, angles are in radians, and the header names the frame.
+//! [`OccupancyGrid`] borrows its cells; the other types are small and own their data.
 
 pub mod cell;
 mod codec;
@@ -47,11 +47,11 @@ pub trait RosMessage {
     /// The full name, such as `nav_msgs/msg/OccupancyGrid`.
     const NAME: &'static str;
 
-    /// The type as it is decoded from bytes that live for `'a`: one that borrows from them, or this type itself.
+    /// The decoded type: one that borrows from bytes with the lifetime `'a`, or this type itself.
     type Borrowed<'a>: Serialize + Deserialize<'a>;
 }
 
-/// Gives types that own all their parts their ROS 2 names.
+/// Implements [`RosMessage`] for types that own all their data.
 macro_rules! ros_messages {
     ($package:literal: $($type:ident),*) => {$(
         impl $crate::ros::RosMessage for $type {

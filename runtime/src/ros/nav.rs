@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct MapMetaData {
     /// When the map was loaded.
     pub map_load_time: Time,
-    /// Metres a cell.
+    /// Metres per cell.
     pub resolution: f32,
     /// Cells along x.
     pub width: u32,
@@ -44,9 +44,9 @@ impl RosMessage for OccupancyGrid<'_> {
     type Borrowed<'a> = OccupancyGrid<'a>;
 }
 
-/// All of an occupancy grid but its cells: what stands before them in the encoded message.
+/// An occupancy grid without its cells: the beginning of the encoded message.
 ///
-/// A stage that makes a grid encodes this, and then fills the cells in the memory that the message will be sent in.
+/// A stage that makes a grid encodes this prefix, and then writes the cells directly to the memory of the sent message.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GridPrefix {
     /// Time, and the map's frame.
@@ -56,13 +56,12 @@ pub struct GridPrefix {
 }
 
 impl GridPrefix {
-    /// The number of cells that the size calls for.
+    /// The number of cells, width times height.
     pub fn cell_count(&self) -> usize {
         self.info.width as usize * self.info.height as usize
     }
 
-    /// The encoded message up to its first cell. The message is complete with [`cell_count`](Self::cell_count) bytes
-    /// behind it.
+    /// The encoded message up to its first cell. [`cell_count`](Self::cell_count) bytes complete the message.
     pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
         let count = u32::try_from(self.cell_count()).map_err(|_| {
             EncodeError(format!("a grid of {} x {} cells is too large", self.info.width, self.info.height))
@@ -101,7 +100,7 @@ mod tests {
     use crate::ros::{decode, encode};
 
     #[test]
-    fn a_grid_written_in_place_is_the_grid_encoded_at_once() {
+    fn a_grid_written_in_place_equals_the_encoded_grid() {
         let info = MapMetaData { resolution: 0.05, width: 3, height: 2, ..Default::default() };
         for frame in ["", "a", "map", "robot1/map"] {
             let header = Header { frame_id: frame.into(), ..Default::default() };

@@ -3,7 +3,7 @@
 use super::{Header, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// `sensor_msgs/msg/LaserScan`: a scan of a lidar that turns about its axis.
+/// `sensor_msgs/msg/LaserScan`: a scan of a lidar that rotates about its axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LaserScan {
     /// When the first beam was sent, and the frame of the lidar.
@@ -12,30 +12,30 @@ pub struct LaserScan {
     pub angle_min: f32,
     /// The direction of the last beam, radians.
     pub angle_max: f32,
-    /// From a beam to the next, radians.
+    /// The angle from one beam to the next, radians.
     pub angle_increment: f32,
-    /// From a beam to the next, seconds; 0 if it is not known.
+    /// The time from one beam to the next, seconds; 0 if unknown.
     pub time_increment: f32,
-    /// From a scan to the next, seconds.
+    /// The time from one scan to the next, seconds.
     pub scan_time: f32,
-    /// What is nearer is no measurement, metres.
+    /// The minimum valid range, metres.
     pub range_min: f32,
-    /// What is farther is no measurement, metres.
+    /// The maximum valid range, metres.
     pub range_max: f32,
-    /// What the beams have measured, metres.
+    /// The measured ranges, metres.
     pub ranges: Vec<f32>,
-    /// How strong each came back, in a unit of the device; none if it does not tell.
+    /// The intensities of the echoes, in a unit of the device; empty if the device provides none.
     pub intensities: Vec<f32>,
 }
 
-/// `sensor_msgs/msg/LaserEcho`: what came back of one beam, the nearest first.
+/// `sensor_msgs/msg/LaserEcho`: the echoes of one beam, the nearest first.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct LaserEcho {
     pub echoes: Vec<f32>,
 }
 
-/// `sensor_msgs/msg/MultiEchoLaserScan`: a [`LaserScan`] of which each beam may have met several things.
+/// `sensor_msgs/msg/MultiEchoLaserScan`: a [`LaserScan`] with several echoes per beam.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct MultiEchoLaserScan {

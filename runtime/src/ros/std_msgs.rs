@@ -28,7 +28,7 @@ impl From<Time> for LogTime {
 /// `std_msgs/msg/Header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    /// When what the message tells was so.
+    /// The time to which the message's values apply.
     pub stamp: Time,
     /// The frame that the message's values are in.
     pub frame_id: String,

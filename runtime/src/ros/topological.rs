@@ -1,46 +1,46 @@
-//! `gridweave_msgs`, the part that describes a map by its places and the ways between them.
+//! `gridweave_msgs`: topological maps.
 
 use super::{Header, Point, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// A place of a topological map.
+/// A node of a topological map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TopologicalNode {
     /// Metres, map frame.
     pub x: f64,
     /// Metres, map frame.
     pub y: f64,
-    /// What it is: `end`, `junction`, `door`, `loop`, or what its maker calls it.
+    /// Its kind: `end`, `junction`, `door`, `loop`, or another one of its producer.
     pub kind: String,
-    /// That it really is one, 0 to 1; 1 where nothing is known of it.
+    /// The probability that it exists, 0 to 1; 1 if unknown.
     pub probability: f64,
 }
 
-/// A way between two places of a topological map.
+/// An edge between two nodes of a topological map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TopologicalPath {
-    /// The place of its first node in the list of nodes.
+    /// The index of its first node in the list of nodes.
     pub start: u32,
-    /// The place of its last node in the list of nodes.
+    /// The index of its last node in the list of nodes.
     pub end: u32,
-    /// Metres.
+    /// Its length, metres.
     pub length: f64,
-    /// That it really is there, 0 to 1; 1 where nothing is known of it.
+    /// The probability that it exists, 0 to 1; 1 if unknown.
     pub probability: f64,
-    /// What it passes through, from the first node to the last, both of them among these; metres, map frame.
+    /// Its course from the first node to the last, including both; metres, map frame.
     pub points: Vec<Point>,
 }
 
-/// The places of a map and the ways between them.
+/// The topological map of a robot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TopologicalMap {
     /// Time, and the robot's map frame.
     pub header: Header,
-    /// Whose map.
+    /// The robot of the map.
     pub robot: String,
-    /// The places.
+    /// The nodes.
     pub nodes: Vec<TopologicalNode>,
-    /// The ways between them.
+    /// The edges.
     pub paths: Vec<TopologicalPath>,
 }
 

@@ -1,12 +1,12 @@
-//! `gridweave_msgs`: what is true of a simulated world.
+//! `gridweave_msgs`: the ground truth of a simulated world.
 
 use super::{Header, ros_messages};
 use serde::{Deserialize, Serialize};
 
-/// Where a simulated robot's map lies in truth.
+/// The true pose of a simulated robot's map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueFrame {
-    /// Whose map.
+    /// The robot of the map.
     pub robot: String,
     /// Metres in the first robot's map frame.
     pub x: f64,
@@ -18,10 +18,10 @@ pub struct TrueFrame {
     pub centre: [f64; 2],
 }
 
-/// Where a simulated tag is.
+/// The true position of a simulated tag.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueTag {
-    /// Which tag.
+    /// The id of the tag.
     pub tag_id: String,
     /// Metres in the first robot's map frame.
     pub x: f64,
@@ -29,22 +29,22 @@ pub struct TrueTag {
     pub y: f64,
 }
 
-/// What is true of a simulated world.
+/// The ground truth of a simulated world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SimulationTruth {
     /// Time, and the first robot's map frame.
     pub header: Header,
-    /// Metres a cell of the first robot's map.
+    /// The resolution of the first robot's map, metres per cell.
     pub resolution: f64,
     /// The robots, by name.
     pub frames: Vec<TrueFrame>,
     /// The tags, by id.
     pub tags: Vec<TrueTag>,
-    /// Places that the first two robots by name both have driven through.
+    /// Positions that both of the first two robots by name have driven through.
     pub common: Vec<CommonPlace>,
 }
 
-/// A place as the maps of two robots show it.
+/// A position in the maps of two robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CommonPlace {
     /// x and y in the map frame of the first robot, metres.

@@ -1,4 +1,4 @@
-//! `visualization_msgs`: shapes that RViz and Foxglove draw. Fields that are none of ours are always empty.
+//! `visualization_msgs`: shapes that RViz and Foxglove draw. Unused fields are always empty.
 
 use super::{Header, Point, Pose, Vector3, ros_messages};
 use serde::{Deserialize, Serialize};
@@ -26,28 +26,28 @@ pub struct Duration {
 pub struct Marker {
     /// Time, and the frame that the shape is in.
     pub header: Header,
-    /// What sort of shape it is, to us; viewers switch shapes by it.
+    /// The namespace of the shape; viewers can hide shapes by namespace.
     pub ns: String,
-    /// Its number among those of its sort.
+    /// The id of the shape in its namespace.
     pub id: i32,
-    /// What it is: see the constants.
+    /// The type of the shape: see the constants.
     #[serde(rename = "type")]
     pub shape: i32,
-    /// What becomes of it: [`ADD`](Self::ADD) or [`DELETE_ALL`](Self::DELETE_ALL).
+    /// The action: [`ADD`](Self::ADD) or [`DELETE_ALL`](Self::DELETE_ALL).
     pub action: i32,
-    /// Where it is.
+    /// The pose of the shape.
     pub pose: Pose,
-    /// Its sides; of lines, x is the width; of text, z is the height. Metres.
+    /// The side lengths; for lines, x is the width; for text, z is the height. Metres.
     pub scale: Vector3,
-    /// Its colour, where the points have none of their own.
+    /// The colour, if the points have no colours.
     pub color: ColorRGBA,
-    /// How long it is shown; zero for ever.
+    /// How long it is shown; zero means forever.
     pub lifetime: Duration,
     /// Whether it moves with its frame.
     pub frame_locked: bool,
-    /// Of lists.
+    /// The points of list types.
     pub points: Vec<Point>,
-    /// For each point, or none.
+    /// The colours of the points; empty for the colour of the shape.
     pub colors: Vec<ColorRGBA>,
     /// Empty.
     pub texture_resource: String,
@@ -55,7 +55,7 @@ pub struct Marker {
     pub texture: CompressedImage,
     /// Empty.
     pub uv_coordinates: Vec<UVCoordinate>,
-    /// Of text.
+    /// The text of a text shape.
     pub text: String,
     /// Empty.
     pub mesh_resource: String,
@@ -70,15 +70,15 @@ impl Marker {
     pub const ARROW: i32 = 0;
     /// An ellipsoid.
     pub const SPHERE: i32 = 2;
-    /// Lines between each two points.
+    /// A line between each two points.
     pub const LINE_LIST: i32 = 5;
     /// A sphere at each point.
     pub const SPHERE_LIST: i32 = 7;
-    /// Text that faces who looks.
+    /// Text that faces the viewer.
     pub const TEXT: i32 = 9;
-    /// Draws the shape, in place of the one of its sort and number.
+    /// Adds the shape, or replaces the one with the same namespace and id.
     pub const ADD: i32 = 0;
-    /// Takes all shapes of the topic away.
+    /// Deletes all shapes of the topic.
     pub const DELETE_ALL: i32 = 3;
 }
 
