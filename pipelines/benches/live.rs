@@ -1,13 +1,12 @@
-//! What a live pipeline costs while nothing happens, and how long it takes from a new map to the merged one.
+//! Processor time of an idle live pipeline, and latency from a map to the merged map.
 //!
 //!     GRIDWEAVE_LOGS=FOLDER cargo bench -p gridweave --bench live
 //!
-//! It starts `pipelines/live.toml` with a second sink, ten stages in all. Idle: the processor time of all its processes
-//! over ten seconds, before anything was sent and after. Latency: `FOLDER/intel-2.mcap` (a simulated log, without a
-//! folder) is played again and again; the time from when a map is sent on `robots.map` to when the merged map that it leads
-//! to is sent on `fuser.map`.
+//! It starts `pipelines/live.toml` with a second sink, ten stages in all. Idle: the processor time of all its processes over ten
+//! seconds, before and after messages were sent. Latency: `FOLDER/intel-2.mcap` (a simulated log, without a folder) is played
+//! repeatedly; the time from when a map is sent on `robots.map` to when the merged map from it is sent on `fuser.map`.
 
-// A bench that cannot go on has nothing better to do than to stop.
+// A bench that cannot go on may panic.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_runtime::engine::{RunningRun, WatchedLink, running_runs};
@@ -21,7 +20,7 @@ use std::time::{Duration, Instant};
 
 const IDLE: Duration = Duration::from_secs(10);
 const PLAY: Duration = Duration::from_secs(90);
-/// How much faster than it was recorded the log is played.
+/// Rate at which the log is played, relative to the recording.
 const RATE: &str = "100";
 const LIVE: &str = include_str!("../live.toml");
 
@@ -71,7 +70,7 @@ fn simulated(folder: &Path) -> PathBuf {
     log
 }
 
-/// The run that a process supervises.
+/// Finds the run that a process supervises.
 fn find(supervisor: &Child) -> RunningRun {
     let prefix = format!("gw{}_", supervisor.id());
     loop {
@@ -87,14 +86,14 @@ fn interrupt(mut program: Child) {
     program.wait().unwrap();
 }
 
-/// The share of one core that all processes of a run take, per cent.
+/// Measures the share of one core that all processes of a run take, percent.
 fn idle(run: &RunningRun, supervisor: u32) -> f64 {
     let (before, start) = (ticks(run, supervisor), Instant::now());
     sleep(IDLE);
     (ticks(run, supervisor) - before) as f64 / start.elapsed().as_secs_f64()
 }
 
-/// The processor time of all processes of a run, hundredths of a second.
+/// Processor time of all processes of a run, hundredths of a second.
 fn ticks(run: &RunningRun, supervisor: u32) -> u64 {
     let folder = run.folder.display().to_string();
     let processes = std::fs::read_dir("/proc").unwrap().flatten();
@@ -105,14 +104,14 @@ fn ticks(run: &RunningRun, supervisor: u32) -> u64 {
             return None;
         }
         let stat = std::fs::read_to_string(process.path().join("stat")).ok()?;
-        // Behind the name, which may hold anything: the state, then numbers.
+        // The state and the numbers follow the name, which may contain any character.
         let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
         Some(fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?)
     };
     processes.filter_map(of_process).sum()
 }
 
-/// Plays the log, and gives how long it took from each map to the merged one, seconds, the shortest first.
+/// Plays the log, and returns the latencies from each map to the merged one, seconds, sorted.
 fn latencies(run: &RunningRun, log: &Path) -> Vec<f64> {
     let registry = Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()));
     let pipeline = Pipeline::load(&run.pipeline(), &registry, &Overrides::default()).unwrap();
@@ -133,7 +132,7 @@ fn latencies(run: &RunningRun, log: &Path) -> Vec<f64> {
         .unwrap();
         merged
             .take(|sample, message| {
-                // Of several maps that one leads to, the first.
+                // Only the first of several merged maps from one map counts.
                 if let Some(since) = sent.remove(&message.header().log_time) {
                     latencies.push((sample.sent_at - since) as f64 * 1e-9);
                 }

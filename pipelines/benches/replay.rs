@@ -1,11 +1,11 @@
-//! How long a whole merge takes, from the command line to the closed output, and how much memory.
+//! Time and memory of a complete merge, from the command line to the closed output.
 //!
 //!     GRIDWEAVE_LOGS=FOLDER cargo bench -p gridweave --bench replay
 //!
-//! Without a folder of logs it makes one by simulation. The reference, in the same run, is a plain copy of the log by
-//! the `mcap` crate (read, decompress, compress, write), which is the least that any tool with an MCAP output does.
+//! Without a folder of logs it simulates one. The reference, in the same run, is a copy of the log by the `mcap` crate (read,
+//! decompress, compress, write), which is the least that any tool with an MCAP output does.
 
-// A bench that cannot go on has nothing better to do than to stop.
+// A bench that cannot go on may panic.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ fn main() {
     }
 }
 
-/// Whether the memory of the program that is started is all that there is.
+/// Whether one process holds all the memory of the run.
 fn is_one_process(engine: &str) -> bool {
     engine != "processes"
 }
@@ -77,7 +77,7 @@ fn simulated(folder: &Path) -> PathBuf {
     log
 }
 
-/// Copies a log. Gives the seconds and the number of messages.
+/// Copies a log. Returns the time in seconds and the number of messages.
 fn copy(input: &Path, output: &Path) -> (f64, u64) {
     let start = Instant::now();
     let bytes = std::fs::read(input).unwrap();
@@ -92,7 +92,7 @@ fn copy(input: &Path, output: &Path) -> (f64, u64) {
     (start.elapsed().as_secs_f64(), count)
 }
 
-/// Merges a log. Gives the seconds and the peak memory, KiB.
+/// Merges a log. Returns the time in seconds and the peak memory, KiB.
 fn merge(input: &Path, output: &Path, engine: &str) -> (f64, u64) {
     let start = Instant::now();
     let mut child = Command::new(env!("CARGO_BIN_EXE_gridweave"))
@@ -111,8 +111,7 @@ fn merge(input: &Path, output: &Path, engine: &str) -> (f64, u64) {
     (seconds, memory)
 }
 
-/// Waits for the end of a process and gives the most memory that it was seen to hold, from `/proc`; 0 where there is
-/// none.
+/// Waits for the end of a process and returns its peak memory from `/proc`, KiB; 0 where there is no `/proc`.
 fn peak_memory(child: &mut std::process::Child) -> u64 {
     let status = format!("/proc/{}/status", child.id());
     let mut peak = 0;

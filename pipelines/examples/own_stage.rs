@@ -1,4 +1,4 @@
-//! A stage of one's own, without a fork: the command `gridweave` with one more stage kind, `map_inflater`.
+//! A user-defined stage: the command `gridweave` with one more stage kind, `map_inflater`.
 //!
 //!     cargo run --example own_stage -- kinds map_inflater
 //!     cargo run --example own_stage -- golden --partial --cases pipelines/examples/own_stage_golden
@@ -13,7 +13,7 @@ fn main() -> std::process::ExitCode {
     gridweave::command([kind()])
 }
 
-/// The doc comments and the ranges are what `kinds` shows.
+/// Parameters; `kinds` shows their doc comments and ranges.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct InflaterParameters {
