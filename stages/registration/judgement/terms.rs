@@ -3,7 +3,7 @@
 use super::weights::{INTERCEPT, WEIGHTS};
 use crate::registration::comparison::Agreement;
 
-/// Least independent share of the inliers for the evidence to count in full: two walls fit any corner.
+/// Least independent share of the inliers for the other terms to count in full: two walls fit any corner.
 const FULL_SHARE: f64 = 0.5;
 /// Beyond this the model of chance itself is in doubt.
 const MOST_SIGNIFICANCE: f64 = 300.0;
@@ -17,7 +17,7 @@ const MORE_CONFLICT: f64 = 5.0;
 const MORE_WALL: f64 = 40.0;
 
 /// The number of terms.
-pub const COUNT: usize = 11;
+pub const COUNT: usize = 10;
 
 /// A term of the log-odds that a hypothesis is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,8 +42,6 @@ pub enum Term {
     Crossings,
     /// Root of the cost of the deformation.
     Deformation,
-    /// Root of the log-likelihood ratio of the walls, less the cost of the deformation.
-    Evidence,
 }
 
 impl Term {
@@ -59,14 +57,13 @@ impl Term {
         Self::CrossingConflicts,
         Self::Crossings,
         Self::Deformation,
-        Self::Evidence,
     ];
 
     /// Name in the explanation of a verdict and in the tables of the fit.
     pub fn name(self) -> &'static str {
         match self {
             Self::PeakSignificance => "peak significance",
-            Self::Deviation => "standard deviation of the place",
+            Self::Deviation => "standard deviation of the position",
             Self::InliersToCrossings => "inliers to walls through free space",
             Self::CommonArea => "common area",
             Self::IndependentInliers => "independent inliers",
@@ -75,7 +72,6 @@ impl Term {
             Self::CrossingConflicts => "conflicts that are walls",
             Self::Crossings => "walls through free space",
             Self::Deformation => "deformation",
-            Self::Evidence => "evidence of the walls",
         }
     }
 
@@ -86,8 +82,7 @@ impl Term {
             | Self::InliersToCrossings
             | Self::CommonArea
             | Self::IndependentInliers
-            | Self::Constraints
-            | Self::Evidence => 1.0,
+            | Self::Constraints => 1.0,
             Self::Deviation | Self::Residual | Self::CrossingConflicts | Self::Crossings | Self::Deformation => -1.0,
         }
     }
@@ -111,7 +106,6 @@ impl Terms {
             residual,
             ..
         } = *agreement;
-        let cost = deformation_cost.max(0.0);
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
             confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
@@ -123,8 +117,7 @@ impl Terms {
             residual,
             crossing_length / (conflict_length + MORE_CONFLICT),
             crossing_length / (agreement.compared_length() + MORE_WALL),
-            cost.sqrt(),
-            confirmed * (agreement.evidence - cost).max(0.0).sqrt(),
+            deformation_cost.max(0.0).sqrt(),
         ])
     }
 

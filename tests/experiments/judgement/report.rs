@@ -120,10 +120,12 @@ pub(super) fn weights_source(weights: &Weights, examples: &[Example]) -> String 
         examples.iter().filter(|example| example.is_related && example.set.starts_with("simulated")).count(),
         examples.len() - related,
     );
+    // Comments begin in one column, as rustfmt has them.
     let array = |values: &[f64]| {
-        let lines =
-            Term::ALL.iter().zip(values).map(|(term, value)| format!("    // {}\n    {value:.4},\n", term.name()));
-        lines.collect::<String>()
+        let numbers: Vec<String> = values.iter().map(|value| format!("{value:.4},")).collect();
+        let widest = numbers.iter().map(String::len).max().unwrap_or(0);
+        let lines = Term::ALL.iter().zip(&numbers);
+        lines.map(|(term, number)| format!("    {number:widest$} // {}\n", term.name())).collect::<String>()
     };
     let _ = write!(
         text,
