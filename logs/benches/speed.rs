@@ -1,17 +1,17 @@
-//! How fast logs are read and written, beside what the crate `mcap` does with the same bytes, in one run.
+//! The speed of reading and writing logs, compared with the `mcap` crate on the same data in the same run.
 //!
 //!     cargo bench -p gridweave-logs --bench speed
 //!
-//! - Reading: the messages by log time as stages are given them, against a bare walk over the records with the same checksums
-//!   (`mcap::sans_io::LinearReader`), and against `mcap::MessageStream`. All three read the file.
-//! - Writing: `LogWriter`, against the bare `mcap::Writer` with the same chunks, compression and checksums, both where no file
-//!   lies;
-//!   and `LogWriter` where one does, which it replaces only once the new one is on the disk.
-//! - `info`: what `gridweave info` does with a file of 2 GB that has an index.
+//! - Reading: the messages in log time order, compared with a scan of the records with the same checksums
+//!   (`mcap::sans_io::LinearReader`), and with `mcap::MessageStream`. All three read the file.
+//! - Writing: `LogWriter`, compared with `mcap::Writer` with the same chunks, compression and checksums, both to a file
+//!   that does not exist; and `LogWriter` to an existing file, which it replaces only when the new one is on the disk.
+//! - `info`: `gridweave info` on a file of 2 GB with an index.
 //!
-//! The contestants take turns, and the least time of each counts: what others do on the machine adds to all.
+//! The candidates run alternately, and the minimum time of each is reported, since other load on the machine only adds
+//! time.
 
-// A bench that cannot go on has nothing better to do than to stop.
+// A benchmark that cannot continue can only stop.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_logs::info::glance;
@@ -28,7 +28,7 @@ use std::io::{BufWriter, Read};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Bytes of messages in a log.
+/// The size of all messages in a log, bytes.
 const BYTES: usize = 64 << 20;
 const SIZES: [(&str, usize); 2] = [("100 B", 100), ("1 MB", 1_000_000)];
 const COMPRESSIONS: [(&str, Compression); 3] =
@@ -36,7 +36,7 @@ const COMPRESSIONS: [(&str, Compression); 3] =
 const ROUNDS: usize = 7;
 const CHUNK_SIZE: u64 = 1 << 20;
 
-/// A message of a size that packs about as maps and scans do: runs of one value, and noise.
+/// A message that compresses about like maps and scans: runs of one value, and noise.
 fn message(size: usize, number: usize) -> Vec<u8> {
     let mut state = number as u64 | 1;
     let mut bytes = Vec::with_capacity(size);
@@ -67,7 +67,7 @@ fn header(channel_id: u16, sequence: usize) -> MessageHeader {
     MessageHeader { channel_id, sequence: sequence as u32, log_time: time, publish_time: time }
 }
 
-/// Writes messages with the writer of logs, again and again the same few.
+/// Writes messages with `LogWriter`, cycling through `messages`.
 fn write(path: &Path, compression: Compression, messages: &[Vec<u8>], count: usize) {
     let mut log = LogWriter::create(path, LogOptions { compression, chunk_size: CHUNK_SIZE }).unwrap();
     let channel_id = log.channel(&channel()).unwrap();
@@ -77,12 +77,12 @@ fn write(path: &Path, compression: Compression, messages: &[Vec<u8>], count: usi
     log.finish(Outcome::Complete).unwrap();
 }
 
-/// The same with the bare writer.
+/// The same with `mcap::Writer`.
 fn write_bare(path: &Path, compression: Compression, messages: &[Vec<u8>], count: usize) {
     let (compression, level) = match compression {
         Compression::None => (None, 0),
         Compression::Lz4 => (Some(mcap::Compression::Lz4), 0),
-        // As logs have it.
+        // The level of `LogWriter`.
         Compression::Zstd => (Some(mcap::Compression::Zstd), 1),
     };
     let options = mcap::WriteOptions::new().profile("ros2").chunk_size(Some(CHUNK_SIZE)).compression(compression);
@@ -97,7 +97,7 @@ fn write_bare(path: &Path, compression: Compression, messages: &[Vec<u8>], count
     writer.finish().unwrap();
 }
 
-/// Bytes of all messages, by the reader of logs.
+/// The size of all messages, read with `LogReader`.
 fn read(path: &Path) -> usize {
     let mut reader = LogReader::new(vec![LogFile::open(path).unwrap()]);
     let mut bytes = 0;
@@ -108,7 +108,7 @@ fn read(path: &Path) -> usize {
     bytes
 }
 
-/// The same by a walk over the records.
+/// The same by scanning the records.
 fn read_bare(path: &Path) -> usize {
     let mut file = File::open(path).unwrap();
     let mut walk = LinearReader::new_with_options(LinearReaderOptions::default().with_validate_chunk_crcs(true));
@@ -129,13 +129,13 @@ fn read_bare(path: &Path) -> usize {
     bytes
 }
 
-/// The same by the stream of messages that `mcap` has.
+/// The same with `mcap::MessageStream`.
 fn read_stream(path: &Path) -> usize {
     let file = std::fs::read(path).unwrap();
     mcap::MessageStream::new(&file).unwrap().map(|message| black_box(message.unwrap().data).len()).sum()
 }
 
-/// The least time of each of some contestants, who take turns. What comes `before` each turn does not count.
+/// The minimum time of each candidate, which run alternately. The time of `before` is not counted.
 fn race<const N: usize>(before: impl Fn(), contestants: [&dyn Fn(); N]) -> [Duration; N] {
     let mut least = [Duration::MAX; N];
     for _ in 0..ROUNDS {
@@ -153,13 +153,13 @@ fn main() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.mcap");
     println!(
-        "| messages | packed | read, MB/s | x bare walk | x MessageStream | written, MB/s | x bare writer | replaced, MB/s |"
+        "| messages | compression | read, MB/s | x bare walk | x MessageStream | written, MB/s | x bare writer | replaced, MB/s |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for (name, size) in SIZES {
         let count = BYTES / size;
         let messages: Vec<Vec<u8>> = (0..count.min(5000)).map(|number| message(size, number)).collect();
-        for (packed, compression) in COMPRESSIONS {
+        for (label, compression) in COMPRESSIONS {
             let fresh = folder.path().join("fresh.mcap");
             let remove = || drop(std::fs::remove_file(&fresh));
             let [written, written_bare] = race(
@@ -179,7 +179,7 @@ fn main() {
             let speed = |time: Duration| expected as f64 * 1e-6 / time.as_secs_f64();
             let times = |other: Duration, own: Duration| other.as_secs_f64() / own.as_secs_f64();
             println!(
-                "| {name} | {packed} | {:.0} | {:.2} | {:.2} | {:.0} | {:.2} | {:.0} |",
+                "| {name} | {label} | {:.0} | {:.2} | {:.2} | {:.0} | {:.2} | {:.0} |",
                 speed(read),
                 times(walked, read),
                 times(streamed, read),

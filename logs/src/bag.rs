@@ -1,4 +1,4 @@
-//! Bags of rosbag2 that are written: a folder with one MCAP file, and `metadata.yaml`, which says what is in it.
+//! Writing of rosbag2 bags: a folder with one MCAP file, and the metadata in `metadata.yaml`.
 
 use crate::file::{WriteError, replace};
 use crate::qos;
@@ -12,56 +12,56 @@ use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// The version of the description, that of Humble, which all later ones read.
+/// The version of the metadata format, that of Humble, which all later versions read.
 const VERSION: u32 = 5;
 const DESCRIPTION: &str = "metadata.yaml";
 
-/// A bag could not be written.
+/// The error when a bag cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BagError {
-    /// Its folder cannot be made or looked into.
-    #[error("cannot write a bag in {}: {source}; see that the folder that it lies in exists and may be written", folder.display())]
+    /// The folder cannot be created or read.
+    #[error("cannot write a bag in {}: {source}; check that its parent folder exists and is writable", folder.display())]
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// Why.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// Another bag is there already.
-    #[error("{} holds {other}, which is of another bag; name another folder", folder.display())]
+    /// The folder contains another bag.
+    #[error("{} contains {other} of another bag; choose another folder", folder.display())]
     Taken {
         /// The folder.
         folder: PathBuf,
-        /// What is in it.
+        /// The file of the other bag.
         other: String,
     },
-    /// Its log cannot be read again.
+    /// The log cannot be read back.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The description cannot be written.
+    /// The metadata cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
 
-/// A bag that is to be written.
+/// A bag that is being written.
 #[derive(Debug)]
 pub struct Bag {
     folder: PathBuf,
-    /// Whether the folder was made here.
+    /// Whether the folder was created by this run.
     is_made: bool,
 }
 
 impl Bag {
-    /// Whether a path means a bag: one that ends with a slash, or a folder.
+    /// Whether a path denotes a bag: it ends with a slash, or is a folder.
     pub fn is_meant(path: &Path) -> bool {
         path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir()
     }
 
-    /// Makes the folder of a bag if it is not there.
+    /// Creates the folder of a bag if it does not exist.
     ///
     /// # Errors
-    /// It cannot be made, or holds files of another bag.
+    /// It cannot be created, or contains files of another bag.
     pub fn create(folder: &Path) -> Result<Self, BagError> {
         let of_folder = |source| BagError::Folder { folder: folder.to_owned(), source };
         let is_made = match fs::create_dir(folder) {
@@ -69,7 +69,7 @@ impl Bag {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => false,
             Err(error) => return Err(of_folder(error)),
         };
-        // A name that does not end with a slash, nor with `.` or `..`.
+        // The name without a trailing slash, `.` or `..`.
         let bag = Self { folder: folder.canonicalize().map_err(of_folder)?, is_made };
         let log = bag.log();
         for entry in fs::read_dir(&bag.folder).map_err(of_folder)? {
@@ -84,15 +84,15 @@ impl Bag {
         Ok(bag)
     }
 
-    /// The log in it, called as rosbag2 would call it.
+    /// The path of the log in the bag, named as by rosbag2.
     pub fn log(&self) -> PathBuf {
         self.folder.join(log_name(self.folder.file_name().unwrap_or_else(|| OsStr::new("bag"))))
     }
 
-    /// Describes the log, which is written.
+    /// Writes the metadata of the finished log.
     ///
     /// # Errors
-    /// It cannot be read, or the description cannot be written.
+    /// The log cannot be read, or the metadata cannot be written.
     pub fn describe(&self) -> Result<(), BagError> {
         let log = self.log();
         let text = description(&LogFile::open(&log)?, &log.file_name().unwrap_or_default().to_string_lossy());
@@ -103,7 +103,7 @@ impl Bag {
 impl Drop for Bag {
     fn drop(&mut self) {
         if self.is_made {
-            // Fails where there is something in it.
+            // Fails if the folder is not empty.
             let _ = fs::remove_dir(&self.folder);
         }
     }
@@ -171,7 +171,7 @@ struct TopicMetadata {
     offered_qos_profiles: String,
 }
 
-/// What `metadata.yaml` says of a log.
+/// The text of `metadata.yaml` for a log.
 fn description(log: &LogFile, name: &str) -> String {
     let Statistics { messages, first, last, by_channel } = log.statistics().cloned().unwrap_or_default();
     let span = Span {
@@ -179,7 +179,7 @@ fn description(log: &LogFile, name: &str) -> String {
         starting_time: Start { nanoseconds_since_epoch: first },
         message_count: messages,
     };
-    // Channels that differ in what rosbag2 does not know of are one topic.
+    // Channels that differ only in properties that rosbag2 does not have are one topic.
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     for (number, channel) in log.channels() {
         let Channel { topic, schema_name, message_encoding, metadata, .. } = channel;
@@ -205,7 +205,7 @@ fn description(log: &LogFile, name: &str) -> String {
         relative_file_paths: [name],
         files: [File { path: name, span }],
     };
-    // Texts and numbers can all be written.
+    // Strings and numbers can always be serialized.
     serde_norway::to_string(&Description { rosbag2_bagfile_information: information }).unwrap_or_default()
 }
 
@@ -217,7 +217,7 @@ mod tests {
     use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
 
     #[test]
-    fn a_bag_is_a_folder_with_a_log_that_its_description_names() {
+    fn a_bag_is_a_folder_with_a_log_and_its_metadata() {
         let folder = tempfile::tempdir().unwrap();
         let bag = Bag::create(&folder.path().join("merged/")).unwrap();
         assert_eq!(bag.log().file_name().unwrap(), "merged_0.mcap");
@@ -228,12 +228,14 @@ mod tests {
         fs::write(bag.log(), log.finish()).unwrap();
         bag.describe().unwrap();
         let text = fs::read_to_string(folder.path().join("merged/metadata.yaml")).unwrap();
-        let told: serde_json::Value = serde_norway::from_str(&text).unwrap();
-        let told = &told["rosbag2_bagfile_information"];
-        assert_eq!(told["message_count"], 3);
-        assert_eq!(told["starting_time"]["nanoseconds_since_epoch"], 5_000_000_000_u64);
-        assert_eq!(told["duration"]["nanoseconds"], 3_000_000_000_u64);
-        let [map, other] = told["topics_with_message_count"].as_array().unwrap().as_slice() else { panic!("{text}") };
+        let metadata: serde_json::Value = serde_norway::from_str(&text).unwrap();
+        let metadata = &metadata["rosbag2_bagfile_information"];
+        assert_eq!(metadata["message_count"], 3);
+        assert_eq!(metadata["starting_time"]["nanoseconds_since_epoch"], 5_000_000_000_u64);
+        assert_eq!(metadata["duration"]["nanoseconds"], 3_000_000_000_u64);
+        let [map, other] = metadata["topics_with_message_count"].as_array().unwrap().as_slice() else {
+            panic!("{text}")
+        };
         assert_eq!(map["topic_metadata"]["offered_qos_profiles"], qos::LATCHED);
         assert_eq!((&other["topic_metadata"]["type"], &other["message_count"]), (&"a_msgs/msg/B".into(), &2.into()));
         let files = log_files(&[folder.path().join("merged")]).unwrap();
@@ -241,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_is_taken_away_where_nothing_was_written_and_it_was_made_for_that() {
+    fn an_empty_folder_is_removed_if_it_was_created_for_the_bag() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         drop(Bag::create(&path).unwrap());
@@ -252,11 +254,11 @@ mod tests {
     }
 
     #[test]
-    fn a_bag_takes_the_place_of_one_of_its_name_and_of_no_other() {
+    fn a_bag_replaces_one_of_its_name_and_no_other() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("other_0.mcap"), "").unwrap();
         let error = Bag::create(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("other_0.mcap, which is of another bag"), "{error}");
+        assert!(error.contains("other_0.mcap of another bag"), "{error}");
         let bag = folder.path().join("a");
         fs::create_dir(&bag).unwrap();
         fs::write(bag.join("a_0.mcap"), "").unwrap();

@@ -1,8 +1,8 @@
-//! Files that are replaced only once what takes their place is written.
+//! Output files that are replaced only when their new content is completely written.
 //!
-//! A file NAME is written beside as `NAME.part`, which its writer keeps locked. The system takes such a lock back when the
-//! writer dies, in whatever way. So a part that is locked belongs to a living writer, and nobody else touches it; one that
-//! is not locked is what a killed writer has left.
+//! A file NAME is written as `NAME.part`, which its writer keeps locked. The operating system releases the lock when
+//! the writer dies. So a locked part belongs to a running writer, and no other program touches it; an unlocked part was
+//! left by a killed writer.
 
 use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -10,38 +10,37 @@ use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-/// A file could not be written.
+/// The error when a file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// A living program writes it.
-    #[error("{} is being written by {writer}; wait for its end, or name another file", path.display())]
+    /// A running program is writing it.
+    #[error("{} is being written by {writer}; wait for it to end, or choose another file", path.display())]
     InUse {
         /// The file.
         path: PathBuf,
-        /// The process, where the system tells.
+        /// The process, if known.
         writer: String,
     },
     /// It is a device, a pipe or a socket.
-    #[error("{} is no regular file and may not be replaced by one; name another file", path.display())]
+    #[error("{} is not a regular file and is not replaced; choose another file", path.display())]
     NotRegular {
-        /// What was named.
+        /// The path.
         path: PathBuf,
     },
     /// The file system fails.
-    #[error("cannot write {}: {error}; see that its folder exists, may be written and has room", path.display())]
+    #[error("cannot write {}: {error}; check that its folder exists, is writable and has room", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the operating system.
         error: io::Error,
     },
 }
 
-/// Where a file lies that is called `path`: the same for all names of a file, by links and through other folders. The file
-/// need not be there, but its folder must.
+/// The canonical path of a file: the same for all links and paths to it. The file need not exist, but its folder must.
 ///
 /// # Errors
-/// There is no such folder, or `path` is a link that leads nowhere.
+/// The folder does not exist, or `path` is a dangling link.
 pub fn resolve(path: &Path) -> io::Result<PathBuf> {
     if fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink()) {
         return path.canonicalize();
@@ -50,15 +49,15 @@ pub fn resolve(path: &Path) -> io::Result<PathBuf> {
     Ok(folder_of(path).canonicalize()?.join(name))
 }
 
-/// The folder that a file lies in.
+/// The folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether a file could be written at `path`. Leaves what is there as it is, but for what a killed writer has left of it.
+/// Checks that a file can be written at `path`. Changes nothing, except that the part of a killed writer is removed.
 ///
 /// # Errors
-/// It could not.
+/// It cannot be written.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if let Some(mut left) = OutputFile::of_killed(path)? {
         left.keep(false);
@@ -67,11 +66,11 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     folder.map_err(|error| WriteError::Io { path: path.to_owned(), error })
 }
 
-/// Writes files that belong together. All are written beside before the first is put in its place, in the given order, so
-/// that a full disk leaves the files that were there.
+/// Writes files that belong together. All parts are written before the first file is replaced, in the given order, so
+/// that a full disk leaves the earlier files.
 ///
 /// # Errors
-/// One of them cannot be written, or put in its place.
+/// A file cannot be written or renamed.
 pub fn replace(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     let write = |(path, bytes): &(&Path, &[u8])| {
         let output = OutputFile::create(path)?;
@@ -82,28 +81,28 @@ pub fn replace(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
     outputs.into_iter().try_for_each(|output| output.put_in_place().map(drop))
 }
 
-/// A file that is written beside the one whose place it takes. While this lives, no other program writes there.
+/// An output file that is written as a part. While this exists, no other program writes the file.
 ///
-/// It is gone with this, unless it was put in place or is meant to be kept.
+/// On drop the part is deleted, unless it was renamed or is to be kept.
 #[derive(Debug)]
 pub(crate) struct OutputFile {
-    /// As the user calls it.
+    /// The path as given by the user.
     path: PathBuf,
-    /// Where that is.
+    /// The canonical path.
     place: PathBuf,
     part: PathBuf,
     file: File,
-    /// Whether the part stays when this goes.
+    /// Whether the part is kept on drop.
     is_kept: bool,
 }
 
 impl OutputFile {
-    /// Starts a file. What a killed writer has left of it is taken away.
+    /// Creates the part. One left by a killed writer is removed.
     pub(crate) fn create(path: &Path) -> Result<Self, WriteError> {
         let of_path = |error| WriteError::Io { path: path.to_owned(), error };
         let (place, part) = places(path)?;
         loop {
-            // Not emptied but made anew: a program that reads what was left keeps what it reads.
+            // The part is created instead of truncated: programs that read the old one can still read it.
             let (file, is_made) = match options().create_new(true).open(&part) {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => match options().open(&part) {
                     Err(error) if error.kind() == ErrorKind::NotFound => continue,
@@ -113,7 +112,7 @@ impl OutputFile {
             };
             lock(&file, path, &part, is_made)?;
             match is_at(&file, &part) {
-                // Another writer has put it in place, or has taken it away, before it was locked here.
+                // Another writer has renamed or removed it before it was locked here.
                 false => {}
                 true if is_made => return Ok(Self { path: path.to_owned(), place, part, file, is_kept: false }),
                 true => fs::remove_file(&part).map_err(of_path)?,
@@ -121,7 +120,7 @@ impl OutputFile {
         }
     }
 
-    /// What a killed writer has left of the file at `path`; none if there is no such thing. It is kept.
+    /// Opens the part that a killed writer has left for `path`; `None` if there is none. It is kept.
     pub(crate) fn of_killed(path: &Path) -> Result<Option<Self>, WriteError> {
         let (place, part) = places(path)?;
         let file = match options().open(&part) {
@@ -133,26 +132,26 @@ impl OutputFile {
         Ok(is_at(&file, &part).then_some(Self { path, place, part, file, is_kept: true }))
     }
 
-    /// What is written.
+    /// The open part.
     pub(crate) fn file(&self) -> &File {
         &self.file
     }
 
-    /// Where it lies until it is put in place.
+    /// The path of the part.
     pub(crate) fn part(&self) -> &Path {
         &self.part
     }
 
-    /// Whether what was written stays when this goes without having been put in place.
+    /// Sets whether the part is kept on drop if it was not renamed.
     pub(crate) fn keep(&mut self, is_kept: bool) {
         self.is_kept = is_kept;
     }
 
-    /// Puts the file in its place, and takes away what was there. Gives it, still locked.
+    /// Renames the part to the file, replacing an existing file. Returns the file, still locked.
     pub(crate) fn put_in_place(mut self) -> Result<File, WriteError> {
         let put = || {
             if self.place.exists() {
-                // Where the power fails, one of the two is there.
+                // After a power failure one of the two files exists.
                 self.file.sync_data()?;
             }
             fs::rename(&self.part, &self.place)?;
@@ -163,7 +162,7 @@ impl OutputFile {
         Ok(file)
     }
 
-    /// Puts the file in its place if nothing is there; otherwise it stays beside. Gives where it lies.
+    /// Renames the part to the file if there is no such file, and keeps the part otherwise. Returns its path.
     pub(crate) fn put_in_free_place(mut self) -> Result<PathBuf, WriteError> {
         self.is_kept = true;
         if fs::symlink_metadata(&self.place).is_ok() {
@@ -186,21 +185,21 @@ impl Drop for OutputFile {
     }
 }
 
-/// No link is followed, and no pipe is waited for.
+/// Links are not followed, and pipes do not block.
 fn options() -> OpenOptions {
     let mut options = File::options();
     options.read(true).write(true).custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed());
     options
 }
 
-/// The place of the file that is called `path`, and where it is written until it is whole.
+/// The canonical path of a file, and the path of its part.
 fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     let of_path = |error| WriteError::Io { path: path.to_owned(), error };
     let place = resolve(path).map_err(of_path)?;
     match fs::symlink_metadata(&place) {
         Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
         Ok(metadata) if !metadata.is_file() => return Err(WriteError::NotRegular { path: path.to_owned() }),
-        // What may not be written may not be replaced either.
+        // A read-only file must not be replaced either.
         Ok(_) => drop(options().open(&place).map_err(of_path)?),
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(of_path(error)),
         Err(_) => {}
@@ -221,7 +220,7 @@ fn lock(file: &File, path: &Path, part: &Path, is_made: bool) -> Result<(), Writ
     match file.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => Err(WriteError::InUse { path, writer: writer_of(file) }),
-        // Where the file system knows no locks, the part itself tells that it is being written.
+        // If the file system has no locks, an existing part counts as locked.
         Err(TryLockError::Error(_)) if is_made => Ok(()),
         Err(TryLockError::Error(_)) => {
             let writer = format!("another program, unless {} was left by one that was killed", part.display());
@@ -230,13 +229,13 @@ fn lock(file: &File, path: &Path, part: &Path, is_made: bool) -> Result<(), Writ
     }
 }
 
-/// Whether a file lies at `path`.
+/// Whether `file` is at `path`.
 fn is_at(file: &File, path: &Path) -> bool {
     let (Ok(file), Ok(path)) = (file.metadata(), fs::symlink_metadata(path)) else { return false };
     (file.dev(), file.ino()) == (path.dev(), path.ino())
 }
 
-/// The process that holds the lock of a file, by the system's list: `1: FLOCK ADVISORY WRITE 4711 08:01:1234 0 EOF`.
+/// The process that holds the lock of a file, from the system's list: `1: FLOCK ADVISORY WRITE 4711 08:01:1234 0 EOF`.
 fn writer_of(file: &File) -> String {
     let find = || {
         let inode = file.metadata().ok()?.ino();
@@ -258,7 +257,7 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     #[test]
-    fn files_that_cannot_all_be_written_leave_those_that_were_there() {
+    fn if_one_file_cannot_be_written_the_earlier_files_stay() {
         let folder = tempfile::tempdir().unwrap();
         let (kept, missing) = (folder.path().join("a"), folder.path().join("none/b"));
         fs::write(&kept, "before").unwrap();
@@ -271,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_has_one_writer_at_a_time_by_whatever_name() {
+    fn a_file_has_one_writer_at_a_time_through_any_path() {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("sub")).unwrap();
         let (path, link) = (folder.path().join("a"), folder.path().join("link"));
@@ -293,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_writer_has_left_makes_way() {
+    fn the_part_of_a_killed_writer_is_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         let mut killed = OutputFile::create(&path).unwrap();
@@ -306,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn devices_pipes_and_links_that_lead_nowhere_are_refused_and_stay() {
+    fn devices_pipes_and_dangling_links_are_errors_and_stay() {
         let folder = tempfile::tempdir().unwrap();
         let (pipe, link, part) = (folder.path().join("pipe"), folder.path().join("link"), folder.path().join("a.part"));
         for pipe in [&pipe, &part] {

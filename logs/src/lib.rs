@@ -1,5 +1,5 @@
-//! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, what a log holds, maps of
-//! nav2's map server, pictures of maps, and summaries of merges.
+//! MCAP logs and map files: the stages that read and write them, ROS 2 message definitions, the contents of logs, maps
+//! of nav2's map server, pictures of maps, and summaries of merges.
 
 pub mod bag;
 pub mod drawing;

@@ -1,4 +1,4 @@
-//! The quality of service that a log states for a topic, in the form of rosbag2.
+//! The quality of service of a topic, in rosbag2 format.
 
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
@@ -8,14 +8,13 @@ use gridweave_runtime::ros::{
 };
 use std::collections::BTreeMap;
 
-/// The key of a channel's metadata under which rosbag2 keeps it.
+/// The metadata key of a channel under which rosbag2 stores it.
 pub(crate) const KEY: &str = "offered_qos_profiles";
 
-/// Reliable, and the last message is kept for those who come later (transient local), as map servers and static
-/// transforms are sent.
+/// Reliable and transient local (latched), as map servers and static transforms publish.
 ///
-/// Policies are the numbers of `rmw`, which every version of rosbag2 since Foxy reads, names being for later versions
-/// only. The times stand for "without limit".
+/// Policies are written as numbers of `rmw`, which every rosbag2 since Foxy reads; only later ones read names. The
+/// durations mean "unlimited".
 pub(crate) const LATCHED: &str = "\
 - history: 1
   depth: 1
@@ -34,7 +33,7 @@ pub(crate) const LATCHED: &str = "\
   avoid_ros_namespace_conventions: false
 ";
 
-/// What is sent when it changes, and holds until it is sent again.
+/// Types that are published on change, and are valid until the next message.
 const STATES: [&str; 10] = [
     MachineStages::NAME,
     MapAgreement::NAME,
@@ -48,24 +47,24 @@ const STATES: [&str; 10] = [
     Verdicts::NAME,
 ];
 
-/// The metadata of the channel of a result. What holds until it is sent again is latched, static transforms among it; of
-/// the others nothing is said, and a player takes its default.
+/// The metadata of a result's channel. Results that are valid until the next message, including static transforms, are
+/// latched; for others nothing is set, and a player uses its default.
 pub(crate) fn metadata(topic: &str, ros_type: &str) -> BTreeMap<String, String> {
     offered(is_latched_result(topic, ros_type))
 }
 
-/// Whether a result on a topic holds until it is sent again, so that its last message is kept for those who come later.
+/// Whether a result on a topic is valid until the next message, and so is latched.
 pub fn is_latched_result(topic: &str, ros_type: &str) -> bool {
     STATES.contains(&ros_type) || topic.ends_with("/tf_static")
 }
 
-/// The metadata of a channel whose last message is kept for those who come later (`is_latched`), or of which nothing is said.
+/// The metadata of a channel that is latched (`is_latched`), or has no quality of service.
 pub fn offered(is_latched: bool) -> BTreeMap<String, String> {
     BTreeMap::from([(KEY.to_owned(), if is_latched { LATCHED.to_owned() } else { String::new() })])
 }
 
-/// A channel of the input, of which nothing may be said: without it, maps and static transforms that are played reach nobody
-/// who asks for them as map servers and tf send them.
+/// Completes the quality of service of an input channel. Without it, maps and static transforms of a played log do not
+/// reach subscribers that request transient local durability.
 pub(crate) fn completed(mut channel: Channel) -> Channel {
     let is_needed = channel.message_encoding == "cdr"
         && (full_type_name(&channel.schema_name) == OccupancyGrid::NAME || channel.topic.ends_with("/tf_static"));
@@ -75,14 +74,14 @@ pub(crate) fn completed(mut channel: Channel) -> Channel {
     channel
 }
 
-/// Whether the metadata of a channel says that its last message is kept for those who come later.
+/// Whether the metadata of a channel contains transient local durability.
 pub(crate) fn is_transient_local(metadata: &BTreeMap<String, String>) -> bool {
     let offered = metadata.get(KEY).map_or("", String::as_str);
-    // ROS 2 writes the durability as a number up to Iron, and as a word since.
+    // ROS 2 writes the durability as a number up to Iron, and as a name since.
     offered.lines().any(|line| matches!(line.trim(), "durability: 1" | "durability: transient_local"))
 }
 
-/// What the metadata of a channel says, in a word or two; nothing if it says nothing.
+/// The quality of service of a channel in a word or two; empty if unknown.
 pub(crate) fn word(metadata: &BTreeMap<String, String>) -> &'static str {
     let offered = metadata.get(KEY).map_or("", String::as_str);
     let is_best_effort =
@@ -113,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_and_static_transforms_of_the_input_are_latched_where_nothing_is_said_of_them() {
+    fn maps_and_static_transforms_of_the_input_are_latched_by_default() {
         let of = |topic: &str, schema_name: &str, offered: Option<&str>| {
             let metadata = offered.map(|offered| (KEY.to_owned(), offered.to_owned())).into_iter().collect();
             let (topic, schema_name) = (topic.to_owned(), schema_name.to_owned());

@@ -1,17 +1,20 @@
-//! The definitions of the ROS 2 types that Gridweave writes, and of common ones that older bags hold without a definition, from
-//! the `.msg` files in `logs/msg`.
+//! The definitions of the ROS 2 types that Gridweave writes, and of common types that older bags contain without a
+//! definition, from the `.msg` files in `logs/msg`.
+//!
+//! They are embedded, not taken from a library or a ROS installation: logs must be self-contained on machines without
+//! ROS, and bags up to Humble contain no definitions.
 
 use std::borrow::Cow;
 
-/// Stands between a definition and the next of the types that it uses.
+/// The separator between the definitions of a schema.
 const SEPARATOR: &str = "================================================================================";
 
 macro_rules! definitions {
     ($($before:literal,)* gridweave_msgs: [$($ours:literal,)*], $($after:literal,)*) => {
-        /// Name (`package/Type`) and text of every definition, by name.
+        /// Name (`package/Type`) and text of each definition, sorted by name.
         const DEFINITIONS: &[(&str, &str)] = &[
             $(($before, include_str!(concat!("../msg/", $before, ".msg"))),)*
-            // A package for ROS, and so with a folder of its own for messages.
+            // A ROS package, with a subfolder for messages.
             $((concat!("gridweave_msgs/", $ours), include_str!(concat!("../msg/gridweave_msgs/msg/", $ours, ".msg"))),)*
             $(($after, include_str!(concat!("../msg/", $after, ".msg"))),)*
         ];
@@ -117,10 +120,10 @@ definitions![
     "visualization_msgs/UVCoordinate",
 ];
 
-/// The schema of a ROS 2 type as a log holds it (encoding `ros2msg`): the definition of the type, and then that of
-/// every type that it uses, each once, after a line of 80 `=` and a line `MSG: package/Type`.
+/// The schema of a ROS 2 type as stored in a log (encoding `ros2msg`): the definition of the type, followed by that of
+/// each type that it uses, each once, after a line of 80 `=` and a line `MSG: package/Type`.
 ///
-/// `name` is `package/msg/Type` or `package/Type`. `None` if the type is none of those.
+/// `name` is `package/msg/Type` or `package/Type`. `None` for other types.
 pub fn schema_text(name: &str) -> Option<String> {
     let name = name.replacen("/msg/", "/", 1);
     let mut text = definition(&name)?.to_owned();
@@ -129,7 +132,7 @@ pub fn schema_text(name: &str) -> Option<String> {
     Some(text)
 }
 
-/// The name of a type with its `/msg/`, which some old logs leave out.
+/// The type name with `/msg/`, which some old logs omit.
 pub fn full_type_name(name: &str) -> Cow<'_, str> {
     match name.split_once('/') {
         Some((package, message)) if !message.contains('/') => Cow::Owned(format!("{package}/msg/{message}")),
@@ -137,7 +140,7 @@ pub fn full_type_name(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// The full names (`package/msg/Type`) of all types that [`schema_text`] knows, by name.
+/// The full names (`package/msg/Type`) of all types of [`schema_text`], sorted by name.
 pub fn schema_names() -> impl Iterator<Item = String> {
     DEFINITIONS.iter().map(|(name, _)| name.replacen('/', "/msg/", 1))
 }

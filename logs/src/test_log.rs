@@ -52,20 +52,20 @@ impl TestLog {
         self.raw(topic, type_name, time, &encode(message).unwrap())
     }
 
-    /// Ends the chunk.
+    /// Closes the chunk.
     pub(crate) fn flush(&mut self) -> &mut Self {
         self.writer.flush().unwrap();
         self
     }
 
-    /// The bytes of the whole file.
+    /// Finishes the log and returns its bytes.
     pub(crate) fn finish(mut self) -> Vec<u8> {
         self.writer.finish().unwrap();
         self.writer.into_inner().into_inner()
     }
 }
 
-/// The four ways to lay a log out.
+/// Four layouts of a log.
 pub(crate) fn layouts() -> [WriteOptions; 4] {
     [
         WriteOptions::new().use_chunks(false),
@@ -75,7 +75,7 @@ pub(crate) fn layouts() -> [WriteOptions; 4] {
     ]
 }
 
-/// A folder for the logs of one test; it goes when it is dropped.
+/// A temporary folder for the logs of one test, deleted on drop.
 pub(crate) struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -87,7 +87,7 @@ impl Folder {
         self.0.path().to_owned()
     }
 
-    /// Writes a file and gives its path.
+    /// Writes a file and returns its path.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
         let path = self.0.path().join(name);
         std::fs::write(&path, bytes).unwrap();

@@ -1,4 +1,4 @@
-//! Robot poses from tf, the tree of frames that ROS programs publish one edge at a time.
+//! Robot poses from tf, the tree of frames that ROS programs publish edge by edge.
 
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
@@ -7,8 +7,8 @@ use gridweave_runtime::stage::{TfFrames, frame_of_robot, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Whether transforms come on a channel, and the prefix of the frames in them: `/tf` and `/tf_static` have frames with
-/// their full names, `/robot1/tf` and `/robot1/tf_static` frames that lack the `robot1/` before them.
+/// The prefix of the frames in a channel's transforms; `None` if it carries no transforms. On `/tf` and `/tf_static`
+/// frames have full names; on `/robot1/tf` and `/robot1/tf_static` they lack the prefix `robot1/`.
 pub fn tf_topic(channel: &Channel) -> Option<&str> {
     let is_tf = channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME;
     let (namespace, last) = channel.topic.rsplit_once('/').filter(|_| is_tf)?;
@@ -16,15 +16,15 @@ pub fn tf_topic(channel: &Channel) -> Option<&str> {
     matches!(last, "tf" | "tf_static").then_some(robot)
 }
 
-/// Whether the transforms on a topic of tf hold for good, as those of sensors on a robot do.
+/// Whether the transforms on a tf topic are static.
 pub fn is_static(topic: &str) -> bool {
     topic.ends_with("tf_static")
 }
 
-/// The latest transform of every frame to its parent.
+/// The latest transform of each frame to its parent.
 #[derive(Clone, Debug, Default)]
 pub struct FrameTree {
-    /// By child.
+    /// By child frame.
     edges: BTreeMap<String, Edge>,
 }
 
@@ -32,20 +32,20 @@ pub struct FrameTree {
 struct Edge {
     parent: String,
     transform_parent_child: Isometry3<f64>,
-    /// Whether it holds for good.
+    /// Whether the transform is static.
     is_static: bool,
 }
 
-/// How one frame lies in another, and the edges that say so.
+/// The pose of one frame in another, and the edges between them.
 struct Chain<'a> {
     transform_target_source: Isometry3<f64>,
-    /// The child frames of the edges between the two, from the source to the target.
+    /// The child frames of the edges, from the source to the target.
     children: Vec<&'a str>,
 }
 
 impl FrameTree {
-    /// Puts in an edge, in place of the one that the child had; it may hold for good. `false` if it cannot be used: it
-    /// has values that are not finite, or ties a frame to itself.
+    /// Adds an edge, replacing that of the child frame. Returns `false` if it is invalid: a value is not finite, or
+    /// parent and child are the same frame.
     pub fn insert(&mut self, parent: &str, child: &str, transform: &Transform, is_static: bool) -> bool {
         let Some(transform_parent_child) = isometry(transform).filter(|_| parent != child && !child.is_empty()) else {
             return false;
@@ -66,14 +66,14 @@ impl FrameTree {
         true
     }
 
-    /// The pose of the frame `source` in the frame `target`; `None` if nothing ties them together.
+    /// The pose of the frame `source` in the frame `target`; `None` if they are not connected.
     pub fn lookup(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
         self.chain(target, source).map(|chain| chain.transform_target_source)
     }
 
     fn chain<'a>(&'a self, target: &'a str, source: &'a str) -> Option<Chain<'a>> {
         let to_root: Vec<_> = self.ancestors(source).collect();
-        // The first ancestor of the target that is also one of the source's is where the two meet.
+        // The two paths meet at the first ancestor of the target that is also one of the source's.
         for (steps, (frame, transform_ancestor_target)) in self.ancestors(target).enumerate() {
             let Some(meeting) = to_root.iter().position(|(other, _)| *other == frame) else { continue };
             let mut to_target: Vec<&str> = self.ancestors(target).take(steps).map(|(frame, _)| frame).collect();
@@ -87,24 +87,24 @@ impl FrameTree {
         None
     }
 
-    /// The child frame of the edge of a chain that moves the source: the first that does not hold for good.
+    /// The child frame of the edge that moves the source: the first that is not static.
     fn moving<'a>(&self, chain: &Chain<'a>) -> Option<&'a str> {
         let moves = |child: &&&str| self.edges.get(**child).is_some_and(|edge| !edge.is_static);
         chain.children.iter().find(moves).or(chain.children.first()).copied()
     }
 
-    /// `frame` and then its ancestors, each with the pose of `frame` in it.
+    /// `frame` and its ancestors, each with the pose of `frame` in it.
     fn ancestors<'a>(&'a self, frame: &'a str) -> impl Iterator<Item = (&'a str, Isometry3<f64>)> {
         let step = |(child, transform): &(&'a str, Isometry3<f64>)| {
             let edge = self.edges.get(*child)?;
             Some((edge.parent.as_str(), edge.transform_parent_child * transform))
         };
-        // A path that is longer than there are edges goes round in a circle.
+        // A path with more steps than there are edges is a cycle.
         std::iter::successors(Some((frame, Isometry3::identity())), step).take(self.edges.len() + 1)
     }
 }
 
-/// `None` if a value is not finite. A rotation of four zeros, which many programs write, is no rotation.
+/// `None` if a value is not finite. A zero quaternion, which many programs write, is read as no rotation.
 fn isometry(transform: &Transform) -> Option<Isometry3<f64>> {
     let (t, r) = (transform.translation, transform.rotation);
     let finite = [t.x, t.y, t.z, r.x, r.y, r.z, r.w].iter().all(|value| value.is_finite());
@@ -118,47 +118,47 @@ fn pose(isometry: &Isometry3<f64>) -> Pose {
     Pose { position: Point { x: t.x, y: t.y, z: t.z }, orientation: Quaternion { x: r.i, y: r.j, z: r.k, w: r.w } }
 }
 
-/// Gives the pose of each robot's base in its map whenever tf says how the base has moved.
+/// Derives the pose of each robot's base in its map whenever tf moves the base.
 ///
-/// A base moves in a frame of odometry, and a SLAM system corrects how that lies in the map. A correction by itself gives
-/// no pose: joined to a movement of before it would be a pose of no time, and many systems date their corrections into
-/// the future.
+/// A base moves in the odometry frame, and a SLAM system corrects the pose of that frame in the map. A correction alone
+/// gives no pose: combined with an earlier movement it would be a pose of no particular time, and many systems date
+/// their corrections into the future.
 #[derive(Clone, Debug, Default)]
 pub struct TfPoses {
-    /// What the frames of robots are called that are not known yet.
+    /// The frame patterns of robots that are not known yet.
     frames: Option<TfFrames>,
     tree: FrameTree,
-    /// The robots that are known: with `frames`, those of which one of the two was seen.
-    robots: BTreeMap<String, Ends>,
+    /// The known robots: with `frames`, those of which one of the two frames was seen.
+    robots: BTreeMap<String, PoseFrames>,
 }
 
-/// The frames of one robot between which its pose is looked for.
+/// The frames between which a robot's pose is looked up.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ends {
-    /// The frame of its map.
+pub struct PoseFrames {
+    /// The map frame.
     pub map: String,
-    /// The frames that may be that of its base. The first that is tied to the map is, from then on.
+    /// Candidates for the base frame. The first that is connected to the map frame is used from then on.
     pub bases: Vec<String>,
 }
 
 impl TfPoses {
-    /// Poses between the two frames, in which `{robot}` stands for the robot's name.
+    /// Poses between the two frames, in which `{robot}` is the robot's name.
     pub fn new(frames: TfFrames) -> Self {
         Self { frames: Some(frames), ..Self::default() }
     }
 
-    /// Gives poses of these robots. What was learnt of the frames of those that were known stays.
-    pub fn set_robots(&mut self, robots: BTreeMap<String, Ends>) {
+    /// Sets the robots to derive poses of. Known base frames are kept.
+    pub fn set_robots(&mut self, robots: BTreeMap<String, PoseFrames>) {
         let mut known = std::mem::take(&mut self.robots);
-        let with_known = robots.into_iter().map(|(robot, ends)| {
-            let ends = known.remove(&robot).unwrap_or(ends);
-            (robot, ends)
+        let with_known = robots.into_iter().map(|(robot, pose_frames)| {
+            let pose_frames = known.remove(&robot).unwrap_or(pose_frames);
+            (robot, pose_frames)
         });
         self.robots = with_known.collect();
     }
 
-    /// Takes up a tf message in which the frames lack the given prefix (empty: none), and which may hold for good. Gives
-    /// the poses that it tells, by robot, and how many of its transforms could not be used.
+    /// Adds a tf message whose frames lack `prefix` (empty: none). Returns the derived poses, by robot, and the number
+    /// of invalid transforms.
     pub fn update(
         &mut self,
         prefix: &str,
@@ -188,28 +188,28 @@ impl TfPoses {
                 && !self.robots.contains_key(robot)
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);
-                let ends = Ends { map: named(&frames.map_frame), bases: vec![named(&frames.base_frame)] };
-                self.robots.insert(robot.to_owned(), ends);
+                let pose_frames = PoseFrames { map: named(&frames.map_frame), bases: vec![named(&frames.base_frame)] };
+                self.robots.insert(robot.to_owned(), pose_frames);
             }
         }
     }
 
     fn poses(&mut self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
         let tree = &self.tree;
-        let pose_of = |(robot, ends): (&String, &mut Ends)| {
-            if ends.bases.len() > 1 {
-                let tied = ends.bases.iter().find(|base| tree.chain(&ends.map, base).is_some())?;
-                ends.bases = vec![tied.clone()];
+        let pose_of = |(robot, pose_frames): (&String, &mut PoseFrames)| {
+            if pose_frames.bases.len() > 1 {
+                let connected = pose_frames.bases.iter().find(|base| tree.chain(&pose_frames.map, base).is_some())?;
+                pose_frames.bases = vec![connected.clone()];
             }
-            let chain = tree.chain(&ends.map, ends.bases.first()?)?;
+            let chain = tree.chain(&pose_frames.map, pose_frames.bases.first()?)?;
             let stamp = changed.get(tree.moving(&chain)?)?;
-            let header = Header { stamp: *stamp, frame_id: ends.map.clone() };
+            let header = Header { stamp: *stamp, frame_id: pose_frames.map.clone() };
             Some((robot.clone(), PoseStamped { header, pose: pose(&chain.transform_target_source) }))
         };
         self.robots.iter_mut().filter_map(pose_of).collect()
     }
 
-    /// The robots that are known, by name.
+    /// The known robots, by name.
     pub fn robots(&self) -> impl Iterator<Item = &str> {
         self.robots.keys().map(String::as_str)
     }
@@ -219,19 +219,19 @@ impl TfPoses {
         self.robots.contains_key(robot)
     }
 
-    /// The frame of a robot's map.
+    /// The map frame of a robot.
     pub fn map_frame(&self, robot: &str) -> Option<&str> {
-        self.robots.get(robot).map(|ends| ends.map.as_str())
+        self.robots.get(robot).map(|pose_frames| pose_frames.map.as_str())
     }
 
-    /// Says what the frame of a robot's map is called.
+    /// Sets the map frame of a robot.
     pub fn set_map_frame(&mut self, robot: &str, frame: &str) {
-        if let Some(ends) = self.robots.get_mut(robot) {
-            frame.clone_into(&mut ends.map);
+        if let Some(pose_frames) = self.robots.get_mut(robot) {
+            frame.clone_into(&mut pose_frames.map);
         }
     }
 
-    /// The frame of a robot's base, once it is known which of several it is.
+    /// The base frame of a robot, once it is known which of several it is.
     pub fn base_of(&self, robot: &str) -> Option<&str> {
         match &self.robots.get(robot)?.bases[..] {
             [base] => Some(base),
@@ -239,16 +239,17 @@ impl TfPoses {
         }
     }
 
-    /// Whether any transform has come.
+    /// Whether any transform was added.
     pub fn has_frames(&self) -> bool {
         !self.tree.edges.is_empty()
     }
 
-    /// The robots of which a frame was seen and whose base was never tied to their map.
+    /// The robots of which a frame was seen and whose base was never connected to their map.
     pub fn robots_without_pose(&self) -> BTreeSet<&str> {
-        let untied =
-            |(_, ends): &(&String, &Ends)| ends.bases.iter().all(|base| self.tree.chain(&ends.map, base).is_none());
-        self.robots.iter().filter(untied).map(|(robot, _)| robot.as_str()).collect()
+        let unconnected = |(_, pose_frames): &(&String, &PoseFrames)| {
+            pose_frames.bases.iter().all(|base| self.tree.chain(&pose_frames.map, base).is_none())
+        };
+        self.robots.iter().filter(unconnected).map(|(robot, _)| robot.as_str()).collect()
     }
 }
 

@@ -1,4 +1,4 @@
-//! The truth of a simulated log, as a JSON file that merges are measured against.
+//! The ground truth of a simulated log, as a JSON file for the evaluation of merges.
 
 use crate::file::replace;
 use gridweave_runtime::ros::SimulationTruth;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct TruthParameters {
-    /// The JSON file to write. A file that has this name is replaced.
+    /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
 }
 
@@ -20,8 +20,8 @@ impl Parameters for TruthParameters {}
 
 /// The kind `truth_sink`.
 pub fn kind() -> StageKind {
-    StageKind::stage("truth_sink", "Writes the truth of a simulated world to a JSON file.", TruthSink::new)
-        .input("truth", "what is true", TruthSink::write)
+    StageKind::stage("truth_sink", "Writes the ground truth of a simulated world to a JSON file.", TruthSink::new)
+        .input("truth", "the ground truth", TruthSink::write)
         .build()
 }
 
@@ -73,7 +73,7 @@ mod tests {
     use gridweave_runtime::stage::StageHarness;
 
     #[test]
-    fn the_file_has_the_form_of_a_truth_file() {
+    fn the_file_has_the_format_of_a_truth_file() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("truth.json");
         let mut sink = StageHarness::new(&kind(), &format!("file = {file:?}")).unwrap();

@@ -1,6 +1,6 @@
 //! Distances between common places, which two robots have both seen, in a merge; the truth of a log with deformed maps lists them.
 
-use gridweave_logs::summary::{Bend, Frame, Summary};
+use gridweave_logs::summary::{DeformationSummary, Frame, Summary};
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
 use gridweave_stages::shared::deformation::Deformation;
 use gridweave_stages::shared::geometry::{PointPair, fit_rigid};
@@ -54,9 +54,12 @@ pub struct Distances {
 /// Measures a merge of the robots `first` and `second`. `None` if they are not merged with each other, or there are no
 /// places.
 pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) -> Option<CommonPlaces> {
-    let one = Placed { frame: pose(run.frames.get(first)?), deformation: run.bends.get(first).and_then(deformation) };
-    let other =
-        Placed { frame: pose(run.frames.get(second)?), deformation: run.bends.get(second).and_then(deformation) };
+    let one =
+        Placed { frame: pose(run.frames.get(first)?), deformation: run.deformations.get(first).and_then(deformation) };
+    let other = Placed {
+        frame: pose(run.frames.get(second)?),
+        deformation: run.deformations.get(second).and_then(deformation),
+    };
     let distances = |is_deformed: bool| {
         let apart = |&[x2, y2, x1, y1]: &CommonPlace| {
             (one.in_world(Point2::new(x1, y1), is_deformed) - other.in_world(Point2::new(x2, y2), is_deformed)).norm()
@@ -138,27 +141,27 @@ pub(crate) fn pose(frame: &Frame) -> Isometry2<f64> {
     Isometry2::new(nalgebra::Vector2::new(frame.x, frame.y), frame.yaw)
 }
 
-fn deformation(bend: &Bend) -> Option<Deformation> {
+fn deformation(summary: &DeformationSummary) -> Option<Deformation> {
     let node = |&[x, y, dx, dy, dyaw]: &[f64; 5]| DeformationNode { x, y, dx, dy, dyaw, ..Default::default() };
-    let nodes = bend.nodes.iter().map(node).collect();
-    Deformation::from_message(&MapDeformation { spacing: bend.spacing, nodes, ..Default::default() })
+    let nodes = summary.nodes.iter().map(node).collect();
+    Deformation::from_message(&MapDeformation { spacing: summary.spacing, nodes, ..Default::default() })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn summary(bends: &[(&str, f64)]) -> Summary {
+    fn summary(displacements: &[(&str, f64)]) -> Summary {
         let frame = |x: f64| Frame { x, ..Default::default() };
         let corners = [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0), (4.0, 4.0)];
-        let bend = |dx: f64| Bend {
+        let deformation = |dx: f64| DeformationSummary {
             spacing: 4.0,
             nodes: corners.iter().map(|&(x, y)| [x, y, dx, 0.0, 0.0]).collect(),
             ..Default::default()
         };
         Summary {
             frames: [("robot1".into(), frame(0.0)), ("robot2".into(), frame(10.0))].into(),
-            bends: bends.iter().map(|&(robot, dx)| (robot.to_owned(), bend(dx))).collect(),
+            deformations: displacements.iter().map(|&(robot, dx)| (robot.to_owned(), deformation(dx))).collect(),
             ..Default::default()
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::table::Table;
 use crate::text_wrapping::{wrap, wrap_up_to};
-use gridweave_logs::summary::{Bend, Frame, Summary};
+use gridweave_logs::summary::{DeformationSummary, Frame, Summary};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -20,10 +20,10 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize
             (_, all) => writeln!(out, "merged {merged} of {all} robots; map frames in the frame of {reference}:")?,
         }
         out.push_str(&frames_table(&merge.frames).fit(width));
-        if !merge.bends.is_empty() {
+        if !merge.deformations.is_empty() {
             let head = "deformation of bent maps, and sharpness of walls that several maps show (before and after):";
             writeln!(out, "{}", wrap(head, 2, width))?;
-            out.push_str(&deformations_table(&merge.bends).fit(width));
+            out.push_str(&deformations_table(&merge.deformations).fit(width));
         }
     }
     for (robot, reason) in &merge.unmerged {
@@ -104,15 +104,15 @@ fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
 
 /// Makes the table of the largest displacement and rotation of each map, its size, and the thickness spread and share of double walls
 /// before and after.
-fn deformations_table(bends: &BTreeMap<String, Bend>) -> Table {
+fn deformations_table(deformations: &BTreeMap<String, DeformationSummary>) -> Table {
     let mut table = Table::new(["robot", "max m", "max deg", "size m", "wall spread m", "double walls"]);
-    for (robot, bend) in bends {
-        let (before, after) = (&bend.sharpness_rigid, &bend.sharpness);
+    for (robot, deformation) in deformations {
+        let (before, after) = (&deformation.sharpness_rigid, &deformation.sharpness);
         table.row([
             robot.clone(),
-            format!("{:.3}", bend.largest_m),
-            format!("{:.2}", bend.largest_deg),
-            format!("{:.0}", bend.over_m),
+            format!("{:.3}", deformation.largest_m),
+            format!("{:.2}", deformation.largest_deg),
+            format!("{:.0}", deformation.over_m),
             format!("{:.3}, {:.3}", before.apart_m, after.apart_m),
             format!("{:.0} %, {:.0} %", 100.0 * before.doubled, 100.0 * after.doubled),
         ]);
@@ -176,12 +176,12 @@ mod tests {
     #[test]
     fn deformations_are_shown_with_their_effect_on_walls() {
         let sharpness = |apart_m: f64, doubled: f64| json!({"apart_m": apart_m, "doubled": doubled});
-        let bend = json!({
+        let deformation = json!({
             "largest_m": 0.25, "largest_deg": 1.5, "over_m": 40.0, "wall_matched_m": 90.0, "spacing": 3.0, "nodes": [],
             "sharpness_rigid": sharpness(0.12, 0.4), "sharpness": sharpness(0.02, 0.01),
         });
         let frame = json!({"x": 0.0, "y": 0.0, "yaw": 0.0});
-        let text = text(json!({"reference": "robot1", "frames": {"robot1": frame}, "bends": {"robot1": bend}}));
+        let text = text(json!({"reference": "robot1", "frames": {"robot1": frame}, "bends": {"robot1": deformation}}));
         let line = text.lines().find(|line| line.contains("0.250")).unwrap();
         for part in ["robot1", "1.50", "40", "0.120, 0.020", "40 %, 1 %"] {
             assert!(line.contains(part), "{text}");

@@ -36,8 +36,8 @@ fn a_file_that_is_no_log() {
     for (bytes, word) in [
         (&b"what is this? not a log, for sure"[..], "MCAP"),
         (b"#ROSBAG V1.2\n and so on and so on", "ROS 1"),
-        (b"#ROSBAG V2.0\n and so on and so on", "no whole message is left"),
-        (b"SQLite format 3\0 and so on and so on", "the database cannot be read"),
+        (b"#ROSBAG V2.0\n and so on and so on", "damaged before the first whole message"),
+        (b"SQLite format 3\0 and so on and so on", "cannot read the database"),
     ] {
         let folder = TempDir::new().unwrap();
         fs::write(folder.path().join("in.mcap"), bytes).unwrap();

@@ -83,7 +83,7 @@ fn bags_in_databases_are_merged_shown_and_converted_as_mcap_files_are() {
     run(&["merge", "one", "two.db3.zstd", "-o", "out.mcap", "--summary", "summary.json"]).assert(0, &["merged 2 of 2"]);
     let truth = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap()];
     run(&truth).assert(0, &["right 1, wrong 0, refused 0"]);
-    run(&["info", "one", "two.db3.zstd"]).assert(0, &["SQLite, packed with zstd", "/robot2/map", "robot1"]);
+    run(&["info", "one", "two.db3.zstd"]).assert(0, &["SQLite, compressed with zstd", "/robot2/map", "robot1"]);
     let left: Vec<_> = fs::read_dir(path("one")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left.len(), 3, "{left:?}");
     run(&["convert", "one", "-o", "one/one_0.db3"]).assert(2, &["one_0.db3 is an input"]);

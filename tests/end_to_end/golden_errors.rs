@@ -21,7 +21,7 @@ fn an_error_in_stage_toml_is_shown_with_the_right_name() {
         ("[inputs]", "[[expect]]\nport = \"comon\"\nmessages = 1\n[inputs]", "did you mean `common`?"),
         ("[inputs]", "[[expect]]\nports = \"common\"\n[inputs]", "unknown field `ports`"),
         ("[inputs]", "[[expect]]\nport = \"common\"\n[inputs]", "neither `field` nor `messages`"),
-        ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a[\"\nlength = 1\n[inputs]", "is no path to a field"),
+        ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a[\"\nlength = 1\n[inputs]", "is not a field path"),
         ("[inputs]", "[[expect]]\nport = \"common\"\nfield = \"a\"\n[inputs]", "`field` needs one of"),
         ("[inputs]", "[[expect]]\nwarning = \"a\"\n[inputs]", "`warning` needs `count`"),
         ("[inputs]", "[pipeline]\nseeds = 1\n[inputs]", "did you mean `seed`?"),

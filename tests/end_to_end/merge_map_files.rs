@@ -288,7 +288,7 @@ fn equal_names_are_distinguished_by_their_folders() {
     }
     merge(folder.path(), &["r1/map.yaml", "r2/map.yaml", "-o", "merged.yaml"]).assert(0, &["merged 2 of 2", "r1 r2"]);
     let ended = merge(folder.path(), &["b/r2/map.yaml", "r2/map.yaml", "-o", "merged.yaml"]);
-    ended.assert(1, &["a robot called `r2`", "rename"]);
+    ended.assert(1, &["named `r2`", "rename"]);
 }
 
 #[test]

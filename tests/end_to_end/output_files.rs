@@ -100,9 +100,9 @@ fn what_is_no_regular_file_is_refused_as_an_output_and_stays() {
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for option in ["--map", "--picture", "--summary"] {
         let args = ["run", "diamond.toml", "-o", OUTPUT, option, "pipe.yaml"];
-        gridweave(folder.path(), &args).assert(1, &["is no regular file"]);
+        gridweave(folder.path(), &args).assert(1, &["is not a regular file"]);
     }
     fs::rename(&pipe, folder.path().join(OUTPUT)).unwrap();
-    gridweave(folder.path(), &["run", "diamond.toml", "-o", OUTPUT]).assert(1, &["is no regular file"]);
+    gridweave(folder.path(), &["run", "diamond.toml", "-o", OUTPUT]).assert(1, &["is not a regular file"]);
     assert!(fs::metadata(folder.path().join(OUTPUT)).unwrap().file_type().is_fifo());
 }

@@ -54,7 +54,7 @@ fn inputs_that_cannot_be_drawn_are_errors() {
     let refused = |args: &[&str], words: &str| {
         gridweave(folder.path(), &[&["render", "merged.mcap"], args].concat()).assert(2, &[words]);
     };
-    refused(&["-o", "a.jpg"], "a.jpg ends on none of .png, .svg and .pdf");
+    refused(&["-o", "a.jpg"], "a.jpg has an unsupported extension; use .png, .svg or .pdf");
     refused(&["-o", "a.png", "--robot", "robot3"], "there is no map of a robot `robot3`");
     refused(&["-o", "a.png", "--grid", "0"], "--grid: a line every 0 m cannot be drawn");
     refused(&["-o", "a.png", "--at=-1"], "--at must be 0 s or more");

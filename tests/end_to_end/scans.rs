@@ -34,7 +34,7 @@ fn robots_with_scans_and_poses_and_without_maps_are_merged() {
     let folder = folder.path();
     logs_with(folder, "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges");
     gridweave(folder, &["info", "scans.mcap"])
-        .assert(0, &["there is no map of robot1: `merge` draws one from its", "at the poses of /robot1/pose"]);
+        .assert(0, &["there is no map of robot1: `merge` builds one from its", "at the poses of /robot1/pose"]);
     merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
     // The output has the maps that were built, and the scans that they were built from.
@@ -53,10 +53,10 @@ fn poses_of_scans_may_come_from_tf_and_a_robot_may_have_its_map() {
     let folder = folder.path();
     logs_with(folder, "/{robot}/scan,/tf,/robot2/map");
     gridweave(folder, &["info", "scans.mcap"])
-        .assert(0, &["`merge` draws one from its", "at the poses of tf (robot1/map to robot1/base_link)"]);
+        .assert(0, &["`merge` builds one from its", "at the poses of tf (robot1/map to robot1/base_link)"]);
     let ended = merge(folder);
     ended.assert(0, &["no map of robot1: maps are built from scans", "merged 2 of 2"]);
-    assert!(!ended.text().contains("were left out: a result"), "{ended:?}");
+    assert!(!ended.text().contains("were dropped: a result"), "{ended:?}");
     gridweave(folder, &["render", "out.mcap", "-o", "out.png"]).assert(0, &["wrote out.png"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
 }
@@ -66,7 +66,7 @@ fn scans_of_robots_of_which_nothing_says_where_they_were_give_no_map() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     logs_with(folder, "/{robot}/scan");
-    gridweave(folder, &["info", "scans.mcap"]).assert(0, &["nothing says where it was"]);
+    gridweave(folder, &["info", "scans.mcap"]).assert(0, &["without poses or odometry"]);
     merge(folder).assert(1, &["nothing says where it was"]);
 }
 

@@ -149,7 +149,7 @@ fn fields_of_any_message_are_ranges_or_signal_strengths_of_tags() {
         "tags = { topic = \"/{robot}/radio/readings\", id_field = \"header.frame_id\", range_field = \"mm\" }",
     );
     let args = ["run", "own.toml", "--input", "in.mcap", "--output", "out.mcap"];
-    world.run(&args).assert(3, &["readings of tags on `/robot1/radio/readings` were left out", "no field `mm`"]);
+    world.run(&args).assert(3, &["tag readings on `/robot1/radio/readings` were dropped", "no field `mm`"]);
     world.pipeline("tag_merge", "tags = { topic = \"/{robot}/radio/readings\", rssi_field = \"dbm\", range = 1 }");
     world.run(&args).assert(2, &["`tags` has no `id_field`", "`tags` has no `rssi_at_1m`", "did you mean `range_"]);
 }

@@ -69,7 +69,7 @@ fn topological_maps_are_distinguished_from_other_inputs() {
         let inputs: Vec<&str> = inputs.iter().flat_map(|input| ["--input", input]).collect();
         gridweave(folder, &[&["run", pipeline, "--output", "out.mcap"][..], &inputs].concat())
     };
-    run("topology_file_merge", &["a.json", "b.json"]).assert(1, &["b.json is no topological map"]);
+    run("topology_file_merge", &["a.json", "b.json"]).assert(1, &["b.json is not a topological map"]);
     run("topology_file_merge", &["a.json", "b.mcap"]).assert(2, &["a.json is a topological map, and b.mcap is not"]);
     run("auto_merge", &["a.json"]).assert(2, &["there is no stage of kind `topology_file_source`"]);
     run("topology_file_merge", &["a.mcap"]).assert(2, &["there is no stage of kind `mcap_source`"]);

@@ -1,7 +1,7 @@
-//! Drawings of lines, areas, words and images, written as PNG, SVG or PDF: the same shapes in each.
+//! Drawings of lines, areas, text and images, written as PNG, SVG or PDF with the same shapes in each.
 //!
-//! Lengths are pixels, x to the right and y down from the upper left corner. Words are drawn as the outlines of their letters,
-//! from a font that comes with the crate, so that they look the same everywhere. The same drawing gives the same bytes.
+//! Lengths are pixels, x to the right and y down from the upper left corner. Text is drawn as outlines of its letters,
+//! from a font in this crate, so that it looks the same everywhere. The same drawing gives the same bytes.
 
 mod pdf;
 mod png;
@@ -16,34 +16,34 @@ pub use text::{text, text_width};
 use image::RgbImage;
 use nalgebra::Point2;
 
-/// A rectangle along the sides of a drawing.
+/// An axis-aligned rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectangle {
-    /// Its upper left corner.
+    /// The upper left corner.
     pub corner: Point2<f64>,
-    /// Along x.
+    /// The size along x.
     pub width: f64,
-    /// Along y.
+    /// The size along y.
     pub height: f64,
 }
 
-/// An image on white paper, and shapes upon it.
+/// An image on white paper, with shapes on it.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    /// Pixels.
+    /// The width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// The height, pixels.
     pub height: u32,
-    /// What lies below all shapes.
+    /// The image below all shapes.
     pub image: RgbImage,
-    /// Where the upper left corner of the image lies: whole pixels.
+    /// The upper left corner of the image, pixels.
     pub image_at: (u32, u32),
-    /// What is drawn upon it, one after the other.
+    /// The shapes, in drawing order.
     pub groups: Vec<Group>,
 }
 
 impl Drawing {
-    /// Where the image lies.
+    /// The area of the image.
     pub fn image_area(&self) -> Rectangle {
         Rectangle {
             corner: Point2::new(f64::from(self.image_at.0), f64::from(self.image_at.1)),
@@ -53,7 +53,7 @@ impl Drawing {
     }
 }
 
-/// Why a drawing cannot be written.
+/// The error when a drawing cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("the picture cannot be written as {format}: {cause}")]
 pub struct DrawingError {

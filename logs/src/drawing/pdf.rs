@@ -1,4 +1,4 @@
-//! A drawing as PDF.
+//! Drawings as PDF.
 
 use super::{Drawing, DrawingError, Path, Step};
 use flate2::Compression;
@@ -16,11 +16,11 @@ const PAGES: Ref = Ref::new(2);
 const PAGE: Ref = Ref::new(3);
 const CONTENT: Ref = Ref::new(4);
 const IMAGE: Ref = Ref::new(5);
-/// Of the first opacity; the others follow.
+/// The first opacity; the others follow.
 const OPACITIES: i32 = 6;
 
 impl Drawing {
-    /// The drawing as a PDF file of one page, which has the drawing's shape.
+    /// Encodes the drawing as a PDF file of one page with the drawing's aspect ratio.
     ///
     /// # Errors
     /// The image is too large.
@@ -61,7 +61,7 @@ impl Drawing {
 
     fn content(&self, scale: f32, opacities: &Opacities) -> Vec<u8> {
         let mut content = Content::new();
-        // From here on as in the drawing: y down from the upper left corner.
+        // From here on the coordinates are those of the drawing: y down from the upper left corner.
         content.transform([scale, 0.0, 0.0, -scale, 0.0, self.height as f32 * scale]);
         let area = self.image_area();
         let (left, top) = (area.corner.x as f32, area.corner.y as f32);
@@ -81,7 +81,7 @@ impl Drawing {
     }
 }
 
-/// The opacities of a drawing, in thousandths, each with its name and its place in the file.
+/// The opacities in a drawing, in thousandths, each with its name and its object in the file.
 struct Opacities {
     names: BTreeMap<u32, (String, Ref)>,
 }
@@ -125,7 +125,7 @@ fn draw(content: &mut Content, path: &Path, opacities: &Opacities) {
 }
 
 fn outline(content: &mut Content, steps: &[Step]) {
-    // With two decimals, as in SVG.
+    // Two decimals, as in SVG.
     let at = |place: Point2<f64>| [place.x, place.y].map(|value| ((value * 100.0).round() / 100.0) as f32);
     for step in steps {
         match *step {

@@ -1,4 +1,4 @@
-//! A drawing as pixels.
+//! Drawings as pixels.
 
 use super::{Drawing, DrawingError, Paint, Path, Step};
 use image::{ImageFormat, RgbImage, Rgba, RgbaImage};
@@ -6,7 +6,7 @@ use std::io::Cursor;
 use tiny_skia::{FillRule, LineCap, LineJoin, Mask, PathBuilder, Pixmap, Rect, Stroke, Transform};
 
 impl Drawing {
-    /// The pixels.
+    /// Renders the drawing to pixels.
     ///
     /// # Errors
     /// The drawing is too large.
@@ -33,24 +33,24 @@ impl Drawing {
             group.paths.iter().for_each(|path| draw(&mut pixmap, path, mask));
         }
         let rgba = RgbaImage::from_raw(self.width, self.height, pixmap.take()).ok_or_else(too_large)?;
-        // White paper lies below everything: nothing shines through.
+        // With white paper below everything, the result is opaque.
         let rgb = |Rgba([red, green, blue, _]): &Rgba<u8>| [*red, *green, *blue];
         RgbImage::from_raw(self.width, self.height, rgba.pixels().flat_map(rgb).collect()).ok_or_else(too_large)
     }
 
-    /// The drawing as a PNG file.
+    /// Encodes the drawing as a PNG file.
     ///
     /// # Errors
-    /// It is too large.
+    /// The drawing is too large.
     pub fn png(&self) -> Result<Vec<u8>, DrawingError> {
         encode_png(&self.pixels()?)
     }
 }
 
-/// An image as a PNG file.
+/// Encodes an image as a PNG file.
 ///
 /// # Errors
-/// It is too large.
+/// The image is too large.
 pub fn encode_png(image: &RgbImage) -> Result<Vec<u8>, DrawingError> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| DrawingError::new("PNG", error))?;
@@ -76,7 +76,7 @@ fn paint(paint: Paint) -> tiny_skia::Paint<'static> {
     made
 }
 
-/// None for one that has no length.
+/// `None` for a path without length.
 fn outline(steps: &[Step]) -> Option<tiny_skia::Path> {
     let mut builder = PathBuilder::new();
     for step in steps {

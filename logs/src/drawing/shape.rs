@@ -1,19 +1,19 @@
-//! What a drawing consists of.
+//! The shapes of a drawing.
 
 use nalgebra::{Point2, Vector2};
 
 /// Red, green and blue.
 pub type Colour = [u8; 3];
 
-/// How much of a quarter circle's radius the handles of the curve are long that draws it.
+/// The length of the handles of the Bézier curve that approximates a quarter circle of radius 1.
 const QUARTER: f64 = 0.552_284_75;
 
-/// A colour that what lies below may shine through.
+/// A colour with an opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Paint {
-    /// Its colour.
+    /// The colour.
     pub colour: Colour,
-    /// From 0, which cannot be seen, to 1, which hides what lies below.
+    /// The opacity, from 0 (invisible) to 1 (opaque).
     pub opacity: f64,
 }
 
@@ -23,21 +23,21 @@ impl From<Colour> for Paint {
     }
 }
 
-/// A step of an outline, to a place in the drawing.
+/// A segment of a path, to a position in the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// Begins another part of the outline.
+    /// Starts another part of the path.
     Move(Point2<f64>),
     /// A straight line.
     Line(Point2<f64>),
-    /// A Bézier curve: two handles, and its end.
+    /// A Bézier curve: two control points, and the end.
     Curve(Point2<f64>, Point2<f64>, Point2<f64>),
-    /// Back to where the part began.
+    /// Back to the start of the part.
     Close,
 }
 
 impl Step {
-    /// The places that it names.
+    /// The positions in the segment.
     pub(super) fn places(&self) -> Vec<Point2<f64>> {
         match *self {
             Self::Move(place) | Self::Line(place) => vec![place],
@@ -47,19 +47,19 @@ impl Step {
     }
 }
 
-/// An outline that is filled, drawn along, or both.
+/// A path that is filled, stroked, or both.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Path {
-    /// Its steps.
+    /// The segments.
     pub steps: Vec<Step>,
-    /// What fills it.
+    /// The fill, if any.
     pub fill: Option<Paint>,
-    /// What is drawn along it with round ends, and how wide that is.
+    /// The stroke with round ends, and its width, if any.
     pub stroke: Option<(Paint, f64)>,
 }
 
 impl Path {
-    /// Straight lines from place to place.
+    /// A polyline.
     pub fn lines(places: impl IntoIterator<Item = Point2<f64>>) -> Self {
         let mut steps: Vec<Step> = places.into_iter().map(Step::Line).collect();
         if let Some(Step::Line(place)) = steps.first().copied() {
@@ -68,14 +68,14 @@ impl Path {
         Self { steps, ..Self::default() }
     }
 
-    /// The same, and back to the first.
+    /// A polygon.
     pub fn area(places: impl IntoIterator<Item = Point2<f64>>) -> Self {
         let mut path = Self::lines(places);
         path.steps.push(Step::Close);
         path
     }
 
-    /// An ellipse by its middle and its two half axes, which stand upright on each other.
+    /// An ellipse, by its centre and its two semi-axes, which are perpendicular.
     pub fn ellipse(middle: Point2<f64>, first: Vector2<f64>, second: Vector2<f64>) -> Self {
         let corner = |along: Vector2<f64>, then: Vector2<f64>| {
             Step::Curve(middle + along + then * QUARTER, middle + then + along * QUARTER, middle + then)
@@ -97,24 +97,24 @@ impl Path {
         Self::ellipse(middle, Vector2::x() * radius, Vector2::y() * radius)
     }
 
-    /// Filled with this.
+    /// The same path with a fill.
     pub fn filled(self, fill: impl Into<Paint>) -> Self {
         Self { fill: Some(fill.into()), ..self }
     }
 
-    /// Drawn along with this, so wide.
+    /// The same path with a stroke of the given width.
     pub fn stroked(self, stroke: impl Into<Paint>, width: f64) -> Self {
         Self { stroke: Some((stroke.into(), width)), ..self }
     }
 }
 
-/// Paths that belong together.
+/// A group of paths.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
-    /// What it shows, for programs that list the parts of a drawing.
+    /// The name, for programs that list the parts of a drawing.
     pub name: String,
-    /// Whether only what lies on the image of the drawing is shown.
+    /// Whether the paths are clipped to the image of the drawing.
     pub is_on_image: bool,
-    /// Its paths, one upon the other.
+    /// The paths, in drawing order.
     pub paths: Vec<Path>,
 }

@@ -1,4 +1,4 @@
-//! A drawing as SVG.
+//! Drawings as SVG.
 
 use super::{Drawing, DrawingError, Paint, Path, Step, encode_png};
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -6,7 +6,7 @@ use nalgebra::Point2;
 use std::fmt::Write;
 
 impl Drawing {
-    /// The drawing as an SVG file, the image within it as PNG.
+    /// Encodes the drawing as an SVG file, with the image embedded as PNG.
     ///
     /// # Errors
     /// The image is too large.
@@ -74,13 +74,13 @@ fn write_paint(out: &mut String, what: &str, paint: Option<Paint>) -> std::fmt::
     }
 }
 
-/// With two decimals at most.
+/// Rounds to two decimals.
 fn number(value: f64) -> f64 {
-    // There is one zero only.
+    // Adding 0.0 turns -0.0 into 0.0.
     (value * 100.0).round() / 100.0 + 0.0
 }
 
-/// As text in XML, which has no control characters.
+/// Escapes text for XML, without control characters, which XML does not allow.
 fn escape(text: &str) -> String {
     let allowed = text.chars().filter(|letter| !letter.is_control() && !matches!(letter, '\u{fffe}' | '\u{ffff}'));
     allowed.collect::<String>().replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

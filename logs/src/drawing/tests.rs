@@ -3,7 +3,7 @@ use image::Rgb;
 
 const RED: Colour = [200, 30, 30];
 
-/// A black image of 40 x 20 in a margin of 10, with a red square that reaches beyond it and a word.
+/// A black image of 40 x 20 in a margin of 10, with a red square that extends beyond it, and a text.
 fn drawing(is_on_image: bool) -> Drawing {
     let corners = [(40.0, 15.0), (70.0, 15.0), (70.0, 25.0), (40.0, 25.0)];
     let square = Path::area(corners.map(|(x, y)| Point2::new(x, y))).filled(RED);
@@ -23,7 +23,7 @@ fn drawing(is_on_image: bool) -> Drawing {
 }
 
 #[test]
-fn what_belongs_on_the_image_ends_at_its_edge() {
+fn shapes_on_the_image_are_clipped_to_it() {
     for (is_on_image, beyond) in [(true, [255; 3]), (false, RED)] {
         let pixels = drawing(is_on_image).pixels().unwrap();
         assert_eq!(pixels.get_pixel(45, 20).0, RED);
@@ -36,18 +36,18 @@ fn what_belongs_on_the_image_ends_at_its_edge() {
 }
 
 #[test]
-fn words_are_drawn_as_outlines_and_have_a_length() {
+fn text_is_drawn_as_outlines_and_has_a_width() {
     let pixels = drawing(true).pixels().unwrap();
     let dark = pixels.enumerate_pixels().filter(|(_, v, pixel)| *v > 30 && pixel.0[0] < 128).count();
     assert!(dark > 20, "{dark}");
     assert!((text_width("mm", 10.0) - 2.0 * text_width("m", 10.0)).abs() < 1e-9);
     assert!(text_width("robot1", 10.0) > 25.0 && text_width("", 10.0) == 0.0);
-    assert!(text_width("機械\u{7}", 10.0) > 5.0, "letters that the font does not have are boxes");
+    assert!(text_width("機械\u{7}", 10.0) > 5.0, "missing letters are boxes");
     assert!(text_width(&"m".repeat(100_000), 1.0) < 1000.0);
 }
 
 #[test]
-fn an_svg_holds_no_markup_that_came_from_a_name() {
+fn names_in_an_svg_are_escaped() {
     let svg = drawing(true).svg().unwrap();
     assert!(svg.contains("<title>&lt;script&gt;&amp;</title>") && !svg.contains("<script"), "{svg}");
     assert!(svg.contains(r##"fill="#c81e1e""##) && svg.contains(r#"stroke-opacity="0.5""#));
@@ -55,7 +55,7 @@ fn an_svg_holds_no_markup_that_came_from_a_name() {
 }
 
 #[test]
-fn a_pdf_has_one_page_of_the_shape_of_the_drawing() {
+fn a_pdf_has_one_page_with_the_aspect_ratio_of_the_drawing() {
     let pdf = drawing(true).pdf().unwrap();
     let text = String::from_utf8_lossy(&pdf);
     assert!(text.starts_with("%PDF-") && text.contains("/MediaBox [0 0 842 421]"), "{text}");
@@ -71,7 +71,7 @@ fn the_same_drawing_gives_the_same_bytes() {
 }
 
 #[test]
-fn places_that_are_no_numbers_harm_nothing() {
+fn positions_that_are_not_finite_are_ignored() {
     let mut drawing = drawing(true);
     let places = [Point2::new(f64::NAN, 0.0), Point2::new(1e300, f64::INFINITY), Point2::new(-1e9, 5.0)];
     drawing.groups[0].paths.push(Path::lines(places).stroked(RED, f64::NAN).filled(RED));

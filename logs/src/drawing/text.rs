@@ -1,4 +1,4 @@
-//! Words as the outlines of their letters.
+//! Text as outlines of its letters.
 
 use super::{Path, Step};
 use nalgebra::Point2;
@@ -6,30 +6,30 @@ use ttf_parser::{Face, OutlineBuilder};
 
 /// DejaVu Sans with its Latin, Greek and Cyrillic letters; see `fonts/README.md`.
 const FONT: &[u8] = include_bytes!("../../fonts/DejaVuSans-subset.ttf");
-/// Longer words are cut: what comes from a log may be of any length.
+/// The maximum number of letters; longer texts are cut, since texts from a log may have any length.
 const MOST_LETTERS: usize = 200;
 
-/// The letters of a text that stands on a line from `start` on, its capital letters about 0.7 `size` high. Letters that the
-/// font does not have are boxes.
+/// The outlines of a text with its baseline at `start`, with capital letters about 0.7 `size` high. Letters that are
+/// missing in the font are boxes.
 pub fn text(words: &str, start: Point2<f64>, size: f64) -> Path {
     let mut outline = Outline { steps: Vec::new(), scale: 0.0, start };
-    lay_out(words, |face, glyph, along, scale| {
+    for_each_letter(words, |face, glyph, along, scale| {
         (outline.scale, outline.start.x) = (scale * size, start.x + along * size);
-        // A letter without an outline, such as a space, draws nothing.
+        // A letter without an outline, such as a space, is skipped.
         let _ = face.outline_glyph(glyph, &mut outline);
     });
     Path { steps: outline.steps, ..Path::default() }
 }
 
-/// How long a text is.
+/// The width of a text.
 pub fn text_width(words: &str, size: f64) -> f64 {
-    lay_out(words, |_, _, _, _| {}) * size
+    for_each_letter(words, |_, _, _, _| {}) * size
 }
 
-/// Goes over the letters with how far along the line each stands, and the size of a unit of the font; both and the length of the
-/// whole for a size of 1.
-fn lay_out(words: &str, mut each: impl FnMut(&Face<'_>, ttf_parser::GlyphId, f64, f64)) -> f64 {
-    // The font is part of the program, and a test reads it.
+/// Calls `each` with each letter, its position along the baseline and the size of a font unit. These and the returned
+/// width are for a size of 1.
+fn for_each_letter(words: &str, mut each: impl FnMut(&Face<'_>, ttf_parser::GlyphId, f64, f64)) -> f64 {
+    // The font is embedded, and a test loads it.
     let Ok(face) = Face::parse(FONT, 0) else { return 0.0 };
     let scale = 1.0 / f64::from(face.units_per_em());
     let mut along = 0.0;

@@ -1,49 +1,49 @@
-//! Two values, field by field.
+//! Comparison of two values, field by field.
 
 use super::value::{Array, Scalar, Value};
 
-/// Of one array of scalars so many differing elements are told one by one.
-const ELEMENTS_TOLD: usize = 3;
+/// The maximum number of differing elements that are listed for an array of scalars.
+const MOST_ELEMENTS: usize = 3;
 
 /// A field that differs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// Its path, such as `tags[0].tag_id`.
+    /// The path, such as `tags[0].tag_id`.
     pub path: String,
-    /// What it was to be.
+    /// The expected value.
     pub expected: String,
-    /// What it is.
+    /// The actual value.
     pub got: String,
 }
 
-/// How two values differ.
+/// The differences of two values.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Differences {
-    /// The first of them, in the order of the fields.
-    pub told: Vec<Difference>,
-    /// How many there are in all.
+    /// The first differences, in field order.
+    pub listed: Vec<Difference>,
+    /// The total number of differences.
     pub count: usize,
 }
 
 impl Differences {
-    /// Whether there are none.
+    /// Whether there are no differences.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 }
 
-/// Compares two values, field by field. Whole numbers, truth values and texts must be equal; numbers with a fraction
-/// [nearly so](nearly_equal). At most `limit` differences are told.
+/// Compares two values, field by field. Integers, booleans and strings must be equal, floating-point numbers [nearly
+/// equal](nearly_equal). At most `limit` differences are listed.
 pub fn compare(expected: &Value<'_>, got: &Value<'_>, tolerance: f64, limit: usize) -> Differences {
     let mut comparison = Comparison { tolerance, limit, found: Differences::default() };
     comparison.values("", expected, got);
     comparison.found
 }
 
-/// Whether two numbers are equal, both not a number, or no farther apart than `tolerance` times the greatest of 1 and
-/// their absolute values.
+/// Whether two numbers are equal, both NaN, or at most `tolerance` times the maximum of 1 and their absolute values
+/// apart.
 pub fn nearly_equal(a: f64, b: f64, tolerance: f64) -> bool {
-    // Equal first: the difference of two infinities is no number.
+    // Compared first, since the difference of two infinities is NaN.
     a == b
         || (a.is_nan() && b.is_nan())
         || (a - b).abs() <= tolerance * 1f64.max(a.abs()).max(b.abs()) && (a - b).is_finite()
@@ -58,9 +58,9 @@ struct Comparison {
 impl Comparison {
     fn differ(&mut self, path: &str, expected: impl ToString, got: impl ToString) {
         self.found.count += 1;
-        if self.found.told.len() < self.limit {
+        if self.found.listed.len() < self.limit {
             let (expected, got) = (expected.to_string(), got.to_string());
-            self.found.told.push(Difference { path: path.to_owned(), expected, got });
+            self.found.listed.push(Difference { path: path.to_owned(), expected, got });
         }
     }
 
@@ -116,8 +116,8 @@ impl Comparison {
         if same_bytes {
             return;
         }
-        // Of arrays of different lengths, the elements behind the first that differs are others altogether.
-        let told = if same_length { ELEMENTS_TOLD } else { 1 };
+        // In arrays of different lengths, the elements after the first difference are unrelated.
+        let most = if same_length { MOST_ELEMENTS } else { 1 };
         let mut differing = 0;
         for at in 0..expected.len().min(got.len()) {
             let (Some(a), Some(b)) = (expected.scalar(at), got.scalar(at)) else {
@@ -125,12 +125,12 @@ impl Comparison {
             };
             if !self.agree(&a, &b) {
                 differing += 1;
-                if differing <= told {
+                if differing <= most {
                     self.differ(&format!("{path}[{at}]"), a, b);
                 }
             }
         }
-        if same_length && differing > told {
+        if same_length && differing > most {
             let total = expected.len();
             self.differ(path, format!("{total} elements"), format!("{differing} that differ"));
         }

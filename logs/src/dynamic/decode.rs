@@ -1,29 +1,29 @@
-//! From bytes to a value.
+//! Decoding of messages to values.
 
 use super::definition::{Count, Primitive};
 use super::reader::{CdrReader, DecodeFault};
 use super::schema::{Element, Field, MessageType, Schema};
 use super::value::{Array, Scalar, Value};
 
-/// So many bytes may follow the last field: encoders round the length up.
+/// The maximum number of bytes after the last field: encoders pad the length.
 const PADDING: usize = 3;
 
-/// Why a message cannot be decoded.
+/// The error when a message cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    /// The bytes do not begin as CDR does.
+    /// The bytes do not start with a CDR encapsulation header.
     #[error("the message does not begin with a CDR encapsulation")]
     Encapsulation,
-    /// A field does not fit the schema.
-    #[error("the message does not fit its schema: {fault} at `{path}`")]
+    /// A field does not match the schema.
+    #[error("the message does not match its schema: {fault} at `{path}`")]
     Field {
-        /// Which field, such as `tags[3].tag_id`.
+        /// The path of the field, such as `tags[3].tag_id`.
         path: String,
-        /// What is wrong with it.
+        /// The fault.
         fault: DecodeFault,
     },
     /// The message is longer than its fields.
-    #[error("the message does not fit its schema: {0} bytes are left behind its last field")]
+    #[error("the message does not match its schema: {0} bytes are left after its last field")]
     Rest(usize),
 }
 
@@ -52,7 +52,7 @@ impl Fault {
 }
 
 impl Schema {
-    /// Decodes a message. Texts and arrays of bytes are borrowed from it, the names of fields from the schema.
+    /// Decodes a message. Strings and byte arrays are borrowed from it, and field names from the schema.
     pub fn decode<'a>(&'a self, bytes: &'a [u8]) -> Result<Value<'a>, DecodeError> {
         let mut reader = CdrReader::new(bytes).ok_or(DecodeError::Encapsulation)?;
         let Some(root) = self.root() else { return Ok(Value::Message(Vec::new())) };
@@ -82,7 +82,7 @@ impl Schema {
             Count::Fixed(count) => count,
             Count::Any | Count::UpTo(_) => reader.number::<4, u32>()? as usize,
         };
-        // Checked first, so that a damaged count allocates nothing.
+        // Checked first, so that a corrupt length allocates nothing.
         match self.least_size(field.of).checked_mul(count) {
             Some(size) if size <= reader.left() => self.array(field.of, count, reader).map(Value::Array),
             _ => Err(DecodeFault::Count(count).into()),

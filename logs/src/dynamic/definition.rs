@@ -1,12 +1,12 @@
-//! One `.msg` definition: its fields, line by line.
+//! The parser of a `.msg` definition.
 
-/// The types that are no messages.
+/// The primitive types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Primitive {
     Bool,
     I8,
     U8,
-    /// As `U8`, by another name.
+    /// The same as `U8`, with another name.
     Byte,
     I16,
     U16,
@@ -21,7 +21,7 @@ pub(super) enum Primitive {
 }
 
 impl Primitive {
-    /// The type of this name. `byte` and `char` are whole numbers from 0 to 255 in ROS 2.
+    /// The type with this name. `byte` and `char` are unsigned 8-bit integers in ROS 2.
     fn named(name: &str) -> Option<Self> {
         Some(match name {
             "bool" => Self::Bool,
@@ -42,7 +42,7 @@ impl Primitive {
         })
     }
 
-    /// The fewest bytes that a value takes.
+    /// The minimum encoded size of a value, bytes.
     pub(super) fn least_size(self) -> usize {
         match self {
             Self::Bool | Self::I8 | Self::U8 | Self::Byte => 1,
@@ -53,44 +53,44 @@ impl Primitive {
     }
 }
 
-/// How many values a field holds.
+/// The number of values in a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Count {
     /// One.
     One,
-    /// Always so many.
+    /// A fixed number.
     Fixed(usize),
-    /// Any number; the message says how many.
+    /// Any number, stored in the message.
     Any,
-    /// Any number up to this one; the message says how many.
+    /// Any number up to this one, stored in the message.
     UpTo(usize),
 }
 
-/// The type of a field, or of its elements, as the definition names it.
+/// The type of a field or of its elements, as named in the definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum TypeName {
     Primitive(Primitive),
-    /// `package/Type`, or `Type` for one of the same package.
+    /// `package/Type`, or `Type` in the same package.
     Message(String),
 }
 
-/// A line of a definition that is a field.
+/// A field in a definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FieldLine {
     pub(super) name: String,
     pub(super) of: TypeName,
-    /// The most characters of a text, where that is bounded. It changes nothing in the encoding.
+    /// The maximum length of a string, if bounded. It does not affect the encoding.
     pub(super) text_bound: Option<usize>,
     pub(super) count: Count,
 }
 
-/// The fields of a definition; constants and defaults are not part of a message. An error is the line that is wrong.
+/// The fields of a definition; constants and default values are skipped. The error is the invalid line.
 pub(super) fn fields(text: &str) -> Result<Vec<FieldLine>, String> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
     lines.filter(|line| !line.is_empty()).filter_map(|line| field(line).transpose()).collect()
 }
 
-/// The field of a line; `None` for a constant.
+/// The field in a line; `None` for a constant.
 fn field(line: &str) -> Result<Option<FieldLine>, String> {
     let wrong = || line.to_owned();
     let (type_text, rest) = line.split_once(char::is_whitespace).ok_or_else(wrong)?;
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn types_and_counts_are_told_apart() {
+    fn types_and_counts_are_parsed() {
         let field = |name: &str, of, count| FieldLine { name: name.into(), of, text_bound: None, count };
         let primitive = TypeName::Primitive;
         assert_eq!(line("int8[] data  # cells"), field("data", primitive(Primitive::I8), Count::Any));
@@ -147,12 +147,12 @@ mod tests {
     }
 
     #[test]
-    fn constants_are_no_fields() {
+    fn constants_are_not_fields() {
         assert_eq!(fields("int32 A=1\nint32 B = 2\nstring C=\"x y\"\n\n# nothing").unwrap(), []);
     }
 
     #[test]
-    fn a_line_that_is_no_field_is_named() {
+    fn an_invalid_line_is_named() {
         for wrong in ["int32", "int32[ x", "int32[x] y", "int32[<=x] y", "string<=x y", "[] x", "int32 a.b"] {
             assert_eq!(fields(wrong), Err(wrong.to_owned()));
         }

@@ -1,18 +1,18 @@
-//! A value as JSON.
+//! Values as JSON.
 
 use super::value::{Array, Scalar, Value};
 use serde_json::Value as Json;
 
-/// How a value is shown as JSON.
+/// Options for the conversion of a value to JSON.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JsonOptions {
-    /// Of a longer array only so many elements are shown, and then a text that says how many more there are; `None`
-    /// shows all.
+    /// The maximum number of array elements that are shown, followed by a text with the number of the rest; `None` for
+    /// all.
     pub longest_array: Option<usize>,
 }
 
 impl Value<'_> {
-    /// The value as JSON. Numbers that JSON does not have are the texts `NaN`, `Infinity` and `-Infinity`.
+    /// Converts the value to JSON. Numbers that JSON does not have are the strings `NaN`, `Infinity` and `-Infinity`.
     pub fn to_json(&self, options: JsonOptions) -> Json {
         match self {
             Self::Scalar(scalar) => scalar_json(scalar),
@@ -35,7 +35,7 @@ fn scalar_json(scalar: &Scalar<'_>) -> Json {
         Scalar::Bool(value) => value.into(),
         Scalar::Int(number) => number.into(),
         Scalar::Uint(number) => number.into(),
-        // By its own digits: 0.05 is not to become 0.05000000074505806.
+        // Converted by decimal digits, so that 0.05 does not become 0.05000000074505806.
         Scalar::F32(value) => number(format!("{value:?}").parse().unwrap_or_else(|_| value.into())),
         Scalar::F64(value) => number(value),
         Scalar::Text(text) => text.into(),

@@ -1,9 +1,12 @@
-//! Messages of any ROS 2 type, read by the schema that their log holds.
+//! Messages of any ROS 2 type, decoded with the schema in their log.
 //!
-//! A [`Schema`] is made from the text of a channel (`ros2msg`); it decodes a message (CDR) to a [`Value`]: a tree of
-//! fields that knows their names and their order. Values can be compared ([`compare`]), asked for a field by its path
-//! ([`FieldPath`]), and shown as JSON ([`Value::to_json`]). Bytes that do not fit the schema are an error that names the
-//! field; nothing is allocated that the length of the message does not warrant.
+//! A [`Schema`] is parsed from a channel's schema text (`ros2msg`); it decodes a message (CDR) to a [`Value`]: a tree
+//! of fields with their names, in order. Values can be compared ([`compare`]), queried by field path ([`FieldPath`]),
+//! and converted to JSON ([`Value::to_json`]). Bytes that do not match the schema give an error that names the field;
+//! nothing is allocated beyond the length of the message.
+//!
+//! The CDR reader is not a library's, because types are known only from the definition in the log, without a ROS
+//! installation; because decoded values borrow from the message; and because it must be safe on damaged bytes.
 //!
 //! ```
 //! use gridweave_logs::dynamic::{FieldPath, Schema};

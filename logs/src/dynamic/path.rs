@@ -1,10 +1,10 @@
-//! The path to a field: `tags[0].tag_id`.
+//! The path of a field: `tags[0].tag_id`.
 
 use super::value::Value;
 use std::fmt;
 use std::str::FromStr;
 
-/// The path to a field of a message, such as `tags[0].tag_id`.
+/// The path of a field in a message, such as `tags[0].tag_id`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FieldPath(Vec<Step>);
 
@@ -14,34 +14,34 @@ enum Step {
     Element(usize),
 }
 
-/// A path leads nowhere.
+/// The error when a path is invalid or does not exist.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PathError {
-    /// It is no path.
-    #[error("`{0}` is no path to a field: write it as in `tags[0].tag_id`")]
+    /// It is not a path.
+    #[error("`{0}` is not a field path: write it as in `tags[0].tag_id`")]
     Form(String),
-    /// There is no field of that name.
+    /// There is no field with that name.
     #[error("{within} has no field `{field}`{}", names(.known))]
     NoField {
-        /// The part of the message that was looked at.
+        /// The part of the message that was searched.
         within: String,
-        /// What was looked for.
+        /// The name.
         field: String,
-        /// The fields that there are; none if it is no message.
+        /// The existing fields; empty if the part is not a message.
         known: Vec<String>,
     },
-    /// There is no such element.
-    #[error("{within} has {length} elements, and none with the number {element}")]
+    /// There is no such array element.
+    #[error("{within} has {length} elements, and no element {element}")]
     NoElement {
         /// The array.
         within: String,
-        /// What was looked for.
+        /// The index.
         element: usize,
-        /// How many there are.
+        /// The number of elements.
         length: usize,
     },
-    /// It is no array.
-    #[error("{0} is no array")]
+    /// It is not an array.
+    #[error("{0} is not an array")]
     NoArray(String),
 }
 
@@ -86,7 +86,7 @@ impl fmt::Display for FieldPath {
 }
 
 impl<'a> Value<'a> {
-    /// What the path leads to.
+    /// The value at a path.
     pub fn find(&self, path: &FieldPath) -> Result<Value<'a>, PathError> {
         let mut value = self.clone();
         for (at, step) in path.0.iter().enumerate() {

@@ -1,33 +1,33 @@
-//! CDR by hand: numbers and texts, aligned as the encoding wants it; and the encoding of ROS 1, which aligns nothing.
+//! Reader of CDR: aligned numbers and strings; and of the ROS 1 encoding, which has no alignment.
 
-/// What is wrong with a field.
+/// The fault of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeFault {
     /// The bytes end within it.
-    #[error("it ends")]
+    #[error("the message ends")]
     End,
-    /// It claims more elements than the rest of the message has room for.
-    #[error("there is no room for the {0} elements that it claims")]
+    /// It claims more elements than the rest of the message can contain.
+    #[error("the message is too short for {0} elements")]
     Count(usize),
-    /// A truth value is neither 0 nor 1.
-    #[error("a truth value is {0}")]
+    /// A boolean is neither 0 nor 1.
+    #[error("the boolean is {0}")]
     Boolean(u8),
-    /// A text is not UTF-8.
-    #[error("the text is not UTF-8")]
+    /// A string is not UTF-8.
+    #[error("the string is not UTF-8")]
     Text,
-    /// `wstring`: how it is encoded differs between the versions of ROS 2.
-    #[error("there is a wide text (wstring), which cannot be read")]
+    /// `wstring`: its encoding differs between ROS 2 versions.
+    #[error("wstring is not supported")]
     WideText,
 }
 
-/// Reads the fields of a message one after the other.
+/// Reads the fields of a message in order.
 pub(super) struct CdrReader<'a> {
-    /// What follows the encapsulation; alignment counts from here.
+    /// The bytes after the encapsulation header; alignment is relative to their start.
     body: &'a [u8],
     at: usize,
     big_endian: bool,
-    /// Whether the fields follow each other without a gap, as in ROS 1.
-    packed: bool,
+    /// Whether there is no alignment, as in ROS 1.
+    unaligned: bool,
 }
 
 /// A number of fixed size.
@@ -53,7 +53,7 @@ macro_rules! numbers {
 numbers!(i8: 1, u8: 1, i16: 2, u16: 2, i32: 4, u32: 4, i64: 8, u64: 8, f32: 4, f64: 8);
 
 impl<'a> CdrReader<'a> {
-    /// Reads what follows the encapsulation, which says the byte order. `None` if it is none of plain CDR.
+    /// Reads after the encapsulation header, which contains the byte order. `None` if it is not plain CDR.
     pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
         let (encapsulation, body) = bytes.split_at_checked(4)?;
         let big_endian = match encapsulation {
@@ -61,12 +61,12 @@ impl<'a> CdrReader<'a> {
             [0, 1, ..] => false,
             _ => return None,
         };
-        Some(Self { body, at: 0, big_endian, packed: false })
+        Some(Self { body, at: 0, big_endian, unaligned: false })
     }
 
-    /// Reads a message as ROS 1 encodes it: little-endian, without gaps, texts without a zero byte.
+    /// Reads a message in ROS 1 encoding: little-endian, without alignment and without zero bytes after strings.
     pub(super) fn ros1(body: &'a [u8]) -> Self {
-        Self { body, at: 0, big_endian: false, packed: true }
+        Self { body, at: 0, big_endian: false, unaligned: true }
     }
 
     /// Whether numbers are big-endian.
@@ -74,24 +74,24 @@ impl<'a> CdrReader<'a> {
         self.big_endian
     }
 
-    /// Whether the message is encoded as in ROS 1.
+    /// Whether the message is in ROS 1 encoding.
     pub(super) fn is_ros1(&self) -> bool {
-        self.packed
+        self.unaligned
     }
 
-    /// How many bytes are left.
+    /// The number of bytes left.
     pub(super) fn left(&self) -> usize {
         self.body.len().saturating_sub(self.at)
     }
 
-    /// Goes on to where a number of this size may begin.
+    /// Skips to the alignment of a number with this size.
     pub(super) fn align(&mut self, size: usize) {
-        if !self.packed {
+        if !self.unaligned {
             self.at = self.at.next_multiple_of(size);
         }
     }
 
-    /// The next bytes, as they are.
+    /// The next bytes.
     pub(super) fn bytes(&mut self, count: usize) -> Result<&'a [u8], DecodeFault> {
         let end = self.at.checked_add(count).ok_or(DecodeFault::End)?;
         let bytes = self.body.get(self.at..end).ok_or(DecodeFault::End)?;
@@ -118,7 +118,7 @@ impl<'a> CdrReader<'a> {
         Ok(numbers.iter().map(|bytes| order(*bytes)).collect())
     }
 
-    /// The next truth value.
+    /// The next boolean.
     pub(super) fn boolean(&mut self) -> Result<bool, DecodeFault> {
         match self.number::<1, u8>()? {
             0 => Ok(false),
@@ -127,16 +127,16 @@ impl<'a> CdrReader<'a> {
         }
     }
 
-    /// The next text: its length with the zero byte behind it, and its bytes.
+    /// The next string: its length including the zero byte, and its bytes.
     pub(super) fn text(&mut self) -> Result<&'a str, DecodeFault> {
         std::str::from_utf8(self.text_bytes()?).map_err(|_| DecodeFault::Text)
     }
 
-    /// The bytes of the next text, without the zero byte behind it.
+    /// The bytes of the next string, without the zero byte.
     pub(super) fn text_bytes(&mut self) -> Result<&'a [u8], DecodeFault> {
         let length = self.number::<4, u32>()? as usize;
         let bytes = self.bytes(length)?;
-        // Some writers give an empty text no zero byte.
+        // Some writers omit the zero byte of an empty string.
         Ok(bytes.strip_suffix(&[0]).unwrap_or(bytes))
     }
 }

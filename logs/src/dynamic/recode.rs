@@ -1,4 +1,4 @@
-//! Messages copied field by field: with other names of frames, or out of the encoding of ROS 1.
+//! Copying of messages field by field: with renamed frames, or converted from ROS 1.
 
 use super::decode::DecodeError;
 use super::definition::{Count, Primitive};
@@ -6,11 +6,11 @@ use super::reader::{CdrReader, DecodeFault};
 use super::schema::{Element, Field, MessageType, Schema};
 use std::borrow::Cow;
 
-/// The encapsulations of plain CDR, whose first two bytes say the byte order.
+/// The encapsulation headers of plain CDR; the first two bytes are the byte order.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 const BIG_ENDIAN: [u8; 4] = [0, 0, 0, 0];
 
-/// The type that has a field more in ROS 1: `uint32 seq`, before all others.
+/// The type with an additional first field in ROS 1: `uint32 seq`.
 const HEADER: &str = "std_msgs/Header";
 const SEQ_SIZE: usize = 4;
 const TIME: &str = "builtin_interfaces/Time";
@@ -23,29 +23,30 @@ pub struct Recoder {
 }
 
 impl Recoder {
-    /// For the messages of a schema. `None` if it has texts that cannot be copied (`wstring`).
+    /// Creates a copier for messages of a schema. `None` if it has `wstring` fields, which cannot be copied.
     pub fn new(schema: Schema) -> Option<Self> {
         let is_wide = |field: &Field| matches!(field.of, Element::Primitive(Primitive::WideText));
         let is_copied = !schema.types.iter().flat_map(|of| &of.fields).any(is_wide);
         is_copied.then_some(Self { schema })
     }
 
-    /// Whether messages name frames: in texts that are called `frame_id`, or end so as `child_frame_id` does.
+    /// Whether messages contain frames: strings in fields named `frame_id` or with that suffix, such as
+    /// `child_frame_id`.
     pub fn names_frames(&self) -> bool {
         self.schema.types.iter().flat_map(|of| &of.fields).any(is_frame)
     }
 
-    /// Whether messages say when they were made: in headers.
+    /// Whether messages contain header stamps.
     pub fn has_stamps(&self) -> bool {
         self.schema.types.iter().any(|of| of.name == HEADER)
     }
 
-    /// Appends a message (CDR) to `copy`, with what `rename` makes of the names of frames, and the stamps of headers later by so
-    /// many nanoseconds (earlier where these are negative). `false`, and nothing is appended, if it keeps them all. A stamp of
-    /// zero stands for no time, and stays.
+    /// Appends a message (CDR) to `copy`, with frames renamed by `rename`, and header stamps shifted `later` by
+    /// nanoseconds (earlier if negative). Returns `false`, and appends nothing, if nothing changes. A zero stamp is "no
+    /// time", and is not shifted.
     ///
     /// # Errors
-    /// The message does not fit its schema. What was appended by then is taken back.
+    /// The message does not match its schema. `copy` is unchanged.
     pub fn rename_frames(
         &self,
         message: &[u8],
@@ -54,23 +55,23 @@ impl Recoder {
         copy: &mut Vec<u8>,
     ) -> Result<bool, DecodeError> {
         let reader = || CdrReader::new(message).ok_or(DecodeError::Encapsulation);
-        // Most messages name few frames, and are long.
+        // Most messages contain few frames, and are long.
         if !self.walk(reader()?, rename, later, None)? {
             return Ok(false);
         }
         self.walk(reader()?, rename, later, Some(copy))
     }
 
-    /// Appends a message that is encoded as in ROS 1 to `copy`, as little-endian CDR. The schema is that of ROS 2, in which a
-    /// header has no `seq`.
+    /// Appends a ROS 1 message to `copy` as little-endian CDR. The schema is that of ROS 2, in which a header has no
+    /// `seq`.
     ///
     /// # Errors
-    /// The message does not fit its schema. What was appended by then is taken back.
+    /// The message does not match its schema. `copy` is unchanged.
     pub fn append_ros1(&self, message: &[u8], copy: &mut Vec<u8>) -> Result<(), DecodeError> {
         self.walk(CdrReader::ros1(message), &|frame| Cow::Borrowed(frame), 0, Some(copy)).map(|_| ())
     }
 
-    /// Walks over the fields, and appends them to `copy` if there is one. Whether a frame got another name.
+    /// Walks over the fields, and appends them to `copy` if given. Returns whether anything changed.
     fn walk(
         &self,
         mut reader: CdrReader<'_>,
@@ -102,7 +103,7 @@ fn is_frame(field: &Field) -> bool {
     matches!(field.of, Element::Primitive(Primitive::Text)) && field.name.ends_with("frame_id")
 }
 
-/// The field that could not be copied, and why.
+/// The field that could not be copied, and the fault.
 type Fault = (String, DecodeFault);
 
 struct Walk<'a> {
@@ -139,7 +140,7 @@ impl Walk<'_> {
                 count as usize
             }
         };
-        // Checked first, so that a damaged count copies nothing.
+        // Checked first, so that a corrupt length copies nothing.
         let least = self.schema.least_size(field.of).checked_mul(count);
         if field.count != Count::One && least.is_none_or(|least| least > reader.left()) {
             return Err(own(DecodeFault::Count(count)));
@@ -178,7 +179,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Copies a stamp, moved.
+    /// Copies a stamp, shifted.
     fn stamp(&mut self, reader: &mut CdrReader<'_>, writer: &mut Writer<'_>) -> Result<(), DecodeFault> {
         let (seconds, nanoseconds) = (reader.number::<4, u32>()?, reader.number::<4, u32>()?);
         let moved = match (seconds, nanoseconds) {
@@ -197,10 +198,10 @@ impl Walk<'_> {
     }
 }
 
-/// Appends fields in CDR, if there is something to append them to.
+/// Appends fields in CDR, if there is a target.
 struct Writer<'a> {
     bytes: Option<&'a mut Vec<u8>>,
-    /// Where the fields begin; alignment counts from here.
+    /// The start of the fields; alignment is relative to it.
     body: usize,
     big_endian: bool,
 }
@@ -225,7 +226,7 @@ impl Writer<'_> {
     }
 
     fn text(&mut self, text: &[u8]) {
-        // A text that is longer does not fit into a message.
+        // A longer string does not fit into a message.
         self.u32(u32::try_from(text.len() + 1).unwrap_or(u32::MAX));
         self.put(text);
         self.put(&[0]);

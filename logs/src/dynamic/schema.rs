@@ -1,17 +1,17 @@
-//! The type of a message, with the types that it uses.
+//! The schema of a message type, with the types that it uses.
 
 use super::definition::{Count, FieldLine, Primitive, TypeName, fields};
 use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Types may use each other to this depth. Those of ROS reach 6 or so.
+/// The maximum nesting of types. Those of ROS are nested about 6 deep.
 const DEEPEST: usize = 64;
 
 /// A message type, with all types that it uses.
 #[derive(Clone, Debug)]
 pub struct Schema {
-    /// Each behind those that it uses.
+    /// Each type comes after those that it uses.
     pub(super) types: Vec<MessageType>,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct MessageType {
     /// `package/Type`.
     pub(super) name: String,
     pub(super) fields: Vec<Field>,
-    /// The fewest bytes that a value takes, and at least 1.
+    /// The minimum encoded size of a value, at least 1 byte.
     pub(super) least_size: usize,
 }
 
@@ -30,59 +30,58 @@ pub(super) struct MessageType {
 pub(super) struct Field {
     pub(super) name: String,
     pub(super) of: Element,
-    /// The most characters of a text, where that is bounded.
+    /// The maximum length of a string, if bounded.
     pub(super) text_bound: Option<usize>,
     pub(super) count: Count,
 }
 
-/// The type of a field, or of its elements.
+/// The type of a field or of its elements.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Element {
     Primitive(Primitive),
-    /// An index among the schema's types.
+    /// An index into the schema's types.
     Message(usize),
 }
 
-/// Why messages of a type cannot be decoded.
+/// The error when messages of a type cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SchemaError {
-    /// The messages or the schema are encoded in another way.
-    #[error("{what} is encoded as `{found}`, and only `{expected}` can be read")]
+    /// The messages or the schema have an unsupported encoding.
+    #[error("{what} is encoded as `{found}`; only `{expected}` is supported")]
     Encoding {
-        /// Which of the two.
+        /// The message or the schema.
         what: &'static str,
         /// Its encoding.
         found: String,
-        /// The one that can be read.
+        /// The supported encoding.
         expected: &'static str,
     },
     /// There is no definition of the type.
     #[error("there is no definition of {0}")]
     Undefined(String),
-    /// A line of a definition cannot be understood.
-    #[error("the definition of {name} has the line `{line}`, which is no field")]
+    /// A line of a definition is invalid.
+    #[error("the definition of {name} has the invalid line `{line}`")]
     Line {
         /// The type.
         name: String,
         /// The line.
         line: String,
     },
-    /// Two fields of a type have one name, so that neither can be asked for.
-    #[error("the definition of {name} has two fields called `{field}`")]
+    /// A type has two fields with the same name, which would be ambiguous.
+    #[error("the definition of {name} has two fields named `{field}`")]
     Twice {
         /// The type.
         name: String,
-        /// The name of both fields.
+        /// The name.
         field: String,
     },
-    /// A type contains itself, or types contain each other to no end.
+    /// A type contains itself, or types are nested too deeply.
     #[error("the definition of {0} contains itself, or is nested too deeply")]
     Nested(String),
 }
 
 impl Schema {
-    /// The schema of a channel's messages. Where the channel has none, that of the type that Gridweave knows by its
-    /// name.
+    /// The schema of a channel's messages. If the channel has none, the built-in definition of the type is used.
     pub fn of_channel(channel: &Channel) -> Result<Self, SchemaError> {
         let check = |what, found: &str, expected| match found == expected {
             true => Ok(()),
@@ -98,8 +97,8 @@ impl Schema {
         Self::parse(&channel.schema_name, &String::from_utf8_lossy(&channel.schema))
     }
 
-    /// The schema of the type `name` (`package/msg/Type`) from its text: its definition and then, each after a line of
-    /// `=` and a line `MSG: package/Type`, the definitions of all types that it uses.
+    /// Parses the schema of the type `name` (`package/msg/Type`): its definition and then, each after a line of `=` and
+    /// a line `MSG: package/Type`, the definitions of all types that it uses.
     pub fn parse(name: &str, text: &str) -> Result<Self, SchemaError> {
         let mut sections = BTreeMap::new();
         let mut section = (short_name(name), String::new());
@@ -122,12 +121,12 @@ impl Schema {
         Ok(Self { types: builder.types })
     }
 
-    /// The type of the whole message.
+    /// The type of the message.
     pub(super) fn root(&self) -> Option<&MessageType> {
         self.types.last()
     }
 
-    /// The fewest bytes that a value of a type takes.
+    /// The minimum encoded size of a value, bytes.
     pub(super) fn least_size(&self, of: Element) -> usize {
         match of {
             Element::Primitive(primitive) => primitive.least_size(),
@@ -146,7 +145,7 @@ fn short_name(name: &str) -> String {
     full_type_name(name).replacen("/msg/", "/", 1)
 }
 
-/// The definition of a type that some programs take for built in, so that their logs do not hold it.
+/// The definition of a type that some programs treat as built-in, so that their logs lack it.
 fn built_in(name: &str) -> Option<&'static str> {
     match name {
         "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Some("int32 sec\nuint32 nanosec"),
@@ -154,7 +153,7 @@ fn built_in(name: &str) -> Option<&'static str> {
     }
 }
 
-/// Makes the types of a schema, each after those that it uses.
+/// Builds the types of a schema, each after those that it uses.
 struct Builder {
     sections: BTreeMap<String, String>,
     done: BTreeMap<String, usize>,
@@ -162,7 +161,7 @@ struct Builder {
 }
 
 impl Builder {
-    /// Adds the type and all that it uses; gives its index.
+    /// Adds the type and all that it uses; returns its index.
     fn add(&mut self, name: &str, depth: usize) -> Result<usize, SchemaError> {
         if let Some(&index) = self.done.get(name) {
             return Ok(index);
@@ -194,15 +193,15 @@ impl Builder {
             made.least_size = made.least_size.saturating_add(size);
             made.fields.push(Field { name: field, of, text_bound, count });
         }
-        // A message without fields is one byte, as a structure has at least one member.
+        // A message without fields is one byte, since a structure has at least one member.
         made.least_size = made.least_size.max(1);
         self.types.push(made);
         self.done.insert(name.to_owned(), self.types.len() - 1);
         Ok(self.types.len() - 1)
     }
 
-    /// The full name of a type that the definition of `user` names. One without a package is of the same package, but
-    /// for `Header`.
+    /// The full name of a type named in the definition of `user`. A name without a package is in the same package,
+    /// except `Header`.
     fn resolve(&self, used: &str, user: &str) -> String {
         if used.contains('/') {
             return short_name(used);

@@ -1,4 +1,4 @@
-//! Decoding by schema: what is read, what is refused, and what damaged bytes do.
+//! Decoding by schema: valid messages, errors, and damaged bytes.
 
 use super::*;
 use crate::schemas::{schema_names, schema_text};
@@ -7,7 +7,7 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TagEstimate, Tag
 use proptest::prelude::*;
 use serde_json::json;
 
-/// A definition with everything that a definition may hold.
+/// A definition with every construct.
 const ALL: &str = "\
 # Everything.
 int32 LIMIT=5
@@ -146,15 +146,15 @@ fn a_field_is_found_by_its_path() {
     assert_eq!(find("tags"), "2 elements");
     for (path, says) in [
         ("tag", "the message has no field `tag`; it has header, robot, tags"),
-        ("tags[2].x", "`tags` has 2 elements, and none with the number 2"),
+        ("tags[2].x", "`tags` has 2 elements, and no element 2"),
         ("tags[0].id", "`tags[0]` has no field `id`; it has tag_id"),
-        ("robot[0]", "`robot` is no array"),
+        ("robot[0]", "`robot` is not an array"),
         ("robot.x", "`robot` has no field `x`"),
         ("tags.x", "`tags` has no field `x`"),
-        ("", "no path"),
-        ("tags[", "no path"),
-        ("tags[-1]", "no path"),
-        ("a..b", "no path"),
+        ("", "not a field path"),
+        ("tags[", "not a field path"),
+        ("tags[-1]", "not a field path"),
+        ("a..b", "not a field path"),
     ] {
         assert!(find(path).starts_with("error: ") && find(path).contains(says), "{path}: {}", find(path));
     }
@@ -170,7 +170,7 @@ fn values_are_compared_field_by_field() {
         let bytes = encode(&other).unwrap();
         let found = compare(&expected, &schema.decode(&bytes).unwrap(), tolerance, 2);
         let text = |d: &Difference| format!("{}: {} / {}", d.path, d.expected, d.got);
-        (found.count, found.told.iter().map(text).collect::<Vec<_>>().join("; "))
+        (found.count, found.listed.iter().map(text).collect::<Vec<_>>().join("; "))
     };
     let none = (0, String::new());
     assert_eq!(differences(&|_| {}, 0.0), none);
@@ -189,7 +189,7 @@ fn fields_that_only_one_type_has_differ() {
     let new = Schema::parse("a/A", "int32 x\nfloat32 z").unwrap();
     let bytes = [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
     let found = compare(&old.decode(&bytes).unwrap(), &new.decode(&bytes).unwrap(), 0.0, 9);
-    let text: Vec<String> = found.told.iter().map(|d| format!("{}: {} / {}", d.path, d.expected, d.got)).collect();
+    let text: Vec<String> = found.listed.iter().map(|d| format!("{}: {} / {}", d.path, d.expected, d.got)).collect();
     assert_eq!(text, ["y: 0 / no such field", "z: no such field / 0.0"]);
 }
 
@@ -206,7 +206,7 @@ fn numbers_are_nearly_equal_by_the_greater_of_them_and_one() {
 
 #[test]
 fn times_need_no_definition() {
-    // So the Python library mcap-ros2-support writes definitions.
+    // The Python library mcap-ros2-support writes definitions like this.
     let text = "std_msgs/Header header\n===\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n";
     let full = format!("{text}===\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n");
     let parsed = |text: &str| format!("{:?}", Schema::parse("a/msg/A", text).unwrap());
@@ -215,35 +215,35 @@ fn times_need_no_definition() {
 }
 
 #[test]
-fn a_schema_that_cannot_be_used_says_why() {
+fn a_schema_that_cannot_be_used_gives_a_reason() {
     let of = |text: &str| Schema::parse("a/msg/A", text).unwrap_err().to_string();
     assert_eq!(of("b/B[] x"), "there is no definition of b/B");
-    assert_eq!(of("int32 x\nint32"), "the definition of a/A has the line `int32`, which is no field");
-    assert_eq!(of("int32 x\nint8 y\nfloat64 x"), "the definition of a/A has two fields called `x`");
+    assert_eq!(of("int32 x\nint32"), "the definition of a/A has the invalid line `int32`");
+    assert_eq!(of("int32 x\nint8 y\nfloat64 x"), "the definition of a/A has two fields named `x`");
     assert!(of("A[] again").contains("contains itself"), "{}", of("A[] again"));
     let chain: String = (0..1000).map(|n| format!("===\nMSG: a/T{n}\nT{} x\n", n + 1)).collect();
     assert!(of(&format!("T0 x\n{chain}")).contains("nested too deeply"));
     let channel = Channel { message_encoding: "ros1".into(), ..Default::default() };
     let error = Schema::of_channel(&channel).unwrap_err().to_string();
-    assert_eq!(error, "the message is encoded as `ros1`, and only `cdr` can be read");
+    assert_eq!(error, "the message is encoded as `ros1`; only `cdr` is supported");
     let channel = Channel { message_encoding: "cdr".into(), schema_name: "x/msg/X".into(), ..Default::default() };
     assert_eq!(Schema::of_channel(&channel).unwrap_err().to_string(), "there is no definition of x/msg/X");
     let known = Channel { schema_name: TagEstimates::NAME.into(), ..channel };
-    assert!(Schema::of_channel(&known).is_ok(), "a type of ours needs no schema in the log");
+    assert!(Schema::of_channel(&known).is_ok(), "a built-in type needs no schema in the log");
 }
 
 #[test]
-fn bytes_that_do_not_fit_name_the_field() {
+fn bytes_that_do_not_match_give_an_error_with_the_field() {
     let schema = Schema::parse("a/A", "b/B[] list\n===\nMSG: b/B\nstring name\nbool ok").unwrap();
     let of = |body: &[u8]| schema.decode(&[&[0, 1, 0, 0], body].concat()).unwrap_err().to_string();
     assert!(
-        of(&[9, 0, 0, 0, 1]).contains("no room for the 9 elements that it claims at `list`"),
+        of(&[9, 0, 0, 0, 1]).contains("the message is too short for 9 elements at `list`"),
         "{}",
         of(&[9, 0, 0, 0])
     );
-    assert!(of(&[1, 0, 0, 0, 9, 0, 0, 0, 65]).ends_with("it ends at `list[0].name`"));
-    assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0, 7]).ends_with("a truth value is 7 at `list[0].ok`"));
-    assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0xff, 1]).ends_with("the text is not UTF-8 at `list[0].name`"));
+    assert!(of(&[1, 0, 0, 0, 9, 0, 0, 0, 65]).ends_with("the message ends at `list[0].name`"));
+    assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0, 7]).ends_with("the boolean is 7 at `list[0].ok`"));
+    assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0xff, 1]).ends_with("the string is not UTF-8 at `list[0].name`"));
     assert!(of(&[0, 0, 0, 0, 1, 2, 3, 4]).contains("4 bytes are left"));
     assert_eq!(schema.decode(&[0, 1, 0]), Err(DecodeError::Encapsulation));
     assert_eq!(schema.decode(&[0, 7, 0, 0, 0]), Err(DecodeError::Encapsulation));

@@ -1,8 +1,8 @@
-//! The hash of a type, by which ROS 2 (from Iron) tells whether two programs mean the same by its name.
+//! The hash of a type, by which ROS 2 (since Iron) checks that two programs use the same definition.
 //!
-//! It is the SHA-256 of a description of the type and of all types that it uses, written as JSON in one certain way: version 1 of
-//! REP-2016 ("ROS 2 Interface Type Descriptions"), which `rosidl_generator_type_description` implements. Comments, constants and
-//! defaults are no part of it.
+//! It is the SHA-256 of a canonical JSON description of the type and of all types that it uses: version 1 of REP-2016
+//! ("ROS 2 Interface Type Descriptions"), as implemented by `rosidl_generator_type_description`. Comments, constants
+//! and default values are not included.
 
 use super::definition::{Count, Primitive};
 use super::schema::{Element, Field, MessageType, Schema};
@@ -10,17 +10,17 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The numbers of types, in `type_description_interfaces/msg/FieldType`.
+/// The ids of types in `type_description_interfaces/msg/FieldType`.
 const MESSAGE: u32 = 1;
 const BOUNDED_TEXT: u32 = 21;
 const BOUNDED_WIDE_TEXT: u32 = 22;
-/// What is added to these where a field holds several values.
+/// The offsets of these ids for fields with several values.
 const ARRAY: u32 = 48;
 const BOUNDED_SEQUENCE: u32 = 96;
 const SEQUENCE: u32 = 144;
 
 impl Schema {
-    /// The hash of the type, such as `RIHS01_` and 64 hexadecimal digits.
+    /// The hash of the type: `RIHS01_` and 64 hexadecimal digits.
     pub fn type_hash(&self) -> String {
         let description = self.description();
         let digits = Sha256::digest(description.as_bytes());
@@ -32,7 +32,7 @@ impl Schema {
 
     fn description(&self) -> String {
         let Some((root, used)) = self.types.split_last() else { return String::new() };
-        // By name, as the text of a type may come in any order.
+        // Sorted by name, since the text of a type may be in any order.
         let used: BTreeMap<String, &MessageType> = used.iter().map(|of| (long_name(of), of)).collect();
         let used: Vec<String> = used.into_values().map(|of| self.describe(of)).collect();
         let root = self.describe(root);
@@ -41,7 +41,7 @@ impl Schema {
 
     fn describe(&self, of: &MessageType) -> String {
         let fields: Vec<String> = match of.fields.is_empty() {
-            // What IDL, in which a structure has a member at least, makes of a message without fields.
+            // The member that IDL adds to a message without fields, since a structure has at least one member.
             true => vec![described("structure_needs_at_least_one_member", number(Primitive::U8), 0, 0, "")],
             false => of.fields.iter().map(|field| self.describe_field(field)).collect(),
         };
@@ -109,7 +109,7 @@ mod tests {
         Schema::parse(name, text).unwrap().type_hash()
     }
 
-    /// What ROS 2 Jazzy installs for its types, as `share/PACKAGE/msg/TYPE.json`; `ros2 topic info -v` shows it, too.
+    /// From the files `share/PACKAGE/msg/TYPE.json` of ROS 2 Jazzy; `ros2 topic info -v` shows the same.
     #[test]
     fn standard_types_have_the_hashes_that_ros_publishes() {
         for (name, expected) in [

@@ -1,36 +1,36 @@
-//! A decoded message as a tree.
+//! A decoded message as a tree of values.
 
 use std::fmt;
 
-/// A decoded message, or a part of one.
+/// A decoded message, or a part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value<'a> {
-    /// A number, a text or a truth value.
+    /// A number, a string or a boolean.
     Scalar(Scalar<'a>),
-    /// An array, of fixed length or not.
+    /// An array of fixed or variable length.
     Array(Array<'a>),
-    /// A message: its fields with their names, in the order of its definition.
+    /// A message: its fields with their names, in the order of the definition.
     Message(Vec<(&'a str, Value<'a>)>),
 }
 
-/// A number, a text or a truth value.
+/// A number, a string or a boolean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scalar<'a> {
-    /// A truth value.
+    /// A boolean.
     Bool(bool),
-    /// A whole number of a type with a sign.
+    /// A signed integer.
     Int(i64),
-    /// A whole number of a type without a sign.
+    /// An unsigned integer.
     Uint(u64),
-    /// A number of type `float32`.
+    /// A `float32`.
     F32(f32),
-    /// A number of type `float64`.
+    /// A `float64`.
     F64(f64),
-    /// A text.
+    /// A string.
     Text(&'a str),
 }
 
-/// The elements of an array, by their type.
+/// The elements of an array, by type.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Array<'a> {
@@ -46,12 +46,12 @@ pub enum Array<'a> {
     F32(Vec<f32>),
     F64(Vec<f64>),
     Text(Vec<&'a str>),
-    /// Each a [`Value::Message`].
+    /// Each is a [`Value::Message`].
     Messages(Vec<Value<'a>>),
 }
 
 impl<'a> Value<'a> {
-    /// The field of this name, if it is a message that has one.
+    /// The field with this name, if the value is a message that has one.
     pub fn field(&self, name: &str) -> Option<&Value<'a>> {
         match self {
             Self::Message(fields) => fields.iter().find(|(field, _)| *field == name).map(|(_, value)| value),
@@ -61,7 +61,7 @@ impl<'a> Value<'a> {
 }
 
 impl<'a> Array<'a> {
-    /// How many elements there are.
+    /// The number of elements.
     pub fn len(&self) -> usize {
         match self {
             Self::Bool(list) => list.len(),
@@ -80,12 +80,12 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// Whether there are none.
+    /// Whether the array is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// An element, unless there is none there or the elements are messages.
+    /// A scalar element; `None` if the index is out of range or the elements are messages.
     pub fn scalar(&self, at: usize) -> Option<Scalar<'a>> {
         Some(match self {
             Self::Bool(list) => Scalar::Bool(*list.get(at)?),
@@ -104,7 +104,7 @@ impl<'a> Array<'a> {
         })
     }
 
-    /// An element of any kind.
+    /// An element of any type.
     pub fn element(&self, at: usize) -> Option<Value<'a>> {
         match self {
             Self::Messages(list) => list.get(at).cloned(),
@@ -114,7 +114,7 @@ impl<'a> Array<'a> {
 }
 
 impl Scalar<'_> {
-    /// The number; `None` if it is none. Above 2^53 whole numbers are rounded.
+    /// The value as a number; `None` for a string. Integers above 2^53 are rounded.
     pub fn as_f64(&self) -> Option<f64> {
         match *self {
             Self::Int(number) => Some(number as f64),
@@ -140,9 +140,9 @@ impl fmt::Display for Scalar<'_> {
 }
 
 impl fmt::Display for Array<'_> {
-    /// The elements if they are few, and otherwise how many.
+    /// Shows the elements if they are few, and otherwise their number.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        /// A longer array is not written out.
+        /// The maximum number of elements that are shown.
         const LONGEST: usize = 16;
         let scalars = (0..self.len().min(LONGEST)).map_while(|at| self.scalar(at));
         match self.len() {

@@ -1,16 +1,16 @@
-//! The stage kind `foxglove_sink`: shows all that comes in to the Foxglove app while the run goes on.
+//! The stage kind `foxglove_sink`: shows all input messages in the Foxglove app during a run.
 //!
-//! It serves a WebSocket (`ws://HOST:PORT`), which Foxglove opens as "Foxglove WebSocket". The messages go there as they are,
-//! ROS 2 messages in CDR with their definitions, on the topics that a log would have them on.
+//! It serves a WebSocket (`ws://HOST:PORT`), which Foxglove opens as "Foxglove WebSocket". The messages are sent
+//! unchanged: ROS 2 messages in CDR with their definitions, on the topics that they would have in a log.
 //!
-//! Foxglove's protocol keeps nothing for those who come late. So the last message of each latched topic is kept here, and sent
-//! to whoever subscribes to it; of `/tf_static` all transforms are, the last to each frame. A viewer that is too slow
-//! gets fewer messages, the oldest of those that wait for it being dropped; nothing of the run waits for it.
+//! Foxglove's protocol has no latched topics. So the latest message of each latched topic is retained here, and sent to
+//! each client that subscribes to it; for `/tf_static`, the latest transform of each frame. For a slow client, the
+//! oldest messages in its queue are dropped; the run never waits for a client.
 //!
-//! What the stages of the run have done so far is told on a topic of its own, `/gridweave/stages`, once a second, as JSON with a
-//! schema; not with the engine `single`, which does not count while it runs.
+//! The progress of the stages is published on the topic `/gridweave/stages`, once a second, as JSON with a schema; not
+//! with the engine `single`, which does not count during the run.
 
-mod kept;
+mod retained;
 mod stage;
 mod statistics;
 
@@ -19,20 +19,21 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use stage::FoxgloveSink;
 
-/// Where Foxglove looks for a server unless it is told otherwise.
+/// The port that Foxglove connects to by default.
 pub const STANDARD_PORT: u16 = 8765;
-/// Programs of this machine alone can reach it.
+/// Only programs on this machine can connect.
 pub const STANDARD_HOST: &str = "127.0.0.1";
 
 /// The parameters of `foxglove_sink`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct FoxgloveParameters {
-    /// The address to serve on. Anybody who can reach it can read all that the run sends: `0.0.0.0` lets other machines in.
+    /// The address to serve on. Anybody who can connect can read all messages of the run; `0.0.0.0` allows connections
+    /// from other machines.
     host: String,
-    /// The port to serve on; 0 for one that is free, which is told with `-v`.
+    /// The port to serve on; 0 for a free port, which `-v` prints.
     port: u16,
-    /// For each viewer so many messages may wait; above that the oldest are dropped.
+    /// The maximum number of queued messages per client; beyond it the oldest are dropped.
     #[schemars(range(min = 1, max = 100_000))]
     backlog: usize,
 }
@@ -54,8 +55,8 @@ impl Parameters for FoxgloveParameters {
 pub fn kind() -> StageKind {
     StageKind::stage(
         "foxglove_sink",
-        "Shows messages of any type to the Foxglove app while the run goes on, over a WebSocket that it serves. Who comes late \
-         gets the last message of each latched topic at once, and nobody slows the run.",
+        "Shows messages of any type in the Foxglove app during the run, over a WebSocket server. A client that joins late \
+         gets the latest message of each latched topic at once, and no client slows the run.",
         FoxgloveSink::new,
     )
     .any_inputs("messages", "what to show", FoxgloveSink::receive)

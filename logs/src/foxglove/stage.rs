@@ -1,7 +1,7 @@
-//! The stage around the server.
+//! The stage around the Foxglove server.
 
 use super::FoxgloveParameters;
-use super::kept::KeptMessages;
+use super::retained::RetainedMessages;
 use super::statistics::Statistics;
 use crate::qos::is_transient_local;
 use crate::reader::SupplementKind;
@@ -22,19 +22,19 @@ struct Shown {
     is_latched: bool,
 }
 
-/// Shows messages to Foxglove.
+/// Sends messages to Foxglove.
 pub(super) struct FoxgloveSink {
-    /// None once it has ended.
+    /// `None` after the end.
     server: Option<WebSocketServerHandle>,
-    /// The channels that are served. They go with it.
+    /// The served channels, which are closed on drop.
     context: Arc<foxglove::Context>,
-    kept: KeptMessages,
+    retained: RetainedMessages,
     statistics: Statistics,
     result_topics: ResultTopics,
     given_frames: GivenFrames,
     inputs: Vec<InputWire>,
     shown: Vec<Shown>,
-    /// By wire and number: numbers are given by each source for itself. None is not shown.
+    /// By wire and number, since each source numbers its channels itself. `None` is not shown.
     announced: BTreeMap<(usize, u32), Option<usize>>,
     /// By wire and topic.
     results: BTreeMap<(usize, FixedText<128>), Option<usize>>,
@@ -43,21 +43,21 @@ pub(super) struct FoxgloveSink {
 impl FoxgloveSink {
     pub(super) fn new(parameters: FoxgloveParameters, context: &Context) -> Result<Self, StageError> {
         let FoxgloveParameters { host, port, backlog } = parameters;
-        let (channels, kept) = (foxglove::Context::new(), KeptMessages::default());
+        let (channels, retained) = (foxglove::Context::new(), RetainedMessages::default());
         let server = WebSocketServer::new()
             .name("gridweave")
             .context(&channels)
-            .listener(Arc::new(kept.clone()))
+            .listener(Arc::new(retained.clone()))
             .message_backlog_size(backlog)
             .bind(host.as_str(), port)
             .start_blocking()
             .map_err(|error| cannot_serve(&host, port, &error))?;
-        tracing::info!("Foxglove can open ws://{host}:{}", server.port());
+        tracing::info!("serving Foxglove on ws://{host}:{}", server.port());
         Ok(Self {
             server: Some(server),
-            statistics: Statistics::start(context.statistics.clone(), &channels, kept.clone()),
+            statistics: Statistics::start(context.statistics.clone(), &channels, retained.clone()),
             context: channels,
-            kept,
+            retained,
             result_topics: ResultTopics::new(context),
             given_frames: GivenFrames::new(context),
             inputs: context.inputs.clone(),
@@ -67,7 +67,7 @@ impl FoxgloveSink {
         })
     }
 
-    /// The topic of a channel; equal channels share one. None if it cannot be shown.
+    /// The topic of a channel; equal channels share one. `None` if it cannot be shown.
     fn show(&mut self, channel: Channel) -> Option<usize> {
         if let Some(place) = self.shown.iter().position(|shown| shown.channel == channel) {
             return Some(place);
@@ -111,13 +111,13 @@ impl FoxgloveSink {
                 }
             }
             output.count("messages", 1);
-            self.kept.send(raw, *is_latched, header.log_time.0, &bytes);
+            self.retained.send(raw, *is_latched, header.log_time.0, &bytes);
             self.statistics.log_time.store(header.log_time.0, Ordering::Relaxed);
         }
         Ok(())
     }
 
-    /// The topic of what a stage has made. What has no type is not shown.
+    /// The topic of a result of a stage; `None` if it has no type.
     fn result(&mut self, message: &Message) -> Option<usize> {
         let key = (message.wire(), message.header().topic);
         if let Some(&place) = self.results.get(&key) {
@@ -131,11 +131,11 @@ impl FoxgloveSink {
         place
     }
 
-    /// Ends the connections of all viewers.
+    /// Closes all connections.
     pub(super) fn close(&mut self) {
         self.statistics.end();
         if let Some(server) = self.server.take() {
-            // Without waiting for them: one that does not read could keep the run from its end.
+            // Does not wait for clients: one that does not read could block the end of the run.
             drop(server.stop());
         }
     }

@@ -1,4 +1,4 @@
-//! How the clocks of robots go: the stamps in their messages against the times that they were logged at.
+//! The clocks of robots: the stamps of their messages compared with the log times.
 
 use super::TopicInfo;
 use crate::schemas::full_type_name;
@@ -7,28 +7,28 @@ use gridweave_runtime::ros::{Header, RosMessage, TFMessage, decode};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A clock that differs by less, seconds, may be that of the log: messages are on their way for a while.
+/// A smaller offset, seconds, may be the latency of messages.
 const NOTABLE: f64 = 5.0;
-/// A clock that drifts by less, seconds over the whole log, goes right.
+/// A smaller drift over the whole log, seconds, is not reported.
 const NOTABLE_DRIFT: f64 = 0.5;
 
-/// The beginning of a message with a header.
+/// The leading header of a message.
 #[derive(Deserialize)]
 struct Start {
     header: Header,
 }
 
-/// The header of a message, read as its type begins.
+/// The location of the header in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HeaderPlace {
-    /// It is the first field.
+    /// The first field.
     First,
-    /// It has none, or nobody knows.
+    /// There is none, or the definition is unknown.
     Nowhere,
 }
 
 impl HeaderPlace {
-    /// Of the messages of a channel.
+    /// The location of the header in a channel's messages.
     pub(super) fn of(channel: &Channel) -> Self {
         let text = String::from_utf8_lossy(&channel.schema);
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
@@ -38,7 +38,7 @@ impl HeaderPlace {
         if is_cdr && is_header { Self::First } else { Self::Nowhere }
     }
 
-    /// The header of a message.
+    /// Reads the header of a message.
     pub(super) fn read(self, message: &[u8]) -> Option<Header> {
         match self {
             Self::First => decode::<Start>(message).ok().map(|start| start.header),
@@ -47,19 +47,19 @@ impl HeaderPlace {
     }
 }
 
-/// How far a clock is ahead of that of the log.
+/// The offset of a clock from the log's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ClockInfo {
     /// Seconds at the first message.
     pub first: f64,
     /// Seconds at the last message.
     pub last: f64,
-    /// How many messages have a stamp.
+    /// The number of messages with a stamp.
     pub messages: u64,
 }
 
 impl ClockInfo {
-    /// Takes up a stamp, of a clock that was set `later` by so many nanoseconds. One of zero stands for no time.
+    /// Adds a stamp from a clock that was shifted `later` by nanoseconds. A zero stamp is "no time" and is ignored.
     pub(super) fn add(&mut self, header: &Header, log_time: LogTime, later: i64) {
         if header.stamp.sec == 0 && header.stamp.nanosec == 0 {
             return;
@@ -73,8 +73,8 @@ impl ClockInfo {
         self.messages += 1;
     }
 
-    /// What the user should know of it; nothing if it goes as the log's does.
-    fn remark(&self, robot: &str) -> Option<String> {
+    /// A note for the user; `None` if the clock agrees with the log's.
+    fn note(&self, robot: &str) -> Option<String> {
         let drift = self.last - self.first;
         let is_off = self.first.abs() > NOTABLE || self.last.abs() > NOTABLE;
         if !is_off && drift.abs() <= NOTABLE_DRIFT {
@@ -86,12 +86,12 @@ impl ClockInfo {
             false => String::new(),
         };
         let first = period(self.first.abs());
-        Some(format!("the stamps of {robot} are {first} {direction} the times that its messages were logged at{drift}"))
+        Some(format!("the stamps of {robot} are {first} {direction} the log times of its messages{drift}"))
     }
 }
 
-/// What is to be told of the clocks of robots, from their topics.
-pub(super) fn remarks<'a>(topics: impl Iterator<Item = (&'a str, &'a TopicInfo)>) -> Vec<String> {
+/// Notes for the user about the clocks of robots, from their topics.
+pub(super) fn notes<'a>(topics: impl Iterator<Item = (&'a str, &'a TopicInfo)>) -> Vec<String> {
     let mut clocks: BTreeMap<&str, ClockInfo> = BTreeMap::new();
     let mut spans: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
     for (robot, topic) in topics.filter(|(robot, topic)| !robot.is_empty() && topic.messages > 0) {
@@ -104,23 +104,23 @@ pub(super) fn remarks<'a>(topics: impl Iterator<Item = (&'a str, &'a TopicInfo)>
         let span = spans.entry(robot).or_insert((topic.first, topic.last));
         *span = (span.0.min(topic.first), span.1.max(topic.last));
     }
-    let mut remarks: Vec<String> = clocks.iter().filter_map(|(robot, clock)| clock.remark(robot)).collect();
+    let mut notes: Vec<String> = clocks.iter().filter_map(|(robot, clock)| clock.note(robot)).collect();
     let mut in_order: Vec<(&str, (f64, f64))> = spans.into_iter().collect();
     in_order.sort_by(|one, other| one.1.0.total_cmp(&other.1.0));
     for pair in in_order.windows(2) {
         let [(one, (_, end)), (other, (start, _))] = pair else { continue };
         if start > end {
-            remarks.push(format!(
-                "nothing of {other} was logged before {} after the end of {one}: if they drove at the same time, their clocks have \
-                 nothing in common, and `--align-start` lays the starts of their logs together",
+            notes.push(format!(
+                "the log of {other} starts {} after the end of {one}: if the robots drove at the same time, their clocks are \
+                 unrelated; `--align-start` aligns the starts of their logs",
                 period(start - end)
             ));
         }
     }
-    remarks
+    notes
 }
 
-/// A number of seconds for people.
+/// A duration for people.
 fn period(seconds: f64) -> String {
     match seconds.abs() {
         60.0..3600.0 => format!("{:.1} minutes", seconds / 60.0),
@@ -141,21 +141,21 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_differ_or_drift_are_told_and_others_are_not() {
-        let told = |one: &TopicInfo, other: &TopicInfo| remarks([("a", one), ("b", other)].into_iter()).join("; ");
+    fn clocks_with_an_offset_or_drift_are_reported_and_others_are_not() {
+        let report = |one: &TopicInfo, other: &TopicInfo| notes([("a", one), ("b", other)].into_iter()).join("; ");
         let right = topic(100.0, 200.0, Some((0.1, -0.1)));
-        assert_eq!(told(&right, &right), "");
-        let text = told(&right, &topic(100.0, 200.0, Some((-7200.0, -7200.0))));
-        assert_eq!(text, "the stamps of b are 2.0 hours behind the times that its messages were logged at");
-        let text = told(&right, &topic(100.0, 200.0, Some((0.0, 2.0))));
+        assert_eq!(report(&right, &right), "");
+        let text = report(&right, &topic(100.0, 200.0, Some((-7200.0, -7200.0))));
+        assert_eq!(text, "the stamps of b are 2.0 hours behind the log times of its messages");
+        let text = report(&right, &topic(100.0, 200.0, Some((0.0, 2.0))));
         assert!(text.contains("0.00 s ahead of") && text.contains("and 2.00 s by the end"), "{text}");
-        let text = told(&right, &topic(3e8, 3e8 + 100.0, None));
-        assert!(text.contains("nothing of b was logged before 9.5 years after the end of a"), "{text}");
+        let text = report(&right, &topic(3e8, 3e8 + 100.0, None));
+        assert!(text.contains("the log of b starts 9.5 years after the end of a"), "{text}");
         assert!(text.contains("--align-start"));
     }
 
     #[test]
-    fn a_stamp_is_held_against_the_time_of_the_log_to_the_nanosecond() {
+    fn a_stamp_is_compared_with_the_log_time_to_the_nanosecond() {
         let mut clock = ClockInfo::default();
         clock.add(&Header::new(LogTime(0), "a"), LogTime(5), 0);
         assert_eq!(clock.messages, 0, "no time");

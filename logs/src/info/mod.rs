@@ -1,4 +1,4 @@
-//! What is in a log: topics, robots, and what is wrong with it.
+//! The contents of logs: topics, robots, and problems.
 
 mod clocks;
 mod robots;
@@ -23,124 +23,125 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// What is in one or more logs. Times are seconds since the epoch of the logs.
+/// The contents of one or more logs. Times are seconds since the epoch.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogInfo {
-    /// The files, in the order given.
+    /// The files, in the given order.
     pub files: Vec<FileInfo>,
-    /// How many messages there are.
+    /// The number of messages.
     pub messages: u64,
-    /// When the first one was logged; `None` if there is none.
+    /// The log time of the first message; `None` without messages.
     pub start: Option<f64>,
-    /// When the last one was logged.
+    /// The log time of the last message.
     pub end: Option<f64>,
     /// Seconds from the first message to the last.
     pub duration: f64,
-    /// Whether only the index and a few messages were read. Then sizes are estimates; and frames, clocks, tags and poses from
-    /// transforms are those of these messages.
+    /// Whether only the index and a few messages were read. Then sizes are estimates, and frames, clocks, tags and
+    /// poses from transforms are those of these messages.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub is_sampled: bool,
     /// The topics, by name and then by type.
     pub topics: Vec<TopicInfo>,
-    /// How robots were named without being asked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub remark: Option<String>,
-    /// What was recognised of each robot.
+    /// A note about robot names that were inferred.
+    #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+    /// The robots.
     pub robots: BTreeMap<String, RobotInfo>,
-    /// What stands in the way of using the logs, or of merging the robots' maps.
+    /// Problems with reading the logs or merging the robots' maps.
     pub problems: Vec<String>,
 }
 
-/// One file of a log.
+/// A log file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FileInfo {
-    /// Its path.
+    /// The path.
     pub path: PathBuf,
-    /// What it is: `MCAP` or `SQLite`, and whether it is packed.
+    /// The container, such as `MCAP` or `SQLite`, and whether it is compressed.
     pub container: String,
-    /// The robot that all of it was put under.
+    /// The robot that the whole file was put under.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// Its size in bytes.
+    /// The size in bytes.
     pub size: u64,
-    /// How many messages were read from it.
+    /// The number of messages that were read.
     pub messages: u64,
-    /// How many chunks it has; 0 if its messages are not in chunks.
+    /// The number of chunks; 0 if messages are not in chunks.
     pub chunks: usize,
-    /// How its chunks are compressed: `none`, `lz4`, `zstd`.
+    /// The compressions of the chunks: `none`, `lz4`, `zstd`.
     pub compression: Vec<String>,
-    /// The run that wrote it, if that is a log of Gridweave.
+    /// The run that wrote the file, if it is a log of Gridweave.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<RunInfo>,
-    /// The names of its metadata records, but for those of its run.
+    /// The names of its metadata records, except those about its run.
     #[serde(skip_serializing_if = "BTreeSet::is_empty")]
     pub metadata: BTreeSet<String>,
-    /// How many attachments it has.
+    /// The number of attachments.
     pub attachments: usize,
-    /// What is wrong with it, and how often.
+    /// Descriptions of the damage, with the number of times each occurred.
     pub damage: BTreeMap<String, u64>,
 }
 
-/// One topic of a log.
+/// A topic.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TopicInfo {
-    /// Its name, under that of its robot.
+    /// The name, under its robot.
     pub topic: String,
-    /// The names that it has in the logs.
+    /// The names in the logs.
     pub logged: BTreeSet<String>,
-    /// The type of its messages; empty if the log does not tell.
+    /// The message type; empty if the log does not contain it.
     #[serde(rename = "type")]
     pub type_name: String,
-    /// How its messages are encoded, `cdr` for ROS 2.
+    /// The message encoding, `cdr` for ROS 2.
     pub encoding: String,
-    /// How many messages there are.
+    /// The number of messages.
     pub messages: u64,
-    /// Bytes of the messages, uncompressed.
+    /// The size of the messages, uncompressed, bytes.
     pub bytes: u64,
-    /// When the first one was logged.
+    /// The log time of the first message.
     pub first: f64,
-    /// When the last one was logged.
+    /// The log time of the last message.
     pub last: f64,
-    /// How many there are in a second, from the first to the last; none of a single one.
+    /// The mean number of messages per second, from the first to the last; `None` for a single one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<f64>,
-    /// The longest time between two that follow each other, seconds.
+    /// The longest time between consecutive messages, seconds.
     pub largest_gap: f64,
-    /// What the log says of their quality of service: `latched`, `reliable` or `best effort`; empty if it says nothing.
+    /// The quality of service: `latched`, `reliable` or `best effort`; empty if unknown.
     pub qos: String,
-    /// The frames that their headers name, ten at most.
+    /// The frames in the headers, at most ten.
     #[serde(skip_serializing_if = "BTreeSet::is_empty")]
     pub frames: BTreeSet<String>,
-    /// How far the stamps of their headers are ahead of the times that they were logged at.
+    /// The offset of the stamps in the headers from the log times.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock: Option<ClockInfo>,
 }
 
-/// Of a topic so many frames are told.
+/// The maximum number of frames listed for a topic.
 const MOST_FRAMES: usize = 10;
 
-/// Reads logs through, and says what is in them. `rules` say what topics are called, and `robots` how they are told apart.
+/// Reads logs completely and returns their contents. `rules` name the topics, and `robots` are the topic patterns.
 ///
 /// # Errors
-/// A log cannot be read, or the rules do not fit what is in them.
+/// A log cannot be read, or the rules do not match the logs.
 pub fn inspect(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<LogInfo, NameError> {
     look(inputs, rules, robots, u64::MAX)
 }
 
-/// The same, but of logs that are large and have an index that is whole only the index is read and a few messages.
+/// The same, but reads only the index and a few messages of large logs with an intact index.
 ///
 /// # Errors
-/// A log cannot be read, or the rules do not fit what is in them.
+/// A log cannot be read, or the rules do not match the logs.
 pub fn glance(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<LogInfo, NameError> {
     look(inputs, rules, robots, LARGE)
 }
 
-/// Logs of fewer bytes are always read through.
+/// Logs with fewer bytes are always read completely.
 const LARGE: u64 = 64 << 20;
-/// Of a large log the messages in so many blocks are read, at its beginning and at its end, and in those in which a topic begins.
+/// The number of blocks that are read at the beginning and at the end of a large log, in addition to those in which a
+/// topic begins.
 const SAMPLE: usize = 2;
 
-/// Says what is in logs. Those of more than `large` bytes are not read through if their index is whole.
+/// Inspects logs. Those with more than `large` bytes are not read completely if their index is intact.
 fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -> Result<LogInfo, NameError> {
     let (mut reader, names) = names::open(inputs, rules, robots)?;
     let files = reader.files().clone();
@@ -150,7 +151,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         reader.sample(SAMPLE);
     }
     let mut info = LogInfo { is_sampled, files: files.iter().map(file_info).collect(), ..Default::default() };
-    info.remark = names.remark().map(str::to_owned);
+    info.note = names.note().map(str::to_owned);
     for (number, file) in info.files.iter_mut().enumerate() {
         file.robot = names.robot_of_file(number).map(str::to_owned);
     }
@@ -191,7 +192,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         topic.last = time.seconds();
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
-        // Where frames are looked at, they are to have the names that a merge gives them.
+        // The frames must have the names that a merge gives them.
         let is_renamed =
             survey.looks_at_frames(*role, robot) && names.rename_frames(&message, &mut renamed) == Renamed::Copied;
         survey.take(*role, robot, &topic.topic, if is_renamed { &renamed } else { message.data });
@@ -205,7 +206,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         info.duration = last.seconds_since(first);
     }
     let robots = topics.entries.iter().map(|entry| (entry.robot.as_str(), &entry.info));
-    let clocks = clocks::remarks(robots);
+    let clocks = clocks::notes(robots);
     let finished = |Entry { mut info, .. }: Entry| {
         let seconds = info.last - info.first;
         info.rate = (info.messages > 1 && seconds > 0.0).then(|| (info.messages - 1) as f64 / seconds);
@@ -219,11 +220,11 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     Ok(info)
 }
 
-/// Whether logs hold tags that robots have read or seen, but no map of any robot: then there is nothing to merge but frames.
-/// Nothing but the channels is looked at.
+/// Whether logs contain tag readings and no map or scans of any robot, so that only frames can be merged. Only the
+/// channels are read.
 ///
 /// # Errors
-/// A log cannot be read, or the rules do not fit what is in them.
+/// A log cannot be read, or the rules do not match the logs.
 pub fn holds_tags_alone(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<bool, NameError> {
     let (_, names) = names::open(inputs, rules, robots)?;
     let channels = RobotChannels::new(robots.clone(), names.channels());
@@ -232,11 +233,15 @@ pub fn holds_tags_alone(inputs: &[Input], rules: &NameRules, robots: &RobotTopic
     Ok(holds_tags && !roles.contains(&Role::Map) && !roles.contains(&Role::Scan))
 }
 
-/// The robots of logs that have scans and no map, by name: their maps can be drawn. Nothing but the channels is looked at.
+/// The robots with scans and without maps, by name; maps can be built from their scans. Only the channels are read.
 ///
 /// # Errors
-/// A log cannot be read, or the rules do not fit what is in them.
-pub fn robots_to_draw(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<Vec<String>, NameError> {
+/// A log cannot be read, or the rules do not match the logs.
+pub fn robots_with_scans_only(
+    inputs: &[Input],
+    rules: &NameRules,
+    robots: &RobotTopics,
+) -> Result<Vec<String>, NameError> {
     let (_, names) = names::open(inputs, rules, robots)?;
     let channels = RobotChannels::new(robots.clone(), names.channels());
     Ok(channels.scanned().map(str::to_owned).collect())
@@ -271,9 +276,9 @@ impl FileInfo {
     }
 }
 
-/// The topics met so far. Channels that agree in topic, type and encoding are one.
+/// The topics found so far. Channels with equal topic, type and encoding are one topic.
 struct Topics {
-    /// For every file and channel number: the index of the entry, once it is known.
+    /// By file and channel number: the index of the entry, once known.
     known: Vec<Vec<Option<usize>>>,
     entries: Vec<Entry>,
 }
@@ -286,8 +291,8 @@ struct Entry {
 }
 
 impl Topics {
-    /// Puts what the indexes say of all messages in place of what a sample of them has told. Gives the times of the first and the
-    /// last.
+    /// Replaces the sampled statistics by those of all messages, from the indexes. Returns the times of the first and
+    /// the last message.
     fn complete(
         &mut self,
         files: &[LogFile],
@@ -316,7 +321,7 @@ impl Topics {
                     0 => {
                         (topic.first, topic.last, topic.largest_gap) = (first.seconds(), last.seconds(), gap);
                     }
-                    // The files of a split bag follow each other.
+                    // The files of a split bag are consecutive.
                     _ => {
                         topic.largest_gap = topic.largest_gap.max(gap).max(first.seconds() - topic.last);
                         topic.first = topic.first.min(first.seconds());

@@ -1,4 +1,4 @@
-//! What a log holds of each robot.
+//! The contents of a log by robot.
 
 use super::LogInfo;
 use crate::robots::{Classified, InferredPoses, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance};
@@ -10,26 +10,26 @@ use gridweave_runtime::stage::RobotTopics;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a log holds of one robot.
+/// The contents of a log for one robot.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RobotInfo {
-    /// The topics that were recognised as the robot's.
+    /// The robot's topics.
     pub topics: BTreeSet<String>,
-    /// How many maps there are.
+    /// The number of maps.
     pub maps: u64,
-    /// How many updates of parts of maps there are.
+    /// The number of map updates.
     pub map_updates: u64,
-    /// How many scans there are, if there are no maps: these would be drawn from them.
+    /// The number of scans, if there are no maps: a map would be built from them.
     #[serde(skip_serializing_if = "is_zero")]
     pub scans: u64,
-    /// How many poses there are, or can be made from other messages.
+    /// The number of poses, including those derived from other messages.
     pub poses: u64,
-    /// What they are taken from: a topic, or frames of tf; `None` if there are none.
+    /// The source of the poses: a topic, or frames of tf; `None` without poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses_from: Option<String>,
-    /// How many range readings of tags there are.
+    /// The number of tag readings.
     pub readings: u64,
-    /// The tags that were read, and how often.
+    /// The tags, and the number of readings of each.
     pub tags: BTreeMap<String, u64>,
 }
 
@@ -37,7 +37,7 @@ fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
-/// The fields of a range reading up to the tag's name.
+/// The leading fields of a tag range, up to the tag's id.
 #[derive(Deserialize)]
 struct TagRangeStart {
     #[serde(rename = "header")]
@@ -45,26 +45,26 @@ struct TagRangeStart {
     tag_id: String,
 }
 
-/// Takes up messages one by one.
+/// Collects the contents of a log by robot, one message at a time.
 pub(super) struct RobotSurvey {
     topics: RobotTopics,
     roles: RobotChannels,
     mismatches: BTreeSet<String>,
-    /// Topics with maps that were not recognised as a robot's.
+    /// Topics with maps that belong to no robot.
     other_maps: BTreeSet<String>,
     robots: BTreeMap<String, RobotInfo>,
     tf: Option<TfPoses>,
     inferred: InferredPoses,
-    /// Odometry in frames of its own: the topic, by robot.
+    /// Odometry in a frame other than the map frame: the topic, by robot.
     odometry: BTreeMap<String, String>,
     /// By topic.
     tag_readers: BTreeMap<String, TagReader>,
-    /// Messages that do not fit their type, by topic.
+    /// The number of messages that do not match their type, by topic.
     unreadable: BTreeMap<String, u64>,
 }
 
 impl RobotSurvey {
-    /// For logs with these channels.
+    /// Creates a survey of logs with these channels.
     pub(super) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
         let roles = RobotChannels::new(topics.clone(), channels);
         Self {
@@ -81,7 +81,7 @@ impl RobotSurvey {
         }
     }
 
-    /// What a channel carries, and of which robot.
+    /// The role of a channel, and its robot.
     pub(super) fn classify(&mut self, channel: &Channel) -> (Role, String) {
         let Classified { role, robot, mismatch } = self.roles.classify(channel);
         self.mismatches.extend(mismatch);
@@ -101,7 +101,7 @@ impl RobotSurvey {
         (role, robot.to_owned())
     }
 
-    /// Whether it matters what the frames in a message of this role and robot are called.
+    /// Whether the frame names in messages of this role and robot are needed.
     pub(super) fn looks_at_frames(&self, role: Role, robot: &str) -> bool {
         match role {
             Role::Tf | Role::Odometry => true,
@@ -110,7 +110,7 @@ impl RobotSurvey {
         }
     }
 
-    /// Takes up a message on a channel with the given role, robot and topic.
+    /// Adds a message of a channel with the given role, robot and topic.
     pub(super) fn take(&mut self, role: Role, robot: &str, topic: &str, data: &[u8]) {
         if role == Role::Tf {
             return self.take_tf(robot, topic, data);
@@ -161,7 +161,7 @@ impl RobotSurvey {
         }
     }
 
-    /// Counts messages with the given role, robot and topic that were not looked into.
+    /// Adds a number of unread messages with the given role, robot and topic.
     pub(super) fn add(&mut self, role: Role, robot: &str, topic: &str, messages: u64) {
         let Some(info) = self.robots.get_mut(robot) else { return };
         match role {
@@ -170,7 +170,7 @@ impl RobotSurvey {
             Role::Scan => info.scans += messages,
             Role::Pose(_) => info.poses += messages,
             Role::Odometry if info.poses_from.as_deref() == Some(topic) => info.poses += messages,
-            // A message of tags holds one reading or more.
+            // A message contains one tag reading or more.
             Role::Tags | Role::TagMessage => info.readings += messages,
             _ => {}
         }
@@ -199,7 +199,7 @@ impl RobotSurvey {
         }
     }
 
-    /// What stands in the way of using the logs, in the order in which one would mend it.
+    /// Problems with reading the logs or merging the maps, in the order in which they should be fixed.
     pub(super) fn problems(&self, info: &LogInfo) -> Vec<String> {
         let mut problems = Vec::new();
         for file in &info.files {
@@ -215,7 +215,7 @@ impl RobotSurvey {
         }
         problems.extend(self.mismatches.iter().cloned());
         for (topic, count) in &self.unreadable {
-            problems.push(format!("{count} messages on `{topic}` do not fit their type"));
+            problems.push(format!("{count} messages on `{topic}` do not match their type"));
         }
         let robots = &self.robots;
         if robots.values().all(|robot| robot.maps == 0 && robot.scans == 0) {
@@ -223,7 +223,7 @@ impl RobotSurvey {
                 true => "; there is no occupancy grid at all".to_owned(),
                 false => {
                     let topics: Vec<_> = self.other_maps.iter().map(String::as_str).collect();
-                    format!("; there are occupancy grids on {}: set `robots.map` to fit them", topics.join(", "))
+                    format!("; there are occupancy grids on {}: set `robots.map` to match them", topics.join(", "))
                 }
             };
             problems.push(format!("no map was recognised: no topic fits `{}`{elsewhere}", self.topics.map));
@@ -231,10 +231,10 @@ impl RobotSurvey {
         if let [robot] = robots.keys().collect::<Vec<_>>()[..] {
             problems.push(format!("there is one robot only, {robot}: nothing to merge"));
         }
-        let told = self.inferred.missing();
+        let missing_poses = self.inferred.missing();
         let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {
             let lacks = |(name, robot): &(&String, &RobotInfo)| {
-                what(robot) == 0 && !(kind == "pose" && told.contains_key(name.as_str()))
+                what(robot) == 0 && !(kind == "pose" && missing_poses.contains_key(name.as_str()))
             };
             let names = robots.iter().filter(lacks).map(|(name, _)| name.as_str());
             names.collect::<Vec<_>>().join(", ")
@@ -247,32 +247,33 @@ impl RobotSurvey {
         ];
         for (what, count) in kinds {
             let names = lacking(what, count);
-            let already_told = what == "map" && robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
-            if !names.is_empty() && !already_told {
+            let already_reported = what == "map" && robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
+            if !names.is_empty() && !already_reported {
                 problems.push(format!("there is no {what} of {names}"));
             }
         }
-        problems.extend(told.into_values());
-        problems
-            .extend(robots.iter().filter(|(_, robot)| robot.scans > 0).map(|(name, robot)| self.drawing(name, robot)));
+        problems.extend(missing_poses.into_values());
+        problems.extend(
+            robots.iter().filter(|(_, robot)| robot.scans > 0).map(|(name, robot)| self.built_map(name, robot)),
+        );
         problems
     }
 
-    /// How the map of a robot would be drawn that has none.
-    fn drawing(&self, name: &str, robot: &RobotInfo) -> String {
+    /// A description of the map that would be built for a robot without one.
+    fn built_map(&self, name: &str, robot: &RobotInfo) -> String {
         let poses = robot.poses_from.clone().or_else(|| self.inferred.origin(name)).filter(|_| robot.poses > 0);
         let by_topic = self.odometry.get(name).map(|topic| format!("`{topic}`"));
         let how = match (poses, by_topic.or_else(|| self.inferred.odometry_origin(name))) {
             (Some(poses), _) => {
-                format!("draws one from its {} scans, at the poses of {poses}; a SLAM does better", robot.scans)
+                format!("builds one from its {} scans, at the poses of {poses}; a SLAM is better", robot.scans)
             }
             (None, Some(odometry)) => format!(
-                "draws one from its {} scans, each matched with those before it along {odometry}: it drifts, and a full SLAM \
+                "builds one from its {} scans, each matched with those before it along {odometry}: it drifts, and a full SLAM \
                  is better",
                 robot.scans
             ),
             (None, None) => {
-                format!("cannot draw one from its {} scans, as nothing says where it was", robot.scans)
+                format!("cannot build one from its {} scans without poses or odometry", robot.scans)
             }
         };
         format!("there is no map of {name}: `merge` {how}")

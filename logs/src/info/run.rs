@@ -1,4 +1,4 @@
-//! What a log says of the run that wrote it.
+//! The run that wrote a log, as recorded in the log.
 
 use crate::reader::LogFile;
 use crate::reader::OUTCOME_RECORD;
@@ -12,12 +12,12 @@ pub struct RunInfo {
     pub version: String,
     /// The pipeline with all its parameters and its seed, as the text of a pipeline file.
     pub pipeline: String,
-    /// The files that were read; none if the run has not come to its end.
+    /// The input files; empty if the run did not complete.
     pub inputs: Vec<InputFile>,
 }
 
 impl RunInfo {
-    /// What a log says; nothing if it is not of Gridweave.
+    /// Reads the record about the run; `None` if the log is not from Gridweave.
     pub(super) fn of(file: &LogFile) -> Option<Self> {
         let run = file.metadata(RUN_RECORD)?;
         let text = |key: &str| run.get(key).cloned().unwrap_or_default();
@@ -30,7 +30,7 @@ impl RunInfo {
     }
 }
 
-/// Whether a metadata record is one that a run of Gridweave writes of itself.
+/// Whether a metadata record is about the run that wrote it.
 pub(super) fn is_of_run(name: &str) -> bool {
     [RUN_RECORD, INPUTS_RECORD, OUTCOME_RECORD].contains(&name)
 }

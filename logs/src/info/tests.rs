@@ -27,7 +27,7 @@ fn inspect_bytes(bytes: &[u8]) -> LogInfo {
 }
 
 #[test]
-fn topics_robots_and_times_are_told() {
+fn topics_robots_and_times_are_reported() {
     let info = inspect_bytes(&two_robots().finish());
     assert_eq!((info.messages, info.start, info.end, info.duration), (10, Some(1.0), Some(5.0), 4.0));
     assert_eq!(info.topics.len(), 6);
@@ -43,7 +43,7 @@ fn topics_robots_and_times_are_told() {
 }
 
 #[test]
-fn what_stands_in_the_way_of_a_merge_is_told() {
+fn problems_for_a_merge_are_reported() {
     let mut log = TestLog::new(layouts()[0].clone());
     log.add("/r/slam/map", OccupancyGrid::NAME, 1, &OccupancyGrid::default())
         .add("/r/tag_ranges", TagRange::NAME, 2, &reading("a"))
@@ -67,7 +67,7 @@ fn what_stands_in_the_way_of_a_merge_is_told() {
 }
 
 #[test]
-fn a_log_whose_run_ended_early_says_so() {
+fn a_log_whose_run_ended_early_is_reported() {
     let folder = Folder::new();
     let path = folder.path().join("a.mcap");
     for (outcome, expected) in [
@@ -77,13 +77,13 @@ fn a_log_whose_run_ended_early_says_so() {
         let log = LogWriter::create(&path, LogOptions::default()).unwrap();
         log.finish(outcome).unwrap();
         let info = inspect(&[Input::new(&path)], &NameRules::default(), &RobotTopics::default()).unwrap();
-        let said = info.problems.iter().any(|problem| problem.contains(expected.unwrap_or("ended early")));
-        assert_eq!(said, expected.is_some(), "{:?}", info.problems);
+        let text = info.problems.iter().any(|problem| problem.contains(expected.unwrap_or("ended early")));
+        assert_eq!(text, expected.is_some(), "{:?}", info.problems);
     }
 }
 
 #[test]
-fn where_poses_come_from_is_told() {
+fn the_source_of_poses_is_reported() {
     use gridweave_runtime::message::LogTime;
     use gridweave_runtime::ros::{Header, Odometry, PoseWithCovariance, TFMessage, TransformStamped};
     let mut log = TestLog::new(layouts()[3].clone());
@@ -103,15 +103,15 @@ fn where_poses_come_from_is_told() {
     let info = inspect_bytes(&log.finish());
     let from =
         ["robot1", "robot2", "robot3"].map(|robot| (info.robots[robot].poses, info.robots[robot].poses_from.clone()));
-    let said = |text: &str| Some(text.to_owned());
-    assert_eq!(from, [(1, said("tf (robot1/map to robot1/base_link)")), (1, said("/robot2/odom")), (0, None)]);
-    let problem = "`/robot3/odom` is in the frame `robot3/odom`, which is not that of the map, `robot3/map`";
-    assert!(info.problems.iter().any(|said| said.contains(problem)), "{:?}", info.problems);
-    assert_eq!(inspect_bytes(&two_robots().finish()).robots["robot1"].poses_from, said("/robot1/pose"));
+    let text = |text: &str| Some(text.to_owned());
+    assert_eq!(from, [(1, text("tf (robot1/map to robot1/base_link)")), (1, text("/robot2/odom")), (0, None)]);
+    let problem = "`/robot3/odom` is in the frame `robot3/odom`, not in the map frame `robot3/map`";
+    assert!(info.problems.iter().any(|text| text.contains(problem)), "{:?}", info.problems);
+    assert_eq!(inspect_bytes(&two_robots().finish()).robots["robot1"].poses_from, text("/robot1/pose"));
 }
 
 #[test]
-fn a_log_of_tags_without_maps_is_told_from_others() {
+fn a_log_of_tags_without_maps_is_recognised() {
     let folder = Folder::new();
     let alone = |name: &str, fill: &dyn Fn(&mut TestLog)| {
         let mut log = TestLog::new(layouts()[3].clone());
@@ -137,7 +137,7 @@ fn a_log_of_tags_without_maps_is_told_from_others() {
 }
 
 #[test]
-fn at_a_glance_a_log_with_an_index_tells_the_same_as_when_it_is_read_through() {
+fn a_sampled_log_with_an_index_has_the_same_contents_as_a_completely_read_one() {
     let folder = Folder::new();
     let mut log = TestLog::new(mcap::WriteOptions::new().chunk_size(Some(2000)));
     for number in 0..400_u64 {
@@ -163,7 +163,7 @@ fn at_a_glance_a_log_with_an_index_tells_the_same_as_when_it_is_read_through() {
     }
     assert_eq!(pose.0.largest_gap, 2.0);
 
-    // One that is cut has no index to go by.
+    // A truncated log has no index.
     let mut bytes = std::fs::read(&path).unwrap();
     bytes.truncate(bytes.len() - 20);
     std::fs::write(&path, bytes).unwrap();

@@ -6,19 +6,19 @@ use serde::{Deserialize, Deserializer};
 use serde_norway::Value;
 use std::path::{Path, PathBuf};
 
-/// What the YAML file says, checked.
+/// The validated contents of the YAML file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Description {
     /// The image, relative to the YAML file.
     pub(super) image: PathBuf,
-    /// Metres a cell.
+    /// The resolution, metres per cell.
     pub(super) resolution: f32,
     /// x and y of the lower left corner, metres, and yaw, radians.
     pub(super) origin: [f64; 3],
     pub(super) reading: Reading,
 }
 
-/// The file as it stands. Other fields, which some programs add, are passed over.
+/// The fields of the file. Other fields, which some programs add, are ignored.
 #[derive(Deserialize)]
 struct Fields {
     image: PathBuf,
@@ -46,7 +46,7 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 impl Description {
-    /// Reads `text`; `path` is for errors.
+    /// Parses `text`; `path` is for errors.
     pub(super) fn parse(text: &str, path: &Path) -> Result<Self, MapFileError> {
         // Editors of Windows write a byte order mark.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -57,7 +57,7 @@ impl Description {
         let Fields { image, resolution: Number(metres), origin, .. } = fields;
         let (Number(occupied_thresh), Number(free_thresh)) = (fields.occupied_thresh, fields.free_thresh);
         if image.as_os_str().is_empty() {
-            return Err(wrong("image", "is empty; name the image beside the file".into()));
+            return Err(wrong("image", "is empty; it must be the image file".into()));
         }
         let resolution = metres as f32;
         if !(resolution.is_finite() && resolution > 0.0) {
@@ -71,7 +71,7 @@ impl Description {
             .ok_or_else(|| wrong("origin", "must be three finite numbers: [x, y, yaw], metres and radians".into()))?;
         for (field, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
             if !(0.0..=1.0).contains(&value) {
-                return Err(wrong(field, format!("is {value}; it must lie between 0 and 1")));
+                return Err(wrong(field, format!("is {value}; it must be between 0 and 1")));
             }
         }
         if free_thresh > occupied_thresh {

@@ -1,53 +1,53 @@
-//! Why a map file cannot be read or written.
+//! The error when a map file cannot be read or written.
 
 use crate::file::WriteError;
 use std::path::PathBuf;
 
-/// Why a map file cannot be read or written.
+/// The error when a map file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapFileError {
     /// A file cannot be read.
     #[error("cannot read the map file {path}: {source}")]
     Read {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The YAML file is no description of a map.
+    /// The YAML file does not describe a map.
     #[error("{path} does not describe a map: {message}")]
     Yaml {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// The cause, and its position.
         message: String,
     },
-    /// A value of the YAML file makes no sense.
+    /// A value of the YAML file is invalid.
     #[error("{path}: `{field}` {problem}")]
     Field {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Which field.
+        /// The field.
         field: &'static str,
-        /// What is wrong, and what would be right.
+        /// The cause, and valid values.
         problem: String,
     },
-    /// The image is missing, cut or of a format that is not supported.
+    /// The image is missing, truncated or in an unsupported format.
     #[error("cannot read {path}, the image of the map {yaml}: {message}")]
     Image {
         /// The image.
         path: PathBuf,
         /// The file that names it.
         yaml: PathBuf,
-        /// What is wrong.
+        /// The cause.
         message: String,
     },
-    /// The map to be saved is none.
+    /// The map to save is invalid.
     #[error("cannot save a map to {path}: {problem}")]
     Map {
-        /// Where to.
+        /// The file to write.
         path: PathBuf,
-        /// What is wrong with the map or the name.
+        /// The problem with the map or the name.
         problem: String,
     },
     /// A file cannot be written.

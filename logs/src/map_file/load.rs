@@ -10,25 +10,25 @@ use nalgebra::{Isometry2, Vector2};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The most bytes of an image file that are read: as many as the pixels of the largest image that is decoded.
+/// The maximum size of an image file, bytes: the size of the pixels of the largest image.
 const LARGEST_IMAGE: u64 = 512 << 20;
-/// The endings of images that lie beside a YAML file of the same name.
+/// The extensions of images that are looked for beside a YAML file with the same name.
 const IMAGE_ENDINGS: [&str; 6] = ["pgm", "png", "bmp", "jpg", "jpeg", "ppm"];
 
-/// Reads the map that the YAML file at `yaml` describes, by its thresholds.
+/// Reads the map in the YAML file at `yaml`, with its thresholds applied literally.
 ///
 /// # Errors
 ///
-/// A file cannot be read, or is no map.
+/// A file cannot be read, or is not a map.
 pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
     Ok(load_as(yaml, Thresholds::Literal)?.0)
 }
 
-/// Reads the map that the YAML file at `yaml` describes, and warns if it is read otherwise than the file says.
+/// Reads the map in the YAML file at `yaml`, with a warning if it is not read literally.
 ///
 /// # Errors
 ///
-/// A file cannot be read, or is no map.
+/// A file cannot be read, or is not a map.
 pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
     let (description, missing) = describe(yaml)?;
     let Description { image: path, resolution, origin: [x, y, yaw], reading } = description;
@@ -52,12 +52,13 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
     Ok((GridMap { info, cells }, warning.if_any()))
 }
 
-/// The image of the map that the YAML file at `yaml` describes, which may not exist.
+/// The path of the image in the YAML file at `yaml`. The image need not exist.
 pub fn image_of(yaml: &Path) -> Result<PathBuf, MapFileError> {
     Ok(describe(yaml)?.0.image)
 }
 
-/// What the YAML file says, its image as seen from here; and the image that it names, if another is taken for it.
+/// The content of the YAML file, with the image's path relative to the working directory; and the path in the file if that
+/// image is missing and another one is used.
 fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError> {
     let text = input_file::read_text(yaml).map_err(|source| MapFileError::Read { path: yaml.to_owned(), source })?;
     let description = Description::parse(&text, yaml)?;
@@ -69,14 +70,14 @@ fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError>
     Ok((Description { image, ..description }, missing))
 }
 
-/// The image beside the YAML file where the one that it names does not exist: of the same name, as in a file that was copied
-/// from another machine with its image, or called as the YAML file.
+/// The image beside the YAML file, if the one in the file does not exist: with the same name, as in a file that was copied
+/// from another machine with its image, or with the name of the YAML file.
 fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
     if !matches!(std::fs::metadata(named), Err(error) if error.kind() == io::ErrorKind::NotFound) {
         return None;
     }
     let text = named.to_str()?;
-    // A path of Windows, too.
+    // Windows paths are split, too.
     let name = text.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
     let same_name = yaml.with_file_name(name);
     let as_yaml = IMAGE_ENDINGS.iter().map(|ending| yaml.with_extension(ending));

@@ -1,7 +1,7 @@
-//! Maps as files: the YAML and image of nav2's map server.
+//! Map files: the YAML and image of nav2's map server.
 //!
-//! The YAML file names an image (relative to itself), the size of a cell, the pose of the image's lower left corner, and
-//! how the shades of the image are to be read. The image's first row is the map's last.
+//! The YAML file contains the image path (relative to itself), the resolution, the pose of the image's lower left
+//! corner, and the interpretation of the image's shades. The first row of the image is the last row of the map.
 
 mod description;
 mod error;
@@ -31,19 +31,19 @@ pub struct GridMap {
 }
 
 impl GridMap {
-    /// The map that a message holds.
+    /// Copies the map in a message.
     pub fn from_message(message: &OccupancyGrid<'_>) -> Self {
         Self { info: message.info, cells: message.cells().to_vec() }
     }
 }
 
-/// How the shades of an image are read as occupancy.
+/// The interpretation of an image's shades as occupancy (the `mode` of nav2's map server).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Mode {
-    /// Occupied above one threshold, free below the other, and unknown between them.
+    /// Occupied above one threshold, free below the other, and unknown in between.
     #[default]
     Trinary,
-    /// As trinary, but between the thresholds occupancy rises from 0 to 100; what is not opaque is unknown.
+    /// As trinary, but between the thresholds occupancy rises from 0 to 100; transparent pixels are unknown.
     Scale,
     /// The shade, 0 to 255, is the occupancy; above 100 it is unknown.
     Raw,

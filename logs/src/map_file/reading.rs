@@ -1,4 +1,4 @@
-//! How the shades of a map's image are read as occupancy.
+//! The interpretation of the shades of a map's image as occupancy.
 
 use super::Mode;
 use super::shades::Shades;
@@ -6,37 +6,36 @@ use super::warning::MapFileWarning;
 
 /// The shade in which map savers write unknown cells.
 const UNKNOWN_SHADE: usize = 205;
-/// The least occupancy, above that of unknown, at which the darkest shade of an image is that of its walls.
+/// The minimum occupancy, above that of unknown, at which the darkest shade of an image is occupied.
 const LEAST_CONTRAST: f64 = 0.1;
 
-/// Whether the thresholds of a map file are believed.
+/// The treatment of a map file's thresholds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Thresholds {
-    /// As they stand, as a map server reads them.
+    /// Applied literally, as by a map server.
     Literal,
-    /// Where the image of a trinary file tells otherwise, the image is believed: nav2's map saver writes unknown cells in
-    /// grey 205 with `free_thresh: 0.25`, which makes them free; and walls that are all drawn in grey may lie below
-    /// `occupied_thresh`.
+    /// Corrected by the image of a trinary file where the two disagree: nav2's map saver writes unknown cells in grey
+    /// 205 with `free_thresh: 0.25`, which makes them free; and walls in grey may be below `occupied_thresh`.
     #[default]
     ByPicture,
 }
 
-/// How a shade is read as occupancy.
+/// The interpretation of shades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading {
     pub(super) mode: Mode,
-    /// Whether white stands for occupied.
+    /// Whether white is occupied.
     pub(super) negate: bool,
     /// Occupied above this occupancy, 0 to 1.
     pub(super) occupied_thresh: f64,
     /// Free below this occupancy, 0 to 1.
     pub(super) free_thresh: f64,
-    /// Shades of grey that are unknown whatever the thresholds, 0 for black to 1 for white, first and last.
+    /// The first and the last shade that are unknown whatever the thresholds, 0 for black to 1 for white.
     pub(super) unknown: Option<(f64, f64)>,
 }
 
 impl Reading {
-    /// The same as the image has it, and what that changes.
+    /// The interpretation corrected by the image, and the corrections.
     pub(super) fn by_picture(self, shades: &Shades) -> (Self, MapFileWarning) {
         if self.mode != Mode::Trinary || self.negate {
             return (self, MapFileWarning::default());
@@ -45,7 +44,7 @@ impl Reading {
         let spread = if shades.is_lossy() { 4 } else { 0 };
         let range = UNKNOWN_SHADE - spread..=UNKNOWN_SHADE + spread;
         let cells: u64 = greys[range.clone()].iter().sum();
-        // A shade of its own, and not one of a gradient.
+        // The shade is a peak of the histogram, and not part of a gradient.
         let stands_out =
             greys[UNKNOWN_SHADE] > greys[UNKNOWN_SHADE - spread - 1].max(greys[UNKNOWN_SHADE + spread + 1]);
         let unknown = occupancy_of(UNKNOWN_SHADE);
@@ -67,7 +66,7 @@ impl Reading {
         (reading, warning)
     }
 
-    /// The cell of a pixel: grey or three colours, the last of an even number being its opacity.
+    /// The cell for a pixel: grey or three colours; the last of an even number of samples is the opacity.
     pub(super) fn pixel(&self, samples: &[f64], white: f64) -> i8 {
         match samples.split_last() {
             Some((opacity, colours)) if samples.len() % 2 == 0 => self.cell(colours, Some(*opacity), white),
@@ -75,7 +74,7 @@ impl Reading {
         }
     }
 
-    /// The cell of a pixel with the given colours and opacity.
+    /// The cell for a pixel with the given colours and opacity.
     fn cell(&self, colours: &[f64], opacity: Option<f64>, white: f64) -> i8 {
         let mean_of = |sum: f64, count: usize| (sum / (count.max(1) as f64) / white).min(1.0);
         let (sum, count) = (colours.iter().sum::<f64>(), colours.len());
@@ -84,7 +83,7 @@ impl Reading {
             return -1;
         }
         let shade = match (self.mode, opacity) {
-            // The map server counts opacity as one more channel beside red, green and blue here.
+            // The map server averages opacity with red, green and blue here.
             (Mode::Trinary, Some(opacity)) if count == 1 => mean_of(3.0 * sum + opacity, 4),
             (Mode::Trinary, Some(opacity)) => mean_of(sum + opacity, count + 1),
             _ => grey,
@@ -108,7 +107,7 @@ impl Reading {
     }
 }
 
-/// A shade from 0 to 255 as a share of white.
+/// A shade from 0 to 255 as a fraction of white.
 fn grey_of(shade: usize) -> f64 {
     shade as f64 / 255.0
 }

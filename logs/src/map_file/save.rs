@@ -7,20 +7,20 @@ use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
 use std::path::{Path, PathBuf};
 
-/// The shade of a cell that is occupied, free or unknown.
+/// The shades of occupied, free and unknown cells.
 const OCCUPIED_SHADE: u8 = 0;
 const FREE_SHADE: u8 = 254;
 const UNKNOWN_SHADE: u8 = 205;
-/// The thresholds that read those shades back. The shade of unknown has the occupancy 50 / 255 = 0.19608, so that the
-/// usual 0.25 would turn unknown cells into free ones.
+/// The thresholds that read those shades back. The shade of unknown has the occupancy 50 / 255 = 0.19608, so the usual
+/// 0.25 would turn unknown cells into free ones.
 const OCCUPIED_THRESHOLD: f64 = 0.65;
 const FREE_THRESHOLD: f64 = 0.196;
 
-/// Writes a map: the YAML file at `yaml`, and the image beside it under the same name with the ending `pgm`. Files that
-/// have these names are replaced.
+/// Writes a map: the YAML file at `yaml`, and the image beside it with the extension `pgm`. Existing files are
+/// replaced.
 ///
 /// The mode is trinary: cells of 65 and more are occupied, 0 to 24 free, all others unknown. The origin is written in
-/// full precision; height, roll and pitch are left out.
+/// full precision; height, roll and pitch are dropped.
 pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     let (text, image, pixels) = describe(yaml, map)
         .map_err(|problem| MapFileError::Map { path: yaml.to_owned(), problem: problem.to_owned() })?;
@@ -29,7 +29,7 @@ pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     let encoded = encoder.write_image(&pixels, map.info.width, map.info.height, ExtendedColorType::L8);
     encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
 
-    // The image first, so that there is never a description of a map that is not there.
+    // The image is written first, so that the YAML file never refers to a missing image.
     Ok(replace(&[(&image, &file), (yaml, text.as_bytes())])?)
 }
 
@@ -38,7 +38,7 @@ pub fn image_beside(yaml: &Path) -> PathBuf {
     yaml.with_extension("pgm")
 }
 
-/// The YAML text, the path of the image, and its pixels. Otherwise what is wrong.
+/// The YAML text, the path of the image, and its pixels, or an error text.
 fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'static str> {
     let GridMap { info, cells } = map;
     let (width, height) = (info.width as usize, info.height as usize);
@@ -52,10 +52,10 @@ fn describe(yaml: &Path, map: &GridMap) -> Result<(String, PathBuf, Vec<u8>), &'
     }
     let image = image_beside(yaml);
     if image == yaml {
-        return Err("name the YAML file; the image gets the same name with the ending pgm");
+        return Err("give the YAML file; the image has the same name with the extension pgm");
     }
     let name = image.file_name().and_then(|name| name.to_str()).ok_or("the name of the file must be UTF-8 text")?;
-    let name = serde_norway::to_string(name).map_err(|_| "the name of the file cannot stand in YAML")?;
+    let name = serde_norway::to_string(name).map_err(|_| "the name of the file cannot be written as YAML")?;
     let text = format!(
         "image: {}\nmode: trinary\nresolution: {}\norigin: [{x}, {y}, {yaw}]\nnegate: 0\n\
          occupied_thresh: {OCCUPIED_THRESHOLD}\nfree_thresh: {FREE_THRESHOLD}\n",

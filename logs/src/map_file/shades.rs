@@ -1,20 +1,21 @@
-//! The image of a map: from shades to cells, as nav2's map server reads them.
+//! The image of a map: its conversion from shades to cells, as in nav2's map server.
 
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use std::io::{self, Cursor};
 
-/// What a byte of a file stands for at the most, bytes of the image: eight pixels in a PBM.
+/// The maximum number of image bytes per file byte: eight pixels in a PBM.
 const DENSEST_PNM: u64 = 8;
-/// The same for a PNG: its compression, deflate, makes at most 1032 bytes of one, and each may be eight pixels.
+/// The same for a PNG: deflate expands a byte to at most 1032 bytes, each of up to eight pixels.
 const DENSEST_PNG: u64 = 8 * 1032;
-/// The same for a JPEG: a bit for a block of 8 x 8 pixels of each of three colours, two of them at half the width and height.
+/// The same for a JPEG: a bit for a block of 8 x 8 pixels in each of three colours, two of them at half the width and
+/// height.
 const DENSEST_JPEG: u64 = 1024;
 /// The same for a BMP: a run of 255 pixels of three colours in two bytes.
 const DENSEST_BMP: u64 = 384;
-/// No image takes more, bytes.
+/// The maximum size of an image, bytes.
 const LARGEST: u64 = 512 << 20;
 
-/// An image, and the value that stands for white in it.
+/// An image, and the value of white in it.
 pub(super) struct Shades {
     image: DynamicImage,
     white: f64,
@@ -22,7 +23,7 @@ pub(super) struct Shades {
 }
 
 impl Shades {
-    /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, told by its first bytes.
+    /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, recognised by its first bytes.
     pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         let format = reader.format();
@@ -33,7 +34,7 @@ impl Shades {
             _ => DENSEST_PNM,
         };
         let decoder = reader.into_decoder()?;
-        // The size is the file's word only.
+        // The size is claimed by the file, so it is not trusted.
         if decoder.total_bytes() > densest.saturating_mul(bytes.len() as u64).min(LARGEST) {
             let (width, height) = decoder.dimensions();
             let text = format!("its {} bytes cannot hold the {width} x {height} pixels that it claims", bytes.len());
@@ -45,12 +46,12 @@ impl Shades {
         Ok(Self { image, white, is_lossy: format == Some(ImageFormat::Jpeg) })
     }
 
-    /// Columns and rows.
+    /// The number of columns and rows.
     pub(super) fn size(&self) -> (u32, u32) {
         (self.image.width(), self.image.height())
     }
 
-    /// Whether shades are near those that were written, and not the same.
+    /// Whether shades are approximate, because of a lossy format.
     pub(super) fn is_lossy(&self) -> bool {
         self.is_lossy
     }
@@ -60,7 +61,7 @@ impl Shades {
         self.image.color().has_alpha()
     }
 
-    /// How many pixels have each shade of grey, 0 for black to 255 for white.
+    /// The histogram of grey shades, 0 for black to 255 for white.
     pub(super) fn greys(&self) -> [u64; 256] {
         let mut greys = [0; 256];
         match &self.image {
@@ -84,13 +85,13 @@ impl Shades {
         greys
     }
 
-    /// The cells, row by row from the image's last row to its first. `cell` makes one of a pixel's samples, each from 0 to
+    /// The cells, row by row from the image's last row to its first. `cell` converts a pixel's samples, each from 0 to
     /// `white`.
     pub(super) fn cells(&self, cell: impl Fn(&[f64], f64) -> i8) -> Vec<i8> {
         let white = self.white;
         let channels = usize::from(self.image.color().channel_count());
         match &self.image {
-            // Most maps: 256 shades, each of which is read once.
+            // For most maps: 256 shades, each of which is converted once.
             DynamicImage::ImageLuma8(grey) => {
                 let table: Vec<i8> = (0..=255u8).map(|value| cell(&[f64::from(value)], white)).collect();
                 self.rows_upward(grey.as_raw(), 1, |pixel| table[usize::from(pixel[0])])

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct MapFileSinkParameters {
-    /// The YAML file to write; the image gets the same name with the ending pgm. Files that have these names are replaced.
+    /// The YAML file to write; the image has the same name with the extension pgm. Existing files are replaced.
     file: PathBuf,
 }
 
@@ -22,8 +22,8 @@ impl Parameters for MapFileSinkParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "map_file_sink",
-        "Writes the last map that comes in as a map file (YAML and image of nav2's map server), at the end of the run. \
-         Writes nothing if no map has come.",
+        "Writes the last received map as a map file (YAML and image of nav2's map server), at the end of the run. \
+         Writes nothing if no map was received.",
         MapFileSink::new,
     )
     .inputs("map", "the merged map", MapFileSink::receive)

@@ -89,7 +89,7 @@ fn png_is_read_with_its_opacity() {
 }
 
 #[test]
-fn numbers_may_stand_in_quotes() {
+fn numbers_may_be_quoted() {
     let quoted = "image: map.pgm\nresolution: '0.05'\norigin: ['1', \"-2.5\", 0.5]\noccupied_thresh: '0.65'\n\
                   free_thresh: \"0.25\"\nnegate: '0'";
     assert_eq!(cells(quoted), cells(&yaml("")));
@@ -97,39 +97,42 @@ fn numbers_may_stand_in_quotes() {
 }
 
 #[test]
-fn what_the_image_shows_goes_before_the_thresholds_and_is_told() {
+fn the_image_overrides_the_thresholds_with_a_note() {
     let read = |bytes: &[u8], more: &str| {
         let (folder, path) = folder(&yaml(more));
         fs::write(folder.path().join("map.pgm"), bytes).unwrap();
-        let (map, remark) = load_as(&path, Thresholds::ByPicture).unwrap();
-        (map.cells, remark.map(|remark| remark.to_string()).unwrap_or_default())
+        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
+        (map.cells, warning.map(|warning| warning.to_string()).unwrap_or_default())
     };
-    let (cells, remark) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "");
+    let (cells, warning) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "");
     assert_eq!(cells, [100, -1, -1, 0]);
-    assert!(remark.starts_with("2 cells of grey 205 are read as unknown, not as free as free_thresh 0.25"), "{remark}");
-    assert!(remark.ends_with("--literal-thresholds reads the file literally"), "{remark}");
-    // Other modes have no shade for unknown, and where white is occupied 205 is a wall.
+    assert!(
+        warning.starts_with("2 cells in grey 205 are read as unknown; with free_thresh 0.25 they would be free"),
+        "{warning}"
+    );
+    assert!(warning.ends_with("--literal-thresholds reads the file literally"), "{warning}");
+    // Other modes have no shade for unknown, and where white is occupied 205 is occupied.
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale"), (vec![100, 0, 0, 0], String::new()));
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1"), (vec![0, 100, 100, 100], String::new()));
-    // One of a gradient.
+    // A shade of a gradient.
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcc\xcd\xce", "").0, [100, 0, 0, 0]);
-    let (cells, remark) = read(b"P5\n4 1\n255\n\x6e\x6e\xcd\xfe", "");
+    let (cells, warning) = read(b"P5\n4 1\n255\n\x6e\x6e\xcd\xfe", "");
     assert_eq!(cells, [100, 100, -1, 0]);
-    assert!(remark.contains("the darkest cells, of occupancy 0.57, are read as walls"), "{remark}");
+    assert!(warning.contains("the darkest cells, with occupancy 0.57, are read as occupied"), "{warning}");
 }
 
 #[test]
 fn bmp_and_jpeg_are_read() {
     let (folder, path) = folder("");
-    // Blocks of eight pixels, as a JPEG cuts them.
+    // Blocks of eight pixels, as in a JPEG.
     let shades = [0u8, 205, 254];
     let image = ImageBuffer::from_fn(24, 8, |x, _| Luma([shades[x as usize / 8]]));
     for name in ["map.bmp", "map.jpg"] {
         DynamicImage::ImageLuma8(image.clone()).save(folder.path().join(name)).unwrap();
         fs::write(&path, yaml("").replace("map.pgm", name)).unwrap();
-        let (map, remark) = load_as(&path, Thresholds::ByPicture).unwrap();
+        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
         let middle: Vec<i8> = [4, 12, 20].map(|column| map.cells[3 * 24 + column]).into();
-        assert_eq!(middle, [100, -1, 0], "{name}: {remark:?}");
+        assert_eq!(middle, [100, -1, 0], "{name}: {warning:?}");
     }
 }
 
@@ -178,7 +181,7 @@ proptest! {
 }
 
 #[test]
-fn wrong_values_are_told_with_what_would_be_right() {
+fn invalid_values_are_reported_with_valid_ones() {
     assert!(error("").contains("DIR/map.yaml does not describe a map: missing field `image`"));
     assert!(error("image: [").contains("does not describe a map"));
     let without =
@@ -193,7 +196,7 @@ fn wrong_values_are_told_with_what_would_be_right() {
     for value in ["[0, 0]", "[0, 0, 0, 0]", "[0, .nan, 0]", "[]"] {
         assert!(with("[1, -2.5, 0.5]", value).contains("`origin` must be three finite numbers"));
     }
-    assert!(with("0.65", "65").contains("`occupied_thresh` is 65; it must lie between 0 and 1"));
+    assert!(with("0.65", "65").contains("`occupied_thresh` is 65; it must be between 0 and 1"));
     assert!(with("0.65", "0.1").contains("`free_thresh` is 0.25; it must not be above `occupied_thresh`, 0.1"));
     assert!(error(&yaml("negate: perhaps")).contains("`negate` must be 0 or 1"));
     assert_eq!(
@@ -203,7 +206,7 @@ fn wrong_values_are_told_with_what_would_be_right() {
 }
 
 #[test]
-fn missing_and_broken_files_are_told() {
+fn missing_and_broken_files_are_reported() {
     let (folder, path) = folder(&yaml(""));
     let text = load(&folder.path().join("other.yaml")).unwrap_err().to_string();
     assert!(text.starts_with("cannot read the map file") && text.contains("other.yaml: No such file"), "{text}");
@@ -217,7 +220,7 @@ fn missing_and_broken_files_are_told() {
 }
 
 #[test]
-fn an_image_that_claims_more_than_its_bytes_can_hold_is_refused() {
+fn an_image_that_claims_more_than_its_bytes_can_hold_is_an_error() {
     for header in ["P5\n20000 20000\n255\n", "P4 60000 60000\n", "P2 20000 20000 255\n", "P6\n9000 9000\n255\n"] {
         let (folder, path) = folder(&yaml(""));
         fs::write(folder.path().join("map.pgm"), format!("{header}abc")).unwrap();
@@ -240,7 +243,7 @@ fn a_map_that_cannot_be_written_leaves_the_one_that_was_there() {
     let (folder, path) = folder(&yaml(""));
     let before = load(&path).unwrap();
     let names = || fs::read_dir(folder.path()).unwrap().count();
-    // The image can be written, and the description cannot.
+    // The image can be written, and the YAML file cannot.
     fs::create_dir(folder.path().join("map.yaml.part")).unwrap();
     let other = GridMap { cells: vec![0; before.cells.len()], ..before.clone() };
     assert!(save(&path, &other).unwrap_err().to_string().contains("map.yaml"));
@@ -251,7 +254,7 @@ fn a_map_that_cannot_be_written_leaves_the_one_that_was_there() {
 }
 
 #[test]
-fn what_is_no_map_is_not_saved() {
+fn an_invalid_map_is_not_saved() {
     let folder = tempfile::tempdir().unwrap();
     let info = MapMetaData { resolution: 0.05, width: 2, height: 2, ..Default::default() };
     let map = GridMap { info, cells: vec![0; 4] };
@@ -259,7 +262,7 @@ fn what_is_no_map_is_not_saved() {
     assert!(error("a.yaml", &GridMap { cells: vec![0; 3], ..map.clone() }).contains("width x height cells"));
     let info = MapMetaData { resolution: f32::NAN, ..map.info };
     assert!(error("a.yaml", &GridMap { info, ..map.clone() }).contains("resolution must be above 0"));
-    assert!(error("a.pgm", &map).contains("name the YAML file"));
+    assert!(error("a.pgm", &map).contains("give the YAML file"));
     assert!(error("missing/a.yaml", &map).contains("missing/a."));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

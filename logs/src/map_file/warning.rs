@@ -1,21 +1,21 @@
-//! Warning of a map file that is read otherwise than it says.
+//! The warning about a map file that is not read literally.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// What was read otherwise than a map file says.
+/// The deviations from a map file's literal content.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MapFileWarning {
-    /// The image that the file names and that does not exist, and the one that was read.
+    /// The missing image of the file, and the one that was read instead.
     pub image: Option<(PathBuf, PathBuf)>,
-    /// Cells of grey 205 that are unknown though `free_thresh`, which follows, would make them free.
+    /// The number of cells in grey 205 that are unknown, and the `free_thresh` that would make them free.
     pub unknown: Option<(u64, f64)>,
-    /// The occupancy from which cells are walls, though `occupied_thresh`, which follows, leaves none.
+    /// The minimum occupancy of occupied cells, and the `occupied_thresh` that no cell reaches.
     pub walls: Option<(f64, f64)>,
 }
 
 impl MapFileWarning {
-    /// The warning; `None` if the file was read as it says.
+    /// The warning; `None` if the file was read literally.
     pub(super) fn if_any(self) -> Option<Self> {
         (self != Self::default()).then_some(self)
     }
@@ -29,12 +29,12 @@ impl fmt::Display for MapFileWarning {
         }
         if let Some((cells, free_thresh)) = self.unknown {
             parts.push(format!(
-                "{cells} cells of grey 205 are read as unknown, not as free as free_thresh {free_thresh} has it"
+                "{cells} cells in grey 205 are read as unknown; with free_thresh {free_thresh} they would be free"
             ));
         }
         if let Some((from, occupied_thresh)) = self.walls {
             parts.push(format!(
-                "the darkest cells, of occupancy {from:.2}, are read as walls, as none reaches occupied_thresh \
+                "the darkest cells, with occupancy {from:.2}, are read as occupied, since no cell reaches occupied_thresh \
                  {occupied_thresh}"
             ));
         }

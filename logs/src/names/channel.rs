@@ -1,11 +1,11 @@
-//! One channel with its names.
+//! A channel with its names under a robot.
 
 use crate::dynamic::{Recoder, Schema};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::frame_of_robot;
 use std::borrow::Cow;
 
-/// A channel as it is called beside those of other robots.
+/// A channel named so that it is unique among the channels of all robots.
 #[derive(Debug)]
 pub(crate) struct NamedChannel {
     pub(crate) channel: Channel,
@@ -13,39 +13,39 @@ pub(crate) struct NamedChannel {
     frames: Frames,
 }
 
-/// What becomes of the frames in a channel's messages.
+/// The treatment of the frames in a channel's messages.
 #[derive(Debug)]
 enum Frames {
-    /// They stay, or there are none.
+    /// Unchanged, or there are none.
     AsLogged,
-    /// They are put under a robot (empty: under none), and stamps are `later` by so many nanoseconds. `is_map`: a frame without a
-    /// name is that of its map.
+    /// Put under a robot (unchanged if empty), with stamps shifted `later` by nanoseconds. With `is_map`, an empty
+    /// frame name is the map frame.
     OfRobot { robot: String, is_map: bool, later: i64, recoder: Recoder },
-    /// They should be, but nobody knows where in the messages they are, for this reason.
+    /// Unchanged, because the definition of the messages cannot be used, for this reason.
     Unknown(String),
 }
 
-/// What was done to a message.
+/// The result of renaming the frames of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Renamed {
-    /// It stays as it was logged.
+    /// The message is unchanged.
     AsLogged,
-    /// It was copied with other names.
+    /// The message was copied with other names.
     Copied,
-    /// It does not fit its type, and stays as it was logged.
+    /// The message does not match its type and is unchanged.
     Unreadable,
 }
 
 impl NamedChannel {
-    /// A channel whose frames are put under `robot`, without a robot they stay as they were logged; and whose clock is set
-    /// `later` by so many nanoseconds.
+    /// Creates a named channel. Its frames are put under `robot`, or unchanged if that is empty; its stamps are shifted
+    /// `later` by nanoseconds.
     pub(crate) fn new(channel: Channel, robot: String, is_map: bool, later: i64, is_wanted: bool) -> Self {
         let frames = match robot.is_empty() && later == 0 {
             true => Frames::AsLogged,
             false => match Schema::of_channel(&channel) {
                 Err(error) => Frames::Unknown(error.to_string()),
                 Ok(schema) => match Recoder::new(schema) {
-                    None => Frames::Unknown("there are wide texts (wstring) in them".to_owned()),
+                    None => Frames::Unknown("they contain wstring fields".to_owned()),
                     Some(recoder) if recoder.names_frames() || later != 0 && recoder.has_stamps() => {
                         Frames::OfRobot { robot, is_map, later, recoder }
                     }
@@ -56,7 +56,7 @@ impl NamedChannel {
         Self { channel, is_wanted, frames }
     }
 
-    /// What a frame is called that its messages name.
+    /// The new name of a frame in the channel's messages.
     pub(super) fn frame<'a>(&self, frame: &'a str) -> Cow<'a, str> {
         match &self.frames {
             Frames::OfRobot { robot, is_map, .. } => name(robot, frame, if *is_map { "map" } else { "" }),
@@ -64,10 +64,10 @@ impl NamedChannel {
         }
     }
 
-    /// Why frames stay as they were logged that should be put under a robot.
-    pub(crate) fn frames_left(&self) -> Option<String> {
+    /// The reason why frames are unchanged that should be put under a robot.
+    pub(crate) fn unrenamed_frames(&self) -> Option<String> {
         let Frames::Unknown(why) = &self.frames else { return None };
-        Some(format!("frames and stamps in messages on `{}` stay as they were logged: {why}", self.channel.topic))
+        Some(format!("frames and stamps in messages on `{}` are not renamed: {why}", self.channel.topic))
     }
 
     /// Puts the frames of a message under the robot, in a copy if that changes anything.
@@ -83,7 +83,7 @@ impl NamedChannel {
     }
 }
 
-/// The name of a robot's frame; `unnamed` is the one without a name.
+/// The name of a robot's frame. An empty frame name is replaced by `unnamed`.
 fn name<'a>(robot: &str, frame: &'a str, unnamed: &'static str) -> Cow<'a, str> {
     match robot {
         "" => Cow::Borrowed(frame),

@@ -1,9 +1,10 @@
-//! Clocks of logs that know nothing of each other, laid together.
+//! Alignment of the clocks of unrelated logs.
 
 use crate::reader::LogFile;
 
-/// Sets the clocks of files, of which each belongs to the input of the given number: with `align_start` so that all inputs begin
-/// when the first does that is a log. Map files, which know no time, begin with the earliest log in any case.
+/// Shifts the times of files, where `input_of` is the index of the input that each file belongs to. With `align_start`,
+/// all inputs start at the time of the first log. Map files, which have no time, are always moved to the start of the
+/// earliest log.
 pub(super) fn align(files: &mut [LogFile], input_of: &[usize], align_start: bool) {
     let start_of = |files: &[LogFile], input: usize| {
         let own = files.iter().zip(input_of).filter(|(_, of)| **of == input);

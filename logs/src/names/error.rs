@@ -1,33 +1,35 @@
-//! Why logs cannot be named.
+//! The error when logs cannot be named.
 
 use super::file_names::FileNameError;
 use crate::reader::ReadError;
 use gridweave_runtime::pipeline::suggest;
 
-/// Logs cannot be opened and named.
+/// The error when logs cannot be opened or named.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
     /// A log cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Logs look alike, and so do their names.
-    #[error("the logs look alike, and their names do not tell them apart: {0}; or say whose they are: ROBOT=LOG")]
-    Alike(#[from] FileNameError),
-    /// A robot that was asked for is not there.
-    #[error("there is nothing of a robot `{robot}` in the logs: {}", listed(.known))]
+    /// Logs have equal topics, and their file names do not distinguish them.
+    #[error(
+        "the logs have equal topics, and their file names do not distinguish the robots: {0}; or set the robots with ROBOT=LOG"
+    )]
+    SameNames(#[from] FileNameError),
+    /// A selected robot is not in the logs.
+    #[error("there is no robot `{robot}` in the logs: {}", listed(.known))]
     NoSuchRobot {
-        /// What was asked for.
+        /// The selected robot.
         robot: String,
-        /// The robots that are there.
+        /// The robots in the logs.
         known: Vec<String>,
     },
-    /// A topic that was asked for is not there.
+    /// A selected topic is not in the logs.
     #[error("there is no topic `{topic}` in the logs{}", nearest(.topic, .known))]
     NoSuchTopic {
-        /// What was asked for.
+        /// The selected topic.
         topic: String,
-        /// The topics that are there, as they are called here.
+        /// The topics in the logs, after renaming.
         known: Vec<String>,
     },
 }

@@ -1,20 +1,20 @@
-//! What the robots are called whose maps come as files.
+//! Robot names from the names of files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Why map files give no names.
+/// The error when files cannot be used as robot names.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FileNameError {
-    /// One file would be two robots' map.
-    #[error("{0} is given twice; give every map once")]
+    /// A file is given twice.
+    #[error("{0} is given twice; give each file once")]
     GivenTwice(PathBuf),
-    /// Two robots would have one name.
+    /// Two robots would have the same name.
     #[error(
-        "{one} and {other} would both be the map of a robot called `{name}`; rename one of these files or folders",
+        "{one} and {other} would both be named `{name}`; rename one of these files or folders",
         one = one.display(), other = other.display()
     )]
-    Alike {
+    SameName {
         /// The name.
         name: String,
         /// The first file.
@@ -24,13 +24,13 @@ pub enum FileNameError {
     },
 }
 
-/// The name of a robot for every file of a map or a log, in the order of the files: that of the file without its ending or,
-/// where several are called alike, that of its folder. A folder has no ending. Names are parts of topics: what cannot stand
-/// there becomes `_`.
+/// A robot name for each file of a map or log, in the order of the files: the file name without its extension, or the
+/// folder name where several files have the same name. A folder's name has no extension. Characters that are not
+/// allowed in a topic are replaced by `_`.
 ///
 /// # Errors
 ///
-/// A file is given twice, or two robots would have one name.
+/// A file is given twice, or two robots would have the same name.
 pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
     check_once(files)?;
     let stems: Vec<String> = files.iter().map(|file| own_name(file)).collect();
@@ -43,14 +43,14 @@ pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
     let mut owners: BTreeMap<&str, &PathBuf> = BTreeMap::new();
     for (name, file) in names.iter().zip(files) {
         if let Some(one) = owners.insert(name, file) {
-            return Err(FileNameError::Alike { name: name.clone(), one: one.clone(), other: file.clone() });
+            return Err(FileNameError::SameName { name: name.clone(), one: one.clone(), other: file.clone() });
         }
     }
     Ok(names)
 }
 
 fn check_once(files: &[PathBuf]) -> Result<(), FileNameError> {
-    // A file that is not there is found out when it is read.
+    // A missing file is reported when it is read.
     let mut places: Vec<PathBuf> =
         files.iter().map(|file| file.canonicalize().unwrap_or_else(|_| file.clone())).collect();
     places.sort();
@@ -67,14 +67,14 @@ fn own_name(file: &Path) -> String {
     }
 }
 
-/// The folder of a file, by its full path: `map.yaml` and `../map.yaml` do not say how theirs are called.
+/// The absolute folder of a file, since `map.yaml` and `../map.yaml` do not contain its name.
 fn folder_of(file: &Path) -> PathBuf {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
 }
 
-/// A name as it can stand between the slashes of a topic. ROS 2 allows letters, digits and `_` only; but a log may have
-/// others, and a name that is not the file's would have to be guessed.
+/// A name as one part of a topic. ROS 2 allows only letters, digits and `_`, but logs may contain others, and a name
+/// that differs from the file's would be hard to guess.
 fn topic_part(name: Option<&std::ffi::OsStr>) -> String {
     let name = name.map(|name| name.to_string_lossy()).unwrap_or_default();
     let part: String = name
@@ -94,17 +94,17 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_is_called_as_its_file() {
+    fn a_robot_is_named_after_its_file() {
         assert_eq!(names(&["maps/robot2.yaml", "robot1.yml", "/x/r3"]).unwrap(), ["robot2", "robot1", "r3"]);
     }
 
     #[test]
-    fn files_that_are_called_alike_are_told_apart_by_their_folders() {
+    fn files_with_equal_names_are_distinguished_by_their_folders() {
         assert_eq!(names(&["r1/map.yaml", "a/r2/map.yaml", "hall.yaml"]).unwrap(), ["r1", "r2", "hall"]);
     }
 
     #[test]
-    fn a_folder_has_its_name_from_wherever_it_is_seen() {
+    fn a_folder_has_the_same_name_through_any_path() {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("r1/maps");
         std::fs::create_dir_all(&inner).unwrap();
@@ -121,13 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn names_that_stay_alike_are_an_error_that_says_what_would_mend_it() {
+    fn names_that_stay_equal_are_an_error_with_a_fix() {
         for files in [["a/r1/map.yaml", "b/r1/map.yaml"], ["a/map.yaml", "a/map.yml"]] {
             let error = names(&files).unwrap_err().to_string();
             assert!(files.iter().all(|file| error.contains(file)) && error.contains("rename"), "{error}");
         }
-        // A folder is called as another file.
-        assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(FileNameError::Alike { .. })));
+        // A folder with the name of another file.
+        assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(FileNameError::SameName { .. })));
     }
 
     #[test]

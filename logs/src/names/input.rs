@@ -1,18 +1,18 @@
-//! An input, as it is typed: a path, or a robot and a path.
+//! An input argument: a path, or a robot and a path.
 
 use std::path::{Path, PathBuf};
 
-/// A log, and the robot whose it is if that was said.
+/// A log, with its robot if given.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Input {
-    /// The robot whose name its topics and frames get.
+    /// The robot that its topics and frames are put under.
     pub robot: Option<String>,
-    /// Where it is.
+    /// The path.
     pub path: PathBuf,
 }
 
 impl Input {
-    /// Reads `PATH` or `ROBOT=PATH`. A file that is called so as a whole is meant as it is.
+    /// Parses `PATH` or `ROBOT=PATH`. If a file with the whole name exists, it is a path.
     pub fn new(typed: &Path) -> Self {
         let unnamed = || Self { robot: None, path: typed.to_owned() };
         let Some((robot, path)) = typed.to_str().and_then(|text| text.split_once('=')) else { return unnamed() };

@@ -1,18 +1,18 @@
-//! Topics and frames under the names of their robots.
+//! Names of topics and frames under their robots.
 //!
-//! Programs of one robot call its map `/map` and its frames `map` and `base_link`, and so do those of the next. What several
-//! robots have logged is one tree of frames, and one set of topics, only once each has the name of its robot before it: the
-//! topic `/map` of `robot1` becomes `/robot1/map`, and the frame `map` becomes `robot1/map` in every message that names it.
-//! Transforms are the exception: those of all robots are on `/tf` and `/tf_static`, where programs look for them.
+//! Programs on each robot publish the map as `/map`, with frames such as `map` and `base_link`. To combine the logs of
+//! several robots, each topic and frame needs the name of its robot as a prefix: the topic `/map` of `robot1` becomes
+//! `/robot1/map`, and the frame `map` becomes `robot1/map` in every message. Transforms are the exception: those of all
+//! robots are on `/tf` and `/tf_static`, where programs expect them.
 //!
-//! Which robot that is, is said by the user ([`Input`]), by the names of files where several logs look alike, or by the
-//! topics of a log: `/robot1/tf` tells of the frames of `robot1`.
+//! The robot is given by the user ([`Input`]), or by the file name where several logs have equal topics, or by a topic
+//! such as `/robot1/tf`, which contains the frames of `robot1`.
 
-mod alike;
 mod channel;
 mod clock;
 mod error;
 mod file_names;
+mod infer_robots;
 mod input;
 mod naming;
 mod rename;
@@ -35,20 +35,20 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// The channels of logs, as they are called beside those of other robots.
+/// The channels of logs, named under their robots.
 #[derive(Debug)]
 pub struct Names {
-    /// By file, and by the channel's number in it.
+    /// By file, and by channel number in the file.
     channels: Vec<BTreeMap<u16, NamedChannel>>,
-    /// By file: the robot that it was put under.
+    /// By file: the robot that the whole file was put under.
     robots: Vec<Option<String>>,
-    remark: Option<String>,
+    note: Option<String>,
 }
 
-/// Opens logs, and names what is in them. `robots` says how topics are told apart.
+/// Opens logs and names their channels. `robots` are the topic patterns.
 ///
 /// # Errors
-/// A log cannot be read, or the rules do not fit what is in them.
+/// A log cannot be read, or the rules do not match the logs.
 pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<(LogReader, Names), NameError> {
     let paths: Vec<PathBuf> = inputs.iter().map(|input| input.path.clone()).collect();
     let (input_of, files): (Vec<usize>, Vec<PathBuf>) = log_files(&paths)?.into_iter().unzip();
@@ -60,7 +60,7 @@ pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result
     Ok((LogReader::new(files), names))
 }
 
-/// The inputs, and with map files the robots that are called as they are, where nothing else was said.
+/// The inputs, in which map files without a robot are named after their file.
 fn name_maps(files: &[LogFile], input_of: &[usize], inputs: &[Input]) -> Result<Vec<Input>, NameError> {
     let mut named = inputs.to_vec();
     for (_, &input) in files.iter().zip(input_of).filter(|(file, _)| file.is_map()) {
@@ -72,42 +72,42 @@ fn name_maps(files: &[LogFile], input_of: &[usize], inputs: &[Input]) -> Result<
 }
 
 impl Names {
-    /// The channel with the given number in a file, as it is called here; none if its file does not describe it.
+    /// The named channel with the given number in a file; `None` if the file does not describe it.
     pub fn channel(&self, file: usize, number: u16) -> Option<&Channel> {
         self.of_number(file, number).map(|named| &named.channel)
     }
 
-    /// All channels, as they are called here.
+    /// All named channels.
     pub fn channels(&self) -> impl Iterator<Item = &Channel> {
         self.channels.iter().flat_map(BTreeMap::values).map(|named| &named.channel)
     }
 
-    /// Whether the rules ask for the messages of a channel.
+    /// Whether the rules select a channel.
     pub fn wants(&self, file: usize, number: u16) -> bool {
         self.of_number(file, number).is_none_or(|named| named.is_wanted)
     }
 
-    /// The robot that all of a file was put under.
+    /// The robot that a whole file was put under.
     pub fn robot_of_file(&self, file: usize) -> Option<&str> {
         self.robots.get(file)?.as_deref()
     }
 
-    /// What the user should know of how robots were named without being asked.
-    pub fn remark(&self) -> Option<&str> {
-        self.remark.as_deref()
+    /// A note for the user about robot names that were inferred, if any.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
     }
 
-    /// Why the frames in the messages of a channel stay as they were logged, although others get their robot's name.
-    pub fn frames_left(&self, file: usize, number: u16) -> Option<String> {
-        self.of_number(file, number)?.frames_left()
+    /// The reason why the frames in a channel's messages are not renamed, although they should be.
+    pub fn unrenamed_frames(&self, file: usize, number: u16) -> Option<String> {
+        self.of_number(file, number)?.unrenamed_frames()
     }
 
-    /// What a frame is called here that messages of a channel name.
+    /// The new name of a frame in a channel's messages.
     pub fn frame<'a>(&self, file: usize, number: u16, frame: &'a str) -> Cow<'a, str> {
         self.of_number(file, number).map_or(Cow::Borrowed(frame), |named| named.frame(frame))
     }
 
-    /// Puts the frames in a message under its robot. Where that changes anything, the message is in `copy`.
+    /// Puts the frames of a message under its robot. If that changes anything, the result is in `copy`.
     pub(crate) fn rename_frames(&self, message: &LogMessage<'_>, copy: &mut Vec<u8>) -> Renamed {
         match self.of_number(message.file, message.channel) {
             Some(named) => named.rename_frames(message.data, copy),
@@ -115,7 +115,7 @@ impl Names {
         }
     }
 
-    /// A message with the names that its frames have here; where these are others than in the log, in `copy`.
+    /// The message with its frames under the robot; in `copy` if that changes anything.
     pub fn named<'a>(&self, message: &LogMessage<'a>, copy: &'a mut Vec<u8>) -> &'a [u8] {
         match self.rename_frames(message, copy) {
             Renamed::Copied => copy,

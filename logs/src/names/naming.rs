@@ -1,8 +1,9 @@
-//! From what logs hold, and what was said of them, to the names of their channels.
+//! Naming of channels, from the content of logs and the rules of the user.
 
 use super::channel::NamedChannel;
+use super::infer_robots::infer_robots;
 use super::rules::fits;
-use super::{Convention, Input, NameError, NameRules, Names, alike};
+use super::{Convention, Input, NameError, NameRules, Names};
 use crate::reader::LogFile;
 use crate::robots::{RobotChannels, Role};
 use crate::tf::{is_static, tf_topic};
@@ -10,18 +11,18 @@ use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A channel on its way to its name.
+/// A channel that is being named.
 struct Draft {
     file: usize,
     number: u16,
     channel: Channel,
-    /// Whether it has the name already that the user wants it to have.
+    /// Whether the user renamed the topic.
     is_renamed: bool,
     /// The robot that its frames are put under.
     robot: Option<String>,
 }
 
-/// Names the channels of `files`, which belong to the `inputs` of the given numbers.
+/// Names the channels of `files`, where `input_of` is the index of the input that each file belongs to.
 pub(super) fn name(
     files: &[LogFile],
     input_of: &[usize],
@@ -36,12 +37,12 @@ pub(super) fn name(
             of_input.push(channel);
         }
     }
-    let (of_input, remark) = match rules.convention {
+    let (of_input, note) = match rules.convention {
         Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
-        Convention::ByRobot => alike::name(inputs, &of_inputs, robots)?,
+        Convention::ByRobot => infer_robots(inputs, &of_inputs, robots)?,
     };
-    let remark = [remark, named_already(inputs, &of_inputs, rules, robots)];
-    let remark = remark.into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
+    let note = [note, already_named(inputs, &of_inputs, rules, robots)];
+    let note = note.into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
     let robot_of_file: Vec<Option<String>> =
         input_of.iter().map(|&input| of_input.get(input).cloned().flatten()).collect();
     put_under_robots(&mut drafts, &robot_of_file, rules);
@@ -62,7 +63,7 @@ pub(super) fn name(
     for Draft { file, number, channel, robot, .. } in drafts {
         let classified = roles.classify(&channel);
         let is_map = matches!(classified.role, Role::Map | Role::MapUpdate);
-        // The frame of a robot's map, and of its poses in it, is the robot's in any case.
+        // Maps, and poses in them, are always in the robot's map frame.
         let is_robots =
             is_map || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan);
         let by_role = is_robots && rules.convention == Convention::ByRobot;
@@ -73,12 +74,12 @@ pub(super) fn name(
             of_file.insert(number, NamedChannel::new(channel, robot, is_map, later, is_wanted));
         }
     }
-    Ok(Names { channels, robots: robot_of_file, remark })
+    Ok(Names { channels, robots: robot_of_file, note })
 }
 
-/// What is wrong where a log was said to be one robot's, and names other robots itself: under one more name its maps are
-/// nobody's.
-fn named_already(
+/// A note for the user if a log was assigned to one robot and its topics contain the names of others. With a second
+/// robot name in front, its maps match no robot.
+fn already_named(
     inputs: &[Input],
     of_inputs: &[Vec<&Channel>],
     rules: &NameRules,
@@ -91,15 +92,15 @@ fn named_already(
         let named: BTreeSet<&str> = maps().map(|found| found.robot).filter(|named| named != robot).collect();
         let (path, first) = (input.path.display(), named.first()?);
         Some(format!(
-            "the topics of {path} bear the names of their robots already ({}), and get `{robot}` before them: give it without \
-             `{robot}=`, or say `--rename /{first}/map=/map` to make one of them {robot}'s",
+            "the topics of {path} already contain robot names ({}), and `{robot}` is put before them: omit \
+             `{robot}=`, or use `--rename /{first}/map=/map` to make one of them {robot}'s",
             named.iter().copied().collect::<Vec<_>>().join(", ")
         ))
     };
     inputs.iter().zip(of_inputs).find_map(of_input)
 }
 
-/// The channels of all files, with the topics that the user wants them to have.
+/// The channels of all files, with the user's renames applied.
 fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
     let draft = |file: usize, number: u16, channel: Channel| {
         let renamed = rules.renamed(&channel.topic);
@@ -113,7 +114,7 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
     files.iter().enumerate().flat_map(of_file).collect()
 }
 
-/// Puts topics and frames under the robots of their files, or of the namespaces that they are in.
+/// Puts topics and frames under the robots of their files or namespaces.
 fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rules: &NameRules) {
     let of_file = |file: usize| robot_of_file.get(file).and_then(Option::as_deref);
     let trees = own_trees(drafts.iter().filter(|draft| of_file(draft.file).is_none()).map(|draft| &draft.channel));
@@ -138,7 +139,7 @@ fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rule
     }
 }
 
-/// The topic that transforms of all robots are on, for a channel of transforms.
+/// The topic for the transforms of all robots, if the channel carries transforms.
 fn shared_topic(channel: &Channel) -> Option<&'static str> {
     tf_topic(channel)?;
     Some(if is_static(&channel.topic) { "/tf_static" } else { "/tf" })
@@ -152,7 +153,7 @@ fn topic_of_robot(robot: &str, topic: &str) -> String {
     }
 }
 
-/// The namespaces that have transforms of their own, and their robots: `/robot1/` for `/robot1/tf`.
+/// The namespaces with their own transforms, and their robots: `/robot1/` for `/robot1/tf`.
 fn own_trees<'a>(channels: impl Iterator<Item = &'a Channel>) -> BTreeMap<String, String> {
     let tree = |channel: &'a Channel| {
         let robot = tf_topic(channel).filter(|robot| !robot.is_empty())?;
@@ -162,14 +163,14 @@ fn own_trees<'a>(channels: impl Iterator<Item = &'a Channel>) -> BTreeMap<String
     channels.filter_map(tree).collect()
 }
 
-/// The robot in whose namespace a topic is.
+/// The robot whose namespace contains a topic.
 fn tree_of<'a>(trees: &'a BTreeMap<String, String>, topic: &str) -> Option<&'a str> {
-    // Of namespaces within each other the inner one counts.
+    // Of nested namespaces the innermost is used.
     let within = trees.iter().filter(|(namespace, _)| topic.starts_with(namespace.as_str()));
     within.max_by_key(|(namespace, _)| namespace.len()).map(|(_, robot)| robot.as_str())
 }
 
-/// The robots that topics tell of.
+/// The robots in topics.
 fn known_robots(roles: &RobotChannels, drafts: &[Draft]) -> BTreeSet<String> {
     let robot = |draft: &Draft| {
         let classified = roles.classify(&draft.channel);
@@ -178,7 +179,7 @@ fn known_robots(roles: &RobotChannels, drafts: &[Draft]) -> BTreeSet<String> {
     drafts.iter().filter_map(robot).collect()
 }
 
-/// The robot under whose name a topic is, if it is that of a known one.
+/// The known robot under whose name a topic is.
 fn robot_of<'a>(known: &BTreeSet<String>, robots: &RobotTopics, topic: &'a str) -> Option<&'a str> {
     let (namespace, _) = robots.map.split_once("{robot}")?;
     let (robot, _) = topic.strip_prefix(namespace)?.split_once('/')?;

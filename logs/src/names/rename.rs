@@ -1,9 +1,9 @@
-//! Other names for topics.
+//! Renaming of topics.
 
 use gridweave_runtime::stage::match_robot;
 use std::str::FromStr;
 
-/// Another name for a topic, written `OLD=NEW`. `{robot}` may stand for one part of both.
+/// A topic rename, written `OLD=NEW`. `{robot}` matches one part of both.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TopicRename {
     old: String,
@@ -11,7 +11,7 @@ pub struct TopicRename {
 }
 
 impl TopicRename {
-    /// The name of `topic`, if it is one that this renames.
+    /// The new name of `topic`, if it matches.
     pub fn apply(&self, topic: &str) -> Option<String> {
         match match_robot(&self.old, topic) {
             Some(robot) => Some(self.new.replace("{robot}", robot)),
@@ -24,7 +24,7 @@ impl FromStr for TopicRename {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = |what: &str| format!("`{text}` renames no topic: {what}; write it as in /slam/map=/map");
+        let wrong = |what: &str| format!("`{text}` is not a topic rename: {what}; write it as in /slam/map=/map");
         let (old, new) = text.split_once('=').ok_or_else(|| wrong("there is no `=`"))?;
         if let Some(topic) = [old, new].iter().find(|topic| !topic.starts_with('/') || topic.len() < 2) {
             return Err(wrong(&format!("`{topic}` does not begin with `/` and a name")));

@@ -1,4 +1,4 @@
-//! What is said of the names of topics and robots.
+//! Rules for the names and the selection of topics and robots.
 
 use super::TopicRename;
 use crate::map_file::Thresholds;
@@ -6,48 +6,47 @@ use gridweave_runtime::stage::match_robot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whose names topics and frames bear.
+/// The convention for the names of topics and frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Convention {
-    /// Their robots': logs that look alike are each put under the name of their file; frames that lack their robot's name
-    /// get it, where the log has `/ROBOT/tf`, and in maps and poses; and `/ROBOT/tf` becomes `/tf`.
+    /// Named under robots: of logs with equal topics, each is put under the name of its file; frames without a robot
+    /// name get one, where the log has `/ROBOT/tf`, and in maps and poses; and `/ROBOT/tf` becomes `/tf`.
     #[default]
     ByRobot,
-    /// Those that they were logged with, unless a log is put under a robot by name; and nobody is told of robots that the logs
-    /// do not hold.
+    /// As logged, unless the user puts a log under a robot. Missing robots are not reported.
     AsLogged,
 }
 
 /// How topics and robots are named, and which of them are read.
 #[derive(Clone, Debug, Default)]
 pub struct NameRules {
-    /// Whose names topics and frames bear.
+    /// The naming convention.
     pub convention: Convention,
-    /// Topics that get other names.
+    /// Topics to rename.
     pub renames: Vec<TopicRename>,
-    /// The robots that are read; all if there are none.
+    /// The robots to read; empty for all.
     pub robots: Vec<String>,
-    /// The topics that are read, `{robot}` standing for any one part; all if there are none.
+    /// The topics to read, in which `{robot}` matches one part of the path; empty for all.
     pub topics: Vec<String>,
-    /// Whether the clocks of all logs are set so that they begin together.
+    /// Whether all logs are shifted in time so that they start together.
     pub align_start: bool,
-    /// How the thresholds of map files are read.
+    /// How the thresholds of map files are applied.
     pub thresholds: Thresholds,
 }
 
-/// Whether a topic is the one that is asked for, in which `{robot}` stands for any one part.
+/// Whether a topic matches a pattern, in which `{robot}` matches one part of the path.
 pub(super) fn fits(wanted: &str, topic: &str) -> bool {
     wanted == topic || match_robot(wanted, topic).is_some()
 }
 
 impl NameRules {
-    /// The other name that a topic is to have.
+    /// The user's new name for a topic.
     pub(super) fn renamed(&self, topic: &str) -> Option<String> {
         self.renames.iter().find_map(|rename| rename.apply(topic))
     }
 
-    /// Whether a topic is read, which is that of the given robot.
+    /// Whether a topic of the given robot is read.
     pub(super) fn wants(&self, topic: &str, robot: Option<&str>) -> bool {
         let of_robot = robot.is_none_or(|robot| self.robots.is_empty() || self.robots.iter().any(|one| one == robot));
         of_robot && (self.topics.is_empty() || self.topics.iter().any(|wanted| fits(wanted, topic)))

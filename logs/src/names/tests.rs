@@ -32,7 +32,7 @@ fn topics(inputs: &[Input], rules: &NameRules) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn what_is_put_under_a_robot_has_its_name_once_and_shares_the_topics_of_transforms() {
+fn topics_under_a_robot_have_its_name_once_and_transforms_share_a_topic() {
     let folder = Folder::new();
     let path = log(
         &folder,
@@ -54,7 +54,7 @@ fn what_is_put_under_a_robot_has_its_name_once_and_shares_the_topics_of_transfor
 }
 
 #[test]
-fn logs_that_look_alike_are_called_as_their_files_unless_names_stay_as_logged() {
+fn logs_with_equal_topics_are_named_after_their_files_unless_names_stay_as_logged() {
     let folder = Folder::new();
     let one = [("/map", OccupancyGrid::NAME), ("/amcl_pose", PoseWithCovarianceStamped::NAME), ("/x", "p/msg/X")];
     let paths = [log(&folder, "red.mcap", &one), log(&folder, "blue.mcap", &one)];
@@ -62,19 +62,19 @@ fn logs_that_look_alike_are_called_as_their_files_unless_names_stay_as_logged() 
     assert_eq!(named[0], ["/red/map", "/red/amcl_pose", "/red/x"]);
     assert_eq!(named[1], ["/blue/map", "/blue/amcl_pose", "/blue/x"]);
     let (_, names) = open(&inputs(&paths), &NameRules::default(), &RobotTopics::default()).unwrap();
-    let remark = names.remark().unwrap();
-    assert!(remark.contains("red.mcap for red") && remark.contains("ROBOT=LOG"), "{remark}");
+    let note = names.note().unwrap();
+    assert!(note.contains("red.mcap to red") && note.contains("ROBOT=LOG"), "{note}");
     assert_eq!((names.robot_of_file(0), names.robot_of_file(1)), (Some("red"), Some("blue")));
 
     let as_logged = NameRules { convention: Convention::AsLogged, ..Default::default() };
     assert_eq!(topics(&inputs(&paths), &as_logged)[1], ["/map", "/amcl_pose", "/x"]);
     let mut half = inputs(&paths);
     half[0].robot = Some("red1".into());
-    assert_eq!(topics(&half, &NameRules::default())[1][0], "/blue/map", "it looks like one that was named");
+    assert_eq!(topics(&half, &NameRules::default())[1][0], "/blue/map", "it has the topics of one that was named");
 }
 
 #[test]
-fn logs_with_robots_in_them_or_with_nothing_in_common_do_not_look_alike() {
+fn logs_with_robot_names_or_without_common_topics_are_not_named() {
     let folder = Folder::new();
     let with_robot = |robot: &str| {
         let map = format!("/{robot}/map");
@@ -90,7 +90,7 @@ fn logs_with_robots_in_them_or_with_nothing_in_common_do_not_look_alike() {
 }
 
 #[test]
-fn logs_that_look_alike_and_are_called_alike_are_an_error_that_says_what_to_do() {
+fn logs_with_equal_topics_and_equal_file_names_are_an_error_with_a_fix() {
     let folder = Folder::new();
     std::fs::create_dir_all(folder.path().join("x/r")).unwrap();
     std::fs::create_dir_all(folder.path().join("y/r")).unwrap();
@@ -101,7 +101,7 @@ fn logs_that_look_alike_and_are_called_alike_are_an_error_that_says_what_to_do()
 }
 
 #[test]
-fn topics_are_renamed_before_and_behind_the_name_of_their_robot() {
+fn topics_are_renamed_before_and_after_they_are_put_under_their_robot() {
     let folder = Folder::new();
     let path = log(&folder, "a.mcap", &[("/slam/map", OccupancyGrid::NAME), ("/bot/map", OccupancyGrid::NAME)]);
     let renames = ["/slam/map=/map", "/{robot}/bot/map=/{robot}/second/map"].map(|text| text.parse().unwrap());
@@ -111,7 +111,7 @@ fn topics_are_renamed_before_and_behind_the_name_of_their_robot() {
 }
 
 #[test]
-fn robots_and_topics_that_nobody_asked_for_are_left_out() {
+fn robots_and_topics_that_are_not_selected_are_dropped() {
     let folder = Folder::new();
     let path = log(
         &folder,
@@ -127,7 +127,7 @@ fn robots_and_topics_that_nobody_asked_for_are_left_out() {
     assert!(error.contains("`r3`") && error.contains("r1, r2"), "{error}");
 }
 
-/// The frames of a message on a topic of a log, as they are called.
+/// The frames of a message on a topic of a log, after renaming.
 fn frames<T: RosMessage + serde::Serialize>(topic: &str, others: &[&str], message: &T) -> (Renamed, Vec<u8>) {
     let folder = Folder::new();
     let mut log = TestLog::new(layouts()[1].clone());
@@ -143,7 +143,7 @@ fn frames<T: RosMessage + serde::Serialize>(topic: &str, others: &[&str], messag
 }
 
 #[test]
-fn frames_without_their_robots_name_get_it_where_the_log_says_whose_they_are() {
+fn frames_without_a_robot_name_get_it_where_the_log_contains_it() {
     let edge = |parent: &str, child: &str| TransformStamped {
         header: Header::new(LogTime(1), parent),
         child_frame_id: child.into(),
@@ -184,7 +184,7 @@ fn frames_without_their_robots_name_get_it_where_the_log_says_whose_they_are() {
 }
 
 #[test]
-fn a_message_that_does_not_fit_its_type_keeps_its_frames_and_one_without_definition_is_told() {
+fn a_message_that_does_not_match_its_type_keeps_its_frames_and_a_missing_definition_is_reported() {
     let folder = Folder::new();
     let mut log = TestLog::new(layouts()[1].clone());
     log.raw("/map", OccupancyGrid::NAME, 1, b"\0\x01\0\0cut").raw("/x", "p/msg/X", 2, b"?");
@@ -193,7 +193,7 @@ fn a_message_that_does_not_fit_its_type_keeps_its_frames_and_one_without_definit
     let (mut reader, names) = open(&[input], &NameRules::default(), &RobotTopics::default()).unwrap();
     assert_eq!(names.rename_frames(&reader.next_message().unwrap(), &mut Vec::new()), Renamed::Unreadable);
     let message = reader.next_message().unwrap();
-    let why = names.frames_left(message.file, message.channel).unwrap();
+    let why = names.unrenamed_frames(message.file, message.channel).unwrap();
     assert!(why.contains("/robot1/x") && why.contains("p/msg/X"), "{why}");
     assert_eq!(names.rename_frames(&message, &mut Vec::new()), Renamed::AsLogged);
 }

@@ -7,21 +7,21 @@ use image::Rgb;
 pub(super) const UNKNOWN: Rgb<u8> = Rgb([205, 205, 205]);
 pub(super) const FREE: Rgb<u8> = Rgb([255, 255, 255]);
 pub(super) const OCCUPIED: Rgb<u8> = Rgb([0, 0, 0]);
-/// What lies behind the maps of an overlay: lighter, so that the tints stand out.
+/// The background of an overlay: lighter than unknown, so that the tints are visible.
 const BACKGROUND: Rgb<u8> = Rgb([218, 218, 218]);
 
-/// How much of a map's colour its free space has.
+/// The share of a map's colour in its free space.
 const TINT: f64 = 0.2;
-/// How much darker walls are that two maps have in common.
+/// The darkening of walls that two maps have in common.
 const SHADOW: f64 = 0.45;
 
-/// `share`, 0 to 1, of the way from one colour to another.
+/// Interpolates between two colours; `share` is 0 to 1.
 pub(super) fn mix(from: Rgb<u8>, to: Rgb<u8>, share: f64) -> Rgb<u8> {
     let share = share.clamp(0.0, 1.0);
     Rgb(std::array::from_fn(|i| (f64::from(from.0[i]) * (1.0 - share) + f64::from(to.0[i]) * share).round() as u8))
 }
 
-/// The mean of the maps' colours, each with its weight, and the sum of the weights.
+/// The weighted mean of the maps' colours, and the sum of the weights.
 fn weighted_mean(weights: impl Iterator<Item = (Colour, f64)>) -> Option<(Rgb<u8>, f64)> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for (colour, weight) in weights {
@@ -36,7 +36,8 @@ pub(super) fn overlay(shares: &[Coverage], colours: &[Colour]) -> Rgb<u8> {
     let mut colour = BACKGROUND;
     let with_colours = |part: fn(&Coverage) -> f64| colours.iter().copied().zip(shares.iter().map(part));
     if let Some((tint, total)) = weighted_mean(with_colours(|share| share.free)) {
-        // What one map knows has its colour; what several know is nearly white, so that the overlap shows.
+        // Space known to one map has its colour; space known to several is nearly white, so that the overlap is
+        // visible.
         colour = mix(colour, mix(FREE, tint, TINT / total.max(1.0).powi(3)), total);
     }
     if let Some((walls, total)) = weighted_mean(with_colours(|share| share.wall)) {

@@ -13,7 +13,7 @@ const INK: Colour = [0, 0, 0];
 const X_AXIS: Colour = [200, 30, 30];
 const Y_AXIS: Colour = [30, 150, 30];
 
-/// The maps with all that is drawn on them and beside them.
+/// Adds everything that is drawn on the maps and beside them.
 pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<Picture, PictureError> {
     let unit = view.unit().round();
     let (margin, size) = (8.0 * unit, text_size(unit));
@@ -29,7 +29,7 @@ pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<
     for marks in scene.marks.iter().chain(&lines) {
         if let Some(colour) = marks.legend {
             let entry = Entry { words: &marks.name, colour };
-            // Marks of one sort may come in several groups.
+            // Marks of the same kind may be in several groups.
             if !entries.iter().any(|other| other.words == entry.words) {
                 entries.push(entry);
             }
@@ -55,7 +55,7 @@ pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<
     Ok(Picture { drawing, metres_per_pixel: view.metres_per_pixel, scale_bar: bar.metres })
 }
 
-/// The axes of the world at its origin, x red and y green; none if it lies far beyond the picture.
+/// The axes of the world at its origin, x red and y green; `None` if it is far outside of the picture.
 fn axes(view: &View, corner: Vector2<f64>) -> Option<Group> {
     let unit = view.unit();
     let origin = view.pixel(Point2::origin());
@@ -74,7 +74,7 @@ fn axes(view: &View, corner: Vector2<f64>) -> Option<Group> {
     Some(Group { name: "axes of the world".into(), is_on_image: true, paths })
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above `limit`, and into how many parts it is divided.
+/// The largest of 1, 2 and 5 times a power of ten that is not above `limit`, and the number of its divisions.
 fn round_length(limit: f64) -> (f64, u32) {
     let power = 10_f64.powi(limit.log10().floor() as i32);
     match limit / power {
@@ -84,7 +84,7 @@ fn round_length(limit: f64) -> (f64, u32) {
     }
 }
 
-/// A bar of a round length, its parts black and white in turn, and that length beside it.
+/// A scale bar of a round length, with alternating black and white divisions, and its length as text.
 struct ScaleBar {
     metres: f64,
     pixels: f64,
@@ -98,12 +98,12 @@ impl ScaleBar {
         Self { metres, pixels: metres / metres_per_pixel, parts, words: length_text(metres) }
     }
 
-    /// With the words, pixels.
+    /// The width including the text, pixels.
     fn width(&self, size: f64) -> f64 {
         self.pixels + 0.6 * size + text_width(&self.words, size)
     }
 
-    /// At the left of a line that words stand on.
+    /// Draws the bar at `left`, with its text on the baseline `line`.
     fn draw(&self, left: f64, line: f64, size: f64, unit: f64) -> Vec<Path> {
         let (top, bottom) = (line - 0.6 * size, line - 0.6 * size + 4.0 * unit);
         let part = |from: f64, to: f64| {

@@ -1,31 +1,31 @@
-//! Where two grids of one size differ.
+//! The difference of two grids with the same size.
 
 use super::PictureError;
 use super::colour::{FREE, OCCUPIED, UNKNOWN, mix};
 use gridweave_runtime::ros::cell::{is_free, is_known, is_occupied};
 use image::{Rgb, RgbImage};
 
-/// An occupied cell of the first grid alone: orange.
+/// Occupied in the first grid only: orange.
 const ONLY_FIRST: Rgb<u8> = Rgb([213, 94, 0]);
-/// An occupied cell of the second grid alone: blue.
+/// Occupied in the second grid only: blue.
 const ONLY_SECOND: Rgb<u8> = Rgb([0, 114, 178]);
-/// A cell that differs in another way: purple.
+/// Another difference: purple.
 const OTHERWISE: Rgb<u8> = Rgb([204, 121, 167]);
-/// How pale cells are that do not differ.
+/// The paleness of equal cells.
 const PALENESS: f64 = 0.6;
-/// Small grids are drawn larger, up to this side, pixels.
-const PLEASANT_SIDE: usize = 1000;
+/// Small grids are enlarged, up to this side, pixels.
+const PREFERRED_SIDE: usize = 1000;
 const MOST_PIXELS_A_CELL: usize = 16;
-/// The longest side of a grid that can be drawn, cells.
+/// The maximum side of a grid, cells.
 const LONGEST_SIDE: usize = 20_000;
 
-/// Draws where two grids of `width` columns differ, row 0 at the bottom. Cells that are equal are pale (unknown grey,
+/// Renders the difference of two grids of `width` columns, row 0 at the bottom. Equal cells are pale (unknown grey,
 /// free white, occupied dark); a cell that is occupied in the first grid only is orange, in the second only blue, and
-/// one that differs otherwise purple.
+/// any other difference is purple.
 pub fn render_difference(width: usize, first: &[i8], second: &[i8]) -> Result<RgbImage, PictureError> {
     let height = first.len().checked_div(width).unwrap_or_default();
     if width.checked_mul(height) != Some(first.len()) || first.len() != second.len() {
-        return Err(PictureError::Map { index: 1, problem: "has not the size of the other" });
+        return Err(PictureError::Map { index: 1, problem: "differs in size from the other" });
     }
     if first.is_empty() {
         return Err(PictureError::Empty);
@@ -33,7 +33,7 @@ pub fn render_difference(width: usize, first: &[i8], second: &[i8]) -> Result<Rg
     if width.max(height) > LONGEST_SIDE {
         return Err(PictureError::Map { index: 0, problem: "is too large to be drawn" });
     }
-    let pixels = (PLEASANT_SIDE / width.max(height)).clamp(1, MOST_PIXELS_A_CELL);
+    let pixels = (PREFERRED_SIDE / width.max(height)).clamp(1, MOST_PIXELS_A_CELL);
     Ok(RgbImage::from_fn((width * pixels) as u32, (height * pixels) as u32, |u, v| {
         let (column, row) = (u as usize / pixels, height - 1 - v as usize / pixels);
         let at = row * width + column;

@@ -1,4 +1,4 @@
-//! Lines every so many metres.
+//! Grid lines with their coordinates.
 
 use super::PictureError;
 use super::marks::{Mark, Marks, Shape};
@@ -6,12 +6,12 @@ use super::view::View;
 use crate::drawing::{Colour, Paint};
 use nalgebra::Point2;
 
-/// A picture with more lines would be grey.
+/// The maximum number of lines; more would make the picture grey.
 const MOST_LINES: f64 = 400.0;
 const LINE: Paint = Paint { colour: [60, 60, 60], opacity: 0.3 };
 const NUMBER: Colour = [70, 70, 70];
 
-/// Lines along the axes of the world every `metres`, with their coordinates where they begin.
+/// Grid lines parallel to the axes of the world every `metres`, labelled with their coordinates.
 pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError> {
     let low = view.world(0.0, f64::from(view.height));
     let high = view.world(f64::from(view.width), 0.0);
@@ -23,7 +23,7 @@ pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError
     let mut marks = Vec::new();
     let mut add = |from: Point2<f64>, to: Point2<f64>, value: f64| {
         marks.push(Mark { shape: Shape::Line { places: vec![from, to], width: 0.5 }, paint: LINE });
-        // Where the next line's number still has room.
+        // The position where the next label has room.
         let words = length_text(value);
         marks.push(Mark { shape: Shape::Label { at: from, words }, paint: NUMBER.into() });
     };
@@ -36,9 +36,9 @@ pub(super) fn grid_lines(view: &View, metres: f64) -> Result<Marks, PictureError
     Ok(Marks { name: format!("a line every {}", length_text(metres)), legend: Some(LINE.colour), marks })
 }
 
-/// A length for people, as in `2.5 m`.
+/// A length for people, such as `2.5 m`.
 pub(super) fn length_text(metres: f64) -> String {
-    // Without the last digits of what is no round number to the machine.
+    // Rounded, to hide the inexact last digits of a binary number.
     format!("{} m", (metres * 1e6).round() / 1e6 + 0.0)
 }
 

@@ -6,12 +6,12 @@ use gridweave_runtime::ros::MapMetaData;
 use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// A map, and where it lies.
+/// A map, and its pose in the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct MapLayer<'a> {
-    /// What the legend calls it, if anything: the name of its robot.
+    /// The name in the legend, if any: that of the robot.
     pub name: &'a str,
-    /// Of its walls, where maps are told apart by colour; see [`robot_colour`](super::robot_colour).
+    /// The colour of its walls in an overlay; see [`robot_colour`](super::robot_colour).
     pub colour: Colour,
     /// Size, resolution and origin.
     pub info: MapMetaData,
@@ -21,14 +21,14 @@ pub struct MapLayer<'a> {
     pub transform_world_map: Isometry2<f64>,
 }
 
-/// How much of a pixel is wall, and how much is free, 0 to 1.
+/// The fractions of a pixel that are occupied and free, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Coverage {
     pub(super) wall: f64,
     pub(super) free: f64,
 }
 
-/// A map that has been checked.
+/// A validated map.
 pub(super) struct PlacedLayer<'a> {
     cells: &'a [i8],
     width: usize,
@@ -38,11 +38,11 @@ pub(super) struct PlacedLayer<'a> {
 }
 
 impl<'a> PlacedLayer<'a> {
-    /// Checks a map; otherwise says what is wrong.
+    /// Validates a map.
     pub(super) fn new(map: &MapLayer<'a>) -> Result<Self, &'static str> {
         let (width, height) = (map.info.width as usize, map.info.height as usize);
         if width.checked_mul(height) != Some(map.cells.len()) {
-            return Err("has not width x height cells");
+            return Err("does not have width x height cells");
         }
         let resolution = f64::from(map.info.resolution);
         if !(resolution.is_finite() && resolution > 0.0) {
@@ -56,7 +56,7 @@ impl<'a> PlacedLayer<'a> {
         Ok(Self { cells: map.cells, width, resolution, transform_world_grid })
     }
 
-    /// The outer corners of the known cells of every row, in the world.
+    /// The outer corners of the known cells of each row, in the world.
     pub(super) fn outline(&self) -> impl Iterator<Item = Point2<f64>> + '_ {
         let rows = self.cells.chunks_exact(self.width.max(1)).enumerate();
         rows.flat_map(move |(row, cells)| {
@@ -72,7 +72,7 @@ impl<'a> PlacedLayer<'a> {
         })
     }
 
-    /// What the map has in the pixel in column `u` and row `v`.
+    /// The coverage of the pixel in column `u` and row `v`.
     pub(super) fn coverage(&self, view: &View, u: usize, v: usize) -> Coverage {
         let samples = view.samples_per_side;
         let step = 1.0 / samples as f64;
@@ -92,12 +92,12 @@ impl<'a> PlacedLayer<'a> {
             }
         }
         let count = (samples * samples) as f64;
-        // A wall is one cell wide and must not fade when cells are smaller than pixels.
+        // A wall is one cell wide and must stay visible when cells are smaller than pixels.
         let wall = (2.0 * f64::from(walls) / count).min(1.0);
         Coverage { wall, free: f64::from(free) / (count - f64::from(walls)).max(1.0) }
     }
 
-    /// The cell at a place in units of cells; unknown outside of the map.
+    /// The cell at a position in cells; unknown outside of the map.
     fn cell(&self, place: Point2<f64>) -> i8 {
         if !(place.x >= 0.0 && place.y >= 0.0 && place.x < self.width as f64) {
             return UNKNOWN;

@@ -1,20 +1,20 @@
-//! What is drawn on maps, in metres of the world.
+//! Marks on maps, in metres of the world.
 
 use super::view::View;
 use crate::drawing::{Colour, Group, Paint, Path, text};
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use nalgebra::{Matrix2, Point2, Vector2};
 
-/// Nothing is drawn that lies farther outside of the picture, pixels.
+/// Marks farther outside of the picture are not drawn, pixels.
 const FARTHEST: f64 = 1e5;
 const PAPER: Colour = [255, 255, 255];
 
-/// Marks of one sort.
+/// Marks of one kind.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
-    /// What the legend says of them.
+    /// The text in the legend.
     pub name: String,
-    /// Their colour in the legend; none if it says nothing of them.
+    /// The colour in the legend; `None` for no entry.
     pub legend: Option<Colour>,
     /// The marks.
     pub marks: Vec<Mark>,
@@ -23,56 +23,56 @@ pub struct Marks {
 /// One mark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// What it is.
+    /// The shape.
     pub shape: Shape,
-    /// Its colour.
+    /// The colour.
     pub paint: Paint,
 }
 
-/// What a mark is, in metres of the world. Widths are in units that suit the size of the picture: thin lines are 1 wide.
+/// The shape of a mark, in metres of the world. Widths are in units of the picture's size: thin lines have the width 1.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// Straight lines from place to place.
+    /// A polyline.
     Line {
-        /// The places.
+        /// The vertices.
         places: Vec<Point2<f64>>,
-        /// How wide.
+        /// The width.
         width: f64,
     },
-    /// What lies within so many standard deviations of a place.
+    /// An ellipse of equal standard deviations about a position.
     Ellipse {
-        /// The place.
+        /// The position.
         middle: Point2<f64>,
-        /// Its covariance, square metres.
+        /// The covariance, square metres.
         covariance: Matrix2<f64>,
-        /// How many standard deviations.
+        /// The number of standard deviations.
         deviations: f64,
     },
-    /// An arrow from one place to another.
+    /// An arrow.
     Arrow {
-        /// Where it begins.
+        /// The start.
         from: Point2<f64>,
-        /// Where it points.
+        /// The tip.
         to: Point2<f64>,
     },
     /// A dot.
     Dot {
-        /// Where.
+        /// The centre.
         at: Point2<f64>,
-        /// How wide.
+        /// The diameter.
         width: f64,
     },
-    /// Words, beside a place.
+    /// A text beside a position.
     Label {
-        /// The place.
+        /// The position.
         at: Point2<f64>,
-        /// The words.
+        /// The text.
         words: String,
     },
 }
 
 impl Marks {
-    /// As shapes of a drawing on an image that lies at `corner`.
+    /// Converts the marks to shapes of a drawing, on an image whose corner is at `corner`.
     pub(super) fn draw(&self, view: &View, corner: Vector2<f64>) -> Group {
         let canvas = Canvas { view, corner, unit: view.unit() };
         let paths = self.marks.iter().flat_map(|mark| canvas.draw(mark).unwrap_or_default()).collect();
@@ -80,7 +80,7 @@ impl Marks {
     }
 }
 
-/// Where marks are drawn.
+/// The target of marks.
 struct Canvas<'a> {
     view: &'a View,
     corner: Vector2<f64>,
@@ -88,7 +88,7 @@ struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// None for what is no number, or lies far beyond the picture.
+    /// The pixel of a position; `None` if it is not finite, or far outside of the picture.
     fn pixel(&self, world: &Point2<f64>) -> Option<Point2<f64>> {
         let pixel = self.view.pixel(*world);
         (pixel.x.abs() < FARTHEST && pixel.y.abs() < FARTHEST).then_some(pixel + self.corner)
@@ -98,7 +98,7 @@ impl Canvas<'_> {
         Some(match shape {
             Shape::Line { places, width } => {
                 let pixels = places.iter().map(|place| self.pixel(place)).collect::<Vec<_>>();
-                // A place that cannot be drawn parts the line.
+                // A vertex that cannot be drawn interrupts the line.
                 let parts = pixels.split(Option::is_none).filter(|part| part.len() > 1);
                 let line = |part: &[Option<Point2<f64>>]| Path::lines(part.iter().copied().flatten());
                 parts.map(|part| line(part).stroked(*paint, width * self.unit)).collect()
@@ -125,7 +125,7 @@ impl Canvas<'_> {
                 let size = text_size(self.unit) * 0.85;
                 let start = self.pixel(at)? + Vector2::new(0.45, -0.35) * size;
                 let letters = text(words, start, size);
-                // Letters on a pale edge can be read on any map.
+                // A pale outline makes letters readable on any map.
                 let edge = Paint { colour: PAPER, opacity: 0.8 };
                 vec![letters.clone().stroked(edge, size * 0.2), letters.filled(*paint)]
             }
@@ -147,7 +147,7 @@ impl Canvas<'_> {
     }
 }
 
-/// How large words are, pixels.
+/// The font size, pixels.
 pub(super) fn text_size(unit: f64) -> f64 {
     (8.0 * unit).max(11.0)
 }

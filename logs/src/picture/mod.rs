@@ -1,9 +1,8 @@
-//! Pictures of maps for people: one map in grey, or the maps of several robots laid over each other, each in a colour
-//! of its own, with whatever else there is to show on them.
+//! Pictures of maps: one map in grey, or an overlay of the maps of several robots in different colours, with further
+//! marks on them.
 //!
-//! North of a picture is the y axis of the world. A picture shows the axes of the world at its origin (x red, y green)
-//! and, below the map, a scale bar of a round length with that length, and what the colours stand for. It is written as PNG, SVG
-//! or PDF.
+//! The y axis of the world points up. A picture shows the axes of the world at its origin (x red, y green) and, below
+//! the map, a labelled scale bar and a legend of the colours. It is written as PNG, SVG or PDF.
 
 mod colour;
 mod decoration;
@@ -34,48 +33,49 @@ use rayon::prelude::*;
 use std::path::Path;
 use view::View;
 
-/// What a picture shows.
+/// The contents of a picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Scene<'a> {
     /// The maps.
     pub maps: &'a [MapLayer<'a>],
-    /// How their cells are drawn.
+    /// How cells are coloured.
     pub cells: Cells,
-    /// What is drawn on them, one upon the other.
+    /// The marks on the maps, in drawing order.
     pub marks: &'a [Marks],
-    /// Draws a line every so many metres.
+    /// The distance between grid lines, metres.
     pub grid: Option<f64>,
 }
 
-/// How the cells of maps are drawn.
+/// How the cells of maps are coloured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cells {
-    /// Unknown cells grey, free ones white, occupied ones black; of the first map only.
+    /// Unknown grey, free white, occupied black; shows the first map only.
     #[default]
     Grey,
-    /// Walls in the colour of their map, free space in a light tint of it. Where walls of two maps meet, the colour is darker.
+    /// Walls in the colour of their map, free space in a light tint of it. Walls of several maps at one place are
+    /// darker.
     Coloured,
 }
 
-/// A picture, and what it takes to read it.
+/// A picture and its scale.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// The maps, and all that is drawn on them and beside them. No side of the maps is longer than 2400 pixels.
+    /// The maps with everything on them and beside them. No side of the maps is longer than 2400 pixels.
     pub drawing: Drawing,
-    /// Metres a pixel.
+    /// Metres per pixel.
     pub metres_per_pixel: f64,
     /// The length of the scale bar, metres.
     pub scale_bar: f64,
 }
 
-/// The formats of a picture, by the endings of file names.
+/// The supported formats, as file extensions.
 pub const FORMATS: [&str; 3] = ["png", "svg", "pdf"];
 
 impl Picture {
     /// Draws a scene.
     ///
     /// # Errors
-    /// A map is none, nothing is known, or the lines of the grid would be too many.
+    /// A map is invalid, nothing is known, or there would be too many grid lines.
     pub fn of(scene: &Scene<'_>) -> Result<Self, PictureError> {
         let colours: Vec<_> = scene.maps.iter().map(|map| map.colour).collect();
         let (image, view) = match scene.cells {
@@ -88,10 +88,10 @@ impl Picture {
         decoration::decorate(image, &view, scene)
     }
 
-    /// The picture as a file, in the format that the ending of its name says: see [`FORMATS`].
+    /// Encodes the picture in the format of the file's extension; see [`FORMATS`].
     ///
     /// # Errors
-    /// The ending is none of these, or the picture is too large.
+    /// The extension is not supported, or the picture is too large.
     pub fn encode(&self, path: &Path) -> Result<Vec<u8>, PictureError> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         Ok(match ending.as_str() {
@@ -102,16 +102,16 @@ impl Picture {
         })
     }
 
-    /// Writes the picture to a file, in the format that the ending of its name says: see [`FORMATS`].
+    /// Writes the picture to a file in the format of its extension; see [`FORMATS`].
     ///
     /// # Errors
-    /// The ending is none of these, the picture is too large, or the file cannot be written.
+    /// The extension is not supported, the picture is too large, or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
         Ok(replace(&[(path, &self.encode(path)?)])?)
     }
 }
 
-/// Draws the maps; `paint` gives the colour of a pixel from the share of walls and free space that each map has in it.
+/// Renders the maps; `paint` gives the colour of a pixel from the coverage by each map.
 fn render(
     maps: &[MapLayer<'_>],
     paint: impl Fn(&[Coverage]) -> image::Rgb<u8> + Sync,

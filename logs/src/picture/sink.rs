@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PictureParameters {
-    /// The file to write: PNG, SVG or PDF by its ending. A file that has this name is replaced.
+    /// The file to write: PNG, SVG or PDF by its extension. An existing file is replaced.
     file: PathBuf,
 }
 
@@ -25,20 +25,20 @@ impl Parameters for PictureParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "picture_sink",
-        "Draws the robots' maps as they lie in the merged one, each robot's walls in a colour of its own, or the merged map where \
+        "Draws the robots' maps aligned in the merged frame, with walls in a different colour for each robot, or the merged map where \
          there are none, and topological maps on them, at the end of the run. Writes nothing if there is no merged map.",
         PictureSink::new,
     )
-    .inputs("map", "the merged map, which is about no robot, and the robots' in the same frame", PictureSink::map)
+    .inputs("map", "the merged map, without a robot, and the robots' maps in the same frame", PictureSink::map)
     .optional_inputs("topology", "the robots' topological maps", PictureSink::topology)
-    .optional_inputs("frames", "where topological maps lie, which are not bent", PictureSink::frames)
+    .optional_inputs("frames", "the poses of topological maps, which are not deformed", PictureSink::frames)
     .finish(PictureSink::write)
     .build()
 }
 
 struct PictureSink {
     file: PathBuf,
-    /// The last map of each robot, and the merged one under an empty name.
+    /// The last map of each robot; the merged map has an empty name.
     maps: BTreeMap<String, Message>,
     frames: RobotFrames,
     /// The last topological map of each robot.
@@ -105,16 +105,16 @@ impl PictureSink {
     }
 }
 
-/// An error, at the start of a run and not at its end, if the ending of a picture's name says no format that is written.
+/// Checks the extension of a picture's file name, so that an error is found at the start of a run.
 ///
 /// # Errors
-/// It does.
+/// The extension is not supported.
 pub fn check_format(path: &Path) -> Result<(), PictureError> {
     let is_known = |ending: &OsStr| FORMATS.iter().any(|format| ending.eq_ignore_ascii_case(format));
     if path.extension().is_some_and(is_known) { Ok(()) } else { Err(PictureError::Format(path.to_owned())) }
 }
 
-/// None for a map that cannot be read, which was warned of when it came.
+/// `None` for a map that cannot be read; the warning was given when it was received.
 fn layer<'a>(name: &'a str, message: &'a Message) -> Option<MapLayer<'a>> {
     let grid: OccupancyGrid<'_> = message.decode().ok()?;
     let (colour, transform_world_map) = (robot_colour(0), Isometry2::identity());

@@ -26,7 +26,7 @@ fn at(x: f64, y: f64, yaw: f64) -> Isometry2<f64> {
     Isometry2::new(Vector2::new(x, y), yaw)
 }
 
-/// How many pixels have a colour.
+/// The number of pixels with a colour.
 fn count(picture: &Picture, colour: [u8; 3]) -> usize {
     pixels(picture).pixels().filter(|pixel| pixel.0 == colour).count()
 }
@@ -38,7 +38,7 @@ fn cell(picture: &Picture, column: u32, row: u32) -> [u8; 3] {
 
 #[test]
 fn cells_are_grey_white_and_black_with_row_0_at_the_bottom() {
-    // Far from the world's origin, so that no axis covers them.
+    // Far from the origin of the world, so that no axis covers the cells.
     let layer = MapLayer { transform_world_map: at(50.0, 50.0, 0.0), ..layer(info(2, 2, 0.1), &[0, 100, -1, 0]) };
     let picture = render_map(&layer).unwrap();
     assert_eq!(picture.drawing.image.dimensions(), (16, 16));
@@ -49,8 +49,8 @@ fn cells_are_grey_white_and_black_with_row_0_at_the_bottom() {
 }
 
 #[test]
-fn a_turned_map_lies_as_its_pose_says() {
-    // A wall along x, turned a quarter to the left about its corner, goes up.
+fn a_rotated_map_is_drawn_at_its_pose() {
+    // A wall along x, rotated by a quarter turn about its corner, points up.
     let layer = MapLayer {
         transform_world_map: at(50.0, 50.0, std::f64::consts::FRAC_PI_2),
         ..layer(info(5, 1, 0.1), &[100; 5])
@@ -64,7 +64,7 @@ fn a_turned_map_lies_as_its_pose_says() {
 }
 
 #[test]
-fn every_robot_has_a_colour_and_what_several_see_stands_out() {
+fn every_robot_has_a_colour_and_common_space_is_visible() {
     let place = at(50.0, 50.0, 0.0);
     let left = MapLayer { transform_world_map: place, ..layer(info(4, 1, 0.1), &[100, 0, 100, 0]) };
     let right = MapLayer { cells: &[-1, -1, 100, 0], colour: robot_colour(1), ..left };
@@ -77,7 +77,7 @@ fn every_robot_has_a_colour_and_what_several_see_stands_out() {
 }
 
 #[test]
-fn no_two_of_six_robots_have_one_colour() {
+fn six_robots_have_different_colours() {
     let colours: std::collections::BTreeSet<_> = (0..6).map(robot_colour).collect();
     assert_eq!(colours.len(), 6);
     assert_eq!(robot_colour(6), robot_colour(0));
@@ -107,7 +107,7 @@ fn axes_are_drawn_at_the_origin_of_the_world() {
 }
 
 #[test]
-fn ways_and_places_are_drawn_where_the_map_lies() {
+fn topological_maps_are_drawn_at_their_pose() {
     let cells = [0; 4000];
     let map = MapLayer { transform_world_map: at(50.0, 50.0, 0.0), ..layer(info(100, 40, 0.1), &cells) };
     let node = |x: f64, kind: &str| TopologicalNode { x, y: 2.0, kind: kind.into(), probability: 1.0 };
@@ -132,23 +132,23 @@ fn ways_and_places_are_drawn_where_the_map_lies() {
     }
     let plain = render_overlay(&[map], &[]).unwrap();
     let differ = image.pixels().zip(pixels(&plain).pixels()).filter(|(one, other)| one != other).count();
-    assert!(differ < 40_000, "what is no number is not drawn: {differ}");
+    assert!(differ < 40_000, "values that are not finite are not drawn: {differ}");
 }
 
 #[test]
-fn what_is_no_map_is_an_error() {
+fn invalid_maps_are_errors() {
     let text = |layers: &[MapLayer<'_>]| render_overlay(layers, &[]).unwrap_err().to_string();
     let good = layer(info(1, 1, 0.1), &[0]);
     assert_eq!(text(&[]), "there is nothing to show: no cell of any map is known");
     assert_eq!(text(&[layer(info(2, 1, 0.1), &[-1, -1])]), "there is nothing to show: no cell of any map is known");
-    assert_eq!(text(&[good, layer(info(2, 2, 0.1), &[0])]), "map 1 of the picture has not width x height cells");
+    assert_eq!(text(&[good, layer(info(2, 2, 0.1), &[0])]), "map 1 of the picture does not have width x height cells");
     assert!(text(&[layer(info(1, 1, f32::NAN), &[0])]).contains("resolution"));
     assert!(text(&[MapLayer { transform_world_map: at(f64::NAN, 0.0, 0.0), ..good }]).contains("pose"));
     assert!(text(&[layer(info(0, 0, 0.1), &[])]).contains("nothing to show"));
 }
 
 #[test]
-fn maps_that_lie_far_apart_make_a_picture_of_bounded_size() {
+fn maps_far_apart_give_a_picture_of_bounded_size() {
     let near = layer(info(1, 1, 0.1), &[100]);
     for distance in [1e3, 1e9, 1e200] {
         let far = MapLayer { transform_world_map: at(distance, 0.0, 1.0), ..near };
@@ -171,7 +171,7 @@ fn a_picture_is_the_same_every_time_and_is_saved_in_the_format_of_its_name() {
     assert!(picture.encode(Path::new("a.svg")).unwrap().starts_with(b"<svg"));
     assert!(picture.encode(Path::new("a.pdf")).unwrap().starts_with(b"%PDF"));
     let error = picture.save(Path::new("picture.jpg")).unwrap_err().to_string();
-    assert!(error.contains("picture.jpg ends on none of .png, .svg and .pdf"), "{error}");
+    assert!(error.contains("picture.jpg has an unsupported extension; use .png, .svg or .pdf"), "{error}");
     let error = picture.save(&folder.path().join("missing/picture.png")).unwrap_err().to_string();
     assert!(error.contains("missing/picture.png") && error.contains("folder exists"), "{error}");
 }
@@ -209,7 +209,7 @@ fn the_legend_names_every_map_in_its_colour_and_fits_into_the_picture() {
 }
 
 #[test]
-fn grid_lines_stand_at_round_coordinates_and_are_not_too_many() {
+fn grid_lines_have_round_coordinates_and_a_limited_number() {
     let map = MapLayer { transform_world_map: at(50.3, 50.0, 0.0), ..layer(info(40, 20, 0.1), &[0; 800]) };
     let maps = [map];
     let scene = |grid| Scene { maps: &maps, grid: Some(grid), ..Scene::default() };
@@ -226,7 +226,7 @@ fn grid_lines_stand_at_round_coordinates_and_are_not_too_many() {
 }
 
 #[test]
-fn marks_lie_where_the_world_has_them() {
+fn marks_are_drawn_at_their_world_coordinates() {
     let map = MapLayer { transform_world_map: at(50.0, 50.0, 0.0), ..layer(info(100, 100, 0.1), &[0; 10_000]) };
     let at = nalgebra::Point2::new(55.0, 55.0);
     let mark = |shape| Mark { shape, paint: [0, 0, 255].into() };

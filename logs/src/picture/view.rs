@@ -1,13 +1,13 @@
-//! What part of the world a picture shows, and how large.
+//! The part of the world that a picture shows, and its scale.
 
 use nalgebra::Point2;
 
-/// The longest side of the maps in a picture, pixels.
+/// The maximum side of the maps in a picture, pixels.
 const LONGEST_SIDE: f64 = 2400.0;
-/// Small maps are drawn larger, up to this side and this many pixels a cell.
-const PLEASANT_SIDE: f64 = 2000.0;
+/// Small maps are enlarged, up to this side and this many pixels per cell.
+const PREFERRED_SIDE: f64 = 2000.0;
 const MOST_PIXELS_A_CELL: f64 = 8.0;
-/// Samples a pixel: along each side, at most.
+/// The maximum number of samples per pixel along each side.
 const MOST_SAMPLES: f64 = 6.0;
 
 /// The part of the world that a picture shows, without its margin.
@@ -17,7 +17,7 @@ pub(super) struct View {
     /// Pixels.
     pub(super) height: u32,
     pub(super) metres_per_pixel: f64,
-    /// Every pixel is the mean of so many samples along each side.
+    /// The number of samples along each side of a pixel, whose mean is the pixel.
     pub(super) samples_per_side: usize,
     /// The picture's upper left corner in the world.
     left: f64,
@@ -25,13 +25,13 @@ pub(super) struct View {
 }
 
 impl View {
-    /// A length for lines and gaps that suits the size of the picture, pixels.
+    /// A length for lines and gaps in proportion to the picture, pixels.
     pub(super) fn unit(&self) -> f64 {
         (f64::from(self.width.max(self.height)) / 500.0).max(1.0)
     }
 
-    /// All points of the outlines of so many maps, of which the finest has cells of `finest` metres. `None` if there are
-    /// none, or if they lie too far apart to be measured.
+    /// The view of all outline points of `maps` maps, with the smallest resolution `finest`, metres. `None` if there
+    /// are no points, or if they are too far apart.
     pub(super) fn of(outlines: impl Iterator<Item = Point2<f64>>, maps: usize, finest: f64) -> Option<Self> {
         let mut bounds: Option<[f64; 4]> = None;
         for point in outlines {
@@ -44,9 +44,9 @@ impl View {
         if !(extent.is_finite() && extent > 0.0 && finest.is_finite()) {
             return None;
         }
-        let pixels_a_cell = (PLEASANT_SIDE * finest / extent).floor().clamp(1.0, MOST_PIXELS_A_CELL);
+        let pixels_a_cell = (PREFERRED_SIDE * finest / extent).floor().clamp(1.0, MOST_PIXELS_A_CELL);
         let metres_per_pixel = (finest / pixels_a_cell).max(extent / LONGEST_SIDE);
-        // The cells of one map lie on the pixels; those of several lie askew and need to be smoothed.
+        // The cells of one map are aligned with the pixels; those of several are rotated and need to be smoothed.
         let least_samples = match maps {
             1 => 1.0,
             _ if pixels_a_cell >= 2.0 => 2.0,
@@ -64,12 +64,12 @@ impl View {
         })
     }
 
-    /// The place in the world of a place in the picture, pixels from its upper left corner.
+    /// The world position of a pixel position, measured from the picture's upper left corner.
     pub(super) fn world(&self, u: f64, v: f64) -> Point2<f64> {
         Point2::new(self.left + u * self.metres_per_pixel, self.top - v * self.metres_per_pixel)
     }
 
-    /// The place in the picture of a place in the world.
+    /// The pixel position of a world position.
     pub(super) fn pixel(&self, world: Point2<f64>) -> Point2<f64> {
         Point2::new((world.x - self.left) / self.metres_per_pixel, (self.top - world.y) / self.metres_per_pixel)
     }

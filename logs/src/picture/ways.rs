@@ -10,7 +10,8 @@ const DOOR: Colour = [220, 120, 0];
 const JUNCTION: Colour = [200, 30, 30];
 const PLACE: Colour = [20, 20, 20];
 
-/// A topological map by the pose of its frame in the world: ways blue, doors orange, junctions red and other places black.
+/// A topological map at the pose of its frame in the world: paths blue, doors orange, junctions red and other nodes
+/// black.
 pub fn ways(map: &TopologicalMap, transform_world_map: &Isometry2<f64>) -> Marks {
     let world = |x: f64, y: f64| transform_world_map * Point2::new(x, y);
     let paths = map.paths.iter().map(|path| {

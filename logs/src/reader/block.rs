@@ -1,11 +1,10 @@
-//! Blocks: the pieces in which a file is read. A block is a chunk, or a run of records that lie in the file by
-//! themselves.
+//! Blocks: the units in which a file is read. A block is a chunk, or a run of records outside of chunks.
 
 use super::bytes::FileBytes;
 use super::chunk::Chunk;
+use super::compressed::{ZSTD_MAGIC, decompress_messages};
 use super::damage::{ChunkFault, LARGEST};
 use super::definitions::Definitions;
-use super::packed::{ZSTD_MAGIC, unpack_messages};
 use super::record::{MessageRecord, record_at};
 use super::ros1::BagChunk;
 use super::sqlite::Rows;
@@ -13,36 +12,36 @@ use super::storage::Storage;
 use mcap::records::op;
 use std::ops::Range;
 
-/// A piece of a file, and the time that its messages span.
+/// A unit of a file, and the time span of its messages.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// The least log time in it.
+    /// The least log time.
     pub(crate) first_time: u64,
-    /// The greatest log time in it.
+    /// The greatest log time.
     pub(crate) last_time: u64,
-    /// Where its records are.
+    /// The location of its records.
     pub(crate) records: Records,
 }
 
-/// Where the records of a block are.
+/// The location of a block's records.
 #[derive(Clone, Debug)]
 pub(crate) enum Records {
-    /// In this part of the file, as they are.
+    /// This part of the file, uncompressed.
     Bare(Range<usize>),
-    /// In a chunk.
+    /// A chunk.
     Chunk(Chunk),
-    /// In rows of a database.
+    /// Rows of a database.
     Rows(Rows),
-    /// In a chunk of a bag of ROS 1.
+    /// A chunk of a ROS 1 bag.
     Ros1(BagChunk),
 }
 
 impl Block {
-    /// How much memory its records take when they are loaded.
+    /// The memory that the loaded records take, bytes.
     pub(crate) fn size(&self) -> u64 {
         match &self.records {
             Records::Bare(range) => range.len() as u64,
-            // The size of a chunk that is cut may not have been written yet.
+            // The size of a truncated chunk may not have been written yet.
             Records::Chunk(chunk) if chunk.cut => chunk.data.len() as u64,
             Records::Chunk(chunk) => chunk.size,
             Records::Rows(rows) => rows.size,
@@ -50,7 +49,7 @@ impl Block {
         }
     }
 
-    /// Whether it takes more to load it than to read it.
+    /// Whether loading takes more than reading from the file.
     pub(crate) fn is_work(&self) -> bool {
         match &self.records {
             Records::Bare(_) => false,
@@ -59,7 +58,7 @@ impl Block {
         }
     }
 
-    /// The block's records, uncompressed, in `memory` in place of what that holds.
+    /// The block's records, uncompressed. They are stored in `memory`, whose contents are replaced.
     fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
         match &self.records {
             Records::Bare(range) if range.len() as u64 > LARGEST => {
@@ -70,17 +69,17 @@ impl Block {
                 file.read_into(range.clone(), &mut records).then_some(records).ok_or(ChunkFault::Records)
             }
             Records::Chunk(chunk) => chunk.contents(file, memory),
-            // Databases and bags have no records of MCAP.
+            // Databases and ROS 1 bags have no MCAP records.
             Records::Rows(_) | Records::Ros1(_) => Err(ChunkFault::Records),
         }
     }
 
-    /// Whether it may end with a part of a record.
+    /// Whether the block may end with a partial record.
     pub(crate) fn may_be_cut(&self) -> bool {
         matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
     }
 
-    /// Makes the block's messages ready to be given out, in memory that another has left. `definitions` are those of its file.
+    /// Loads the block's messages, into the memory of a released block. `definitions` are those of its file.
     pub(crate) fn load(
         &self,
         storage: &Storage,
@@ -94,15 +93,15 @@ impl Block {
             _ => return Err(ChunkFault::Records),
         };
         let index = Index::of(&records, self.may_be_cut(), memory.messages)?;
-        if !index.may_be_packed {
-            return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0, is_unpacked: false });
+        if !index.may_be_compressed {
+            return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0, is_decompressed: false });
         }
-        let records = unpack_messages(&records, definitions)?;
+        let records = decompress_messages(&records, definitions)?;
         let messages = Index::of(&records, self.may_be_cut(), index.messages)?.messages;
-        Ok(LoadedBlock { records, messages, lost, later: 0, is_unpacked: true })
+        Ok(LoadedBlock { records, messages, lost, later: 0, is_decompressed: true })
     }
 
-    /// Reads the block through for what its header does not say, or does not say reliably.
+    /// Scans the block for what its header does not contain, or not reliably.
     pub(crate) fn survey(&self, file: &FileBytes) -> Result<Survey, ChunkFault> {
         let contents = self.contents(file, Vec::new())?;
         let mut survey = Survey { times: None, definitions: Definitions::default() };
@@ -125,15 +124,15 @@ impl Block {
     }
 }
 
-/// What reading a block through has shown.
+/// The result of scanning a block.
 pub(crate) struct Survey {
-    /// The least and the greatest log time; `None` if there is no message.
+    /// The least and the greatest log time; `None` if there are no messages.
     pub(crate) times: Option<(u64, u64)>,
-    /// The channels that it describes.
+    /// The channels described in the block.
     pub(crate) definitions: Definitions,
 }
 
-/// What a block that has been given out leaves to one that comes.
+/// The memory of a released block, for reuse.
 #[derive(Default)]
 pub(crate) struct Memory {
     records: Vec<u8>,
@@ -146,44 +145,44 @@ impl Memory {
         Self { records: Vec::with_capacity(size as usize), messages: Vec::new() }
     }
 
-    /// How many bytes it takes.
+    /// The size of the memory, bytes.
     pub(crate) fn size(&self) -> u64 {
         (self.records.capacity() + self.messages.capacity() * size_of::<MessagePlace>()) as u64
     }
 }
 
-/// A block whose messages can be given out.
+/// A block in memory.
 pub(crate) struct LoadedBlock {
     records: Vec<u8>,
-    /// By log time, and at equal times by position.
+    /// Ordered by log time, then by position.
     messages: Vec<MessagePlace>,
-    /// How many messages of the block could not be read.
+    /// The number of unreadable messages in the block.
     pub(crate) lost: u64,
-    /// By how much its clock is set later, nanoseconds.
+    /// The shift of its log times, nanoseconds.
     later: i64,
-    /// Whether it had messages that may have been compressed each by itself.
-    pub(crate) is_unpacked: bool,
+    /// Whether any of its messages may have been compressed individually.
+    pub(crate) is_decompressed: bool,
 }
 
-/// Where a message lies in its block.
+/// The location of a message in its block.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct MessagePlace {
     log_time: u64,
     position: usize,
 }
 
-/// The messages among some records.
+/// The messages in a sequence of records.
 struct Index {
-    /// The places of the messages, in the order they are given out.
+    /// The locations of the messages, in reading order.
     messages: Vec<MessagePlace>,
-    /// Whether one of them begins as a message does that is compressed by itself.
-    may_be_packed: bool,
+    /// Whether any message starts like an individually compressed one.
+    may_be_compressed: bool,
 }
 
 impl Index {
-    /// In `memory` in place of what that holds.
+    /// Indexes the messages of `records`. The index is stored in `memory`, whose contents are replaced.
     fn of(records: &[u8], may_be_cut: bool, memory: Vec<MessagePlace>) -> Result<Self, ChunkFault> {
-        let mut index = Self { messages: memory, may_be_packed: false };
+        let mut index = Self { messages: memory, may_be_compressed: false };
         index.messages.clear();
         index.messages.reserve(records.len() / 256);
         let mut position = 0;
@@ -191,7 +190,7 @@ impl Index {
             if record.opcode == op::MESSAGE {
                 let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
                 index.messages.push(MessagePlace { log_time: message.log_time, position });
-                index.may_be_packed |= message.data.starts_with(ZSTD_MAGIC);
+                index.may_be_compressed |= message.data.starts_with(ZSTD_MAGIC);
             }
             position = record.end();
         }
@@ -206,12 +205,12 @@ impl Index {
 }
 
 impl LoadedBlock {
-    /// Its memory, when all its messages have been given out.
+    /// Releases its memory.
     pub(crate) fn into_memory(self) -> Memory {
         Memory { records: self.records, messages: self.messages }
     }
 
-    /// Sets the times of its messages later, or earlier where `later` is negative.
+    /// Shifts the times of its messages by nanoseconds, which may be negative.
     pub(crate) fn set_later(&mut self, later: i64) {
         self.later = later;
     }

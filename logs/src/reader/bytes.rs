@@ -1,5 +1,5 @@
-//! The bytes of a file, read where they lie. They are not mapped into memory: where another program cuts a file that is mapped,
-//! whoever reads it ends by SIGBUS, and here there are just fewer bytes.
+//! The bytes of a file, read with `pread`. Files are not memory-mapped: if another program truncates a mapped file, its
+//! readers are killed by SIGBUS; `pread` only returns fewer bytes.
 
 use super::record::{HEAD, Record, wanted};
 use gridweave_runtime::input_file;
@@ -11,17 +11,18 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// So much is read at least where records are walked over.
+/// The minimum size of a read while scanning records, bytes.
 const WINDOW: usize = 64 << 10;
 
-/// So much is read at once of a part whose checksum is taken: it is still in the processor's cache then.
+/// The size of the pieces in which data is read and added to a checksum, so that it is still in the processor's cache,
+/// bytes.
 const PIECE: usize = 256 << 10;
 
-/// A file that is read from several places at once.
+/// A file that can be read at several positions concurrently.
 #[derive(Debug)]
 pub(crate) struct FileBytes {
     file: File,
-    /// How long it was when it was opened.
+    /// The length of the file when it was opened.
     length: usize,
 }
 
@@ -29,34 +30,34 @@ impl FileBytes {
     /// Opens a regular file.
     pub(crate) fn open(path: &Path) -> io::Result<Self> {
         let file = input_file::open(path)?;
-        // A folder is opened as well, and cannot be read.
+        // Opening a folder succeeds, and reading from it fails.
         file.read_at(&mut [0], 0)?;
         Self::of(file)
     }
 
-    /// The bytes of a file that is open.
+    /// Wraps an open file.
     pub(crate) fn of(file: File) -> io::Result<Self> {
         let length = usize::try_from(file.metadata()?.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
         Ok(Self { file, length })
     }
 
-    /// How long it was when it was opened.
+    /// The length of the file when it was opened.
     pub(crate) fn len(&self) -> usize {
         self.length
     }
 
-    /// Whether another program has cut it since.
+    /// Whether another program has truncated the file since.
     pub(crate) fn is_cut(&self) -> bool {
         self.file.metadata().is_ok_and(|file| file.len() < self.length as u64)
     }
 
-    /// The bytes of a part of it. None if it does not have them, or has them no more, or if there is no memory for them.
+    /// The bytes of a part of the file. `None` if the file is shorter, was truncated, or there is not enough memory.
     pub(crate) fn read(&self, part: Range<usize>) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         self.read_into(part, &mut bytes).then_some(bytes)
     }
 
-    /// The same in `memory`, in place of what that holds, and with the CRC-32 of the bytes.
+    /// The same, stored in `memory`, whose contents are replaced; with the CRC-32 of the bytes.
     pub(crate) fn read_with_checksum(&self, part: Range<usize>, memory: Vec<u8>) -> Option<(Vec<u8>, u32)> {
         if part.start > part.end || part.end > self.length {
             return None;
@@ -83,7 +84,7 @@ impl FileBytes {
         Some((bytes, checksum.finalize()))
     }
 
-    /// Puts the bytes of a part of it in place of what `bytes` holds; `false` as [`read`](Self::read) gives none.
+    /// Replaces the contents of `bytes` with a part of the file; `false` where [`read`](Self::read) returns `None`.
     pub(crate) fn read_into(&self, part: Range<usize>, bytes: &mut Vec<u8>) -> bool {
         bytes.clear();
         if part.start > part.end || part.end > self.length || bytes.try_reserve_exact(part.len()).is_err() {
@@ -101,13 +102,13 @@ impl FileBytes {
         true
     }
 
-    /// A reader of a part of it.
+    /// A reader of a part of the file.
     pub(crate) fn part(&self, part: Range<usize>) -> impl Read {
         Part { file: self, part }
     }
 }
 
-/// What is left of a part of a file.
+/// The rest of a part of a file.
 struct Part<'a> {
     file: &'a FileBytes,
     part: Range<usize>,
@@ -122,7 +123,7 @@ impl Read for Part<'_> {
     }
 }
 
-/// The part of a file that a walk over its records is at.
+/// A buffered window of a file, for scanning its records.
 pub(crate) struct Window<'a> {
     file: &'a FileBytes,
     start: usize,
@@ -130,7 +131,7 @@ pub(crate) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// At the beginning of the file.
+    /// Starts at the beginning of the file.
     pub(crate) fn new(file: &'a FileBytes) -> Self {
         Self { file, start: 0, bytes: Vec::new() }
     }
@@ -140,7 +141,7 @@ impl<'a> Window<'a> {
         self.file.len()
     }
 
-    /// So many bytes at `position`. None if the file ends before.
+    /// `length` bytes at `position`. `None` if the file ends before.
     pub(crate) fn bytes(&mut self, position: usize, length: usize) -> Option<&[u8]> {
         let end = position.checked_add(length)?;
         if position < self.start || end > self.start + self.bytes.len() {
@@ -154,7 +155,7 @@ impl<'a> Window<'a> {
         self.bytes.get(position - self.start..end - self.start)
     }
 
-    /// The record at `position`, with as much of its body as a walk needs. None if the file ends before it does.
+    /// The record at `position`, with as much of its body as scanning needs. `None` if the file ends within it.
     pub(crate) fn record(&mut self, position: usize) -> Option<Record<'_>> {
         let head = self.bytes(position, HEAD)?;
         let opcode = *head.first()?;

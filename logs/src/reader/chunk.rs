@@ -1,4 +1,4 @@
-//! Chunks: many records, compressed together.
+//! Chunks: records that are compressed together.
 
 use super::bytes::{FileBytes, Window};
 use super::damage::{ChunkFault, LARGEST};
@@ -7,35 +7,35 @@ use mcap::records::op;
 use std::io::Read;
 use std::ops::Range;
 
-/// The most bytes for a chunk that is cut and does not say its size, as one does whose recorder was killed. Recorders close a chunk
-/// after 1 to 16 MB.
-const LARGEST_UNTOLD: u64 = 64 << 20;
+/// The maximum size of a truncated chunk without a known size, as left by a killed recorder, bytes. Recorders close a
+/// chunk after 1 to 16 MB.
+const LARGEST_UNKNOWN_SIZE: u64 = 64 << 20;
 
-/// A chunk, as its header describes it.
+/// A chunk, as described by its header.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
     pub(crate) first_time: u64,
     pub(crate) last_time: u64,
     pub(crate) compression: String,
-    /// Bytes of its contents, uncompressed.
+    /// The uncompressed size of its contents, bytes.
     pub(crate) size: u64,
-    /// CRC-32 of its contents, uncompressed; 0 if it was not taken.
+    /// CRC-32 of the uncompressed contents; 0 if there is none.
     pub(crate) checksum: u32,
-    /// Where its contents lie in the file.
+    /// The location of its contents in the file.
     pub(crate) data: Range<usize>,
-    /// Whether the file breaks off inside of it.
+    /// Whether the file ends within the chunk.
     pub(crate) cut: bool,
 }
 
 impl Chunk {
-    /// Reads a chunk record. `None` if its lengths contradict each other.
+    /// Parses a chunk record. `None` if its lengths are inconsistent.
     pub(crate) fn parse(record: &Record<'_>) -> Option<Self> {
         let (mut chunk, length) = Self::parse_header(record.body, record.position + HEAD)?;
         chunk.data.end = chunk.data.start.checked_add(usize::try_from(length).ok()?)?;
         (chunk.data.end == record.end()).then_some(chunk)
     }
 
-    /// Reads a chunk at `position` that the end of the file cuts.
+    /// Parses a chunk at `position` that is truncated by the end of the file.
     pub(crate) fn parse_cut(file: &mut Window<'_>, position: usize) -> Option<Self> {
         let (start, end) = (position.checked_add(HEAD)?, file.file_length());
         let header = end.checked_sub(start)?.min(wanted(op::CHUNK));
@@ -45,7 +45,8 @@ impl Chunk {
         Some(chunk)
     }
 
-    /// The chunk that a body at `start` describes, its data still empty, and the length that the data should have.
+    /// Parses the header in a chunk's body at `start`. Returns the chunk, with its data still empty, and the length of
+    /// the data.
     fn parse_header(body: &[u8], start: usize) -> Option<(Self, u64)> {
         let mut fields = Fields(body);
         let (first_time, last_time) = (fields.u64()?, fields.u64()?);
@@ -55,15 +56,15 @@ impl Chunk {
         Some((Self { first_time, last_time, compression, size, checksum, data: data..data, cut: false }, length))
     }
 
-    /// The chunk's records, uncompressed and checked, in `memory` in place of what that holds. Those of a chunk that is cut: as
-    /// far as they go, unchecked.
+    /// The chunk's records, decompressed and verified. They are stored in `memory`, whose contents are replaced. The
+    /// records of a truncated chunk are not verified.
     pub(crate) fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
         let most = match self.size {
-            // What recorders write before a chunk is whole.
-            0 | u64::MAX if self.cut => LARGEST_UNTOLD,
+            // Recorders write this before a chunk is complete.
+            0 | u64::MAX if self.cut => LARGEST_UNKNOWN_SIZE,
             size => size,
         };
-        // Neither what is read nor what becomes of it; one that is cut is read bit by bit.
+        // Limits what is read and what it decompresses to; a truncated chunk is decompressed in pieces.
         let most_read = if self.cut { most } else { most.max(self.data.len() as u64) };
         if most_read > LARGEST {
             return Err(ChunkFault::TooMuch { size: most_read });
@@ -97,11 +98,11 @@ impl Chunk {
     }
 }
 
-/// A byte of a log rarely stands for more.
+/// The usual limit of a compression ratio.
 const USUAL_RATIO: u64 = 256;
 
-/// `memory`, emptied, with room for `size` bytes, or for what `data` can be expected to become. The size is the file's word
-/// only, so it may be absurd.
+/// `memory`, emptied, with capacity for `size` bytes, or for what `data` usually decompresses to if that is less: the
+/// size comes from the file and may be absurd.
 fn reserve(size: u64, data: &[u8], memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = memory;
     buffer.clear();
@@ -110,36 +111,36 @@ fn reserve(size: u64, data: &[u8], memory: Vec<u8>) -> Result<Vec<u8>, ChunkFaul
     Ok(buffer)
 }
 
-/// The contents of one or more frames of zstd, in `memory` in place of what that holds: at most `size` bytes and one more, or as
-/// many as `memory` has room for.
+/// Decompresses one or more zstd frames, into `memory`, whose contents are replaced: at most `size` bytes and one more,
+/// or as many as `memory` has room for.
 pub(crate) fn decompress_zstd(data: &[u8], size: u64, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = reserve(size, data, memory)?;
     if buffer.capacity() as u64 >= size {
         let mut decompressor = zstd::bulk::Decompressor::new().map_err(|_| ChunkFault::Decompression)?;
         decompressor.decompress_to_buffer(data, &mut buffer).map_err(|_| ChunkFault::Decompression)?;
     } else {
-        // The buffer grows with what there really is.
+        // The buffer grows with the actual data.
         let decoder = zstd::stream::read::Decoder::with_buffer(data).map_err(|_| ChunkFault::Decompression)?;
         decoder.take(size.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
     }
     Ok(buffer)
 }
 
-/// The contents of one or more frames of lz4, at most `size` bytes and one more, in `memory` in place of what that holds.
+/// Decompresses one or more lz4 frames, at most `size` bytes and one more, into `memory`, whose contents are replaced.
 pub(crate) fn decompress_lz4(data: &[u8], size: u64, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = reserve(size, data, memory)?;
     let mut rest = data;
-    // The data may be several frames; a decoder reads one, and stops behind it.
+    // The data may have several frames; a decoder stops after one.
     while !rest.is_empty() {
         let room = size.saturating_sub(buffer.len() as u64);
         let decoder = lz4::Decoder::new(&mut rest).map_err(|_| ChunkFault::Decompression)?;
-        // One byte more than there is room for shows that the header's size is wrong.
+        // One byte more than expected shows that the size in the header is wrong.
         decoder.take(room.saturating_add(1)).read_to_end(&mut buffer).map_err(|_| ChunkFault::Decompression)?;
     }
     Ok(buffer)
 }
 
-/// The contents of one or more streams of bzip2, at most `size` bytes and one more.
+/// Decompresses one or more bzip2 streams, at most `size` bytes and one more.
 pub(crate) fn decompress_bz2(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFault> {
     let mut buffer = reserve(size, data, Vec::new())?;
     let decoder = bzip2::read::MultiBzDecoder::new(data);
@@ -147,12 +148,12 @@ pub(crate) fn decompress_bz2(data: &[u8], size: u64) -> Result<Vec<u8>, ChunkFau
     Ok(buffer)
 }
 
-/// What a reader gives until it fails, its input ends, or it has given `most` bytes.
+/// The output of a decoder until it fails, its input ends, or it has returned `most` bytes.
 fn read_cut(decoder: std::io::Result<impl Read>, most: u64) -> Vec<u8> {
     let mut buffer = Vec::new();
     if let Ok(decoder) = decoder {
         let mut decoder = decoder.take(most);
-        // The error at the end is expected: the input breaks off. What came before it is kept.
+        // An error at the end is expected, since the input is truncated. The output before it is kept.
         let _ = decoder.read_to_end(&mut buffer);
     }
     buffer
@@ -163,9 +164,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_chunk_gives_no_more_than_it_says_and_no_more_than_is_read() {
+    fn a_chunk_is_decompressed_up_to_its_size_and_up_to_the_limit() {
         let zeros = |size: u64| std::io::repeat(0).take(size);
-        let data = zstd::stream::encode_all(zeros(LARGEST_UNTOLD + 1), 1).unwrap();
+        let data = zstd::stream::encode_all(zeros(LARGEST_UNKNOWN_SIZE + 1), 1).unwrap();
         let chunk = |size: u64, cut: bool| {
             let compression = "zstd".to_owned();
             Chunk { first_time: 0, last_time: 0, compression, size, checksum: 0, data: 0..data.len(), cut }
@@ -176,13 +177,13 @@ mod tests {
         let file = FileBytes::open(&path).unwrap();
         let length = |chunk: &Chunk| chunk.contents(&file, Vec::new()).map(|contents| contents.len() as u64);
         assert_eq!(length(&chunk(1 << 20, true)), Ok(1 << 20));
-        for untold in [0, u64::MAX] {
-            assert_eq!(length(&chunk(untold, true)), Ok(LARGEST_UNTOLD));
+        for unknown_size in [0, u64::MAX] {
+            assert_eq!(length(&chunk(unknown_size, true)), Ok(LARGEST_UNKNOWN_SIZE));
         }
         assert_eq!(length(&chunk(1 << 20, false)), Err(ChunkFault::Decompression));
         for cut in [false, true] {
             assert_eq!(length(&chunk(LARGEST + 1, cut)), Err(ChunkFault::TooMuch { size: LARGEST + 1 }));
         }
-        assert_eq!(length(&chunk(LARGEST_UNTOLD + 1, false)), Ok(LARGEST_UNTOLD + 1));
+        assert_eq!(length(&chunk(LARGEST_UNKNOWN_SIZE + 1, false)), Ok(LARGEST_UNKNOWN_SIZE + 1));
     }
 }

@@ -1,16 +1,19 @@
-//! What a log says of its channels.
+//! The channels and schemas that a log describes.
 
 use super::record::{Fields, Record};
 use gridweave_runtime::message::Channel;
 use mcap::records::op;
 use std::collections::BTreeMap;
 
-/// The channels and schemas of one file, by their numbers in it.
+/// The maximum number of channels in a log: their numbers have 16 bits, and 0 and 65535 are reserved.
+pub(crate) const MOST_CHANNELS: usize = 65534;
+
+/// The channels and schemas of one file, by number.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Definitions {
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, ChannelRecord>,
-    /// How many were described a second time, and differently.
+    /// The number of redefinitions that differ.
     pub(crate) redefined: usize,
 }
 
@@ -30,7 +33,7 @@ struct ChannelRecord {
 }
 
 impl Definitions {
-    /// Takes up a record if it describes a channel or a schema. What is cut is left out.
+    /// Adds the channel or schema in a record, if it contains one. A truncated record is ignored.
     pub(crate) fn read(&mut self, record: &Record<'_>) {
         match record.opcode {
             op::SCHEMA => {
@@ -47,7 +50,7 @@ impl Definitions {
         }
     }
 
-    /// Puts in a channel of the given number, which is neither 0 nor the greatest, and its schema, which has the same.
+    /// Adds a channel with its schema under a number that is neither 0 nor the maximum.
     pub(crate) fn insert(&mut self, number: u16, channel: Channel) {
         let Channel { topic, message_encoding, schema_name: name, schema_encoding: encoding, schema: text, metadata } =
             channel;
@@ -56,7 +59,7 @@ impl Definitions {
         self.channels.insert(number, ChannelRecord { schema, topic, message_encoding, metadata });
     }
 
-    /// Takes up what another part of the same file says.
+    /// Adds the definitions in another part of the same file.
     pub(crate) fn merge(&mut self, other: Self) {
         self.redefined += other.redefined;
         for (id, schema) in other.schemas {
@@ -67,12 +70,12 @@ impl Definitions {
         }
     }
 
-    /// Whether the messages of a channel are encoded in CDR.
+    /// Whether the messages of a channel are encoded as CDR.
     pub(crate) fn is_cdr(&self, id: u16) -> bool {
         self.channels.get(&id).is_some_and(|channel| channel.message_encoding == "cdr")
     }
 
-    /// How many channels are known.
+    /// The number of channels.
     pub(crate) fn channel_count(&self) -> usize {
         self.channels.len()
     }
@@ -82,15 +85,15 @@ impl Definitions {
         self.channels.keys().copied()
     }
 
-    /// Whether every channel is known together with its schema.
+    /// Whether the schemas of all channels are known.
     pub(crate) fn schemas_complete(&self) -> bool {
         self.channels.values().all(|channel| channel.schema == 0 || self.schemas.contains_key(&channel.schema))
     }
 
-    /// The channel of the given number.
+    /// The channel with the given number.
     pub(crate) fn channel(&self, id: u16) -> Option<Channel> {
         let channel = self.channels.get(&id)?;
-        // Number 0 stands for a channel without a schema.
+        // Number 0 is used for a channel without a schema.
         let schema = self.schemas.get(&channel.schema).filter(|_| channel.schema != 0);
         Some(Channel {
             topic: channel.topic.clone(),
@@ -103,7 +106,7 @@ impl Definitions {
     }
 }
 
-/// Keeps what is there; whether the new one differs from it.
+/// Inserts `new` unless there is an entry; whether an existing entry differs.
 fn differs<T: PartialEq>(known: &mut BTreeMap<u16, T>, id: u16, new: T) -> bool {
     match known.get(&id) {
         Some(old) => *old != new,

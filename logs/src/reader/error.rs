@@ -1,56 +1,56 @@
-//! Why a log cannot be read at all.
+//! The error when a log cannot be read at all.
 
 use std::path::PathBuf;
 
-/// A log cannot be read. Damage that leaves some of it readable is a [`Damage`](super::Damage) instead.
+/// A log cannot be read. Damage that leaves a part readable is a [`Damage`](super::Damage) instead.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// No file was named.
-    #[error("no log is given: name a file (MCAP, SQLite of rosbag2, ROS 1 bag), or the folder of a ROS 2 bag")]
+    /// No input was given.
+    #[error("no input log: give a file (MCAP, SQLite of rosbag2, ROS 1 bag), or the folder of a ROS 2 bag")]
     NothingGiven,
     /// The path does not exist.
-    #[error("{}: there is no such file or folder", .path.display())]
+    #[error("{}: no such file or folder", .path.display())]
     Missing {
         /// The path as it was given.
         path: PathBuf,
     },
-    /// The user may not read the path.
-    #[error("{}: permission denied; check who may read it, for example with `ls -l`", .path.display())]
+    /// The user has no permission to read the path.
+    #[error("{}: permission denied; check it with `ls -l`", .path.display())]
     NoPermission {
         /// The path as it was given.
         path: PathBuf,
     },
-    /// The operating system refuses for another reason.
+    /// Another error of the operating system.
     #[error("{}: {cause}", .path.display())]
     Io {
         /// The path.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         cause: std::io::Error,
     },
-    /// The file has no bytes.
+    /// The file is empty.
     #[error("{}: the file is empty; its recorder may have been stopped before it wrote anything", .path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// The file is something else.
-    #[error("{}: it is no log that can be read (MCAP, SQLite of rosbag2, ROS 1 bag) but looks like {looks_like}; {cure}", .path.display())]
+    /// The file is of another type.
+    #[error("{}: not a readable log (MCAP, SQLite of rosbag2, ROS 1 bag); it looks like {looks_like}; {fix}", .path.display())]
     NotALog {
         /// The file.
         path: PathBuf,
-        /// What its first bytes say, such as "a ROS 1 bag".
+        /// The type by its first bytes, such as "a ROS 1 bag".
         looks_like: &'static str,
-        /// What would mend it.
-        cure: &'static str,
+        /// How to make it readable.
+        fix: &'static str,
     },
-    /// A file that is packed cannot be unpacked.
-    #[error("{}: it cannot be unpacked: {cause}; there must be room for all of it where temporary files are, which TMPDIR names", .path.display())]
-    Unpack {
+    /// A compressed file cannot be decompressed.
+    #[error("{}: cannot decompress it: {cause}; the folder for temporary files (TMPDIR) needs room for the whole file", .path.display())]
+    Decompress {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         cause: std::io::Error,
     },
     /// A map file cannot be read.
@@ -58,41 +58,41 @@ pub enum ReadError {
     Map {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
-    /// A database is none of rosbag2, or too damaged.
-    #[error("{}: the database cannot be read: {cause}", .path.display())]
+    /// A database is not a rosbag2 bag, or too damaged.
+    #[error("{}: cannot read the database: {cause}", .path.display())]
     Database {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
-    /// The file begins as a log does and breaks off, or is damaged, before its first whole message.
-    #[error("{}: it is damaged, and no whole message is left in it ({damage}); take another copy", .path.display())]
+    /// The file starts like a log, and is truncated or damaged before its first whole message.
+    #[error("{}: damaged before the first whole message ({damage}); use another copy", .path.display())]
     NothingLeft {
         /// The file.
         path: PathBuf,
-        /// What was found first.
+        /// The first damage that was found.
         damage: super::Damage,
     },
-    /// A folder is no bag.
-    #[error("{}: the folder holds neither metadata.yaml nor an .mcap or .db3 file; name the log itself", .path.display())]
+    /// A folder is not a bag.
+    #[error("{}: the folder has neither metadata.yaml nor an .mcap or .db3 file; give the log file itself", .path.display())]
     NotABag {
         /// The folder.
         path: PathBuf,
     },
-    /// The description of a ROS 2 bag cannot be understood.
-    #[error("{}: it does not describe a ROS 2 bag ({cause}); name its .mcap or .db3 files instead", .path.display())]
+    /// The metadata of a ROS 2 bag cannot be parsed.
+    #[error("{}: not the metadata of a ROS 2 bag ({cause}); give its .mcap or .db3 files instead", .path.display())]
     BagDescription {
         /// The `metadata.yaml`.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
-    /// A file is named twice, which would double its messages.
-    #[error("{}: the log is given twice; name it once", .path.display())]
+    /// A file is given twice, which would duplicate its messages.
+    #[error("{}: the log is given twice; give it once", .path.display())]
     Duplicate {
         /// The file.
         path: PathBuf,
@@ -100,7 +100,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// Names what the operating system refused.
+    /// Classifies an error of the operating system.
     pub(crate) fn io(path: impl Into<PathBuf>, cause: std::io::Error) -> Self {
         let path = path.into();
         match cause.kind() {

@@ -1,4 +1,4 @@
-//! The layout of a file: its blocks, found by walking over its records without reading what is in them.
+//! The layout of a file: its blocks, found by scanning its records without reading their contents.
 
 use super::block::{Block, Records};
 use super::bytes::{FileBytes, Window};
@@ -14,32 +14,32 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// Records without a chunk are read in runs of about this many bytes.
+/// The approximate length of a block of records outside of chunks, bytes.
 const RUN_LENGTH: usize = 1 << 20;
 
-/// What a file consists of.
+/// The layout of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Layout {
-    /// The blocks that hold messages, by position.
+    /// The blocks that contain messages, by position.
     pub(crate) blocks: Vec<Block>,
     pub(crate) definitions: Definitions,
     pub(crate) damage: Vec<Damage>,
-    /// The entries of the metadata records, by name; of two with one name the last.
+    /// The entries of the metadata records, by name; the last of those with the same name.
     pub(crate) metadata: BTreeMap<String, BTreeMap<String, String>>,
-    /// Where the bodies of the attachments and of the metadata records lie, in the order of the file.
+    /// The locations of the bodies of attachments and metadata records, in file order.
     pub(crate) supplements: Vec<(SupplementKind, Range<usize>)>,
-    /// What the index behind each chunk says of the channels.
+    /// The message indexes after the chunks, by channel.
     pub(crate) index: BTreeMap<u16, IndexedChannel>,
-    /// What the file says of its messages, if it was closed.
+    /// The statistics of the file, if it was closed.
     pub(crate) statistics: Option<Statistics>,
-    /// How many chunks there are, the bad ones among them.
+    /// The number of chunks, including bad ones.
     pub(crate) chunks: usize,
-    /// The compressions of the chunks; empty text for none.
+    /// The compressions of the chunks; an empty string for none.
     pub(crate) compressions: BTreeSet<String>,
 }
 
 impl Layout {
-    /// Finds the blocks of `file`, which begins with the magic bytes.
+    /// Finds the blocks of `file`, which starts with the magic bytes.
     pub(crate) fn of(file: &FileBytes) -> Self {
         let summary = SummarySection::read(file);
         let mut walk = Walk { layout: Self::default(), unsure: Vec::new(), run: None };
@@ -49,7 +49,7 @@ impl Layout {
             layout.damage.push(Damage::BadIndex);
         }
         if !summary.definitions_complete {
-            // The chunks may describe channels that nothing else does.
+            // A chunk may describe channels that are described nowhere else.
             unsure = layout.blocks.iter().map(|block| matches!(block.records, Records::Chunk(_))).collect();
         }
         layout.definitions.merge(summary.definitions);
@@ -59,7 +59,7 @@ impl Layout {
         layout
     }
 
-    /// Reads the unsure blocks through, for the time they span and the channels they describe.
+    /// Scans the unsure blocks for their time spans and channels.
     fn survey(&mut self, file: &FileBytes, unsure: &[bool]) {
         let blocks = std::mem::take(&mut self.blocks);
         let surveys: Vec<_> =
@@ -80,12 +80,12 @@ impl Layout {
     }
 }
 
-/// The walk over the records of a file.
+/// The scan of a file's records.
 struct Walk {
     layout: Layout,
-    /// For every block, whether the time that it claims to span is still to be checked.
+    /// For each block, whether its claimed time span is unverified.
     unsure: Vec<bool>,
-    /// The run of records without a chunk that the walk is in.
+    /// The current run of records outside of chunks.
     run: Option<Block>,
 }
 
@@ -100,7 +100,7 @@ impl Walk {
                 Some((op::DATA_END | op::FOOTER, ..)) => break,
                 Some((_, end, _)) => position = end,
                 None => {
-                    // The next chunk that the summary knows of is where reading can go on.
+                    // Reading resumes at the next chunk that the summary lists.
                     let next = summary.chunk_starts.partition_point(|&start| start <= position);
                     let Some(&next) = summary.chunk_starts.get(next).filter(|&&next| next < file.file_length()) else {
                         self.cut_chunk(file, position);
@@ -120,7 +120,7 @@ impl Walk {
         }
     }
 
-    /// Takes up one record; `false` if it cannot be one, and nothing if it is one where another follows.
+    /// Adds a record. Returns `Some(false)` if it cannot be one, and `None` if it is one only where another follows.
     fn take(&mut self, record: &Record<'_>, index: &mut ChunkTimes) -> Option<bool> {
         if let Some(kind) = SupplementKind::of_opcode(record.opcode) {
             self.layout.supplements.push((kind, record.position + HEAD..record.end()));
@@ -139,7 +139,7 @@ impl Walk {
                     Some(chunk) => self.push_chunk(chunk),
                     None => {
                         self.layout.damage.push(Damage::BadChunk { fault: ChunkFault::Records });
-                        // Of the lengths that contradict each other, the record's is right if another record follows.
+                        // If the lengths are inconsistent, the record's is right if another record follows.
                         return None;
                     }
                 }
@@ -188,7 +188,7 @@ impl Walk {
         self.unsure.push(true);
     }
 
-    /// The chunk that the end of the file cuts: a recorder that was killed leaves one.
+    /// A chunk truncated by the end of the file, as left by a killed recorder.
     fn cut_chunk(&mut self, file: &mut Window<'_>, position: usize) {
         if file.bytes(position, 1) == Some(&[op::CHUNK])
             && let Some(chunk) = Chunk::parse_cut(file, position)
@@ -198,7 +198,7 @@ impl Walk {
         }
     }
 
-    /// Believes the last chunk's header if the index records behind the chunk say the same.
+    /// Marks the last chunk's header as verified if the index records after it match.
     fn settle(&mut self, index: &mut ChunkTimes) {
         let times = std::mem::take(index).0;
         if let (Some(block), Some(unsure)) = (self.layout.blocks.last(), self.unsure.last_mut())
@@ -214,18 +214,18 @@ fn is_record(file: &mut Window<'_>, position: usize) -> bool {
     file.record(position).is_some_and(|record| record.opcode != 0)
 }
 
-/// What the index records of a file say of one of its channels.
+/// The index records of one channel of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct IndexedChannel {
-    /// The first block that it has messages in.
+    /// The first block with messages of the channel.
     pub(crate) block: usize,
-    /// How many messages it has.
+    /// The number of messages.
     pub(crate) messages: u64,
     /// The log time of the first, nanoseconds.
     pub(crate) first: u64,
     /// The log time of the last, nanoseconds.
     pub(crate) last: u64,
-    /// The longest time between two that follow each other, nanoseconds.
+    /// The longest time between two consecutive messages, nanoseconds.
     pub(crate) largest_gap: u64,
 }
 
@@ -240,7 +240,7 @@ impl IndexedChannel {
     }
 }
 
-/// The least and the greatest log time that the index records behind a chunk list.
+/// The least and the greatest log time in the index records after a chunk.
 #[derive(Default)]
 struct ChunkTimes(Option<(u64, u64)>);
 

@@ -1,4 +1,4 @@
-//! Map files as logs of one message, so that the map of one robot can lie beside the log of another.
+//! Map files, read as logs of one message, so that the map of one robot can be given beside the log of another.
 
 use super::bytes::FileBytes;
 use crate::map_file::{Thresholds, load_as};
@@ -9,26 +9,25 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use std::io::BufWriter;
 use std::path::Path;
 
-/// Files tell no time, and 0 stands for none in ROS.
+/// The log time of the map. Files have no time, and 0 is "no time" in ROS.
 const TIME: LogTime = LogTime(1_000_000_000);
 const TOPIC: &str = "/map";
 
-/// Whether a file is called as the YAML file of a map, and is not the description of a bag.
+/// Whether a file has the name of a map's YAML file, and not of a bag's metadata.
 pub(crate) fn is_called_so(path: &Path) -> bool {
     let is_yaml =
         path.extension().is_some_and(|ending| ["yaml", "yml"].iter().any(|yaml| ending.eq_ignore_ascii_case(yaml)));
     is_yaml && path.file_name().is_some_and(|name| name != "metadata.yaml")
 }
 
-/// A log (MCAP) that holds the map, whose thresholds are read so, in a temporary file without a name.
+/// Writes the map, with this treatment of its thresholds, as a log (MCAP) to an unnamed temporary file.
 pub(crate) fn as_log(path: &Path, thresholds: Thresholds) -> Result<FileBytes, String> {
     let (map, _) = load_as(path, thresholds).map_err(|error| error.to_string())?;
     let header = Header::new(TIME, "map");
     let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };
     let bytes = encode(&message).map_err(|error| error.to_string())?;
-    let temporary = |error: &dyn std::fmt::Display| {
-        format!("{}: it cannot be put among the temporary files, which TMPDIR names: {error}", path.display())
-    };
+    let temporary =
+        |error: &dyn std::fmt::Display| format!("{}: cannot write a temporary file in TMPDIR: {error}", path.display());
     let write = || -> Result<std::fs::File, mcap::McapError> {
         let file = tempfile::tempfile()?;
         let mut writer = mcap::WriteOptions::new().compression(None).create(BufWriter::new(file.try_clone()?))?;

@@ -1,46 +1,47 @@
-//! The messages of several files in one order: by log time, then by file, then by position in the file.
+//! The merged messages of several files: by log time, then by file, then by position in the file.
 
-use super::ahead::{Ahead, BlockId};
 use super::block::LoadedBlock;
 use super::damage::Damage;
 use super::file::LogFile;
+use super::prefetch::{BlockId, Prefetcher};
 use gridweave_runtime::message::LogTime;
 use std::cmp::Reverse;
 use std::collections::binary_heap::PeekMut;
 use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
 
-/// One message of a log, borrowed from the block that it came in.
+/// A message of a log, borrowed from its block.
 #[derive(Clone, Copy, Debug)]
 pub struct LogMessage<'a> {
-    /// The file, as an index among the reader's files.
+    /// The index of its file in the reader.
     pub file: usize,
-    /// Its channel's number in that file.
+    /// The number of its channel in that file.
     pub channel: u16,
     /// Its sequence number in that file.
     pub sequence: u32,
-    /// When it was logged.
+    /// The log time.
     pub log_time: LogTime,
-    /// When it was published, nanoseconds.
+    /// The publish time, nanoseconds.
     pub publish_time: u64,
     /// The encoded message.
     pub data: &'a [u8],
 }
 
-/// Reads the messages of some files by rising log time.
+/// Reads the messages of some files in log time order.
 ///
-/// Chunks are decompressed ahead of their use. Besides those, only chunks that overlap in time are in memory together.
+/// Chunks are decompressed ahead of their use. Apart from those, only chunks that overlap in time are in memory
+/// together.
 pub struct LogReader {
     files: Arc<[LogFile]>,
-    ahead: Ahead,
-    /// The blocks that have messages left; on top the one whose message is due.
+    prefetcher: Prefetcher,
+    /// The blocks with messages left, as a heap; the top has the next message.
     active: BinaryHeap<Reverse<Active>>,
-    /// Whether the message on top has been given out.
+    /// Whether the message on top was returned.
     given: bool,
     last_time: u64,
     damage: Vec<(usize, Damage)>,
-    /// The files that were changed while they were read. Blocks that were loaded ahead of the change do not make up for
-    /// those that were not.
+    /// The files that were modified while they were read. Blocks that were prefetched before that do not replace those
+    /// that were not.
     changed: BTreeSet<usize>,
     bytes_taken: u64,
     bytes_total: u64,
@@ -81,14 +82,14 @@ impl Ord for Active {
 }
 
 impl LogReader {
-    /// Reads all messages of `files`.
+    /// Creates a reader of all messages in `files`.
     pub fn new(files: Vec<LogFile>) -> Self {
         let files: Arc<[LogFile]> = files.into();
         let sizes = files.iter().flat_map(|file| &file.layout.blocks).map(|block| block.size());
-        // Sizes are the files' word only.
+        // The sizes are claimed by the files, so they are not trusted.
         let bytes_total = sizes.fold(0, u64::saturating_add);
         Self {
-            ahead: Ahead::new(Arc::clone(&files)),
+            prefetcher: Prefetcher::new(Arc::clone(&files)),
             files,
             active: BinaryHeap::new(),
             given: false,
@@ -100,18 +101,18 @@ impl LogReader {
         }
     }
 
-    /// Reads no more than the messages in the first and in the last `count` blocks of each file, and in those in which a channel
-    /// begins. Before any was read.
+    /// Limits reading to the first and the last `count` blocks of each file, and those in which a channel begins. Must
+    /// be called before the first message is read.
     pub(crate) fn sample(&mut self, count: usize) {
-        self.ahead.sample(count);
+        self.prefetcher.sample(count);
     }
 
-    /// The files, in the order in which they break ties.
+    /// The files, in the order that breaks ties.
     pub fn files(&self) -> &Arc<[LogFile]> {
         &self.files
     }
 
-    /// The next message; `None` when there are no more.
+    /// The next message; `None` at the end.
     pub fn next_message(&mut self) -> Option<LogMessage<'_>> {
         self.pass_on();
         self.load_due();
@@ -133,7 +134,7 @@ impl LogReader {
         })
     }
 
-    /// Leaves the message that was given out last.
+    /// Drops the message that was returned last.
     fn pass_on(&mut self) {
         if !std::mem::take(&mut self.given) {
             return;
@@ -145,16 +146,16 @@ impl LogReader {
             Some(time) => active.time = time,
             None => {
                 let Reverse(Active { block, .. }) = PeekMut::pop(top);
-                self.ahead.give_back(block.into_memory());
+                self.prefetcher.release(block.into_memory());
             }
         }
     }
 
-    /// Loads every block that may hold the message that is due.
+    /// Loads each block that may contain the next message.
     fn load_due(&mut self) {
-        while let Some(first_time) = self.ahead.next_time()
+        while let Some(first_time) = self.prefetcher.next_time()
             && self.active.peek().is_none_or(|Reverse(due)| first_time <= due.time)
-            && let Some((id, size, load)) = self.ahead.take()
+            && let Some((id, size, load)) = self.prefetcher.take()
         {
             self.bytes_taken = self.bytes_taken.saturating_add(size);
             match load {
@@ -177,13 +178,13 @@ impl LogReader {
         }
     }
 
-    /// The damage met since the last call, with the index of the file that it is in. What was found when the files
-    /// were opened is not among it.
+    /// The damage found since the last call, with the index of its file, except the damage found when the files were
+    /// opened.
     pub fn take_damage(&mut self) -> Vec<(usize, Damage)> {
         std::mem::take(&mut self.damage)
     }
 
-    /// The share of the files' contents that was taken up, 0 to 1.
+    /// The fraction of the files that was read, 0 to 1.
     pub fn progress(&self) -> f64 {
         match self.bytes_total {
             0 => 1.0,

@@ -1,13 +1,16 @@
-//! Reads MCAP files, databases of rosbag2 and bags of ROS 1 in the order of log time.
+//! Reads MCAP files, rosbag2 databases and ROS 1 bags in log time order.
 //!
-//! A file is walked over once, from record to record, which finds its **blocks**: its chunks, and runs of records without a
-//! chunk, or of rows. A block's time span is taken from its header where the index behind it says
-//! the same, and is looked up in the block itself otherwise. Blocks are then loaded (decompressed and checked) a few
-//! ahead of their use, in the order of their first message, and merged: by log time, then by file, then by position in
-//! the file. A message is borrowed from its block; nothing is copied.
+//! A file is scanned once, record by record, to find its **blocks**: its chunks, and runs of records outside of chunks,
+//! or of rows. The time span of a block is taken from its header if the index after it matches, and otherwise
+//! determined by scanning the block. Blocks are then loaded (decompressed and verified) a few ahead of their use, in
+//! the order of their first message, and merged: by log time, then by file, then by position in the file. A message is
+//! borrowed from its block; nothing is copied.
 //!
-//! A damaged file is read as far as it can be. A chunk with a wrong checksum is left out, a file without an end is
-//! read up to its last whole record, and each [`Damage`] is told.
+//! A damaged file is read as far as possible. A chunk with a wrong checksum is skipped, a truncated file is read up to
+//! its last whole record, and each [`Damage`] is reported.
+//!
+//! MCAP records are parsed here instead of by the `mcap` crate: its readers stop at the first damage, and its
+//! `MessageStream` needs the file memory-mapped, which kills the process if another program truncates the file.
 //!
 //! ```no_run
 //! use gridweave_logs::reader::{LogFile, LogReader};
@@ -19,10 +22,10 @@
 //! # Ok::<(), gridweave_logs::reader::ReadError>(())
 //! ```
 
-mod ahead;
 mod block;
 mod bytes;
 mod chunk;
+mod compressed;
 mod damage;
 mod definitions;
 mod error;
@@ -31,8 +34,8 @@ mod guess;
 mod layout;
 mod map;
 mod merge;
-mod packed;
 mod paths;
+mod prefetch;
 mod record;
 mod ros1;
 mod sqlite;
@@ -54,7 +57,7 @@ pub(crate) use supplement::{OUTCOME_RECORD, describes_its_file, read_attachment,
 
 use std::path::PathBuf;
 
-/// Opens the logs at `paths`: MCAP files, and folders of ROS 2 bags.
+/// Opens the logs at `paths`: log files, and folders of ROS 2 bags.
 pub fn open(paths: &[PathBuf]) -> Result<LogReader, ReadError> {
     let files = log_files(paths)?;
     Ok(LogReader::new(files.into_iter().map(|(_, file)| LogFile::open(file)).collect::<Result<_, _>>()?))

@@ -1,4 +1,4 @@
-//! Which files a path stands for: itself, or the files of a ROS 2 bag.
+//! The log files of an input path: the file itself, or the files of a ROS 2 bag.
 
 use super::error::ReadError;
 use gridweave_runtime::input_file;
@@ -6,7 +6,7 @@ use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
-/// `metadata.yaml` of a ROS 2 bag, as far as it is needed.
+/// `metadata.yaml` of a ROS 2 bag, limited to the needed fields.
 #[derive(Deserialize)]
 struct Description {
     rosbag2_bagfile_information: BagInformation,
@@ -17,8 +17,8 @@ struct BagInformation {
     relative_file_paths: Vec<PathBuf>,
 }
 
-/// The log files that `paths` stand for, in order, each with the number of its path among `paths`. A folder stands for the
-/// ROS 2 bag in it, as does its `metadata.yaml`.
+/// The log files of `paths`, in order, each with the index of its path. The path of a ROS 2 bag is its folder or its
+/// `metadata.yaml`.
 pub fn log_files(paths: &[PathBuf]) -> Result<Vec<(usize, PathBuf)>, ReadError> {
     let mut files = Vec::new();
     for (number, path) in paths.iter().enumerate() {
@@ -48,7 +48,7 @@ fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if description.is_file() {
         return described_files(&description);
     }
-    // A recorder that was killed leaves no description.
+    // A killed recorder leaves no metadata.
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|error| ReadError::io(folder, error))? {
         let path = entry.map_err(|error| ReadError::io(folder, error))?.path();
@@ -74,30 +74,30 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let is_inside =
         |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if let Some(outside) = bag.relative_file_paths.iter().find(|path| !is_inside(path)) {
-        return Err(wrong(format!("{} leads out of the bag", outside.display())));
+        return Err(wrong(format!("{} is outside of the bag", outside.display())));
     }
     let folder = description.parent().unwrap_or(Path::new(""));
     Ok(bag.relative_file_paths.iter().map(|file| described_file(folder, file)).collect())
 }
 
-/// Where a file is that a description names. Up to Foxy files were named from outside of the bag's folder; and some were packed,
-/// or unpacked, since.
+/// The location of a file listed in a bag's metadata. Up to Foxy the names include the bag's folder; and the file may
+/// have been compressed, or decompressed, since.
 fn described_file(folder: &Path, file: &Path) -> PathBuf {
     let named = folder.join(file);
     let beside = |file: &Path| {
-        let mut packed = file.as_os_str().to_owned();
-        packed.push(".zstd");
-        [file.to_owned(), PathBuf::from(packed), file.with_extension("")]
+        let mut compressed = file.as_os_str().to_owned();
+        compressed.push(".zstd");
+        [file.to_owned(), PathBuf::from(compressed), file.with_extension("")]
     };
     let by_name = folder.join(file.file_name().unwrap_or_default());
     let mut candidates = beside(&named).into_iter().chain(beside(&by_name));
-    // One that is not there is told of under the name that it should have.
+    // A missing file is reported under its expected name.
     candidates.find(|path| is_log(path) && path.is_file()).unwrap_or(named)
 }
 
-/// Whether a file is called as those of a bag.
+/// Whether a file has the extension of a bag's log file.
 fn is_log(path: &Path) -> bool {
     let is_called = |path: &Path| path.extension().is_some_and(|ending| ending == "mcap" || ending == "db3");
-    let is_packed = path.extension().is_some_and(|ending| ending == "zstd" || ending == "zst");
-    is_called(path) || is_packed && path.file_stem().is_some_and(|name| is_called(Path::new(name)))
+    let is_compressed = path.extension().is_some_and(|ending| ending == "zstd" || ending == "zst");
+    is_called(path) || is_compressed && path.file_stem().is_some_and(|name| is_called(Path::new(name)))
 }

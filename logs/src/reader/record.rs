@@ -1,30 +1,30 @@
-//! Records, the parts of an MCAP file: an opcode, the body's length, and the body, borrowed where it lies.
+//! MCAP records: an opcode, the length of the body, and the body, borrowed from the file.
 
 use mcap::records::op;
 
-/// The bytes before a record's body: the opcode and the body's length.
+/// The length of a record's header: the opcode and the length of the body.
 pub(crate) const HEAD: usize = 9;
 
-/// One record.
+/// A record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record<'a> {
     pub(crate) opcode: u8,
-    /// Where the record begins.
+    /// The position of the record.
     pub(crate) position: usize,
-    /// How long its body is.
+    /// The length of its body.
     pub(crate) length: usize,
-    /// Its body; only the beginning of it where no more was asked for.
+    /// Its body, or only the beginning if no more was requested.
     pub(crate) body: &'a [u8],
 }
 
 impl Record<'_> {
-    /// Where the next record begins.
+    /// The position of the next record.
     pub(crate) fn end(&self) -> usize {
         self.position + HEAD + self.length
     }
 }
 
-/// The record at `position`; `None` if the bytes end before it does.
+/// The record at `position`; `None` if the bytes end within it.
 pub(crate) fn record_at(bytes: &[u8], position: usize) -> Option<Record<'_>> {
     let mut fields = Fields(bytes.get(position..)?);
     let opcode = fields.u8()?;
@@ -32,18 +32,18 @@ pub(crate) fn record_at(bytes: &[u8], position: usize) -> Option<Record<'_>> {
     Some(Record { opcode, position, length, body: fields.bytes(length)? })
 }
 
-/// How much of a record's body is looked at, at most, where the records of a file are walked over.
+/// The number of leading bytes of a record's body that a scan needs.
 pub(crate) fn wanted(opcode: u8) -> usize {
     match opcode {
         op::MESSAGE => MessageRecord::FIELDS,
-        // Its header. No compression has a name that is longer.
+        // The chunk's header. No compression has a longer name.
         op::CHUNK => 1 << 10,
         op::SCHEMA | op::CHANNEL | op::MESSAGE_INDEX | op::METADATA => 64 << 20,
         _ => 0,
     }
 }
 
-/// A message, as it stands in a record.
+/// A message record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MessageRecord<'a> {
     pub(crate) channel: u16,
@@ -54,10 +54,10 @@ pub(crate) struct MessageRecord<'a> {
 }
 
 impl<'a> MessageRecord<'a> {
-    /// The bytes before the data.
+    /// The number of bytes before the data.
     const FIELDS: usize = 22;
 
-    /// Reads the body of a message record; `None` if it is too short.
+    /// Parses the body of a message record; `None` if it is too short.
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut fields = Fields(body);
         Some(Self {
@@ -70,7 +70,7 @@ impl<'a> MessageRecord<'a> {
     }
 }
 
-/// Appends a message as a record.
+/// Appends a message record.
 pub(crate) fn push_message(
     records: &mut Vec<u8>,
     channel: u16,
@@ -90,7 +90,7 @@ pub(crate) fn push_message(
     records.extend_from_slice(data);
 }
 
-/// Little-endian fields, taken off the front of a body one by one; `None` past its end.
+/// A reader of little-endian fields; each method returns `None` past the end.
 pub(crate) struct Fields<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -122,13 +122,13 @@ impl<'a> Fields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// A text with its length before it. Bytes that are no UTF-8 are replaced.
+    /// A string with its length in front. Invalid UTF-8 is replaced.
     pub(crate) fn text(&mut self) -> Option<String> {
         let length = usize::try_from(self.u32()?).ok()?;
         self.bytes(length).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// The bytes of a block with its length before it.
+    /// A nested block of fields with its length in front.
     pub(crate) fn block(&mut self) -> Option<Fields<'a>> {
         let length = usize::try_from(self.u32()?).ok()?;
         self.bytes(length).map(Fields)

@@ -1,22 +1,22 @@
-//! The containers that messages are in.
+//! The supported containers of messages.
 
 use super::bytes::FileBytes;
 use super::ros1::Bag;
 use super::sqlite::Database;
 
-/// A file that messages are read from.
+/// An open log file.
 #[derive(Debug)]
 pub(crate) enum Storage {
     /// An MCAP file.
     Mcap(FileBytes),
-    /// A database of rosbag2.
+    /// A rosbag2 database.
     Sqlite(Database),
-    /// A bag of ROS 1.
+    /// A ROS 1 bag.
     Ros1(Bag),
 }
 
 impl Storage {
-    /// What the container is called.
+    /// The name of the container.
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Mcap(_) => "MCAP",
@@ -25,7 +25,7 @@ impl Storage {
         }
     }
 
-    /// Whether another program has cut the file since.
+    /// Whether another program has truncated the file since.
     pub(crate) fn is_cut(&self) -> bool {
         match self {
             Self::Mcap(file) => file.is_cut(),

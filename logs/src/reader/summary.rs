@@ -1,4 +1,4 @@
-//! The summary at the end of a file that was closed: its channels again, and where its chunks begin.
+//! The summary section at the end of a closed file: its channels again, and the positions of its chunks.
 
 use super::bytes::FileBytes;
 use super::definitions::Definitions;
@@ -7,42 +7,42 @@ use mcap::MAGIC;
 use mcap::records::op;
 use std::collections::BTreeMap;
 
-/// The footer's body: two offsets and a checksum.
+/// The length of the footer's body: two offsets and a checksum.
 const FOOTER: usize = 20;
-/// A longer summary is not used: it would index millions of chunks.
+/// The maximum length of a summary, bytes; a longer one would index millions of chunks.
 const LARGEST: usize = 256 << 20;
 
-/// What stands behind the messages of a file.
+/// The summary section of a file.
 #[derive(Debug, Default)]
 pub(crate) struct SummarySection {
-    /// Whether the file ends as a file that was closed does.
+    /// Whether the file ends with a footer.
     pub(crate) closed: bool,
-    /// Whether the summary is there and its checksum is wrong.
+    /// Whether the checksum of the summary is wrong.
     pub(crate) bad_checksum: bool,
-    /// The channels it describes.
+    /// The channels in the summary.
     pub(crate) definitions: Definitions,
-    /// Whether `definitions` are known to be all.
+    /// Whether `definitions` is known to be complete.
     pub(crate) definitions_complete: bool,
-    /// Where the chunks begin, rising.
+    /// The positions of the chunks, ascending.
     pub(crate) chunk_starts: Vec<usize>,
     pub(crate) statistics: Option<Statistics>,
 }
 
-/// What a file says of its messages.
+/// The statistics of a file's messages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// How many there are.
+    /// The number of messages.
     pub messages: u64,
     /// The log time of the first, nanoseconds.
     pub first: u64,
     /// The log time of the last, nanoseconds.
     pub last: u64,
-    /// How many there are on each channel, by its number.
+    /// The number of messages by channel.
     pub by_channel: BTreeMap<u16, u64>,
 }
 
 impl SummarySection {
-    /// Reads the summary of a whole file; of a file without one, nothing.
+    /// Reads the summary of a file; empty for a file without one.
     pub(crate) fn read(file: &FileBytes) -> Self {
         let mut summary = Self::default();
         let Some(footer_start) = file.len().checked_sub(HEAD + FOOTER + MAGIC.len()) else { return summary };
@@ -59,7 +59,7 @@ impl SummarySection {
             return summary;
         }
         let Some(records) = file.read(start..footer_start) else { return summary };
-        // The checksum covers the summary and the footer up to the checksum itself.
+        // The checksum covers the summary and the footer up to the checksum field.
         let mut hash = crc32fast::Hasher::new();
         hash.update(&records);
         hash.update(&end[..HEAD + FOOTER - 4]);
@@ -92,7 +92,7 @@ impl SummarySection {
     }
 }
 
-/// The number of channels in a record of statistics: behind the counts of messages and of schemas.
+/// The number of channels in a statistics record: after the numbers of messages and of schemas.
 fn read_channel_count(body: &[u8]) -> Option<usize> {
     let mut fields = Fields(body);
     fields.bytes(8 + 2)?;
@@ -112,7 +112,7 @@ fn read_statistics(body: &[u8]) -> Option<Statistics> {
     Some(Statistics { messages, first, last, by_channel })
 }
 
-/// Where the chunk of an index record begins: behind its two times.
+/// The position of the chunk in an index record: after its two times.
 fn read_chunk_start(body: &[u8]) -> Option<usize> {
     let mut fields = Fields(body);
     fields.bytes(8 + 8)?;

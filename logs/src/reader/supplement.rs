@@ -1,5 +1,5 @@
-//! What a log holds beside its messages: attachments and metadata records. They pass through a pipeline as messages do, on
-//! channels of their own.
+//! Supplements of a log: its attachments and metadata records. They pass through a pipeline like messages, on separate
+//! channels.
 
 use super::damage::Damage;
 use super::record::Fields;
@@ -8,22 +8,22 @@ use mcap::records::op;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// The encoding of the channels that they pass on: each message is the body of a record, as the MCAP specification has it.
+/// The encoding of their channels: each message is the body of a record, as in the MCAP specification.
 const ENCODING: &str = "mcap_record";
-/// Name of the metadata record in which a run says how it has ended.
+/// Name of the metadata record with the outcome of a run.
 pub(crate) const OUTCOME_RECORD: &str = "gridweave";
 
-/// What a record beside the messages is.
+/// The kind of a supplement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SupplementKind {
-    /// A file.
+    /// An attached file.
     Attachment,
-    /// Texts by their keys.
+    /// Strings by key.
     Metadata,
 }
 
 impl SupplementKind {
-    /// Of a record's opcode.
+    /// The kind for a record's opcode.
     pub(crate) fn of_opcode(opcode: u8) -> Option<Self> {
         match opcode {
             op::ATTACHMENT => Some(Self::Attachment),
@@ -32,7 +32,7 @@ impl SupplementKind {
         }
     }
 
-    /// The channel that such records pass on.
+    /// The channel for supplements of this kind.
     pub(crate) fn channel(self) -> Channel {
         let topic = match self {
             Self::Attachment => "attachments",
@@ -41,19 +41,19 @@ impl SupplementKind {
         Channel { topic: topic.to_owned(), message_encoding: ENCODING.to_owned(), ..Default::default() }
     }
 
-    /// What passes on a channel; none if these are messages.
+    /// The kind of a channel's supplements; `None` for a channel of messages.
     pub fn of_channel(channel: &Channel) -> Option<Self> {
         [Self::Attachment, Self::Metadata].into_iter().find(|kind| *channel == kind.channel())
     }
 }
 
-/// Whether a metadata record tells of the file that it is in, and of no other with the same messages: how the run ended that
-/// wrote it, and how rosbag2 has written it.
+/// Whether a metadata record describes the file that it is in, and not its messages: the outcome of its run, and the
+/// properties of a rosbag2 file.
 pub(crate) fn describes_its_file(name: &str) -> bool {
     [OUTCOME_RECORD, "rosbag2"].contains(&name)
 }
 
-/// The name of a metadata record, and its entries as far as they can be read; none if it has no name.
+/// The name of a metadata record, and its readable entries; `None` without a name.
 pub(crate) fn read_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut fields = Fields(body);
     let (name, mut pairs) = (fields.text()?, fields.block()?);
@@ -64,13 +64,13 @@ pub(crate) fn read_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, Str
     Some((name, metadata))
 }
 
-/// The damage that a metadata record tells of: a run that ended early says so in its log.
+/// The damage that a metadata record reports: a run that ended early.
 pub(crate) fn damage_of(name: &str, metadata: &BTreeMap<String, String>) -> Option<Damage> {
     let incomplete = name == OUTCOME_RECORD && metadata.get("complete").is_some_and(|complete| complete == "false");
     incomplete.then(|| Damage::Incomplete { reason: metadata.get("reason").cloned().unwrap_or_default() })
 }
 
-/// The attachment in the body of a record; none if it is not whole, or does not fit its checksum.
+/// The attachment in the body of a record; `None` if it is truncated or its checksum is wrong.
 pub(crate) fn read_attachment(body: &[u8]) -> Option<mcap::Attachment<'_>> {
     let mut fields = Fields(body);
     let (log_time, create_time) = (fields.u64()?, fields.u64()?);
@@ -78,7 +78,7 @@ pub(crate) fn read_attachment(body: &[u8]) -> Option<mcap::Attachment<'_>> {
     let length = usize::try_from(fields.u64()?).ok()?;
     let data = Cow::Borrowed(fields.bytes(length)?);
     let checksum = fields.u32()?;
-    // Nobody computed it where it is zero.
+    // Zero if the writer did not compute it.
     let is_sound = checksum == 0 || crc32fast::hash(body.get(..body.len() - fields.0.len() - 4)?) == checksum;
     is_sound.then_some(mcap::Attachment { log_time, create_time, name, media_type, data })
 }
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_tells_what_passes_on_it() {
+    fn a_channel_has_the_kind_of_its_supplements() {
         for kind in [SupplementKind::Attachment, SupplementKind::Metadata] {
             assert_eq!(SupplementKind::of_channel(&kind.channel()), Some(kind));
         }

@@ -1,4 +1,4 @@
-//! What a channel carries, by its topic and its type.
+//! The role of each channel in a log, decided by its topic and its message type.
 
 use super::scans::is_scan;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
@@ -12,33 +12,33 @@ use gridweave_runtime::ros::{
 use gridweave_runtime::stage::{RobotTopics, TagFields, match_robot};
 use std::collections::BTreeSet;
 
-/// What a channel carries.
+/// The role of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// Occupancy grids of a robot.
     Map,
-    /// Parts of a robot's map that have changed.
+    /// Updates of parts of a robot's map.
     MapUpdate,
     /// Poses of a robot.
     Pose(PoseSource),
-    /// Odometry of a robot without a topic for poses, which gives them if it is in the frame of the map. Scans can be matched
-    /// along any.
+    /// Odometry of a robot without a pose topic. It gives the robot's poses if its frame is the map frame; scans can be
+    /// matched along it in any frame.
     Odometry,
     /// Tag readings of a robot.
     Tags,
-    /// Tag readings of a robot in messages of another type.
+    /// Tag readings of a robot in messages of another type, such as those of detectors.
     TagMessage,
     /// Topological maps of a robot.
     Topology,
-    /// Scans of a robot that has no maps.
+    /// Scans of a robot without maps.
     Scan,
-    /// Transforms from which poses of robots are made.
+    /// Transforms, from which poses of robots are derived.
     Tf,
     /// Anything else.
     Other,
 }
 
-/// A type that holds a pose.
+/// A message type that contains a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PoseSource {
     /// `geometry_msgs/msg/PoseStamped`.
@@ -49,48 +49,48 @@ pub(crate) enum PoseSource {
     PoseWithCovariance,
 }
 
-/// What was found out about a channel.
+/// The role of a channel, and the robot that it belongs to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Classified<'a> {
-    /// What it carries.
+    /// The role.
     pub(crate) role: Role,
-    /// The robot that it is about; empty if none in particular.
+    /// The robot; empty if the channel belongs to none.
     pub(crate) robot: &'a str,
-    /// Why it is not what its topic lets one expect.
+    /// Why the role is not the one that the topic suggests.
     pub(crate) mismatch: Option<String>,
 }
 
-/// Where AMCL and other localizers say the robot's pose in its map.
+/// Topic of the robot's pose in its map, as published by AMCL and other localizers.
 const LOCALIZER_POSE: &str = "/{robot}/amcl_pose";
-/// Where odometry is.
+/// Topic of the robot's odometry.
 const ODOMETRY: &str = "/{robot}/odom";
 
-/// Tells what the channels of logs carry.
+/// Classifies the channels of logs.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotChannels {
     topics: RobotTopics,
-    /// Where updates of maps are: beside the maps, as ROS programs have it.
+    /// Topic pattern of map updates: the map topic and `_updates`, as ROS programs name it.
     map_updates: String,
-    /// The robots whose maps are updated in parts.
+    /// Robots with map updates.
     updated: BTreeSet<String>,
-    /// The robots whose poses are on the topic that was named for them.
+    /// Robots with messages on the configured pose topic.
     posed: BTreeSet<String>,
-    /// The robots with maps or tag readings and without a topic for poses.
+    /// Robots with maps or tag readings and without a pose topic.
     unposed: BTreeSet<String>,
-    /// The robots of which there are maps, poses or tag readings.
+    /// Robots with maps, poses or tag readings.
     known: BTreeSet<String>,
-    /// The known robots whose cameras see tags of which tf says where they are.
+    /// Known robots whose detectors publish tag poses in tf only.
     tags_in_tf: BTreeSet<String>,
-    /// Whether any message says where, or in which direction, tags are in the frame of a camera or another sensor.
+    /// Whether any channel holds positions or bearings of tags in a sensor frame.
     has_cameras: bool,
-    /// The robots with scans and without maps.
+    /// Robots with scans and without maps.
     scanned: BTreeSet<String>,
-    /// The robots with a topic for odometry.
+    /// Robots with an odometry topic.
     with_odometry: BTreeSet<String>,
 }
 
 impl RobotChannels {
-    /// For logs with these channels.
+    /// Creates a classifier for logs with these channels.
     pub(crate) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
         let mut roles = Self {
             map_updates: format!("{}_updates", topics.map),
@@ -149,14 +149,14 @@ impl RobotChannels {
         roles
     }
 
-    /// The known robot in whose namespace a topic is.
+    /// The known robot whose namespace contains the topic.
     fn known_robot<'a>(&self, topic: &'a str) -> Option<&'a str> {
         let (namespace, _) = self.topics.map.split_once("{robot}")?;
         let (robot, _) = topic.strip_prefix(namespace)?.split_once('/')?;
         self.known.contains(robot).then_some(robot)
     }
 
-    /// The robot that reads tags on a channel whose type is not made for that, and where the readings are in its messages.
+    /// The robot whose tag readings a channel of a general type holds, and the fields that contain them.
     fn tag_fields<'a>(&self, channel: &'a Channel) -> Option<(&'a str, TagFields)> {
         let type_name = full_type_name(&channel.schema_name);
         if channel.message_encoding != "cdr" || type_name == TagRange::NAME {
@@ -172,49 +172,49 @@ impl RobotChannels {
         }
     }
 
-    /// What reads the tags in the messages of a channel of [`Role::TagMessage`].
+    /// The reader of the tag readings on a channel of [`Role::TagMessage`].
     pub(crate) fn tag_reader(&self, channel: &Channel) -> Option<TagReader> {
         let (_, fields) = self.tag_fields(channel)?;
         TagReader::new(channel, &fields).ok()
     }
 
-    /// The robot whose scans a channel holds, or would hold if the robot had no map.
+    /// The robot of a channel with scans, whether or not the robot has a map.
     pub(crate) fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
         let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
         match_robot(&self.topics.scan, &channel.topic).filter(|_| holds_scans)
     }
 
-    /// The robots with scans and without maps, by name.
+    /// Robots with scans and without maps, sorted by name.
     pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
         self.scanned.iter().map(String::as_str)
     }
 
-    /// Whether a robot without a topic for poses has one for odometry.
+    /// Whether a robot without a pose topic has an odometry topic.
     pub(crate) fn has_odometry(&self, robot: &str) -> bool {
         self.with_odometry.contains(robot)
     }
 
-    /// The robots whose tags are frames in tf.
+    /// Robots whose tags are frames in tf.
     pub(crate) fn tags_in_tf(&self) -> &BTreeSet<String> {
         &self.tags_in_tf
     }
 
-    /// Whether frames of cameras matter.
+    /// Whether sensor frames are needed to locate tags.
     pub(crate) fn sees_tags(&self) -> bool {
         self.has_cameras || !self.tags_in_tf.is_empty()
     }
 
-    /// Whether parts of a robot's map come after the map.
+    /// Whether a robot's map is updated in parts.
     pub(crate) fn updates_map(&self, robot: &str) -> bool {
         self.updated.contains(robot)
     }
 
-    /// The robots with maps or tag readings whose poses are on no topic for them, by name.
+    /// Robots with maps or tag readings and without a pose topic, sorted by name.
     pub(crate) fn unposed(&self) -> impl Iterator<Item = &str> {
         self.unposed.iter().map(String::as_str)
     }
 
-    /// Tells what `channel` carries.
+    /// Classifies a channel.
     pub(crate) fn classify<'a>(&self, channel: &'a Channel) -> Classified<'a> {
         let topic = channel.topic.as_str();
         let type_name = full_type_name(&channel.schema_name);
@@ -231,12 +231,12 @@ impl RobotChannels {
             return match TagReader::new(channel, &fields) {
                 Ok(_) => Classified { role: Role::TagMessage, robot, mismatch: None },
                 Err(why) => {
-                    let mismatch = Some(format!("no tags are read on `{topic}`: {why}"));
+                    let mismatch = Some(format!("cannot read tags on `{topic}`: {why}"));
                     Classified { role: Role::Other, robot, mismatch }
                 }
             };
         }
-        // Poses come from tf alone if the pipeline says so.
+        // With `robots.tf` in the pipeline, poses come from tf only.
         let has_topic = self.topics.tf.is_none();
         let expectations = [
             ("map", Some(&self.topics.map), OccupancyGrid::NAME, role_of_map as fn(&str) -> Option<Role>),

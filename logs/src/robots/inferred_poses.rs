@@ -1,62 +1,62 @@
-//! Poses of robots that have no topic for them: out of tf, or odometry that is in the frame of the map.
+//! Poses of robots without a pose topic: from tf, or from odometry in the map frame.
 
 use super::channels::RobotChannels;
 use super::mounts::BASES;
-use crate::tf::{Ends, TfPoses};
+use crate::tf::{PoseFrames, TfPoses};
 use gridweave_runtime::ros::{PoseStamped, TFMessage};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the frame of a robot's odometry is called, behind the robot's name.
+/// Frame of a robot's odometry, without the robot's name.
 const ODOMETRY_FRAME: &str = "odom";
 
-/// Where the poses of a robot come from that has no topic for them.
+/// The source of the poses of a robot without a pose topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Origin {
-    /// tf ties this frame of its base to its map.
+    /// tf connects this base frame to the robot's map frame.
     Tf(String),
-    /// Odometry on this topic.
+    /// The odometry on this topic is in the map frame.
     Odometry(String),
 }
 
-/// Finds the poses of robots that have no topic for them.
+/// Finds the poses of robots without a pose topic.
 ///
-/// What gives a pose of a robot first, tf or odometry, gives all of them.
+/// The first source that gives a pose of a robot, tf or odometry, is used for all its poses.
 #[derive(Debug, Default)]
 pub(crate) struct InferredPoses {
     tf: TfPoses,
-    /// Where the bases of robots that have scans, and no odometry on a topic, are by tf in the frame of odometry.
+    /// Poses from tf in the odometry frame, of robots with scans and without an odometry topic.
     odometry: TfPoses,
-    /// The robots of which tf has told that.
+    /// Robots whose odometry pose was found in tf.
     with_odometry: BTreeSet<String>,
     origins: BTreeMap<String, Origin>,
-    /// The robots whose map was seen, so that its frame is known.
+    /// Robots whose map was received, so that its frame is known.
     mapped: BTreeSet<String>,
-    /// Where odometry is in another frame than the map: the topic and the frame, by robot.
+    /// Odometry in a frame other than the map frame: topic and frame, by robot.
     elsewhere: BTreeMap<String, (String, String)>,
 }
 
 impl InferredPoses {
-    /// For the robots that have no topic for poses.
+    /// Creates a finder for the robots without a pose topic.
     pub(crate) fn new(channels: &RobotChannels) -> Self {
         let mut poses = Self::default();
         poses.set_channels(channels);
         poses
     }
 
-    /// Looks for the poses of the robots that have no topic for them now. What is known of frames stays.
+    /// Replaces the set of robots without a pose topic. Known frames are kept.
     pub(crate) fn set_channels(&mut self, channels: &RobotChannels) {
-        let ends = |robot: &str| Ends {
+        let ends = |robot: &str| PoseFrames {
             map: format!("{robot}/map"),
             bases: BASES.map(|base| format!("{robot}{base}")).to_vec(),
         };
         self.tf.set_robots(channels.unposed().map(|robot| (robot.to_owned(), ends(robot))).collect());
         let by_tf = channels.scanned().filter(|robot| channels.unposed().any(|unposed| unposed == *robot));
         let by_tf = by_tf.filter(|robot| !channels.has_odometry(robot));
-        let in_odometry = |robot: &str| Ends { map: format!("{robot}/{ODOMETRY_FRAME}"), ..ends(robot) };
+        let in_odometry = |robot: &str| PoseFrames { map: format!("{robot}/{ODOMETRY_FRAME}"), ..ends(robot) };
         self.odometry.set_robots(by_tf.map(|robot| (robot.to_owned(), in_odometry(robot))).collect());
     }
 
-    /// Where robots with scans are in the frames of their odometry, by a message of transforms: for those that have no topic for it.
+    /// Poses in the odometry frame, of robots with scans and without an odometry topic, from a message of transforms.
     pub(crate) fn odometry(
         &mut self,
         prefix: &str,
@@ -68,18 +68,18 @@ impl InferredPoses {
         poses
     }
 
-    /// Where the odometry of a robot comes from, as in "tf (robot1/odom to robot1/base_link)"; `None` if tf has told none.
+    /// The source of a robot's odometry, such as "tf (robot1/odom to robot1/base_link)"; `None` if tf has none.
     pub(crate) fn odometry_origin(&self, robot: &str) -> Option<String> {
         let base = self.odometry.base_of(robot).filter(|_| self.with_odometry.contains(robot))?;
         Some(format!("tf ({} to {base})", self.odometry.map_frame(robot)?))
     }
 
-    /// Whether the frame of a robot's map is asked for and not known.
+    /// Whether the frame of a robot's map is needed and not known.
     pub(crate) fn asks_for_map(&self, robot: &str) -> bool {
         self.tf.knows(robot) && !self.mapped.contains(robot)
     }
 
-    /// Takes up the frame of a robot's map. Until then it is taken for `ROBOT/map`.
+    /// Sets the frame of a robot's map. The default is `ROBOT/map`.
     pub(crate) fn set_map_frame(&mut self, robot: &str, frame: &str) {
         if !frame.is_empty() {
             self.tf.set_map_frame(robot, frame);
@@ -87,7 +87,7 @@ impl InferredPoses {
         }
     }
 
-    /// The poses that transforms tell, by robot, and how many of these could not be used; see [`TfPoses::update`].
+    /// Poses from a message of transforms, by robot, and the number of unusable transforms; see [`TfPoses::update`].
     pub(crate) fn transforms(
         &mut self,
         prefix: &str,
@@ -103,7 +103,7 @@ impl InferredPoses {
         (poses, unusable)
     }
 
-    /// Whether odometry of a robot, which is in `frame`, gives its poses.
+    /// Whether the odometry of a robot, in the frame `frame`, gives its poses.
     pub(crate) fn takes_odometry(&mut self, robot: &str, topic: &str, frame: &str) -> bool {
         if self.tf.map_frame(robot) != Some(frame) {
             let elsewhere = || (topic.to_owned(), frame.to_owned());
@@ -117,7 +117,7 @@ impl InferredPoses {
         matches!(origin, Origin::Odometry(of) if of == topic)
     }
 
-    /// Where the poses of a robot come from, as in "tf (robot1/map to robot1/base_link)"; `None` if there are none.
+    /// The source of a robot's poses, such as "tf (robot1/map to robot1/base_link)"; `None` if it has no poses.
     pub(crate) fn origin(&self, robot: &str) -> Option<String> {
         Some(match self.origins.get(robot)? {
             Origin::Tf(base) => format!("tf ({} to {base})", self.tf.map_frame(robot)?),
@@ -125,18 +125,21 @@ impl InferredPoses {
         })
     }
 
-    /// The robots without any pose for which there are transforms or odometry, and why these give none.
+    /// Robots that have transforms or odometry and still no pose, each with the reason.
     pub(crate) fn missing(&self) -> BTreeMap<String, String> {
         let missing = |robot: &str| {
             let map = self.tf.map_frame(robot)?;
             let tf = self.tf.has_frames().then(|| {
-                format!("tf does not tie `{robot}/base_link` or `{robot}/base_footprint` to the map, `{map}`")
+                format!(
+                    "tf has no transform from `{robot}/base_link` or `{robot}/base_footprint` to the map frame `{map}`"
+                )
             });
-            let odometry = self.elsewhere.get(robot).map(|(topic, frame)| {
-                format!("`{topic}` is in the frame `{frame}`, which is not that of the map, `{map}`")
-            });
+            let odometry = self
+                .elsewhere
+                .get(robot)
+                .map(|(topic, frame)| format!("`{topic}` is in the frame `{frame}`, not in the map frame `{map}`"));
             let why: Vec<String> = tf.into_iter().chain(odometry).collect();
-            let text = || format!("there is no pose of {robot} in its map: {}", why.join(", and "));
+            let text = || format!("no pose of {robot} in its map: {}", why.join(", and "));
             (!why.is_empty()).then(|| (robot.to_owned(), text()))
         };
         let robots = self.tf.robots().filter(|robot| !self.origins.contains_key(*robot));

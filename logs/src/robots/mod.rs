@@ -1,4 +1,4 @@
-//! The robots of a log: which channel carries what of which robot, and the poses, scans and tag readings in its messages.
+//! The robots of a log: which channel carries what of which robot, and how poses, scans and tag readings are read.
 
 mod channels;
 mod inferred_poses;
@@ -10,8 +10,8 @@ mod tag_reader;
 
 pub(crate) use channels::{Classified, PoseSource, RobotChannels, Role};
 pub(crate) use inferred_poses::InferredPoses;
-pub(crate) use mounts::Untied;
+pub(crate) use mounts::NoTransform;
 pub(crate) use pose::{NoPose, pose_with_covariance};
 pub(crate) use scans::{Scans, read_scan};
 pub(crate) use tag_positions::TagPositions;
-pub(crate) use tag_reader::{Seen, TagReader};
+pub(crate) use tag_reader::{Measurement, TagReader};

@@ -1,43 +1,44 @@
-//! How sensors are mounted on their robots, by tf.
+//! The mounting poses of sensors on their robots, from tf.
 
 use crate::tf::FrameTree;
 use gridweave_runtime::ros::Transform;
 use nalgebra::Isometry3;
 
-/// The names that the frame of a robot's base has, behind that of the robot. The first that is tied to the map counts.
+/// Usual names of a robot's base frame, without the robot's name. The first that tf connects to the map is used.
 pub(crate) const BASES: [&str; 4] = ["/base_link", "/base_footprint", "_base_link", "_base_footprint"];
 
-/// The frames of robots, and what the bases among them are called.
+/// The tf frames of robots, and the names of their base frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Mounts {
     tree: FrameTree,
-    /// What the base of a robot is called, `{robot}` standing for its name. The first that is tied to a sensor counts.
+    /// Names of the base frame, in which `{robot}` is replaced by the robot's name. The first that tf connects to the
+    /// sensor is used.
     bases: Vec<String>,
 }
 
-/// The frame of a sensor is not tied to its robot.
+/// tf has no transform between a sensor and the base of its robot.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Untied;
+pub(crate) struct NoTransform;
 
 impl Mounts {
-    /// For robots whose base is called `base`, or as most are.
+    /// Creates an empty tree for robots with the base frame `base`, or one of the usual names.
     pub(crate) fn new(base: Option<&str>) -> Self {
         let usual = || BASES.map(|base| format!("{{robot}}{base}")).to_vec();
         Self { tree: FrameTree::default(), bases: base.map_or_else(usual, |base| vec![base.to_owned()]) }
     }
 
-    /// Takes up how a frame lies in its parent.
+    /// Adds a transform to the tree.
     pub(crate) fn insert(&mut self, parent: &str, child: &str, transform: &Transform, is_static: bool) {
         self.tree.insert(parent, child, transform, is_static);
     }
 
-    /// The frame of a robot's base, and how the frame of a sensor lies in it.
-    pub(crate) fn mount(&self, robot: &str, frame: &str) -> Result<(String, Isometry3<f64>), Untied> {
-        let tied = |base: &String| {
+    /// The robot's base frame, and the pose of the sensor frame `frame` in it.
+    pub(crate) fn mount(&self, robot: &str, frame: &str) -> Result<(String, Isometry3<f64>), NoTransform> {
+        let connected = |base: &String| {
             let base = base.replace("{robot}", robot);
             let transform_base_sensor = self.tree.lookup(&base, frame)?;
             Some((base, transform_base_sensor))
         };
-        self.bases.iter().find_map(tied).ok_or(Untied)
+        self.bases.iter().find_map(connected).ok_or(NoTransform)
     }
 }

@@ -1,11 +1,11 @@
-//! Poses from all types that hold one.
+//! Poses read from every message type that contains one.
 
 use super::channels::PoseSource;
 use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
 use serde::Deserialize;
 use std::borrow::Cow;
 
-/// The fields of `nav_msgs/msg/Odometry` up to the pose.
+/// The leading fields of `nav_msgs/msg/Odometry`, up to the pose.
 #[derive(Deserialize)]
 struct OdometryStart {
     header: Header,
@@ -14,12 +14,12 @@ struct OdometryStart {
     pose: PoseWithCovariance,
 }
 
-/// A message could not be read as a pose.
+/// The message cannot be read as a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NoPose;
 
-/// The pose that an encoded message of the given type holds, encoded as [`PoseWithCovarianceStamped`]; its covariance is
-/// zeros where the type has none.
+/// Converts an encoded message of the given type to an encoded [`PoseWithCovarianceStamped`]. The covariance is zero if
+/// the type has none.
 pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<Cow<'_, [u8]>, NoPose> {
     let pose = match source {
         PoseSource::Pose => decode::<PoseStamped>(bytes).map_err(|_| NoPose)?.into(),
@@ -50,7 +50,7 @@ mod tests {
             let made = pose_with_covariance(PoseSource::Pose, &bytes).unwrap();
             assert_eq!(made, encode(&PoseWithCovarianceStamped::from(stamped)).unwrap());
             let padded = [bytes.as_slice(), &[7; 4]].concat();
-            assert_eq!(pose_with_covariance(PoseSource::Pose, &padded).unwrap(), made, "what follows is left out");
+            assert_eq!(pose_with_covariance(PoseSource::Pose, &padded).unwrap(), made, "trailing bytes are ignored");
         }
     }
 
@@ -70,7 +70,7 @@ mod tests {
         let pose = encode(&PoseStamped { header: Header::new(LogTime(1), "map"), ..Default::default() }).unwrap();
         let with_covariance = encode(&PoseWithCovarianceStamped::default()).unwrap();
         let odometry = encode(&Odometry::default()).unwrap();
-        // Behind the pose of odometry stand 6 + 36 numbers of its twist, which are not read.
+        // After the pose, odometry has a twist of 6 + 36 numbers, which is not read.
         for (source, bytes, least) in [
             (PoseSource::Pose, &pose, pose.len()),
             (PoseSource::PoseWithCovariance, &with_covariance, with_covariance.len()),

@@ -1,6 +1,6 @@
-//! Scans of lidars, from where they were made to where the base of the robot was.
+//! Laser scans, transformed from the lidar frame to the base frame of the robot.
 
-use super::mounts::{Mounts, Untied};
+use super::mounts::{Mounts, NoTransform};
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{
@@ -9,19 +9,19 @@ use gridweave_runtime::ros::{
 use gridweave_runtime::stage::frame_of_robot;
 use nalgebra::Vector3;
 
-/// Knows how lidars are mounted on their robots.
+/// Transforms scans to the base frame, by the mounting poses of lidars.
 #[derive(Debug)]
 pub(crate) struct Scans {
     mounts: Mounts,
 }
 
 impl Scans {
-    /// For robots whose base is called `base`, or as most are.
+    /// Creates a transformer for robots with the base frame `base`, or one of the usual names.
     pub(crate) fn new(base: Option<&str>) -> Self {
         Self { mounts: Mounts::new(base) }
     }
 
-    /// Takes up transforms whose frames lack a prefix.
+    /// Adds transforms whose frame names lack `prefix`.
     pub(crate) fn transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
         for edge in &message.transforms {
             let parent = frame_of_robot(prefix, &edge.header.frame_id);
@@ -30,8 +30,8 @@ impl Scans {
         }
     }
 
-    /// A scan as the base of its robot sees it: in the plane, with a lidar that hangs upside down turning the other way.
-    pub(crate) fn seen_from_base(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, Untied> {
+    /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise.
+    pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, NoTransform> {
         let (base, transform_base_lidar) = self.mounts.mount(robot, &scan.header.frame_id)?;
         let ahead = transform_base_lidar * Vector3::x();
         let is_upright = (transform_base_lidar * Vector3::z()).z >= 0.0;
@@ -52,12 +52,13 @@ impl Scans {
     }
 }
 
-/// Whether a type is that of scans.
+/// Whether a message type holds scans.
 pub(crate) fn is_scan(type_name: &str) -> bool {
     [LaserScan::NAME, MultiEchoLaserScan::NAME].contains(&type_name)
 }
 
-/// Reads a scan of a channel that [holds some](is_scan). Of several echoes of a beam the nearest counts: it has met something.
+/// Reads a scan from a channel whose type [holds scans](is_scan). Of several echoes of a beam, the nearest is used: it
+/// is the first obstacle.
 pub(crate) fn read_scan(channel: &Channel, data: &[u8]) -> Result<LaserScan, DecodeError> {
     if full_type_name(&channel.schema_name) == LaserScan::NAME {
         return decode(data);
@@ -107,25 +108,25 @@ mod tests {
     #[test]
     fn a_scan_is_seen_from_where_its_lidar_is_mounted() {
         let scans = scans([0.2, -0.1], UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5));
-        let seen = scans.seen_from_base("r1", scan("r1/laser")).unwrap();
-        assert_eq!((seen.header.frame_id.as_str(), seen.x, seen.y), ("r1/base_link", 0.2, -0.1));
-        assert!((seen.yaw - 0.5).abs() < 1e-9, "{seen:?}");
-        assert_eq!((seen.angle_min, seen.angle_increment, seen.ranges.len()), (-1.0, 0.5, 2));
+        let found = scans.to_base_frame("r1", scan("r1/laser")).unwrap();
+        assert_eq!((found.header.frame_id.as_str(), found.x, found.y), ("r1/base_link", 0.2, -0.1));
+        assert!((found.yaw - 0.5).abs() < 1e-9, "{found:?}");
+        assert_eq!((found.angle_min, found.angle_increment, found.ranges.len()), (-1.0, 0.5, 2));
     }
 
     #[test]
     fn a_lidar_that_hangs_upside_down_turns_the_other_way() {
         let scans = scans([0.0, 0.0], UnitQuaternion::from_euler_angles(PI, 0.0, 0.0));
-        let seen = scans.seen_from_base("r1", scan("r1/laser")).unwrap();
-        assert!(seen.yaw.abs() < 1e-9);
-        assert_eq!((seen.angle_min, seen.angle_increment), (1.0, -0.5));
+        let found = scans.to_base_frame("r1", scan("r1/laser")).unwrap();
+        assert!(found.yaw.abs() < 1e-9);
+        assert_eq!((found.angle_min, found.angle_increment), (1.0, -0.5));
     }
 
     #[test]
-    fn a_scan_in_the_frame_of_the_base_needs_no_mount_and_one_in_no_known_frame_is_told() {
+    fn a_scan_in_the_base_frame_needs_no_mount_and_one_in_an_unknown_frame_is_an_error() {
         let scans = Scans::new(None);
-        assert_eq!(scans.seen_from_base("r1", scan("r1/base_footprint")).unwrap().x, 0.0);
-        assert_eq!(scans.seen_from_base("r1", scan("r1/laser")), Err(Untied));
+        assert_eq!(scans.to_base_frame("r1", scan("r1/base_footprint")).unwrap().x, 0.0);
+        assert_eq!(scans.to_base_frame("r1", scan("r1/laser")), Err(NoTransform));
     }
 
     #[test]

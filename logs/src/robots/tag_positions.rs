@@ -1,39 +1,40 @@
-//! From where, or in which direction, a sensor perceives tags to where they are from the robot.
+//! Tag positions and bearings, transformed from the sensor frame to the base frame of the robot.
 
-use super::mounts::{Mounts, Untied};
+use super::mounts::{Mounts, NoTransform};
 use super::tag_reader::tag_of_frame;
 use gridweave_runtime::ros::{Header, TFMessage, TagBearing, TagPosition, Time};
 use gridweave_runtime::stage::frame_of_robot;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeSet;
 
-/// Knows how cameras and other such sensors are mounted on their robots, by tf.
+/// Transforms tag detections to the base frame, by the mounting poses of sensors in tf.
 #[derive(Debug)]
 pub(crate) struct TagPositions {
     mounts: Mounts,
-    /// The robots whose tags are frames in tf.
+    /// Robots whose tags are frames in tf.
     in_tf: BTreeSet<String>,
 }
 
 impl TagPositions {
-    /// For robots whose base is called `base`, or as most are; tags of the robots `in_tf` are frames there.
+    /// Creates a transformer for robots with the base frame `base`, or one of the usual names; the tags of the robots
+    /// `in_tf` are frames in tf.
     pub(crate) fn new(base: Option<&str>, in_tf: BTreeSet<String>) -> Self {
         Self { mounts: Mounts::new(base), in_tf }
     }
 
-    /// Tags of these robots are frames in tf.
+    /// Sets the robots whose tags are frames in tf.
     pub(crate) fn set_robots(&mut self, in_tf: BTreeSet<String>) {
         self.in_tf = in_tf;
     }
 
-    /// Takes up transforms whose frames lack a prefix. Gives the tags that are seen in them: the robot, and where it sees the
-    /// tag, or that this cannot be told.
+    /// Adds transforms whose frame names lack `prefix`. Returns the tags detected in them: the robot, and the tag's
+    /// position in its base frame or the lack of a transform.
     pub(crate) fn transforms(
         &mut self,
         prefix: &str,
         is_static: bool,
         message: &TFMessage,
-    ) -> Vec<(String, Result<TagPosition, Untied>)> {
+    ) -> Vec<(String, Result<TagPosition, NoTransform>)> {
         let mut tags = Vec::new();
         for edge in &message.transforms {
             let parent = frame_of_robot(prefix, &edge.header.frame_id);
@@ -52,14 +53,14 @@ impl TagPositions {
         tags
     }
 
-    /// The robot whose tags are in tf that a frame belongs to.
+    /// The robot with tags in tf that a frame belongs to.
     fn robot_of(&self, frame: &str) -> Option<String> {
         let bears =
             |robot: &&String| frame.strip_prefix(robot.as_str()).is_some_and(|rest| rest.starts_with(['/', '_']));
         self.in_tf.iter().find(bears).cloned()
     }
 
-    /// Where a robot sees a tag that is at a point in a frame.
+    /// The position, in the base frame, of a tag at `point` in a sensor frame.
     pub(crate) fn position(
         &self,
         robot: &str,
@@ -67,15 +68,15 @@ impl TagPositions {
         stamp: Time,
         frame: &str,
         point: &Point3<f64>,
-    ) -> Result<TagPosition, Untied> {
+    ) -> Result<TagPosition, NoTransform> {
         let (base, transform_base_frame) = self.mounts.mount(robot, frame)?;
         let place = transform_base_frame * point;
         let header = Header { stamp, frame_id: base };
         Ok(TagPosition { header, tag_id: tag_id.to_owned(), x: place.x, y: place.y, covariance: [0.0; 4] })
     }
 
-    /// In which direction a robot perceives a tag whose direction a sensor tells: an angle about the z axis of `frame`, radians,
-    /// and its standard deviation.
+    /// The bearing, in the base frame, of a tag whose bearing in the sensor frame is known: an angle about the z axis
+    /// of `frame`, radians, with its standard deviation.
     pub(crate) fn bearing(
         &self,
         robot: &str,
@@ -83,7 +84,7 @@ impl TagPositions {
         stamp: Time,
         frame: &str,
         (bearing, bearing_stddev): (f64, f64),
-    ) -> Result<TagBearing, Untied> {
+    ) -> Result<TagBearing, NoTransform> {
         let (base, transform_base_frame) = self.mounts.mount(robot, frame)?;
         let direction = transform_base_frame * Vector3::new(bearing.cos(), bearing.sin(), 0.0);
         let sensor = transform_base_frame.translation;
@@ -140,15 +141,15 @@ mod tests {
         let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 1.0);
         let mount = edge("r1/base_link", "r1/antennas", [0.2, 0.1, 0.5], turned);
         positions.transforms("", true, &TFMessage { transforms: vec![mount] });
-        let told = |frame: &str| positions.bearing("r1", "a", Time::default(), frame, (0.5, 0.05));
-        let seen = told("r1/antennas").unwrap();
+        let found = |frame: &str| positions.bearing("r1", "a", Time::default(), frame, (0.5, 0.05));
+        let seen = found("r1/antennas").unwrap();
         assert_eq!(
             (seen.header.frame_id.as_str(), seen.x, seen.y, seen.bearing_stddev),
             ("r1/base_link", 0.2, 0.1, 0.05)
         );
         assert!((seen.bearing - 1.5).abs() < 1e-9, "{seen:?}");
-        assert!((told("r1/base_link").unwrap().bearing - 0.5).abs() < 1e-9);
-        assert_eq!(told("r1/other"), Err(Untied));
+        assert!((found("r1/base_link").unwrap().bearing - 0.5).abs() < 1e-9);
+        assert_eq!(found("r1/other"), Err(NoTransform));
     }
 
     #[test]
@@ -156,11 +157,11 @@ mod tests {
         let mut positions = TagPositions::new(Some("{robot}/body"), BTreeSet::from(["r1".to_owned()]));
         let point = Point3::new(1.0, 0.0, 0.0);
         let seen = |positions: &TagPositions| positions.position("r1", "a", Time::default(), "r1/camera", &point);
-        assert_eq!(seen(&positions), Err(Untied));
+        assert_eq!(seen(&positions), Err(NoTransform));
         let mount = edge("r1/body", "r1/camera", [1.0, 0.0, 0.0], UnitQuaternion::identity());
         positions.transforms("", true, &TFMessage { transforms: vec![mount] });
         assert_eq!(seen(&positions).unwrap().x, 2.0);
-        // Frames of robots whose tags are not in tf are frames as any other.
+        // Without tags in tf, a tag frame is like any other frame.
         let other = edge("r2/camera", "r2/tag:1", [1.0, 0.0, 0.0], UnitQuaternion::identity());
         assert!(positions.transforms("", false, &TFMessage { transforms: vec![other] }).is_empty());
     }

@@ -1,4 +1,4 @@
-//! Readings of tags in messages of any type, found by the definition that their log holds.
+//! Tag readings from messages of any type, decoded by the definition in the log.
 
 use crate::dynamic::{FieldPath, Scalar, Schema, Value};
 use crate::schemas::full_type_name;
@@ -10,37 +10,37 @@ use nalgebra::Point3;
 #[cfg(test)]
 mod tests;
 
-/// Reads the messages of one channel.
+/// Reads the tags in the messages of one channel.
 #[derive(Debug)]
 pub(crate) struct TagReader {
     schema: Schema,
     each: Option<FieldPath>,
-    /// The id's parts, which a colon joins.
+    /// Parts of the tag id, which are joined by colons.
     id: Vec<FieldPath>,
     distance: Option<Distance>,
     stddev: Option<FieldPath>,
-    /// Where no field tells it, metres.
+    /// Standard deviation if no field contains it, metres.
     usual_stddev: f64,
-    /// The variance of the distance, which some versions of a type have; 0 if it is not known.
+    /// Variance of the range, which some versions of a type have; 0 if unknown.
     variance: Option<FieldPath>,
-    /// What one unit of a distance is in metres.
+    /// Metres per unit of the range.
     unit: f64,
     bearing: Option<Bearing>,
     pose: Option<FieldPath>,
 }
 
-/// What tells in which direction a tag is.
+/// The field with the bearing of a tag.
 #[derive(Debug)]
 struct Bearing {
     path: FieldPath,
-    /// What one unit of it is in radians, counterclockwise.
+    /// Radians per unit, counterclockwise.
     unit: f64,
     stddev: Option<FieldPath>,
-    /// Where no field tells it, radians.
+    /// Standard deviation if no field contains it, radians.
     usual_stddev: f64,
 }
 
-/// What tells how far a tag is.
+/// The field with the distance to a tag.
 #[derive(Debug)]
 enum Distance {
     Range(FieldPath),
@@ -51,32 +51,32 @@ enum Distance {
 #[derive(Debug, PartialEq)]
 pub(crate) struct TagMessage {
     pub(crate) stamp: Time,
-    /// The frame that positions are in.
+    /// The frame of positions and bearings.
     pub(crate) frame_id: String,
     pub(crate) readings: Vec<TagReading>,
 }
 
-/// What a message says of one tag.
+/// One tag reading.
 #[derive(Debug, PartialEq)]
 pub(crate) struct TagReading {
     pub(crate) tag_id: String,
-    pub(crate) seen: Seen,
+    pub(crate) measurement: Measurement,
 }
 
-/// How a tag was read.
+/// A measurement of a tag.
 #[derive(Debug, PartialEq)]
-pub(crate) enum Seen {
-    /// How far it is, metres, with the standard deviation of that (0 if it is not known), and the signal strength, dBm.
+pub(crate) enum Measurement {
+    /// Distance, metres, with its standard deviation (0 if unknown) and the signal strength, dBm.
     Range { range: f64, stddev: f64, rssi: f32 },
-    /// The direction in which it is, radians about the z axis of the frame of the message, counterclockwise from its x axis, with
-    /// the standard deviation of that (0 if it is not known).
+    /// Bearing, radians about the z axis of the message's frame, counterclockwise from its x axis, with its standard
+    /// deviation (0 if unknown).
     Bearing { bearing: f64, stddev: f64 },
-    /// Where it is in the frame of the message, metres.
-    At(Point3<f64>),
+    /// Position in the message's frame, metres.
+    Position(Point3<f64>),
 }
 
-/// Where readings are in messages of types that are known: a range of a sonar or a radio, named by its frame, and what the
-/// detectors of visual tags say that give poses.
+/// The fields of well-known message types: a sonar or radio range, identified by its frame, and the detections of
+/// visual tag detectors that estimate poses.
 pub(crate) fn known_fields(type_name: &str) -> Option<TagFields> {
     let some = |text: &str| Some(text.to_owned());
     Some(match type_name {
@@ -99,12 +99,12 @@ pub(crate) fn known_fields(type_name: &str) -> Option<TagFields> {
     })
 }
 
-/// Whether a type is that of detections whose poses are in tf.
+/// Whether a type holds detections whose poses are published in tf.
 pub(crate) fn has_poses_in_tf(type_name: &str) -> bool {
     type_name == "apriltag_msgs/msg/AprilTagDetectionArray"
 }
 
-/// The id of a visual tag whose pose is in tf, by the name of its frame: `tag36h11:5` for `robot1/tag36h11:5`.
+/// The id of a visual tag from the name of its tf frame: `tag36h11:5` for `robot1/tag36h11:5`.
 pub(crate) fn tag_of_frame(frame: &str) -> Option<&str> {
     let id = frame.rsplit('/').next()?;
     let (family, number) = id.split_once(':')?;
@@ -113,10 +113,10 @@ pub(crate) fn tag_of_frame(frame: &str) -> Option<&str> {
 }
 
 impl TagReader {
-    /// Reads the messages of `channel`, in which readings are where `fields` says.
+    /// Creates a reader for the messages of `channel` with the given fields.
     ///
     /// # Errors
-    /// Nobody knows the type's definition, a path is none, or the fields say nothing of where a tag is.
+    /// The type has no known definition, a path is invalid, or no field contains a distance, bearing or position.
     pub(crate) fn new(channel: &Channel, fields: &TagFields) -> Result<Self, String> {
         let type_name = full_type_name(&channel.schema_name);
         let schema = Schema::of_channel(channel).map_err(|error| format!("{type_name}: {error}"))?;
@@ -139,7 +139,7 @@ impl TagReader {
         };
         let pose = maybe(&fields.pose_field)?;
         if distance.is_none() && bearing.is_none() && pose.is_none() {
-            return Err("nothing says which field tells where a tag is".to_owned());
+            return Err("no field with the range, bearing or pose of a tag is set".to_owned());
         }
         Ok(Self {
             schema,
@@ -156,10 +156,10 @@ impl TagReader {
         })
     }
 
-    /// The readings in a message of `robot`.
+    /// Reads the tags in a message of `robot`.
     ///
     /// # Errors
-    /// The message does not fit its type, or has no such fields.
+    /// The message does not match its type, or lacks a field.
     pub(crate) fn read(&self, robot: &str, message: &[u8]) -> Result<TagMessage, String> {
         let message = self.schema.decode(message).map_err(|error| error.to_string())?;
         let header = message.field("header");
@@ -182,53 +182,53 @@ impl TagReader {
                         self.add_readings(robot, &element, &mut readings)?;
                     }
                 }
-                _ => return Err(format!("`{each}` is no array")),
+                _ => return Err(format!("`{each}` is not an array")),
             },
         }
         Ok(TagMessage { stamp, frame_id, readings })
     }
 
-    /// What a message or an element says of a tag: its distance and its bearing, or else its place.
+    /// Adds the readings in a message or array element: range and bearing, or else position.
     fn add_readings(&self, robot: &str, of: &Value<'_>, readings: &mut Vec<TagReading>) -> Result<(), String> {
         let find = |path: &FieldPath| of.find(path).map_err(|error| error.to_string());
-        let a_number = |path: &FieldPath| number(&find(path)?).ok_or_else(|| format!("`{path}` is no number"));
+        let a_number = |path: &FieldPath| number(&find(path)?).ok_or_else(|| format!("`{path}` is not a number"));
         let mut id = Vec::new();
         for path in &self.id {
             id.push(match find(path)? {
-                // The same tag has one name in the frames of all robots.
+                // A tag has the same id in the frames of all robots.
                 Value::Scalar(Scalar::Text(text)) => without_robot(robot, text).to_owned(),
                 Value::Scalar(whole @ (Scalar::Int(_) | Scalar::Uint(_))) => whole.to_string(),
-                _ => return Err(format!("`{path}` is neither a text nor a whole number")),
+                _ => return Err(format!("`{path}` is neither a string nor an integer")),
             });
         }
         let tag_id = id.join(":");
-        let mut add = |seen| readings.push(TagReading { tag_id: tag_id.clone(), seen });
+        let mut add = |measurement| readings.push(TagReading { tag_id: tag_id.clone(), measurement });
         if let Some(distance) = &self.distance {
             let stddev = self.stddev.as_ref().map(a_number).transpose()?;
             let variance = || number(&of.find(self.variance.as_ref()?).ok()?).filter(|variance| *variance > 0.0);
-            let told = stddev.map(|stddev| stddev * self.unit).or_else(|| Some(variance()?.sqrt() * self.unit));
-            let stddev = told.unwrap_or(self.usual_stddev);
+            let stated = stddev.map(|stddev| stddev * self.unit).or_else(|| Some(variance()?.sqrt() * self.unit));
+            let stddev = stated.unwrap_or(self.usual_stddev);
             add(match distance {
-                Distance::Range(path) => Seen::Range { range: a_number(path)? * self.unit, stddev, rssi: 0.0 },
+                Distance::Range(path) => Measurement::Range { range: a_number(path)? * self.unit, stddev, rssi: 0.0 },
                 Distance::Strength(path, model) => {
                     let rssi = a_number(path)?;
                     let (range, by_model) = model.distance(rssi);
                     let stddev = if stddev > 0.0 { stddev } else { by_model };
-                    Seen::Range { range, stddev, rssi: rssi as f32 }
+                    Measurement::Range { range, stddev, rssi: rssi as f32 }
                 }
             });
         }
         if let Some(Bearing { path, unit, stddev, usual_stddev }) = &self.bearing {
             let stddev = stddev.as_ref().map(a_number).transpose()?;
             let stddev = stddev.map_or(*usual_stddev, |stddev| (stddev * unit).abs());
-            add(Seen::Bearing { bearing: a_number(path)? * unit, stddev });
+            add(Measurement::Bearing { bearing: a_number(path)? * unit, stddev });
         }
         if let Some(path) = self.pose.as_ref().filter(|_| self.distance.is_none() && self.bearing.is_none()) {
             let pose = find(path)?;
             let point = pose.field("position").unwrap_or(&pose);
             let axis = |name: &str| number(point.field(name)?);
             let place = || Some(Point3::new(axis("x")?, axis("y")?, axis("z")?));
-            add(Seen::At(place().ok_or_else(|| format!("`{path}` is neither a pose nor a point"))?));
+            add(Measurement::Position(place().ok_or_else(|| format!("`{path}` is neither a pose nor a point"))?));
         }
         Ok(())
     }
@@ -241,7 +241,7 @@ fn number(value: &Value<'_>) -> Option<f64> {
     }
 }
 
-/// A frame's name without that of its robot.
+/// A frame name without the robot's name.
 fn without_robot<'a>(robot: &str, frame: &'a str) -> &'a str {
     frame.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).filter(|rest| !rest.is_empty()).unwrap_or(frame)
 }

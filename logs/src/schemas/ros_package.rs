@@ -1,4 +1,4 @@
-//! `logs/msg/gridweave_msgs` is a package that colcon builds: it names all its messages, and all packages that these use.
+//! `logs/msg/gridweave_msgs` is a colcon package: it must list all its messages, and all packages that these use.
 
 use super::*;
 use std::collections::BTreeSet;
@@ -14,13 +14,13 @@ fn messages() -> BTreeSet<String> {
     files.map(|name| name.to_str().unwrap().to_owned()).collect()
 }
 
-/// The texts between two others, wherever they stand.
+/// All texts between two others.
 fn between<'a>(text: &'a str, before: &'a str, after: &'a str) -> BTreeSet<String> {
     text.split(before).skip(1).filter_map(|rest| Some(rest.split_once(after)?.0.to_owned())).collect()
 }
 
 #[test]
-fn the_package_names_every_message_in_its_folder_and_they_are_those_that_are_written() {
+fn the_package_lists_all_its_messages_which_are_those_that_are_written() {
     let list = fs::read_to_string(package().join("CMakeLists.txt")).unwrap();
     assert_eq!(between(&list, "\"msg/", "\""), messages());
     let ours = schema_names().filter_map(|name| Some(format!("{}.msg", name.strip_prefix("gridweave_msgs/msg/")?)));

@@ -1,4 +1,4 @@
-//! The definitions are held against the Rust types by a reader of CDR that knows nothing but the definitions.
+//! The definitions are compared with the Rust types by an independent CDR reader that uses only the definitions.
 
 use super::*;
 use crate::dynamic::{JsonOptions, Schema};
@@ -6,14 +6,14 @@ use gridweave_runtime::ros::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// What the schema of `name` reads in the bytes of `message`, all of which it must use.
+/// Decodes `message` by the definition of `name`. All its bytes must be used.
 fn read_by_schema(name: &str, message: &[u8]) -> Value {
     let schema = Schema::parse(name, &schema_text(name).unwrap()).unwrap();
     assert!(schema.decode(&message[..message.len() - 1]).is_err(), "{name}: every byte is read");
     schema.decode(message).unwrap().to_json(JsonOptions::default())
 }
 
-/// Every field is read with its name and value.
+/// Asserts that every field is decoded with its name and value.
 #[track_caller]
 fn assert_agrees<T: RosMessage + Serialize>(message: &T) {
     assert_eq!(read_by_schema(T::NAME, &encode(message).unwrap()), serde_json::to_value(message).unwrap());
@@ -191,7 +191,7 @@ fn result_messages_agree_with_their_definitions() {
 }
 
 #[test]
-fn bends_and_agreements_agree_with_their_definitions() {
+fn deformations_and_agreements_agree_with_their_definitions() {
     let covariance = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0];
     let node = DeformationNode { x: 1.0, y: 2.0, dx: 0.25, dy: 0.5, dyaw: 0.125, covariance };
     assert_agrees(&MapDeformation {
@@ -242,14 +242,14 @@ fn a_grid_agrees_with_its_definition() {
 }
 
 #[test]
-fn a_part_of_a_grid_agrees_with_its_definition() {
+fn a_grid_update_agrees_with_its_definition() {
     let update = OccupancyGridUpdate { header: header(), x: -1, y: 2, width: 3, height: 1, data: &[0xff, 0, 100] };
     let expected = json!({ "header": header(), "x": -1, "y": 2, "width": 3, "height": 1, "data": [-1, 0, 100] });
     assert_eq!(read_by_schema(OccupancyGridUpdate::NAME, &encode(&update).unwrap()), expected);
 }
 
-/// The Rust types hold covariances as rows, and the twist in parts, so that names differ; the values must come in the same
-/// order.
+/// The Rust types store covariances as rows, and the twist in parts, so the field names differ; the values must be in
+/// the same order.
 #[test]
 fn odometry_and_poses_with_covariance_agree_with_their_definitions() {
     fn numbers(value: &Value, into: &mut Vec<f64>) {
@@ -282,7 +282,7 @@ fn odometry_and_poses_with_covariance_agree_with_their_definitions() {
 }
 
 #[test]
-fn every_definition_uses_only_types_that_are_there() {
+fn every_definition_uses_only_defined_types() {
     assert_eq!(schema_names().count(), DEFINITIONS.len());
     for name in schema_names() {
         Schema::parse(&name, &schema_text(&name).unwrap()).unwrap();
@@ -291,7 +291,7 @@ fn every_definition_uses_only_types_that_are_there() {
 }
 
 #[test]
-fn a_schema_is_laid_out_as_in_a_bag() {
+fn a_schema_has_the_format_of_a_bag() {
     let schema = schema_text("geometry_msgs/msg/PoseStamped").unwrap();
     let titles: Vec<&str> = schema.lines().filter(|line| line.starts_with("MSG: ")).collect();
     let expected = ["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Pose", "geometry_msgs/Point"];

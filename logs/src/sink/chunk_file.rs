@@ -1,44 +1,45 @@
-//! What a log is written through: the beginning of a chunk gets into the file last, and without it the chunk is none.
+//! The output file of a log, in which the beginning of each chunk is written last: until then, readers do not see the
+//! chunk.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 
-/// What is at least as large is not copied together with what comes before and behind it.
+/// Pieces of at least this size are not copied together with their neighbours.
 const LARGE: usize = 64 << 10;
 
-/// A file that is written from its beginning on. What was written since it was flushed last cannot be read in it before it is
-/// flushed again: in the place of its first bytes there are zeros, if anything.
+/// A file that is written in order. Data written since the last flush cannot be read before the next: its first bytes
+/// are zero in the file, or absent.
 ///
-/// In these first bytes, up to the first large piece, one may go back and write anew.
+/// The first bytes after a flush, up to the first large piece, can be rewritten by seeking.
 pub(super) struct ChunkFile {
     file: File,
-    /// Where in the file the first bytes belong.
+    /// The file position of the first bytes.
     start: u64,
-    /// The first bytes since it was flushed.
+    /// The first bytes since the last flush.
     first: Vec<u8>,
-    /// Where in these is written next; none if that is behind all that there is.
+    /// The write position in these; `None` at the end of the file.
     place: Option<usize>,
-    /// How much of what comes behind the first bytes is in the file.
+    /// The number of bytes after the first that are in the file.
     behind: u64,
-    /// What comes behind that.
+    /// The bytes after that, not yet in the file.
     last: Vec<u8>,
-    /// Whether the file could not be written. Then nothing more is.
+    /// Whether a write has failed. Nothing is written after that.
     has_failed: bool,
 }
 
 impl ChunkFile {
-    /// A file that is empty.
+    /// Wraps an empty file.
     pub(super) fn new(file: File) -> Self {
         Self { file, start: 0, first: Vec::new(), place: None, behind: 0, last: Vec::new(), has_failed: false }
     }
 
-    /// Where the file ends once it is flushed.
+    /// The length of the file after the next flush.
     fn end(&self) -> u64 {
         self.start + (self.first.len() + self.last.len()) as u64 + self.behind
     }
 
-    /// Puts bytes behind all but the first.
+    /// Writes all but the first bytes.
     fn put_behind(&mut self, bytes: &[u8]) -> io::Result<()> {
         let place = self.start + self.first.len() as u64 + self.behind;
         self.file.write_all_at(bytes, place)?;
@@ -69,10 +70,10 @@ impl ChunkFile {
         Ok(())
     }
 
-    /// Writes, unless writing has failed before.
+    /// Writes, unless an earlier write has failed.
     fn try_to(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
         if self.has_failed {
-            return Err(io::Error::other("what came before could not be written"));
+            return Err(io::Error::other("an earlier write failed"));
         }
         let written = write(self);
         self.has_failed = written.is_err();
@@ -118,12 +119,12 @@ impl Seek for ChunkFile {
 }
 
 fn no_such_place() -> io::Error {
-    io::Error::new(ErrorKind::InvalidInput, "only the first bytes since the last flush can be written anew")
+    io::Error::new(ErrorKind::InvalidInput, "only the first bytes since the last flush can be rewritten")
 }
 
 impl Drop for ChunkFile {
     fn drop(&mut self) {
-        // Whoever wants to know whether it can be written flushes before.
+        // Errors are lost here; whoever needs them flushes first.
         let _ = self.flush();
     }
 }
@@ -152,11 +153,11 @@ mod tests {
             let end = file.stream_position().unwrap();
             assert_eq!(end, start + 4 + round * (LARGE as u64 + 5));
             let before = fs::read(&path).unwrap();
-            assert!(before[start as usize..].iter().take(4).all(|byte| *byte == 0), "not before it is flushed");
+            assert!(before[start as usize..].iter().take(4).all(|byte| *byte == 0), "only once it is flushed");
             assert_eq!(file.seek(SeekFrom::Start(start + 1)).unwrap(), start + 1);
             file.write_all(b"123").unwrap();
             assert_eq!(file.stream_position().unwrap(), start + 4);
-            assert!(file.write_all(b"4").is_err(), "that would be behind the first bytes");
+            assert!(file.write_all(b"4").is_err(), "that would be after the first bytes");
             for place in [SeekFrom::Start(start.wrapping_sub(1)), SeekFrom::Start(end + 1), SeekFrom::End(-1)] {
                 assert!(file.seek(place).is_err());
             }
@@ -178,13 +179,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_behind_what_could_not_be_written() {
+    fn nothing_is_written_after_a_failed_write() {
         for bytes in [&b"lost"[..], &[7; LARGE]] {
             let mut file = ChunkFile::new(File::options().write(true).open("/dev/full").unwrap());
             let written = file.write_all(bytes).and_then(|()| file.flush());
             assert_eq!(written.unwrap_err().kind(), ErrorKind::StorageFull);
-            assert!(file.write_all(b"more").unwrap_err().to_string().contains("what came before"));
-            assert!(file.flush().unwrap_err().to_string().contains("what came before"));
+            assert!(file.write_all(b"more").unwrap_err().to_string().contains("an earlier write failed"));
+            assert!(file.flush().unwrap_err().to_string().contains("an earlier write failed"));
         }
     }
 }

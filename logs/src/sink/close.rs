@@ -11,37 +11,37 @@ use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Why a log could not be closed.
+/// The error when a log cannot be closed.
 #[derive(Debug, thiserror::Error)]
 pub enum CloseError {
-    /// What there is of it cannot be read.
+    /// The partial log cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// It cannot be written anew.
+    /// The partial log cannot be rewritten.
     #[error(transparent)]
     Write(#[from] LogWriteError),
 }
 
-/// Closes what a killed writer has left of the log at `path`, and gives where it then lies, as
-/// [`LogWriter::finish`] does; none if nothing was left. What can be read of it is written anew, with an index, and with the
-/// `reason` why it is not complete. Where there is no room for that, it is closed as it is, without an index.
+/// Closes the partial log that a killed writer has left for `path`, and returns its place, as [`LogWriter::finish`]
+/// does; `None` if there is no partial log. The readable part is rewritten, with an index and the `reason` why it is
+/// incomplete. If there is no room for that, the file is closed in place, without an index.
 ///
 /// # Errors
-/// The writer lives, what it has left is no log, or it cannot be written.
+/// The writer is alive, the partial file is not a log, or it cannot be written.
 pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseError> {
     let Some(output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
     let (file, end) = match LogFile::open(output.part()) {
         Ok(file) => match file.damage().iter().find_map(end_of_records) {
             Some(end) => (Some(file), Some(end)),
-            // It was killed before it could put it in place.
+            // The writer was killed before it could rename the file.
             None => return place(output),
         },
-        // It was killed before it had written a chunk.
+        // The writer was killed before it had written a chunk.
         Err(ReadError::Empty { .. } | ReadError::NothingLeft { .. }) => (None, None),
         Err(error) => return Err(error.into()),
     };
     let closed = copy(file, output.part(), reason);
-    // While it is locked, nobody else takes it away.
+    // While the file is locked, no other program removes it.
     let _locked = match (closed, end) {
         (Err(LogWriteError::NoRoom(_)), Some(end)) => close_in_place(output.part(), end, reason).map(|()| None)?,
         (closed, _) => closed.map(Some)?,
@@ -53,7 +53,7 @@ fn place(output: OutputFile) -> Result<Option<PathBuf>, CloseError> {
     Ok(Some(output.put_in_free_place().map_err(LogWriteError::from)?))
 }
 
-/// Where the last whole record of a log without an end stops.
+/// The end of the last whole record of a truncated log.
 fn end_of_records(damage: &Damage) -> Option<u64> {
     match damage {
         Damage::NoEnd { position } => u64::try_from(*position).ok(),
@@ -61,8 +61,8 @@ fn end_of_records(damage: &Damage) -> Option<u64> {
     }
 }
 
-/// Puts the end of a log without an index (MCAP specification: metadata, data end, footer, magic) behind its last whole
-/// record. The rest of a record that stood there makes room for it.
+/// Appends the end of a log without an index (MCAP specification: metadata, data end, footer, magic) after its last
+/// whole record. A partial record there is overwritten.
 fn close_in_place(path: &Path, end: u64, reason: &str) -> Result<(), LogWriteError> {
     let mut metadata = Vec::new();
     push_text(&mut metadata, OUTCOME_RECORD);
@@ -95,10 +95,10 @@ fn push_length(bytes: &mut Vec<u8>, length: usize) {
     bytes.extend(u32::try_from(length).unwrap_or(u32::MAX).to_le_bytes());
 }
 
-/// Writes what can be read of a log in its place. Gives what was written, locked.
+/// Rewrites the readable part of a log in its place. Returns the file, locked.
 fn copy(file: Option<LogFile>, path: &Path, reason: &str) -> Result<File, LogWriteError> {
     let mut log = LogWriter::create(path, LogOptions::default())?;
-    // Half of it is of no use, and it may be a full disk that is in the way.
+    // A partial copy is of no use, and may fill a full disk.
     log.keep(false);
     rewrite(&mut LogReader::new(file.into_iter().collect()), &mut log)?;
     Ok(log.end(Outcome::Incomplete(reason))?.put_in_place()?)
@@ -121,7 +121,7 @@ mod tests {
         log.finish(Outcome::Complete).unwrap();
     }
 
-    /// What is beside the log while it is written.
+    /// The partial file beside the log while it is written.
     fn part(path: &Path) -> PathBuf {
         path.with_extension("mcap.part")
     }
@@ -131,7 +131,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         write(&path, 100);
-        assert_eq!(close_log(&path, "nothing").unwrap(), None, "it has an end");
+        assert_eq!(close_log(&path, "nothing").unwrap(), None, "it is closed");
         let whole = fs::read(&path).unwrap();
         for length in [0, 5, 8, 30, whole.len() / 2, whole.len() - 20] {
             fs::remove_file(&path).unwrap();
@@ -147,7 +147,7 @@ mod tests {
             let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
             let record = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
             assert_eq!(record.metadata["reason"], "it was killed");
-            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no other file is left");
         }
     }
 
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_writer_has_left_does_not_take_the_place_of_an_earlier_log() {
+    fn a_partial_log_of_a_killed_writer_does_not_replace_an_earlier_log() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         write(&path, 100);

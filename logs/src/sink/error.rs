@@ -1,34 +1,34 @@
-//! Why a log cannot be written.
+//! The error when a log cannot be written.
 
 use crate::file::{WriteError, folder_of};
 use mcap::McapError;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Why a log cannot be written.
+/// The error when a log cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum LogWriteError {
-    /// The name is that of a folder.
+    /// The path is a folder.
     #[error("{0} is a folder; name a file in it")]
     IsFolder(PathBuf),
-    /// The folder that the file would lie in does not exist.
-    #[error("there is no folder {0}; make it, or name a file elsewhere")]
+    /// The folder of the file does not exist.
+    #[error("there is no folder {0}; create it, or name a file elsewhere")]
     NoFolder(PathBuf),
-    /// The user has no right to write there.
-    #[error("{0} may not be written; change its permissions, or name a file elsewhere")]
+    /// The user has no permission to write there.
+    #[error("permission denied to write {0}; change its permissions, or name a file elsewhere")]
     Denied(PathBuf),
-    /// Another program writes it, or it is no regular file.
+    /// Another program writes the file, or it is not a regular file.
     #[error(transparent)]
     Output(WriteError),
-    /// There is no room.
-    #[error("there is no room left for {0}; make room on its disk, or name a file elsewhere")]
+    /// The disk is full.
+    #[error("there is no room left for {0}; free space on its disk, or name a file elsewhere")]
     NoRoom(PathBuf),
-    /// The file system fails otherwise.
+    /// Another error of the file system.
     #[error("{path}: {source}")]
     Io {
         /// The log.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// The format does not allow it, for instance more than 65,535 channels.
@@ -36,7 +36,7 @@ pub enum LogWriteError {
     Format {
         /// The log.
         path: PathBuf,
-        /// What it does not allow.
+        /// The limit.
         message: String,
     },
 }

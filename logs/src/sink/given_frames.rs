@@ -1,40 +1,41 @@
-//! Frames of which a run says itself where they are: the input must not give them another parent.
+//! Map frames that the run places in the world: transforms of the input must not give them another parent.
 
 use gridweave_runtime::ros::{RosMessage, TFMessage, decode, encode};
 use gridweave_runtime::stage::{Context, match_robot};
 use std::collections::BTreeSet;
 
-/// What the map frame of a robot is called, unless the pipeline or a transform says otherwise.
+/// Name of a robot's map frame, unless the pipeline or a transform sets another.
 const MAP_FRAME: &str = "{robot}/map";
 
-/// The map frames of robots, which the transforms of a run place.
+/// The map frames of robots that the transforms of a run place.
 ///
-/// A frame has one parent: where a recorded `world -> robot1/map` stood beside that of the run, either would be used at random.
-/// What was recorded is left out even for a robot that is not merged, since the `world` in it would pass for that of the run.
+/// A frame has one parent: with a recorded `world -> robot1/map` beside that of the run, either would be used at
+/// random. Recorded transforms are dropped even for robots that are not merged, since their `world` would be mistaken
+/// for that of the run.
 pub(crate) struct GivenFrames {
-    /// What map frames are called, `{robot}` standing for any name; none if the run makes no transforms.
+    /// Patterns of map frames, with `{robot}` for any name; empty if the run publishes no transforms.
     pattern: Option<String>,
-    /// Those that transforms of the run have named.
+    /// Frames that transforms of the run have placed.
     named: BTreeSet<String>,
 }
 
 impl GivenFrames {
-    /// For a sink with these inputs.
+    /// Creates the set for a sink with these inputs.
     pub(crate) fn new(context: &Context) -> Self {
         let gives = context.inputs.iter().any(|wire| !wire.topic.is_empty() && wire.ros_type == TFMessage::NAME);
         let named = context.robots.tf.as_ref().map(|tf| tf.map_frame.clone());
         Self { pattern: gives.then(|| named.unwrap_or_else(|| MAP_FRAME.to_owned())), named: BTreeSet::new() }
     }
 
-    /// Takes up a message of transforms that the run has made.
+    /// Learns the frames in a message of transforms from the run.
     pub(crate) fn learn(&mut self, transforms: &[u8]) {
         if let Ok(message) = decode::<TFMessage>(transforms) {
             self.named.extend(message.transforms.into_iter().map(|edge| edge.child_frame_id));
         }
     }
 
-    /// A message of transforms of the input without those that place such a frame, and how many these are; `None` if there are
-    /// none among them. The message is empty if no other is left.
+    /// A message of input transforms without those that place such a frame, and the number of those; `None` if there
+    /// are none. The message is empty if no transform is left.
     pub(crate) fn without(&self, transforms: &[u8]) -> Option<(Vec<u8>, usize)> {
         let pattern = self.pattern.as_ref()?;
         let mut message = decode::<TFMessage>(transforms).ok()?;

@@ -1,4 +1,4 @@
-//! Writing a log: an MCAP file that can be read up to the last closed chunk whatever happens to the program.
+//! Writing a log: an MCAP file that can be read up to the last closed chunk, whatever happens to the program.
 
 use super::chunk_file::ChunkFile;
 use super::{Compression, LogWriteError};
@@ -11,15 +11,15 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The bytes that a message takes in a chunk beside its own: opcode, length and header.
+/// Bytes per message in a chunk in addition to its data: opcode, length and header.
 const MESSAGE_OVERHEAD: u64 = 31;
 
-/// How a log is written.
+/// Options of a log.
 #[derive(Clone, Copy, Debug)]
 pub struct LogOptions {
-    /// How chunks are compressed.
+    /// The compression of chunks.
     pub compression: Compression,
-    /// A chunk is closed when it holds this many bytes before compression.
+    /// The size before compression at which a chunk is closed, bytes.
     pub chunk_size: u64,
 }
 
@@ -29,10 +29,10 @@ impl Default for LogOptions {
     }
 }
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome<'a> {
-    /// The log holds all that it should.
+    /// The log is complete.
     Complete,
     /// The log ends early, for this reason.
     Incomplete(&'a str),
@@ -40,9 +40,9 @@ pub enum Outcome<'a> {
 
 /// Writes a log: an MCAP file with profile `ros2`, chunked and indexed, with checksums.
 ///
-/// It is written beside, as `NAME.part`, and takes its name when it is [finished](Self::finish). The beginning of a chunk is
-/// written last, when it is closed. Dropped before it is finished, the log stays beside: it can be read but does not say that it
-/// is complete.
+/// The file is written as `NAME.part` and renamed when it is [finished](Self::finish). The beginning of a chunk is
+/// written last, when the chunk is closed. If the writer is dropped before that, the `NAME.part` is left: it is
+/// readable, and not marked as complete.
 pub struct LogWriter {
     path: PathBuf,
     output: OutputFile,
@@ -52,7 +52,7 @@ pub struct LogWriter {
 }
 
 impl LogWriter {
-    /// Starts a log at `path`, which takes the place of a file that has this name when it is complete.
+    /// Starts a log at `path`. When it is complete, it replaces a file of that name.
     ///
     /// # Errors
     /// Another program writes it, it is a folder or a device, or the file system does not allow it.
@@ -65,12 +65,12 @@ impl LogWriter {
         Ok(Self { path: path.to_owned(), output, writer, chunk_size: options.chunk_size, open_bytes: 0 })
     }
 
-    /// Whether what was written stays if the log is not finished; at first it does.
+    /// Sets whether the partial file is kept if the log is not finished. By default it is.
     pub(super) fn keep(&mut self, is_kept: bool) {
         self.output.keep(is_kept);
     }
 
-    /// The number of a channel in this log. A channel that is there already keeps its number.
+    /// The number of a channel in this log. A channel that was added before keeps its number.
     pub fn channel(&mut self, channel: &Channel) -> Result<u16, LogWriteError> {
         let Channel { topic, message_encoding, schema_name, schema_encoding, schema, metadata } = channel;
         let added = match schema_name.is_empty() {
@@ -82,10 +82,10 @@ impl LogWriter {
             .map_err(|error| LogWriteError::from_mcap(&self.path, error))
     }
 
-    /// Writes a message on the channel that the header names by its number.
+    /// Writes a message on the channel whose number is in the header.
     pub fn write(&mut self, header: &MessageHeader, bytes: &[u8]) -> Result<(), LogWriteError> {
         let size = bytes.len() as u64 + MESSAGE_OVERHEAD;
-        // A large message gets a chunk of its own, so that nobody has to unpack it to read the small ones beside it.
+        // A large message gets a separate chunk, so that it need not be decompressed to read the small ones beside it.
         if self.open_bytes > 0 && self.open_bytes + size > self.chunk_size {
             self.close_chunk()?;
         }
@@ -114,12 +114,12 @@ impl LogWriter {
         self.close_chunk()
     }
 
-    /// Ends the log, says in it how the run ended, and gives where it lies. One that is complete takes the place of a file
-    /// that has its name. One that is not only takes a free place, and otherwise stays beside, as `NAME.part`: what was there
-    /// may be of more use.
+    /// Ends the log, records the outcome of the run in it, and returns its path. A complete log replaces a file of its
+    /// name. An incomplete one does so only if there is no such file, and otherwise stays at `NAME.part`, since the
+    /// earlier file may be of more use.
     ///
     /// # Errors
-    /// It cannot be written, or put in its place.
+    /// The file cannot be written or renamed.
     pub fn finish(self, outcome: Outcome<'_>) -> Result<PathBuf, LogWriteError> {
         let path = self.path.clone();
         let output = self.end(outcome)?;
@@ -130,7 +130,7 @@ impl LogWriter {
         .map_err(LogWriteError::from)
     }
 
-    /// Ends the log, which stays beside its place.
+    /// Ends the log, which stays at `NAME.part`.
     pub(super) fn end(mut self, outcome: Outcome<'_>) -> Result<OutputFile, LogWriteError> {
         let mut metadata = BTreeMap::from([("complete".to_owned(), (outcome == Outcome::Complete).to_string())]);
         if let Outcome::Incomplete(reason) = outcome {
@@ -144,7 +144,7 @@ impl LogWriter {
         Ok(self.output)
     }
 
-    /// Writes all that has been handed over to the disk, so that it can be read whatever happens.
+    /// Writes everything to the file, so that it can be read whatever happens.
     pub fn flush(&mut self) -> Result<(), LogWriteError> {
         match self.open_bytes {
             0 => Ok(()),
@@ -152,7 +152,7 @@ impl LogWriter {
         }
     }
 
-    /// Ends the chunk, if one is open. What was written is in the file then, and a chunk may begin.
+    /// Closes the open chunk, if any. Everything is in the file then, and a new chunk may begin.
     fn close_chunk(&mut self) -> Result<(), LogWriteError> {
         self.open_bytes = 0;
         self.writer.flush().map_err(|error| LogWriteError::from_mcap(&self.path, error))
@@ -171,10 +171,10 @@ fn write_options(options: LogOptions) -> WriteOptions {
         .library(concat!("gridweave ", env!("CARGO_PKG_VERSION")))
         .compression(compression)
         .compression_level(level)
-        // The compressor's own threads would make its output depend on their number.
+        // The compressor's threads would make its output depend on their number.
         .compression_threads(0)
-        // Chunks are closed here, so that the file is flushed with every one of them: a program that dies leaves none that is
-        // half written.
+        // Chunks are closed here, so that the file is flushed with each: a program that dies leaves no half-written
+        // chunk.
         .chunk_size(None)
 }
 
@@ -184,7 +184,7 @@ mod tests {
     use crate::reader::{Damage, LogFile, LogReader};
     use std::borrow::Cow;
 
-    /// Small and large ones.
+    /// Small and large messages.
     fn message(number: u32) -> Vec<u8> {
         let size = [10, 70_000, 300, 2_000_000, 40_000][number as usize % 5];
         (0..size).map(|byte: u32| ((byte * (number + 1)) >> 4) as u8).collect()
@@ -215,7 +215,7 @@ mod tests {
     const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Lz4, Compression::Zstd];
 
     #[test]
-    fn messages_records_and_attachments_of_any_size_are_read_as_they_were_written() {
+    fn messages_records_and_attachments_of_any_size_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         for compression in COMPRESSIONS {
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_writer_that_dies_all_closed_chunks_are_left_and_nothing_of_the_open_one() {
+    fn a_writer_that_dies_leaves_all_closed_chunks_and_nothing_of_the_open_one() {
         let folder = tempfile::tempdir().unwrap();
         for (compression, number) in COMPRESSIONS.into_iter().zip(0..) {
             let path = folder.path().join(format!("{number}.mcap"));
@@ -249,7 +249,7 @@ mod tests {
             write(&mut log, 7);
             log.flush().unwrap();
             write(&mut log, 9);
-            // As a process that is killed: nothing more is written.
+            // As if the process was killed: nothing more is written.
             std::mem::forget(log);
             let (messages, damage) = read(&path.with_extension("mcap.part"));
             assert!(messages.into_iter().eq((0..7).map(message)), "{compression:?}");

@@ -1,17 +1,18 @@
-//! The stage kind `mcap_sink`: writes all that comes in to a log (MCAP, profile `ros2`).
+//! The stage kind `mcap_sink`: writes all input messages to a log (MCAP, profile `ros2`).
 //!
-//! The log holds the results, each on the topic of its output, and, unless told otherwise, the messages of the input on
-//! the channels that they were logged on. The same messages give the same bytes: nothing in the log tells when or where
-//! it was written.
+//! The log contains the results, each on the topic of its output, and by default the messages of the input on the
+//! channels that they were logged on. The same messages give the same bytes: the log does not contain when or where it
+//! was written.
 //!
-//! A log that its run has finished holds the metadata record `gridweave` with `complete` = `true`. If the run has
-//! failed, `complete` is `false` and `reason` says why. If the program was killed, there is no such record, and all
-//! chunks but the last can be read.
+//! A log of a completed run has the metadata record `gridweave` with `complete` = `true`. If the run failed, `complete`
+//! is `false` and `reason` says why. If the program was killed, there is no such record, and all chunks but the last
+//! can be read.
 //!
-//! The records `gridweave_run` and `gridweave_inputs` explain the results: the version, the pipeline with all its parameters and
-//! its seed as the text of a pipeline file, and the names, sizes and SHA-256 of the files that were read. Those that the logs of
-//! the input bear are passed on under names that begin with `earlier_`, and so are all their other metadata records and their
-//! attachments, as they are; but not the records `rosbag2`, which describe the file that they are in.
+//! The records `gridweave_run` and `gridweave_inputs` document the results: the version, the pipeline with all
+//! parameters and the seed as the text of a pipeline file, and the names, sizes and SHA-256 of the files that were
+//! read. Such records of the input logs are passed on under names that begin with `earlier_`. All other metadata
+//! records and attachments of the input are passed on unchanged, except the records `rosbag2`, which describe the file
+//! that they are in.
 
 mod chunk_file;
 mod close;
@@ -37,14 +38,14 @@ use serde::{Deserialize, Serialize};
 use stage::McapSink;
 use std::path::PathBuf;
 
-/// How the chunks of a log are compressed.
+/// The compression of a log's chunks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Compression {
     /// Zstandard at its fastest level: the smallest logs.
     #[default]
     Zstd,
-    /// LZ4: larger logs, written sooner.
+    /// LZ4: larger logs, faster to write.
     Lz4,
     /// No compression.
     None,
@@ -54,22 +55,20 @@ pub enum Compression {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The log to write. A file that has this name is replaced. Set by `--output`.
+    /// The log to write. An existing file of that name is replaced. Set by `--output`.
     pub file: PathBuf,
-    /// Whether what is in the input logs is written too, beside the results: messages, attachments and metadata records.
+    /// Whether the content of the input logs is written beside the results: messages, attachments and metadata records.
     pub pass_input: bool,
-    /// The topics to write, `{robot}` standing for any one part of the path: `["/{robot}/map", "/tf"]`. All if none are
-    /// given.
+    /// The topics to write, in which `{robot}` matches one part of the path: `["/{robot}/map", "/tf"]`. Empty for all.
     pub only_topics: Vec<String>,
-    /// How chunks are compressed.
+    /// The compression of chunks.
     pub compression: Compression,
-    /// A chunk is closed when it holds this many bytes before compression. If the program is killed, the open chunk is
-    /// lost.
+    /// The size before compression at which a chunk is closed, bytes. If the program is killed, the open chunk is lost.
     #[schemars(range(min = 1 << 10, max = 1 << 29))]
     pub chunk_size: u64,
     /// The pipeline as the text of a pipeline file, to be recorded in the log. Set by the command.
     pub recorded_pipeline: String,
-    /// The files that the run reads, of which names, sizes and hashes are recorded in the log. Set by the command.
+    /// The input files whose names, sizes and hashes are recorded in the log. Set by the command.
     pub recorded_files: Vec<PathBuf>,
 }
 

@@ -1,4 +1,4 @@
-//! What a log says of the run that wrote it: the pipeline, and the files that it has read.
+//! The provenance recorded in a log: the pipeline, and the files that the run read.
 
 use crate::names::Input;
 use crate::reader::log_files;
@@ -13,19 +13,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-/// The name of the metadata record that says by what a log was written: `version` of Gridweave, and the `pipeline` with all its
-/// parameters as the text of a pipeline file.
+/// Name of the metadata record about the run: the `version` of Gridweave, and the `pipeline` with all its parameters as
+/// the text of a pipeline file.
 pub(crate) const RUN_RECORD: &str = "gridweave_run";
-/// The name of the metadata record of the files that the run has read: each an [`InputFile`] as JSON, numbered from 1.
+/// Name of the metadata record about the input files: each an [`InputFile`] as JSON, numbered from 1.
 pub(crate) const INPUTS_RECORD: &str = "gridweave_inputs";
 
-/// So much of a file is read at a time.
+/// The size of the pieces in which a file is read.
 const PART: usize = 1 << 18;
 
 /// A file that a run has read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Its name, and before it that of its folder where that is what was read.
+    /// Its name, with that of its folder in front if the folder was the input.
     pub name: String,
     /// Its size in bytes.
     pub bytes: u64,
@@ -39,24 +39,24 @@ pub(super) fn run_record(pipeline: &str) -> BTreeMap<String, String> {
     [("version", version), ("pipeline", pipeline)].map(|(key, value)| (key.to_owned(), value.to_owned())).into()
 }
 
-/// The files that a run reads, on their way through a hash beside it.
+/// The hashes of a run's input files, computed in a thread during the run.
 pub(super) struct InputHashes {
     worker: JoinHandle<Vec<InputFile>>,
     stop: Arc<AtomicBool>,
 }
 
 impl InputHashes {
-    /// Of the logs and other files that `typed` names.
+    /// Starts the computation for the files of the inputs `typed`.
     pub(super) fn start(typed: Vec<PathBuf>) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let is_stopped = Arc::clone(&stop);
-        // What cannot be read is an error of the stage that reads it.
+        // Unreadable files are reported by the stage that reads them.
         let worker =
             thread::spawn(move || named_files(&typed).filter_map(|file| hash(file, &is_stopped).ok()).collect());
         Self { worker, stop }
     }
 
-    /// The entries of [`INPUTS_RECORD`], once all are known.
+    /// The entries of [`INPUTS_RECORD`]. Waits until all are known.
     pub(super) fn record(self) -> BTreeMap<String, String> {
         let files = self.worker.join().unwrap_or_default();
         let digits = files.len().to_string().len();
@@ -67,14 +67,14 @@ impl InputHashes {
         files.iter().enumerate().map(entry).collect()
     }
 
-    /// Ends it where nobody wants to know any more.
+    /// Stops the computation.
     pub(super) fn stop(self) {
         self.stop.store(true, Ordering::Relaxed);
         drop(self.worker.join());
     }
 }
 
-/// The files that inputs stand for, with the names that they are recorded under.
+/// The files of the inputs, with the names that they are recorded under.
 fn named_files(typed: &[PathBuf]) -> impl Iterator<Item = (String, PathBuf)> {
     typed.iter().flat_map(|typed| {
         let path = Input::new(typed).path;
@@ -87,10 +87,10 @@ fn named_files(typed: &[PathBuf]) -> impl Iterator<Item = (String, PathBuf)> {
     })
 }
 
-/// The name of a file or folder without those that it lies in.
+/// The name of a file or folder without its parents.
 fn last_part(path: &Path) -> String {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-    // `.` and `..` have none.
+    // `.` and `..` have no name.
     name.or_else(|| Some(path.canonicalize().ok()?.file_name()?.to_string_lossy().into_owned())).unwrap_or_default()
 }
 

@@ -1,4 +1,4 @@
-//! Writing anew what can be read of logs.
+//! Rewriting the readable part of damaged logs.
 
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::reader::{Damage, LogFile, LogReader, ReadError, SupplementKind, log_files};
@@ -8,33 +8,33 @@ use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What could be read of a log, and what could not.
+/// The result of recovering a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recovery {
-    /// How many messages were read.
+    /// The number of messages that were read.
     pub messages: u64,
-    /// The topics that they are on.
+    /// The topics of these.
     pub topics: BTreeSet<String>,
-    /// The log times of the first message and of the last.
+    /// The log times of the first and the last message.
     pub times: Option<(LogTime, LogTime)>,
-    /// What is wrong with the log, and how often.
+    /// Descriptions of the damage, with the number of times each occurred.
     pub losses: BTreeMap<String, u64>,
 }
 
-/// A log could not be recovered.
+/// The error when a log cannot be recovered.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecoverError {
-    /// Nothing of it can be read.
+    /// Nothing can be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// What was read cannot be written.
+    /// The output cannot be written.
     #[error(transparent)]
     Write(#[from] LogWriteError),
 }
 
-/// Writes all that can be read of the log at `input`, a file of any kind that is read or the folder of a bag, to `output`:
-/// messages, attachments and metadata records, under the names and numbers that they were logged with.
+/// Writes everything that can be read of the log at `input`, a log file of any kind or the folder of a bag, to
+/// `output`: messages, attachments and metadata records, under their logged names and numbers.
 ///
 /// # Errors
 /// Nothing can be read, or the output cannot be written.
@@ -45,7 +45,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     for (_, path) in log_files(&[input.to_owned()])? {
         match LogFile::open(path) {
             Ok(file) => files.push(file),
-            // The other files of a bag may be of use.
+            // The other files of a bag may be readable.
             Err(error) => {
                 *losses.entry(error.to_string()).or_default() += 1;
                 failure = Some(error);
@@ -72,7 +72,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     Ok(Recovery { losses, ..recovery })
 }
 
-/// Writes all that a reader gives, but for what its files say of how their runs ended.
+/// Writes everything that a reader returns, except the records of how the runs ended.
 pub(super) fn rewrite(reader: &mut LogReader, log: &mut LogWriter) -> Result<Recovery, LogWriteError> {
     let files = std::sync::Arc::clone(reader.files());
     let mut recovery = Recovery::default();
@@ -119,7 +119,7 @@ pub(super) fn rewrite(reader: &mut LogReader, log: &mut LogWriter) -> Result<Rec
     Ok(recovery)
 }
 
-/// Writes an attachment or a metadata record as it was; `false` if it is damaged.
+/// Writes an attachment or metadata record unchanged; `false` if it is damaged.
 ///
 /// # Errors
 /// The log cannot be written.
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_log_is_written_and_what_is_lost_is_told() {
+    fn the_readable_part_of_a_log_is_written_and_losses_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let [input, output] = ["a.mcap", "b.mcap"].map(|name| folder.path().join(name));
         write(&input, 100);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_bag_the_files_are_recovered_that_can_be() {
+    fn the_readable_files_of_a_bag_are_recovered() {
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.mcap");
         let bag = folder.path().join("bag");

@@ -1,4 +1,4 @@
-//! Which channel of the log a message is written on.
+//! The assignment of messages to channels of the log.
 
 use crate::qos;
 use crate::schemas::{full_type_name, schema_text};
@@ -6,18 +6,18 @@ use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{RosMessage, TFMessage};
 use gridweave_runtime::stage::{Context, match_robot};
 
-/// What becomes of the messages of an input's channel.
+/// The route of the messages of an input channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Route {
     /// They are written on this channel.
     Write(Channel),
-    /// They are left out, for this reason.
+    /// They are dropped, for this reason.
     LeaveOut(String),
 }
 
-/// The topics that the results of a run have, known before its first message.
+/// The topics of a run's results, known before its first message.
 pub(crate) struct ResultTopics {
-    /// Template of the topic, and ROS 2 type, of every input of the sink that has them.
+    /// The topic template and the ROS 2 type of each sink input that has them.
     outputs: Vec<(String, String)>,
 }
 
@@ -27,28 +27,28 @@ impl ResultTopics {
         Self { outputs: results.map(|wire| (wire.topic.clone(), wire.ros_type.clone())).collect() }
     }
 
-    /// The type of the result that has this topic.
+    /// The type of the result on this topic.
     fn type_on(&self, topic: &str) -> Option<&str> {
         self.outputs.iter().find(|(template, _)| fits(template, topic)).map(|(_, ros_type)| ros_type.as_str())
     }
 
-    /// Where the messages of a channel of the input go: on the same channel, unless a result has its topic.
+    /// The route of an input channel: unchanged, unless a result has its topic.
     ///
-    /// A result keeps its topic for itself: a map of the input on `/map` would pass for the merged one. Transforms are
-    /// the exception, since all that are sent on a topic count together; they join the result's channel.
+    /// A result has its topic exclusively: an input map on `/map` would be mistaken for the merged one. Transforms are
+    /// the exception, since all transforms on a topic belong together; they share the result's channel.
     pub(crate) fn route(&self, channel: &Channel) -> Route {
         let topic = &channel.topic;
         match self.type_on(topic) {
             None => Route::Write(qos::completed(channel.clone())),
             Some(TFMessage::NAME) if is_tf(channel) => Route::Write(result_channel(topic, TFMessage::NAME, "")),
             Some(_) => Route::LeaveOut(format!(
-                "the input's messages on {topic} were left out: a result of this run has that topic"
+                "the input's messages on {topic} were dropped: a result of this run has that topic"
             )),
         }
     }
 }
 
-/// Whether a topic is one that `template` gives, with a robot's name or without.
+/// Whether a topic matches `template`, with a robot's name or without.
 fn fits(template: &str, topic: &str) -> bool {
     template.replace("/{robot}", "") == topic || match_robot(template, topic).is_some()
 }
@@ -58,8 +58,8 @@ pub(crate) fn is_tf(channel: &Channel) -> bool {
     channel.message_encoding == "cdr" && full_type_name(&channel.schema_name) == TFMessage::NAME
 }
 
-/// The channel of a result. `definition` is that of its type where a stage brings one. Without it the schema is empty if the type
-/// is none that Gridweave has a definition of.
+/// The channel of a result. `definition` is that of its type, if the stage provides one. Otherwise the schema is empty
+/// for types without a built-in definition.
 pub fn result_channel(topic: &str, ros_type: &str, definition: &str) -> Channel {
     let schema = match definition.is_empty() {
         true => schema_text(ros_type).unwrap_or_default(),
@@ -114,7 +114,7 @@ mod tests {
         for topic in ["/map", "/robot1/lines/segments", "/lines/segments"] {
             for ros_type in ["nav_msgs/msg/OccupancyGrid", "std_msgs/msg/String"] {
                 let Route::LeaveOut(reason) = results().route(&channel(topic, ros_type)) else { panic!("{topic}") };
-                assert!(reason.starts_with(&format!("the input's messages on {topic} were left out")), "{reason}");
+                assert!(reason.starts_with(&format!("the input's messages on {topic} were dropped")), "{reason}");
             }
         }
     }

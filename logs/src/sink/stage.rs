@@ -13,20 +13,20 @@ use std::collections::BTreeMap;
 /// A channel of the log.
 struct Lane {
     channel: Channel,
-    /// Its number in the log, from its first message on.
+    /// The number in the log, set with the first message.
     id: Option<u16>,
     /// The sequence number of the next result.
     next_sequence: u32,
 }
 
-/// Where the messages of an announced channel go.
+/// The target of the messages of an announced channel.
 enum Target {
     Lane(usize),
-    /// They are transforms, of which those are left out that place frames of the run.
+    /// Transforms, from which those are dropped that place frames of the run.
     Transforms(usize),
-    /// They are no messages, but what a log holds beside them.
+    /// Attachments or metadata records of an input log.
     Supplement(SupplementKind),
-    /// They are of no topic that is to be written.
+    /// Dropped: the topic is not selected.
     Unwanted,
     LeaveOut(String),
 }
@@ -39,25 +39,26 @@ fn failure(error: LogWriteError) -> StageError {
     StageError::new("write the log", error)
 }
 
-/// Writes all that comes in to a log.
+/// Writes all input messages to a log.
 ///
-/// The log is claimed at once, so that of two runs with one output the later one ends before it has done anything.
+/// The output file is locked at once, so that of two runs with one output the later one fails before it has done
+/// anything.
 pub(super) struct McapSink {
     pass_input: bool,
-    /// Empty for all.
+    /// Empty for all topics.
     only_topics: Vec<String>,
     result_topics: ResultTopics,
     inputs: Vec<InputWire>,
     given_frames: GivenFrames,
-    /// None once it has ended, or cannot be written any more.
+    /// `None` after the log has ended or failed.
     log: Option<LogWriter>,
-    /// Whether anything was written: there is no log of a run that could not begin.
+    /// Whether anything was written: a run that fails at the start leaves no log.
     begun: bool,
-    /// The pipeline, if it is to be recorded and has not been yet.
+    /// The pipeline, if it is still to be recorded.
     recorded_pipeline: Option<String>,
     recorded_files: Option<InputHashes>,
     lanes: Vec<Lane>,
-    /// By wire and number: numbers are given by each source for itself.
+    /// By wire and number, since each source numbers its channels itself.
     announced: BTreeMap<(usize, u32), Target>,
     /// By wire and topic.
     results: BTreeMap<(usize, FixedText<128>), usize>,
@@ -111,7 +112,7 @@ impl McapSink {
         }
     }
 
-    /// The lane of what a stage has made.
+    /// The lane of a result of a stage.
     fn result_lane(&mut self, message: &Message, output: &Output<()>) -> Result<usize, StageError> {
         let key = (message.wire(), message.header().topic);
         if let Some(&lane) = self.results.get(&key) {
@@ -119,15 +120,12 @@ impl McapSink {
         }
         let topic = message.header().topic;
         let input = self.inputs.get(message.wire()).filter(|input| !input.ros_type.is_empty()).ok_or_else(|| {
-            StageError::new(format!("write a message on {topic}"), "nothing says what type it has")
-                .with_help("wire an output that has a type, or announce a channel before the message")
+            StageError::new(format!("write a message on {topic}"), "its type is unknown")
+                .with_help("connect an output with a type, or announce a channel before the message")
         })?;
         let channel = result_channel(topic.as_str(), &input.ros_type, &input.definition);
         if channel.schema.is_empty() {
-            output.warn(format!(
-                "{} is written without a definition: other programs cannot read {topic}",
-                input.ros_type
-            ));
+            output.warn(format!("{} has no definition: other programs cannot read {topic} in the log", input.ros_type));
         }
         let lane = self.lane(channel);
         self.results.insert(key, lane);
@@ -156,7 +154,7 @@ impl McapSink {
         Ok(())
     }
 
-    /// Says at the beginning of the log what writes it.
+    /// Writes the record about the run at the beginning of the log.
     fn begin(&mut self) -> Result<(), StageError> {
         self.begun = true;
         let log = self.log.as_mut().ok_or_else(closed)?;
@@ -166,7 +164,7 @@ impl McapSink {
         }
     }
 
-    /// Writes what a log of the input holds beside its messages.
+    /// Writes an attachment or metadata record of an input log.
     fn write_supplement(&mut self, kind: SupplementKind, body: &[u8]) -> Result<(), StageError> {
         self.begin()?;
         let log = self.log.as_mut().ok_or_else(closed)?;
@@ -216,7 +214,7 @@ impl McapSink {
     pub(super) fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let written = self.take(message, output);
         if written.is_err() {
-            // Nothing more can be written, not even that the log is not complete.
+            // The log has failed; not even the incomplete outcome can be written.
             self.log = None;
         }
         written
@@ -239,7 +237,9 @@ impl McapSink {
                 Some(Target::Transforms(lane)) => {
                     if let Some((bytes, left_out)) = self.given_frames.without(message.bytes()) {
                         for _ in 0..left_out {
-                            output.warn("transforms of the input that place the map of a robot were left out: this run places it");
+                            output.warn(
+                                "input transforms that place a robot's map frame were dropped: this run places it",
+                            );
                         }
                         if bytes.is_empty() {
                             return Ok(());
@@ -271,7 +271,7 @@ impl McapSink {
         let Some(mut log) = self.log.take() else { return };
         match self.begun {
             true => match log.finish(Outcome::Incomplete(reason)) {
-                Ok(path) => tracing::info!("what there is of the log is in {}", path.display()),
+                Ok(path) => tracing::info!("the partial log is in {}", path.display()),
                 Err(error) => tracing::warn!("{error}"),
             },
             false => log.keep(false),

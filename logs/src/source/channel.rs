@@ -1,36 +1,36 @@
-//! One channel of the logs, and how its messages are sent.
+//! A channel of the logs, and how its messages are sent.
 
-use super::carry::Latch;
+use super::latched::Latch;
 use crate::robots::Role;
 use crate::robots::TagReader;
 use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
 use gridweave_runtime::stage::{Out, StageError};
 
-/// What a message is, besides its bytes.
+/// The metadata of a message.
 #[derive(Clone, Copy)]
 pub(super) struct Stamp {
     pub(super) sequence: u32,
     pub(super) publish_time: u64,
 }
 
-/// What is known of one channel. Channels of several files that are the same share it.
+/// The route of a channel's messages. Equal channels of several files share one route.
 pub(super) struct Route {
     pub(super) channel: Channel,
     pub(super) role: Role,
     pub(super) robot: String,
-    /// What reads the tags in its messages.
+    /// Reads the tags in the messages.
     pub(super) tag_reader: Option<TagReader>,
-    /// What all headers of the channel's messages have in common.
+    /// The fields that the headers of all the channel's messages share.
     pub(super) header: MessageHeader,
     pub(super) latch: Latch,
     pub(super) announced: bool,
     pub(super) messages: u64,
-    /// How many of the messages hold no pose although their type has one.
+    /// The number of messages that contain no pose although their type has one.
     pub(super) unreadable: u64,
 }
 
 impl Route {
-    /// Sends a message of this channel, which is announced before the first of them.
+    /// Sends a message of this channel, after announcing the channel if it is the first.
     pub(super) fn send<T>(
         &mut self,
         stamp: Stamp,

@@ -1,9 +1,9 @@
-//! Sends messages to the ports that their channels call for.
+//! Routes messages to the output ports of their channels.
 
 use super::RobotMessages;
-use super::carry::Latch;
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
+use super::latched::Latch;
 use crate::robots::{RobotChannels, Role};
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
 
-/// Sends messages to the ports that their channels call for, and what they tell beside what they say.
+/// Routes messages to the output ports of their channels, and sends what is derived from them.
 pub(super) struct ChannelRouter {
     robots: RobotTopics,
     roles: RobotChannels,
@@ -21,7 +21,7 @@ pub(super) struct ChannelRouter {
 }
 
 impl ChannelRouter {
-    /// For messages of these channels. Whole maps are made of updates if `updates_maps`.
+    /// Creates a router for messages of these channels. Whole maps are derived from map updates if `updates_maps`.
     pub(super) fn new<'a>(
         robots: RobotTopics,
         channels: impl Iterator<Item = &'a Channel>,
@@ -32,14 +32,14 @@ impl ChannelRouter {
         Self { derived, roles, robots, routes: Vec::new(), by_channel: BTreeMap::new() }
     }
 
-    /// For channels that become known later, and whole maps of updates.
+    /// Creates a router for channels that are added later. Whole maps are derived from map updates.
     pub(super) fn live(robots: RobotTopics) -> Self {
         let mut router = Self::new(robots, std::iter::empty(), true);
         router.derived.expect_sensors();
         router
     }
 
-    /// There are these channels from here on. What was learnt from messages stays.
+    /// Replaces the set of channels. What was learnt from messages is kept.
     pub(super) fn set_channels<'a>(&mut self, channels: impl Iterator<Item = &'a Channel>) {
         self.roles = RobotChannels::new(self.robots.clone(), channels);
         self.derived.set_roles(&self.roles);
@@ -53,7 +53,7 @@ impl ChannelRouter {
         }
     }
 
-    /// What channels carry.
+    /// The roles of the channels.
     pub(super) fn roles(&self) -> &RobotChannels {
         &self.roles
     }
@@ -63,7 +63,7 @@ impl ChannelRouter {
         self.routes.get(index)
     }
 
-    /// Sends a message that has come on a route. The output's log time is the message's.
+    /// Sends a message that was received on a route. The output's log time must be the message's.
     pub(super) fn send(
         &mut self,
         index: usize,
@@ -76,7 +76,7 @@ impl ChannelRouter {
         self.derived.send(route, &self.roles, data, output)
     }
 
-    /// Sends a message as one that means nothing here.
+    /// Sends a message unchanged on the port `other`.
     pub(super) fn pass_on(
         &mut self,
         index: usize,
@@ -90,14 +90,14 @@ impl ChannelRouter {
         }
     }
 
-    /// Takes up what a message tells without sending it.
+    /// Learns from a message (frames, maps) without sending it.
     pub(super) fn learn(&mut self, index: usize, data: &[u8], output: &Output<RobotMessages>) {
         if let Some(route) = self.routes.get(index) {
             self.derived.learn(route, &self.roles, data, output);
         }
     }
 
-    /// Sends the maps of which updates have come since they were last sent.
+    /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.derived.send_updated_maps(output)
     }
@@ -115,8 +115,8 @@ impl ChannelRouter {
         self.derived.send_of_learnt(route, data, output)
     }
 
-    /// The route of a channel, which is added if there is none; `None` if its name is too long, and nothing that this program
-    /// does needs it.
+    /// Adds the route of a channel, or returns the existing one; `None` if its name is too long and nothing in the
+    /// pipeline needs the channel.
     pub(super) fn add(
         &mut self,
         channel: Channel,
@@ -136,12 +136,12 @@ impl ChannelRouter {
             topic => topic.map_err(|error| StageError::new(doing("name"), error))?,
         };
         let robot = match FixedText::new(classified.robot) {
-            // What is passed on as it is needs no robot.
+            // Messages that are passed on unchanged need no robot.
             Err(_) if classified.role == Role::Other => FixedText::EMPTY,
             robot => robot.map_err(|error| StageError::new(doing("robot's name"), error))?,
         };
         let header = MessageHeader {
-            // 0 stands for messages that no log has described.
+            // 0 is the channel of messages that no log describes.
             channel: index as u32 + 1,
             robot,
             topic,
@@ -168,7 +168,7 @@ impl ChannelRouter {
         Ok(Some(index))
     }
 
-    /// Warns of what was expected, and did not come.
+    /// Warns of expected messages that never came.
     pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         let routed = |role: fn(Role) -> bool| {
             self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
@@ -188,7 +188,7 @@ impl ChannelRouter {
         {
             match &self.robots.tf {
                 Some(frames) => output.warn(format!(
-                    "no pose was found: tf never ties `{}` to `{}`",
+                    "no pose was found: tf never connects `{}` to `{}`",
                     frames.base_frame, frames.map_frame
                 )),
                 None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
@@ -203,7 +203,7 @@ impl ChannelRouter {
     }
 }
 
-/// Sends a message as it is, on the port that its role calls for.
+/// Sends a message unchanged on the port of its role.
 fn pass(route: &mut Route, stamp: Stamp, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
     let log_time = output.log_time();
     match route.role {

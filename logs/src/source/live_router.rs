@@ -1,4 +1,4 @@
-//! Sends the messages of robots that come and go while a run goes on.
+//! Routes the messages of robots that join and leave during a run.
 
 use super::RobotMessages;
 use super::channel::Stamp;
@@ -10,43 +10,43 @@ use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{OccupancyGrid, TagRange, TopologicalMap, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError, match_robot};
 
-/// Sends messages to the ports of a source as they come, of channels that become known one by one. Topics and frames get the
-/// names of their robots as those of logs do.
+/// Routes live messages to the ports of a source. Channels are added one by one. Topics and frames are put under the
+/// names of their robots, as for logs.
 pub struct LiveRouter {
-    /// Topics of which messages are passed on although nothing is made of them.
+    /// Topics whose messages are passed on even if no stage uses them.
     also: Vec<String>,
     channels: Vec<LiveChannel>,
     router: ChannelRouter,
-    /// A message whose frames have other names than it came with.
+    /// Buffer for a message whose frames were renamed.
     renamed: Vec<u8>,
 }
 
-/// A channel as it came, and as it is called beside those of other robots.
+/// A channel as received, and under the name of its robot.
 struct LiveChannel {
     original: Channel,
     named: NamedChannel,
 }
 
-/// A message that has come.
+/// A received message.
 #[derive(Clone, Copy, Debug)]
 pub struct LiveMessage<'a> {
-    /// Its number among those of its sender.
+    /// The sequence number of its sender.
     pub sequence: u32,
-    /// When it was sent, nanoseconds.
+    /// The time of publication, nanoseconds.
     pub publish_time: u64,
     /// The message, encoded.
     pub data: &'a [u8],
 }
 
 impl LiveRouter {
-    /// Nothing is known yet. `robots` says how topics are told apart; messages on the topics `also`, in which `{robot}` stands for
-    /// any one part, are passed on as they are.
+    /// Creates a router without channels. `robots` are the topic patterns; messages on the topics `also`, in which
+    /// `{robot}` matches one part of the path, are passed on unchanged.
     pub fn new(robots: RobotTopics, also: Vec<String>) -> Self {
         Self { also, channels: Vec::new(), router: ChannelRouter::live(robots), renamed: Vec::new() }
     }
 
-    /// Takes up a channel, of which there may be messages from here on. Gives its number, the same for the same channel. What
-    /// others are of use for may change with it.
+    /// Adds a channel. Returns its number, which is the same for equal channels. Adding a channel may change which
+    /// other channels are used.
     pub fn add(&mut self, channel: Channel) -> usize {
         if let Some(known) = self.channels.iter().position(|known| known.original == channel) {
             return known;
@@ -58,42 +58,43 @@ impl LiveRouter {
         self.channels.len() - 1
     }
 
-    /// Whether anything is made of the messages of a channel: others need not be asked for.
+    /// Whether anything uses the messages of a channel. There is no need to subscribe to other channels.
     pub fn is_of_use(&self, number: usize) -> bool {
         let is_of_use =
             |channel: &LiveChannel| self.role(channel) != Role::Other || self.is_asked_for(&channel.original);
         self.channels.get(number).is_some_and(is_of_use)
     }
 
-    /// Whether the messages of a channel are passed on even if nothing is made of them.
+    /// Whether the messages of a channel are passed on even if no stage uses them.
     pub fn is_asked_for(&self, channel: &Channel) -> bool {
         let fits = |topic: &String| *topic == channel.topic || match_robot(topic, &channel.topic).is_some();
         self.also.iter().any(fits)
     }
 
-    /// The robot whose scans a channel holds. They are of use as long as no channel with maps of the robot was added.
+    /// The robot of a channel with scans. They are used until a channel with maps of the robot is added.
     pub fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
         self.router.roles().scanning_robot(channel)
     }
 
-    /// Why a channel is not what its topic lets one expect.
+    /// Why the channel's role is not the one that its topic suggests.
     pub fn mismatch(&self, number: usize) -> Option<String> {
         self.router.roles().classify(&self.channels.get(number)?.original).mismatch
     }
 
-    /// Whether the messages of a channel are whole maps, of which only the last counts.
+    /// Whether the messages of a channel are whole maps, of which only the latest is needed.
     pub fn is_map(&self, number: usize) -> bool {
         self.channels.get(number).is_some_and(|channel| self.role(channel) == Role::Map)
     }
 
-    /// Whether a channel tells of one robot alone, so that two programs that send on it are two robots of one name.
+    /// Whether a channel belongs to one robot, so that two programs that publish on it are two robots with the same
+    /// name.
     pub fn is_of_one_robot(&self, number: usize) -> bool {
         let of_one = |role| matches!(role, Role::Map | Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::Scan);
         self.channels.get(number).is_some_and(|channel| of_one(self.role(channel)))
     }
 
-    /// Sends a message of a channel. The output's log time is the message's. One that does not fit its type is left out, and
-    /// counted as a warning; one of a channel that is of no use any more is left out as well.
+    /// Sends a message of a channel. The output's log time must be the message's. A message that does not match its
+    /// type is dropped and counted as a warning; a message on a channel that is no longer used is dropped.
     ///
     /// # Errors
     /// The link has failed.
@@ -117,7 +118,7 @@ impl LiveRouter {
             leave_out(&channel.original, output);
             return Ok(());
         }
-        if let Some(why) = channel.named.frames_left() {
+        if let Some(why) = channel.named.unrenamed_frames() {
             output.warn(why);
         }
         let Some(route) = self.router.add(channel.named.channel.clone(), output)? else { return Ok(()) };
@@ -125,7 +126,7 @@ impl LiveRouter {
         self.router.send(route, stamp, data, output)
     }
 
-    /// Sends the maps whose updates have not been sent. The output's log time is theirs.
+    /// Sends the maps with unsent updates. The output's log time must be theirs.
     ///
     /// # Errors
     /// The link has failed.
@@ -137,7 +138,8 @@ impl LiveRouter {
         self.router.roles().classify(&channel.original).role
     }
 
-    /// Puts the frames of each channel under the robot that it is about, and transforms of one robot where those of all are.
+    /// Puts the frames of each channel under its robot, and the transforms of one robot on the topic shared by all
+    /// robots.
     fn name_channels(&mut self) {
         for channel in &mut self.channels {
             let classified = self.router.roles().classify(&channel.original);
@@ -155,7 +157,7 @@ impl LiveRouter {
     }
 }
 
-/// Whether a message can be read that stages are given as it came; those that others are made of are seen to where that is done.
+/// Whether a message that stages get unchanged can be decoded; other messages are checked where they are converted.
 fn is_readable(role: Role, data: &[u8]) -> bool {
     match role {
         Role::Map => decode::<OccupancyGrid<'_>>(data).is_ok(),
@@ -167,5 +169,5 @@ fn is_readable(role: Role, data: &[u8]) -> bool {
 
 fn leave_out(channel: &Channel, output: &Output<RobotMessages>) {
     let type_name = &channel.schema_name;
-    output.warn(format!("messages on `{}` that do not fit their type, {type_name}, were left out", channel.topic));
+    output.warn(format!("messages on `{}` that do not match their type {type_name} were dropped", channel.topic));
 }

@@ -1,10 +1,10 @@
-//! Where messages come from: `mcap_source` gives those of MCAP logs, each on the port that its topic and type call for;
-//! [`map_file`] gives the maps of map files, and [`topology_file`] topological maps that were drawn by hand.
+//! Sources of messages: `mcap_source` reads logs, each message on the port for its topic and type; [`map_file`] reads
+//! map files, and [`topology_file`] topological maps in JSON.
 
-mod carry;
 mod channel;
 mod channel_router;
 mod derived;
+mod latched;
 mod live_router;
 pub mod map_file;
 mod router;
@@ -31,41 +31,40 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
-    /// The logs to read: MCAP files, and folders of ROS 2 bags. The messages of several are merged by log time. `ROBOT=LOG`
-    /// puts the topics and frames of a log under the name of its robot. `--input` on the command line stands in for it.
+    /// The logs to read: MCAP files, and folders of ROS 2 bags. Several logs are merged by log time. `ROBOT=LOG` puts
+    /// the topics and frames of a log under the name of a robot. Set by `--input` on the command line.
     pub files: Vec<PathBuf>,
-    /// Whose names topics and frames bear: those of their robots, or those that they were logged with.
+    /// How topics and frames are named: under their robots, or as they were logged.
     pub names: Convention,
-    /// Topics that get other names, as `OLD=NEW`, with or without the name of their robot. `{robot}` stands for one part of
-    /// both.
+    /// Topics to rename, as `OLD=NEW`, with or without the name of their robot. `{robot}` matches one part of both.
     pub rename: Vec<String>,
-    /// The robots to read; the topics of others are left out. All if none are given.
+    /// The robots to read; the topics of others are ignored. Empty for all.
     pub only_robots: Vec<String>,
-    /// The topics to read, `{robot}` standing for any one part: `["/{robot}/map", "/tf"]`. All if none are given.
+    /// The topics to read, in which `{robot}` matches one part of the path: `["/{robot}/map", "/tf"]`. Empty for all.
     pub only_topics: Vec<String>,
-    /// Whether the clocks of all logs, and the stamps in their messages, are set so that they begin when the first one does: for
-    /// robots whose clocks have nothing in common.
+    /// Whether all logs, with the stamps in their messages, are shifted in time so that they start when the first one
+    /// does: for robots whose clocks are unrelated.
     pub align_start: bool,
-    /// Whether the thresholds of map files beside logs are taken as they stand; see `map_file_source`.
+    /// Whether the thresholds of map files among the logs are applied literally; see `map_file_source`.
     pub literal_thresholds: bool,
-    /// Seconds from the first message of the logs at which to begin. The last map of each robot before that, and other
-    /// latched messages, are sent at the beginning.
+    /// Start, in seconds after the first message of the logs. The latest map of each robot before that, and other
+    /// latched messages, are sent at the start.
     #[schemars(range(min = 0.0))]
     pub start: f64,
-    /// Seconds from the first message of the logs at which to end; to the end of the logs if it is not given.
+    /// End, in seconds after the first message of the logs; the end of the logs if not set.
     pub end: Option<f64>,
 }
 
 impl SourceParameters {
-    /// The logs, and whose they are.
+    /// The logs and their robots.
     fn inputs(&self) -> Vec<Input> {
         self.files.iter().map(|file| Input::new(file)).collect()
     }
 
-    /// How topics and robots are named.
+    /// The naming rules.
     ///
     /// # Errors
-    /// An entry of `rename` is none.
+    /// An entry of `rename` is invalid.
     fn rules(&self) -> Result<NameRules, String> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let (robots, topics) = (self.only_robots.clone(), self.only_topics.clone());
@@ -91,7 +90,7 @@ impl Parameters for SourceParameters {
 pub fn kind() -> StageKind {
     StageKind::source(
         "mcap_source",
-        "Reads MCAP logs and ROS 2 bags by log time, and tells maps, poses, tag readings and topological maps of the robots apart",
+        "Reads MCAP logs and ROS 2 bags in log time order, and separates maps, poses, tag readings and topological maps of the robots",
         McapSource::new,
     )
 }
@@ -100,12 +99,12 @@ pub fn kind() -> StageKind {
 pub fn live_kind() -> StageKind {
     StageKind::external::<RobotMessages>(
         "live_source",
-        "Takes what robots send into a live pipeline while it runs: `gridweave play`, or a program of theirs. Keeps the last \
-         message of each topic for stages that are started again",
+        "Receives messages from robots in a live pipeline: from `gridweave play`, or from a program on the robot. Retains the last \
+         message of each topic for stages that restart",
     )
 }
 
-/// The outputs of all sources of what robots send.
+/// The outputs of `mcap_source` and of live sources.
 pub struct RobotMessages {
     pub(crate) map: Out<OccupancyGrid<'static>>,
     pub(crate) pose: Out<PoseWithCovarianceStamped>,
@@ -119,7 +118,7 @@ pub struct RobotMessages {
 }
 
 impl RobotMessages {
-    /// Whether anything reads the scans of robots that have no map.
+    /// Whether anything reads the scans of robots without maps.
     pub fn takes_scans(&self) -> bool {
         self.scans.is_read()
     }
@@ -130,38 +129,28 @@ impl Outputs for RobotMessages {
         Self {
             map: ports.output(
                 "map",
-                "the robots' maps, as they were logged or sent; and, out of a log, whole maps made of their updates",
+                "the robots' maps, as logged or sent; from a log, also whole maps with their updates applied",
             ),
             pose: ports.output(
                 "pose",
-                "the robots' poses, with a covariance of zeros where the log has none: made from poses with or without \
+                "the robots' poses, with zero covariance where the log has none: derived from poses with or without \
                  covariance, odometry, or tf",
             ),
-            tags: ports.output(
-                "tags",
-                "range readings of tags, as they were logged or sent, or made from messages of other types",
-            ),
-            positions: ports.output(
-                "positions",
-                "positions at which cameras see tags, in the frames of their robots: made from the messages of detectors, or tf",
-            ),
-            bearings: ports.output(
-                "bearings",
-                "directions in which tags are perceived, in the frames of their robots: made from messages with a bearing",
-            ),
-            topology: ports.output("topology", "the robots' topological maps, as they were logged or sent"),
+            tags: ports.output("tags", "tag ranges, as logged or sent, or derived from messages of other types"),
+            positions: ports
+                .output("positions", "tag positions seen by cameras, in the base frame: derived from detections or tf"),
+            bearings: ports.output("bearings", "tag bearings in the base frame: derived from messages with a bearing"),
+            topology: ports.output("topology", "the robots' topological maps, as logged or sent"),
             scans: ports.output(
                 "scans",
-                "scans of robots that have no map, as the bases of these robots see them: made from the messages of lidars",
+                "scans of robots without maps, in the base frame: derived from the messages of lidars",
             ),
             odometry: ports.output(
                 "odometry",
-                "where robots with scans, and without a map and a topic for poses, are by odometry, in a frame of its own",
+                "odometry of robots with scans, and without maps and a pose topic, in the odometry frame",
             ),
-            other: ports.any_output(
-                "other",
-                "all other messages, and those from which poses were made, as they were logged or sent",
-            ),
+            other: ports
+                .any_output("other", "all other messages, and those from which poses were derived, as logged or sent"),
         }
     }
 }

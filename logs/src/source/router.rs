@@ -1,9 +1,9 @@
-//! Sends each message of the logs to the port of its channel.
+//! Routes each message of the logs to the port of its channel.
 
 use super::RobotMessages;
-use super::carry::{Carried, Carry, Latch};
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
+use super::latched::{Latch, LatchedMessage, LatchedMessages};
 use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::reader::{SupplementKind, describes_its_file, read_attachment, read_metadata};
@@ -12,29 +12,29 @@ use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What becomes of the messages of a channel.
+/// The target of a channel's messages.
 #[derive(Clone, Copy)]
 enum Target {
-    /// They take the route of this index.
+    /// The route of this index.
     Route(usize),
-    /// Nobody asked for them, or they cannot be passed on.
+    /// Dropped: not selected, or cannot be passed on.
     Nothing,
 }
 
-/// Sends messages to the ports that their channels call for.
+/// Routes the messages of logs to output ports.
 pub(crate) struct Router {
     names: Names,
     files: Arc<[LogFile]>,
-    /// A message whose frames have other names than in the log.
+    /// Buffer for a message whose frames were renamed.
     renamed: Vec<u8>,
     channels: ChannelRouter,
-    /// For every file and channel number: what becomes of its messages, once it is known.
+    /// By file and channel number: the target of the messages, once known.
     by_number: Vec<Vec<Option<Target>>>,
     has_sent_supplements: bool,
 }
 
 impl Router {
-    /// Sends the messages of `files`, from which whole maps are made of updates if `updates_maps`.
+    /// Creates a router for the messages of `files`. Whole maps are derived from map updates if `updates_maps`.
     pub(crate) fn new(robots: RobotTopics, names: Names, files: Arc<[LogFile]>, updates_maps: bool) -> Self {
         Self {
             channels: ChannelRouter::new(robots, names.channels(), updates_maps),
@@ -46,7 +46,7 @@ impl Router {
         }
     }
 
-    /// Sends a message. The output's log time is the message's.
+    /// Sends a message. The output's log time must be the message's.
     pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let Some(route) = self.route(message, output)? else { return Ok(()) };
         let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
@@ -57,7 +57,7 @@ impl Router {
         sent
     }
 
-    /// Sends the attachments and metadata records of all logs, if that has not been done yet.
+    /// Sends the attachments and metadata records of all logs, once.
     pub(crate) fn send_supplements(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         if std::mem::replace(&mut self.has_sent_supplements, true) {
             return Ok(());
@@ -78,7 +78,7 @@ impl Router {
                     output.warn(format!("{}: {}", file.path().display(), Damage::BadAttachment));
                     continue;
                 };
-                // The files of a split bag, and robots of one fleet, have some records in common.
+                // The files of a split bag, and robots of one fleet, may contain equal records.
                 if kind == SupplementKind::Attachment || sent.insert(body.clone()) {
                     self.send_supplement(kind, &body, output)?;
                 }
@@ -100,12 +100,12 @@ impl Router {
         }
     }
 
-    /// How topics and frames are called.
+    /// The names of topics and frames.
     pub(crate) fn names(&self) -> &Names {
         &self.names
     }
 
-    /// The message with the names that its frames have beside those of other robots.
+    /// The message with its frames under the names of their robots.
     fn named_data<'a>(
         &self,
         message: &LogMessage<'a>,
@@ -117,18 +117,19 @@ impl Router {
             Renamed::AsLogged => message.data,
             Renamed::Unreadable => {
                 let topic = self.names.channel(message.file, message.channel).map_or("", |channel| &channel.topic);
-                output
-                    .warn(format!("messages on `{topic}` do not fit their type, and name frames as they were logged"));
+                output.warn(format!(
+                    "messages on `{topic}` do not match their type and keep the frame names that they were logged with"
+                ));
                 message.data
             }
         }
     }
 
-    /// Takes up a message before the start: keeps what is latched, and learns the frames.
+    /// Handles a message before the start: stores it if it is latched, and learns its frames.
     pub(crate) fn keep(
         &mut self,
         message: &LogMessage<'_>,
-        carry: &mut Carry,
+        latched: &mut LatchedMessages,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(index) = self.route(message, output)? else { return Ok(()) };
@@ -140,30 +141,30 @@ impl Router {
         }
         let mut renamed = std::mem::take(&mut self.renamed);
         let message = LogMessage { data: self.named_data(message, &mut renamed, output), ..*message };
-        carry.keep(index, latch, &message);
+        latched.keep(index, latch, &message);
         self.channels.learn(index, message.data, output);
         self.renamed = renamed;
         Ok(())
     }
 
-    /// Sends the maps of which updates have come since they were last sent.
+    /// Sends the maps that were updated since they were last sent.
     pub(crate) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.channels.send_updated_maps(output)
     }
 
-    /// Sends a message that was kept.
-    pub(crate) fn send_carried(
+    /// Sends a stored latched message.
+    pub(crate) fn send_latched(
         &mut self,
         route: usize,
-        carried: &Carried,
+        kept: &LatchedMessage,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let stamp = Stamp { sequence: carried.sequence, publish_time: carried.publish_time };
-        self.channels.send_learnt(route, stamp, &carried.data, output)
+        let stamp = Stamp { sequence: kept.sequence, publish_time: kept.publish_time };
+        self.channels.send_learnt(route, stamp, &kept.data, output)
     }
 
-    /// The index of the message's route; `None` if nobody asked for it, if the log does not describe its channel, or if it
-    /// cannot be passed on.
+    /// The index of the message's route; `None` if it is not selected, if the log does not describe its channel, or if
+    /// it cannot be passed on.
     fn route(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<Option<usize>, StageError> {
         let number = usize::from(message.channel);
         match self.by_number.get(message.file).and_then(|file| file.get(number).copied().flatten()) {
@@ -181,7 +182,7 @@ impl Router {
             false => Target::Nothing,
             true => {
                 let Some(index) = self.channels.add(channel, output)? else { return Ok(None) };
-                if let Some(why) = self.names.frames_left(message.file, message.channel) {
+                if let Some(why) = self.names.unrenamed_frames(message.file, message.channel) {
                     output.warn(why);
                 }
                 Target::Route(index)
@@ -197,7 +198,7 @@ impl Router {
         })
     }
 
-    /// Warns of what the logs were expected to hold, and do not.
+    /// Warns of expected messages that the logs do not contain.
     pub(crate) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         self.channels.warn_of_missing(output);
     }

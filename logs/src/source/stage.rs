@@ -1,6 +1,6 @@
 //! The stage `mcap_source`.
 
-use super::carry::{Carry, Window};
+use super::latched::{LatchedMessages, Window};
 use super::router::Router;
 use super::{RobotMessages, SourceParameters};
 use crate::names::{self, Convention};
@@ -8,7 +8,7 @@ use crate::reader::{LogFile, LogReader};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 
-/// How many messages are read at a time.
+/// The number of messages that are read at a time.
 const BATCH: usize = 64;
 
 /// Reads logs; see the [module](super).
@@ -16,10 +16,10 @@ pub struct McapSource {
     reader: LogReader,
     router: Router,
     window: Window,
-    /// What is latched before the start; `None` once it has been sent.
-    carry: Option<Carry>,
+    /// The latched messages before the start; `None` once they are sent.
+    latched: Option<LatchedMessages>,
     begun: bool,
-    /// Whether robots are looked for.
+    /// Whether messages are assigned to robots.
     names_robots: bool,
 }
 
@@ -28,14 +28,14 @@ impl McapSource {
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
         let doing = || format!("read the log of stage `{}`", context.stage);
         if parameters.files.is_empty() {
-            return Err(StageError::new(doing(), "no file is given").with_help("give --input LOG or files = [...]"));
+            return Err(StageError::new(doing(), "no input file").with_help("give --input LOG or files = [...]"));
         }
         if let Some(tf) = &context.robots.tf
             && !(tf.map_frame.contains("{robot}") && tf.base_frame.contains("{robot}"))
         {
             return Err(StageError::new(
                 doing(),
-                "the frames of `robots.tf` do not say which part is the robot's name",
+                "the frames of `robots.tf` lack `{robot}`, the part that is the robot's name",
             )
             .with_help("write them as in map_frame = \"{robot}/map\""));
         }
@@ -48,7 +48,7 @@ impl McapSource {
             router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots),
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
-            carry: Some(Carry::default()),
+            latched: Some(LatchedMessages::default()),
             begun: false,
             names_robots,
         })
@@ -58,8 +58,8 @@ impl McapSource {
         let files = self.reader.files().clone();
         let mut damage = self.reader.take_damage();
         if !std::mem::replace(&mut self.begun, true) {
-            if let Some(remark) = self.router.names().remark() {
-                output.warn(remark);
+            if let Some(note) = self.router.names().note() {
+                output.warn(note);
             }
             let found_at_opening = |(index, file): (usize, &LogFile)| {
                 file.damage().iter().map(move |damage| (index, damage.clone())).collect::<Vec<_>>()
@@ -74,7 +74,7 @@ impl McapSource {
     }
 
     fn end(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
-        send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
+        send_latched(&mut self.latched, self.window.start, &mut self.router, output)?;
         self.router.send_updated_maps(output)?;
         self.router.send_supplements(output)?;
         self.warn_of_damage(output);
@@ -95,12 +95,12 @@ impl Source for McapSource {
                 return self.end(output);
             }
             if message.log_time < self.window.start
-                && let Some(carry) = &mut self.carry
+                && let Some(latched) = &mut self.latched
             {
-                self.router.keep(&message, carry, output)?;
+                self.router.keep(&message, latched, output)?;
                 continue;
             }
-            send_carried(&mut self.carry, self.window.start, &mut self.router, output)?;
+            send_latched(&mut self.latched, self.window.start, &mut self.router, output)?;
             output.set_log_time(message.log_time);
             self.router.send_supplements(output)?;
             self.router.send(&message, output)?;
@@ -114,18 +114,18 @@ impl Source for McapSource {
     }
 }
 
-/// Sends what was latched before the start, as of the start, if that has not been done yet.
-fn send_carried(
-    carry: &mut Option<Carry>,
+/// Sends the latched messages at the start of the window, once.
+fn send_latched(
+    latched: &mut Option<LatchedMessages>,
     start: LogTime,
     router: &mut Router,
     output: &Output<RobotMessages>,
 ) -> Result<(), StageError> {
-    let Some(mut carry) = carry.take() else { return Ok(()) };
-    let carried = carry.take();
-    if !carried.is_empty() {
+    let Some(mut latched) = latched.take() else { return Ok(()) };
+    let kept = latched.take();
+    if !kept.is_empty() {
         output.set_log_time(start);
     }
-    carried.iter().try_for_each(|(route, carried)| router.send_carried(*route, carried, output))?;
+    kept.iter().try_for_each(|(route, kept)| router.send_latched(*route, kept, output))?;
     router.send_updated_maps(output)
 }

@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{
     Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
 use gridweave_runtime::stage::{
-    Context, StageHarness, OutputEnd, OutputPort, OutputSink, RobotTopics, StageError, TfFrames,
+    Context, OutputEnd, OutputPort, OutputSink, RobotTopics, StageError, StageHarness, TfFrames,
 };
 use nalgebra::{Isometry2, Vector2};
 use std::cell::RefCell;

@@ -1,5 +1,5 @@
-//! The summary of a merge as a JSON file: where every robot's map lies, what could not be merged and why, and what became of
-//! each pair.
+//! The summary of a merge as a JSON file: the frames of the robots, the robots that could not be merged with the
+//! reason, and the outcome of each pair.
 
 mod stage;
 
@@ -11,26 +11,26 @@ use gridweave_runtime::ros::{
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a merge has found.
+/// The result of a merge.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// The robot whose map frame the others are placed in; none if there is no robot.
+    /// The robot whose map frame is the reference; `None` if there is no robot.
     pub reference: Option<String>,
-    /// The merged robots' map frames in the reference robot's map frame, by robot.
+    /// The map frames of the merged robots in the reference frame, by robot.
     pub frames: BTreeMap<String, Frame>,
-    /// Why the other robots could not be merged, by robot.
+    /// The reasons why the other robots could not be merged, by robot.
     #[serde(default)]
     pub unmerged: BTreeMap<String, String>,
-    /// Robots that are merged with each other, but not with the reference.
+    /// Groups of robots that are merged with each other, but not with the reference.
     #[serde(default)]
     pub groups: Vec<Group>,
-    /// What became of each pair of robots.
+    /// The outcome of each pair of robots.
     #[serde(default)]
     pub alignments: Vec<Pair>,
-    /// How the maps are bent, by robot.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub bends: BTreeMap<String, Bend>,
-    /// How far the maps agree that were fused, by the stage that fused them.
+    /// The deformations of the maps, by robot.
+    #[serde(default, rename = "bends", skip_serializing_if = "BTreeMap::is_empty")]
+    pub deformations: BTreeMap<String, DeformationSummary>,
+    /// The agreement of the fused maps, by the stage that fused them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub areas: BTreeMap<String, Areas>,
 }
@@ -44,42 +44,42 @@ pub struct Frame {
     pub y: f64,
     /// Radians.
     pub yaw: f64,
-    /// Of (x, y, yaw), 3 x 3 row by row.
+    /// The covariance of (x, y, yaw), 3 x 3 row by row.
     #[serde(default)]
     pub covariance: [f64; 9],
 }
 
-/// How a map is bent: where its places belong before the map is placed as a whole.
+/// The deformation of a map: a displacement field that is applied before the rigid frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Bend {
-    /// The largest displacement of a node, metres.
+pub struct DeformationSummary {
+    /// The maximum displacement of a node, metres.
     pub largest_m: f64,
-    /// The largest turn of a node, degrees.
+    /// The maximum rotation of a node, degrees.
     pub largest_deg: f64,
-    /// The longer side of the rectangle that the nodes fill, metres.
+    /// The longer side of the bounding box of the nodes, metres.
     pub over_m: f64,
-    /// The length of its walls that were laid on walls of others, metres.
+    /// The length of its walls that were matched with walls of other maps, metres.
     pub wall_matched_m: f64,
-    /// How the walls that others show as well lie on theirs, as the rigid frames have them.
+    /// The sharpness of the walls in common with other maps, by the rigid frames alone.
     #[serde(default)]
     pub sharpness_rigid: Sharpness,
-    /// The same, as the maps are bent.
+    /// The same, with the deformations.
     #[serde(default)]
     pub sharpness: Sharpness,
-    /// How it was found to bend: standard deviation of the displacement of two places against each other, metres for the root
-    /// of each metre between them; none if that is not known.
+    /// The estimated strength of the deformation: standard deviation of the relative displacement of two points, metres
+    /// per square root of the distance between them in metres; `None` if unknown.
     #[serde(default)]
     pub bend_m_per_root_m: Option<f64>,
-    /// The same of the turn of two places, radians for the root of each metre.
+    /// The same for the relative rotation of two points, radians per square root of metres.
     #[serde(default)]
     pub turn_rad_per_root_m: Option<f64>,
-    /// From node to node along x and along y, metres.
+    /// The spacing of the nodes along x and along y, metres.
     pub spacing: f64,
-    /// The nodes: x, y, and by how much they are displaced along x and y, metres, and turned, radians.
+    /// The nodes: x, y, their displacements along x and y, metres, and their rotation, radians.
     pub nodes: Vec<[f64; 5]>,
 }
 
-impl From<&MapDeformation> for Bend {
+impl From<&MapDeformation> for DeformationSummary {
     fn from(message: &MapDeformation) -> Self {
         let most = |part: &dyn Fn(&DeformationNode) -> f64| message.nodes.iter().map(part).fold(f64::MIN, f64::max);
         let side = |part: &dyn Fn(&DeformationNode) -> f64| most(part) + most(&|node| -part(node));
@@ -98,12 +98,12 @@ impl From<&MapDeformation> for Bend {
     }
 }
 
-/// How well walls that several maps show come out as one.
+/// The sharpness of walls that several maps contain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sharpness {
-    /// The mean distance of one drawing of a wall from the other, across the wall, metres.
+    /// The wall thickness spread: the mean distance between the copies of a wall, perpendicular to the wall, metres.
     pub apart_m: f64,
-    /// The share of the walls whose two drawings look like two walls, 0 to 1.
+    /// The double-wall ratio: the share of the walls whose copies appear as two walls, 0 to 1.
     pub doubled: f64,
 }
 
@@ -113,23 +113,23 @@ impl From<ros::Sharpness> for Sharpness {
     }
 }
 
-/// Robots that are merged with each other, but not with the reference.
+/// A group of robots that are merged with each other, but not with the reference.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Group {
-    /// The robot in whose map frame the others are placed.
+    /// The robot whose map frame is the reference of the group.
     pub reference: String,
-    /// Their map frames, by robot.
+    /// The map frames, by robot.
     pub frames: BTreeMap<String, Frame>,
 }
 
-/// What became of a pair of robots: `T_a_b` takes a point of map b to map a.
+/// The outcome of a pair of robots: `T_a_b` transforms points of map b to map a.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pair {
-    /// The robot whose map stays.
+    /// The robot of map a.
     pub a: String,
-    /// The robot whose map is moved.
+    /// The robot of map b.
     pub b: String,
-    /// How the alignment was found.
+    /// The method that found the alignment.
     pub method: String,
     /// Translation of `T_a_b`, metres.
     pub x: f64,
@@ -137,24 +137,24 @@ pub struct Pair {
     pub y: f64,
     /// Rotation of `T_a_b`, radians.
     pub yaw: f64,
-    /// How probable it is that it is right, 0 to 1.
+    /// The probability that the alignment is correct, 0 to 1.
     pub score: f64,
     /// Whether it is used.
     pub accepted: bool,
-    /// Whether others along a cycle confirm it.
+    /// Whether alignments along a cycle confirm it.
     pub checked: bool,
-    /// Why it is not used, or what speaks for it.
+    /// The reason why it is not used, or the evidence for it.
     pub reason: String,
 }
 
-/// How far the maps agree that were fused: areas in square metres.
+/// The agreement of the fused maps: areas in square metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Areas {
-    /// What one map knows.
+    /// Known to one map.
     pub known_to_one_m2: f64,
-    /// What several maps know.
+    /// Known to several maps.
     pub known_to_several_m2: f64,
-    /// The part of that on which they contradict each other.
+    /// The part of it in which these contradict each other.
     pub in_conflict_m2: f64,
     /// The same as a share, 0 to 1.
     pub conflict_share: f64,
@@ -170,7 +170,7 @@ impl From<&MapAgreement> for Areas {
 }
 
 impl Summary {
-    /// Takes over the frames of a message.
+    /// Replaces the frames by those in a message.
     pub fn set_frames(&mut self, message: &RobotFrames) {
         self.reference = Some(message.reference.clone());
         self.frames = by_robot(&message.frames);
@@ -179,7 +179,7 @@ impl Summary {
         self.groups = message.groups.iter().map(group).collect();
     }
 
-    /// Takes over the verdicts of a message.
+    /// Replaces the outcomes by the verdicts in a message.
     pub fn set_verdicts(&mut self, message: &Verdicts) {
         let pair = |Verdict { alignment, checked }: &Verdict| Pair {
             a: alignment.a.clone(),

@@ -1,6 +1,6 @@
 //! The stage `summary_sink`.
 
-use super::{Areas, Bend, Summary};
+use super::{Areas, DeformationSummary, Summary};
 use crate::file::replace;
 use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct SummaryParameters {
-    /// The JSON file to write. A file that has this name is replaced.
+    /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
 }
 
@@ -22,18 +22,18 @@ impl Parameters for SummaryParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "summary_sink",
-        "Writes what a merge has found to a JSON file, at the end of the run.",
+        "Writes the result of a merge to a JSON file, at the end of the run.",
         SummarySink::new,
     )
-    .inputs("frames", "where the robots' maps lie", SummarySink::frames)
-    .optional_inputs("verdicts", "what became of each pair of robots", SummarySink::verdicts)
-    .optional_inputs("agreement", "how far the maps agree that were fused", SummarySink::agreement)
-    .optional_inputs("deformation", "how the maps are bent", SummarySink::deformation)
+    .inputs("frames", "the robots' map frames", SummarySink::frames)
+    .optional_inputs("verdicts", "the outcome of each pair of robots", SummarySink::verdicts)
+    .optional_inputs("agreement", "the agreement of the fused maps", SummarySink::agreement)
+    .optional_inputs("deformation", "the deformations of the maps", SummarySink::deformation)
     .finish(SummarySink::write)
     .build()
 }
 
-/// Keeps the last of what it is told.
+/// Stores the latest message of each input.
 struct SummarySink {
     file: PathBuf,
     /// The stage at the other end of each wire.
@@ -68,9 +68,9 @@ impl SummarySink {
     }
 
     fn deformation(&mut self, deformation: Received<'_, MapDeformation>, _: &Output<()>) -> Result<(), StageError> {
-        // Of a map that knows nothing there is nothing to say.
+        // The deformation of an empty map has no nodes.
         if !deformation.nodes.is_empty() {
-            self.summary.bends.insert(deformation.robot.clone(), Bend::from(&*deformation));
+            self.summary.deformations.insert(deformation.robot.clone(), DeformationSummary::from(&*deformation));
         }
         Ok(())
     }

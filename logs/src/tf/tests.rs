@@ -40,7 +40,7 @@ fn a_pose_is_the_product_of_the_chain_from_map_to_base() {
 }
 
 #[test]
-fn a_pose_is_told_only_when_its_base_moves_and_once_a_message() {
+fn a_pose_is_derived_only_when_its_base_moves_and_once_per_message() {
     let mut tf = robots();
     let chain = [edge("r1/map", "r1/odom", 1.0, 0.0, 0.0), edge("r1/odom", "r1/base_link", 2.0, 0.0, 0.0)];
     assert_eq!(tf.update("", false, &message(chain.clone())).0.len(), 1);
@@ -54,7 +54,7 @@ fn a_pose_is_told_only_when_its_base_moves_and_once_a_message() {
 #[test]
 fn a_correction_that_is_dated_into_the_future_gives_no_pose_and_no_later_stamp() {
     let mut tf = robots();
-    // The base stands on a frame that moves, and the stamp of these edges is their x in seconds.
+    // The base is mounted on a moving frame, and the stamp of these edges is their x in seconds.
     let mount = edge("r1/footprint", "r1/base_link", 0.5, 0.0, 0.0);
     assert!(tf.update("", true, &message([mount])).0.is_empty());
     assert!(tf.update("", false, &message([edge("r1/map", "r1/odom", 9.0, 0.0, 0.0)])).0.is_empty());
@@ -66,8 +66,9 @@ fn a_correction_that_is_dated_into_the_future_gives_no_pose_and_no_later_stamp()
 }
 
 #[test]
-fn of_several_frames_the_first_that_is_tied_is_the_base_for_good() {
-    let ends = Ends { map: "map".into(), bases: ["r1/base_link", "r1/base_footprint"].map(str::to_owned).to_vec() };
+fn the_first_connected_frame_is_the_base_from_then_on() {
+    let ends =
+        PoseFrames { map: "map".into(), bases: ["r1/base_link", "r1/base_footprint"].map(str::to_owned).to_vec() };
     let mut tf = TfPoses::default();
     tf.set_robots(BTreeMap::from([("r1".to_owned(), ends)]));
     tf.set_map_frame("r1", "r1/slam_map");
@@ -75,11 +76,11 @@ fn of_several_frames_the_first_that_is_tied_is_the_base_for_good() {
     assert_eq!((tf.base_of("r1"), tf.robots_without_pose().len()), (None, 1));
     let (poses, _) = tf.update("", false, &message([edge("r1/slam_map", "r1/base_footprint", 2.0, 0.0, 0.0)]));
     assert_eq!((poses[0].1.header.frame_id.as_str(), poses[0].1.pose.position.x), ("r1/slam_map", 2.0));
-    // From here on the other is looked at no more, though it is tied.
+    // From here on the other frame is not used, although it is connected.
     let (poses, _) = tf.update("", false, &message([edge("r1/slam_map", "r1/base_link", 5.0, 0.0, 0.0)]));
     assert!(poses.is_empty());
     assert_eq!((tf.base_of("r1"), tf.map_frame("r1")), (Some("r1/base_footprint"), Some("r1/slam_map")));
-    assert!(tf.knows("r1") && !tf.knows("r2"), "robots that nobody asked for stay unknown");
+    assert!(tf.knows("r1") && !tf.knows("r2"), "robots that were not set stay unknown");
 }
 
 #[test]
@@ -105,7 +106,7 @@ fn channel(topic: &str, type_name: &str) -> Channel {
 }
 
 #[test]
-fn tf_topics_are_told_from_others() {
+fn tf_topics_are_recognised() {
     let topics = ["/tf", "tf", "/tf_static", "/robot1/tf", "/fleet/r2/tf_static", "/tf2", "/robot1/tf/x"];
     let channels = topics.map(|topic| channel(topic, "tf2_msgs/TFMessage"));
     let found: Vec<_> = channels.iter().map(tf_topic).collect();
@@ -114,7 +115,7 @@ fn tf_topics_are_told_from_others() {
 }
 
 #[test]
-fn a_base_and_a_map_that_meet_in_another_frame_are_tied() {
+fn a_base_and_a_map_with_a_common_ancestor_are_connected() {
     let mut tree = FrameTree::default();
     for edge in [edge("odom", "map", -1.0, 0.0, 0.0), edge("odom", "base", 4.0, 0.0, 0.0)] {
         assert!(tree.insert(&edge.header.frame_id, &edge.child_frame_id, &edge.transform, false));
@@ -142,7 +143,7 @@ fn a_circle_of_frames_ends() {
 }
 
 #[test]
-fn transforms_that_are_not_finite_are_left_out() {
+fn transforms_that_are_not_finite_are_ignored() {
     let mut tf = robots();
     assert_eq!(tf.update("", false, &message([edge("r1/map", "r1/base_link", f64::NAN, 0.0, 0.0)])), (Vec::new(), 1));
     assert_eq!(tf.update("", false, &message([edge("r1/map", "r1/base_link", f64::INFINITY, 0.0, 0.0)])).1, 1);
@@ -153,12 +154,12 @@ fn transforms_that_are_not_finite_are_left_out() {
 }
 
 #[test]
-fn a_rotation_of_zeros_is_none_and_a_tilted_frame_is_honoured() {
+fn a_zero_quaternion_is_no_rotation_and_a_tilted_frame_is_respected() {
     let mut tree = FrameTree::default();
     let zeros = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 0.0 };
     let ahead = Vector3 { x: 1.0, y: 0.0, z: 0.0 };
     tree.insert("map", "odom", &Transform { translation: ahead, rotation: zeros }, false);
-    // Upside down: what is to its left is to the right of its parent.
+    // Upside down: left of it is right of its parent.
     let upside_down = Quaternion { x: 1.0, y: 0.0, z: 0.0, w: 0.0 };
     tree.insert("odom", "mount", &Transform { translation: ahead, rotation: upside_down }, false);
     let left = Vector3 { x: 0.0, y: 1.0, z: 0.0 };

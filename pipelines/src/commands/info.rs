@@ -78,8 +78,8 @@ fn write_text(found: &LogInfo, text: &mut String, width: Option<usize>) -> std::
         writeln!(text, "{}  {}, {packed}{robot}", file.path.display(), size(file.size))?;
         write_beside(file, text)?;
     }
-    if let Some(remark) = &found.remark {
-        writeln!(text, "{}", wrap(remark, 2, width))?;
+    if let Some(note) = &found.note {
+        writeln!(text, "{}", wrap(note, 2, width))?;
     }
     let start = found.start.map(|start| format!(", from {start:.3} s")).unwrap_or_default();
     writeln!(text, "{} messages over {:.1} s{start}", found.messages, found.duration)?;

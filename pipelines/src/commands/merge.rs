@@ -66,7 +66,7 @@ fn has_only_tags(args: &MergeArgs) -> Result<bool, BadUse> {
 fn robots_without_maps(args: &MergeArgs) -> Result<Vec<String>, BadUse> {
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
     let rules = args.options.reading.names.rules(Convention::ByRobot)?;
-    Ok(info::robots_to_draw(&inputs, &rules, &RobotTopics::default()).unwrap_or_default())
+    Ok(info::robots_with_scans_only(&inputs, &rules, &RobotTopics::default()).unwrap_or_default())
 }
 
 /// Makes the options of a merge whose output is the map. Options that need a log are an error.

@@ -1,4 +1,4 @@
-//! One bag: where its chunks are, and what their messages are in ROS 2.
+//! A ROS 1 bag: its chunks, and the conversion of its messages to ROS 2.
 
 use super::MAGIC;
 use super::definition::{translate, type_name};
@@ -9,31 +9,29 @@ use crate::reader::block::{Block, Records};
 use crate::reader::bytes::{FileBytes, Window};
 use crate::reader::chunk::{decompress_bz2, decompress_lz4};
 use crate::reader::damage::{ChunkFault, Damage, LARGEST};
+use crate::reader::definitions::MOST_CHANNELS;
 use crate::reader::layout::Layout;
 use crate::reader::record::{Fields, push_message};
 use gridweave_runtime::message::Channel;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The most connections of a bag: channels have numbers of 16 bits, and 0 and 65535 stand for none.
-const MOST_CONNECTIONS: usize = 65534;
-
-/// A bag of ROS 1.
+/// A ROS 1 bag.
 #[derive(Debug)]
 pub(crate) struct Bag {
     pub(crate) file: FileBytes,
     connections: Connections,
 }
 
-/// By their numbers in the bag.
+/// The connections by their numbers in the bag.
 type Connections = BTreeMap<u32, Connection>;
 
-/// What is known of the messages of a connection.
+/// A connection of a bag.
 #[derive(Debug)]
 struct Connection {
-    /// Its number as a channel.
+    /// The number of its channel.
     channel: u16,
-    /// Makes messages of ROS 2 of its messages; none if nobody knows how they are laid out.
+    /// Converts its messages to ROS 2; `None` if their definition cannot be used.
     recoder: Option<Recoder>,
 }
 
@@ -41,14 +39,14 @@ struct Connection {
 #[derive(Clone, Debug)]
 pub(crate) struct BagChunk {
     compression: String,
-    /// Bytes of its contents, uncompressed.
+    /// The uncompressed size of its contents, bytes.
     pub(crate) size: u64,
-    /// Where its contents lie in the file.
+    /// The location of its contents in the file.
     data: Range<usize>,
 }
 
 impl Bag {
-    /// Finds out what the bag in a file consists of.
+    /// Opens the bag in a file and determines its layout.
     pub(crate) fn open(file: FileBytes) -> (Self, Layout) {
         let mut walk = Walk { layout: Layout::default(), connections: BTreeMap::new(), unsure: Vec::new() };
         walk.walk(&file);
@@ -58,11 +56,11 @@ impl Bag {
     }
 }
 
-/// The walk over the records of a bag.
+/// The scan of a bag's records.
 struct Walk {
     layout: Layout,
     connections: Connections,
-    /// For every block, whether the time that it spans is still to be found.
+    /// For each block, whether its time span is unknown.
     unsure: Vec<bool>,
 }
 
@@ -83,7 +81,7 @@ impl Walk {
                 continue;
             };
             match header.opcode() {
-                // A recorder writes where the connections are when it closes the bag.
+                // The position of the index is written when the bag is closed.
                 Some(BAG) => {
                     is_closed = header.bytes("index_pos").is_some_and(|place| place.iter().any(|byte| *byte != 0))
                 }
@@ -108,7 +106,7 @@ impl Walk {
         self.unsure.push(true);
     }
 
-    /// The times of messages of one connection in the last chunk.
+    /// Reads the message times of one connection in the last chunk.
     fn index(&mut self, header: &Header<'_>, data: &[u8]) {
         let (Some(block), Some(unsure)) = (self.layout.blocks.last_mut(), self.unsure.last_mut()) else { return };
         if header.u32("ver") != Some(1) {
@@ -123,17 +121,17 @@ impl Walk {
     }
 
     fn connection(&mut self, header: &Header<'_>, data: &[u8]) {
-        let (Some(number), Some(told)) = (header.u32("conn"), Header::parse(data)) else { return };
-        if self.connections.contains_key(&number) || self.connections.len() >= MOST_CONNECTIONS {
+        let (Some(number), Some(data_header)) = (header.u32("conn"), Header::parse(data)) else { return };
+        if self.connections.contains_key(&number) || self.connections.len() >= MOST_CHANNELS {
             return;
         }
-        // It has just been held that there are not so many.
+        // Checked above.
         let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
-        let topic = header.text("topic").or_else(|| told.text("topic")).unwrap_or_default();
-        let schema_name = type_name(&told.text("type").unwrap_or_default());
-        let schema = translate(&told.text("message_definition").unwrap_or_default());
+        let topic = header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default();
+        let schema_name = type_name(&data_header.text("type").unwrap_or_default());
+        let schema = translate(&data_header.text("message_definition").unwrap_or_default());
         let recoder = Schema::parse(&schema_name, &schema).ok().and_then(Recoder::new);
-        let latched = told.bytes("latching") == Some(b"1");
+        let latched = data_header.bytes("latching") == Some(b"1");
         let offered = if latched { qos::LATCHED } else { "" };
         let message_encoding = if recoder.is_some() { "cdr" } else { "ros1" };
         let description = Channel {
@@ -148,7 +146,8 @@ impl Walk {
         self.connections.insert(number, Connection { channel, recoder });
     }
 
-    /// Reads chunks through whose times are not known, or all if connections may be in them that are nowhere else.
+    /// Scans chunks whose time span is unknown, or all chunks if some may contain connections that are described
+    /// nowhere else.
     fn survey(&mut self, file: &FileBytes) {
         let is_whole = self.layout.damage.is_empty();
         let blocks = std::mem::take(&mut self.layout.blocks);
@@ -178,7 +177,7 @@ impl Walk {
                     _ => {}
                 }
             }
-            // A chunk without messages gives nothing.
+            // A chunk without messages is dropped.
             if block.first_time <= block.last_time {
                 self.layout.blocks.push(block);
             }
@@ -187,7 +186,7 @@ impl Walk {
 }
 
 impl BagChunk {
-    /// The records of the chunk, uncompressed.
+    /// The decompressed records of the chunk.
     fn contents(&self, file: &FileBytes) -> Result<Vec<u8>, ChunkFault> {
         let most = self.size.max(self.data.len() as u64);
         if most > LARGEST {
@@ -206,7 +205,8 @@ impl BagChunk {
         }
     }
 
-    /// The messages of the chunk as records of MCAP, in CDR; and how many of them do not fit their definition.
+    /// The messages of the chunk as MCAP records, in CDR; and the number of messages that do not match their
+    /// definition.
     pub(crate) fn messages(&self, bag: &Bag) -> Result<(Vec<u8>, u64), ChunkFault> {
         let contents = self.contents(&bag.file)?;
         let (mut records, mut lost) = (Vec::with_capacity(contents.len() + contents.len() / 4), 0);

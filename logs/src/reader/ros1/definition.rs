@@ -1,10 +1,10 @@
-//! Definitions of ROS 1 as those of ROS 2.
+//! Conversion of ROS 1 message definitions to ROS 2.
 
 use crate::schemas::schema_text;
 
 const SEPARATOR: &str = "================================================================================";
 
-/// The name that a type of ROS 1 has in ROS 2.
+/// The ROS 2 name of a ROS 1 type.
 pub(super) fn type_name(name: &str) -> String {
     match name.split_once('/') {
         Some(("tf", "tfMessage")) => "tf2_msgs/msg/TFMessage".to_owned(),
@@ -13,7 +13,7 @@ pub(super) fn type_name(name: &str) -> String {
     }
 }
 
-/// The text of a definition with the names that types have in ROS 2. Headers lose their `seq`.
+/// The definition text with ROS 2 type names. The field `seq` of headers is removed.
 pub(super) fn translate(text: &str) -> String {
     let mut translated = String::new();
     let mut is_header = false;
@@ -24,7 +24,7 @@ pub(super) fn translate(text: &str) -> String {
             is_header = false;
         } else if let Some(name) = line.trim().strip_prefix("MSG:").filter(|_| starts) {
             starts = false;
-            // Its definition is appended, with those of times.
+            // The definition of the header is appended, with those of times.
             is_header = name.trim() == "std_msgs/Header";
             if !is_header {
                 translated.push_str(&format!("{SEPARATOR}\nMSG: {}\n", name.trim()));
@@ -42,7 +42,7 @@ pub(super) fn translate(text: &str) -> String {
     translated
 }
 
-/// A line with the type of its field as it is called in ROS 2.
+/// A line of a definition with the ROS 2 name of its field's type.
 fn line_of(line: &str) -> String {
     let text = line.trim_start();
     let end = text.find(|char: char| char.is_whitespace() || char == '[').unwrap_or(text.len());

@@ -1,8 +1,11 @@
-//! Bags of ROS 1 (format 2.0).
+//! ROS 1 bags (format 2.0).
 //!
-//! A bag is a sequence of records, each a header of named fields and data: connections, which say the topic, type and definition
-//! of messages; chunks of messages, with an index behind each; and, if the bag was closed, all connections again. The messages
-//! are given out as those of ROS 2: their definitions by the names that types have there, and their bytes in CDR.
+//! A bag is a sequence of records, each with a header of named fields and data: connections, with the topic, type and
+//! definition of messages; chunks of messages, each followed by an index; and, if the bag was closed, all connections
+//! again. The messages are returned as in ROS 2: with ROS 2 type names in their definitions, and encoded in CDR.
+//!
+//! This is not a library, because the messages must be converted to CDR without a ROS installation, and because
+//! truncated and unindexed bags must be readable.
 
 mod bag;
 mod definition;
@@ -13,5 +16,5 @@ mod tests;
 
 pub(crate) use bag::{Bag, BagChunk};
 
-/// What a bag begins with.
+/// The magic bytes of a bag.
 pub(crate) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";

@@ -1,18 +1,18 @@
-//! Records of a bag: a header of named fields, and data.
+//! The records of a bag: a header of named fields, and data.
 
 use crate::reader::bytes::Window;
 use crate::reader::record::Fields;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// What a record is.
+/// The opcodes of records.
 pub(super) const MESSAGE: u8 = 2;
 pub(super) const BAG: u8 = 3;
 pub(super) const INDEX: u8 = 4;
 pub(super) const CHUNK: u8 = 5;
 pub(super) const CONNECTION: u8 = 7;
 
-/// A longer header is none: real ones have tens of bytes.
+/// The maximum length of a header, bytes; actual headers have tens of bytes.
 const LONGEST_HEADER: usize = 1 << 20;
 
 /// The fields of a header, by name.
@@ -20,7 +20,7 @@ const LONGEST_HEADER: usize = 1 << 20;
 pub(super) struct Header<'a>(BTreeMap<&'a [u8], &'a [u8]>);
 
 impl<'a> Header<'a> {
-    /// Reads all fields; of a name that is there twice the first counts. None if they do not fill the bytes.
+    /// Parses all fields; of fields with the same name the first is used. `None` if they do not fill the bytes.
     pub(super) fn parse(bytes: &'a [u8]) -> Option<Self> {
         let mut rest = Fields(bytes);
         let mut fields = BTreeMap::new();
@@ -48,19 +48,19 @@ impl<'a> Header<'a> {
         Fields(self.bytes(name)?).u32()
     }
 
-    /// A time in nanoseconds.
+    /// A time, nanoseconds.
     pub(super) fn time(&self, name: &str) -> Option<u64> {
         time(&mut Fields(self.bytes(name)?))
     }
 }
 
-/// A time of ROS 1 in nanoseconds: seconds, and nanoseconds of the second.
+/// A ROS 1 time, converted to nanoseconds: seconds, and nanoseconds of the second.
 pub(super) fn time(fields: &mut Fields<'_>) -> Option<u64> {
     let (seconds, nanoseconds) = (u64::from(fields.u32()?), u64::from(fields.u32()?));
     Some(seconds * 1_000_000_000 + nanoseconds)
 }
 
-/// A record in memory: its header, its data, and how many bytes it takes.
+/// A record in memory: its header, its data, and the end position.
 pub(super) fn record_at(bytes: &[u8], position: usize) -> Option<(Header<'_>, &[u8], usize)> {
     let mut fields = Fields(bytes.get(position..)?);
     let header = Header::parse(fields.block()?.0)?;
@@ -68,7 +68,7 @@ pub(super) fn record_at(bytes: &[u8], position: usize) -> Option<(Header<'_>, &[
     Some((header, data, bytes.len() - fields.0.len()))
 }
 
-/// A record in a file: the bytes of its header, and where its data lies.
+/// A record in a file: the bytes of its header, and the location of its data.
 pub(super) fn record_in(file: &mut Window<'_>, position: usize) -> Option<(Vec<u8>, Range<usize>)> {
     let length_at = |file: &mut Window<'_>, position: usize| {
         usize::try_from(u32::from_le_bytes(file.bytes(position, 4)?.try_into().ok()?)).ok()

@@ -32,7 +32,7 @@ float64 z
 float64 w
 ";
 
-/// Writes a bag record by record.
+/// Builds a bag record by record.
 struct Bag(Vec<u8>);
 
 fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
@@ -56,13 +56,13 @@ fn record(header: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
 }
 
 fn connection(number: u32, topic: &str, type_name: &str, definition: &str) -> Vec<u8> {
-    let told = fields(&[
+    let described = fields(&[
         ("topic", topic.as_bytes()),
         ("type", type_name.as_bytes()),
         ("message_definition", definition.as_bytes()),
         ("latching", b"1"),
     ]);
-    record(&[("op", &[7]), ("conn", &number.to_le_bytes()), ("topic", topic.as_bytes())], &told)
+    record(&[("op", &[7]), ("conn", &number.to_le_bytes()), ("topic", topic.as_bytes())], &described)
 }
 
 fn time_bytes(time: u64) -> Vec<u8> {
@@ -115,7 +115,7 @@ impl Bag {
     }
 }
 
-/// A pose as ROS 1 encodes it.
+/// A pose in ROS 1 encoding.
 fn pose(x: f64) -> Vec<u8> {
     let mut bytes = [7_u32, 3, 5, 3].map(u32::to_le_bytes).concat();
     bytes.extend_from_slice(b"map");
@@ -134,13 +134,13 @@ fn expected(x: f64) -> PoseStamped {
 #[test]
 fn messages_come_by_time_as_those_of_ros_2() {
     let folder = Folder::new();
-    let told = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
+    let described = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
     for compression in ["none", "lz4", "bz2"] {
         let late =
-            [told.clone(), message(0, 2_000_000_009, &pose(1.0)), message(0, 1_000_000_000, &pose(4.0))].concat();
+            [described.clone(), message(0, 2_000_000_009, &pose(1.0)), message(0, 1_000_000_000, &pose(4.0))].concat();
         let bag = Bag::new(true).chunk(compression, &late, &[2_000_000_009, 1_000_000_000]);
         let bag = bag.chunk(compression, &message(0, 1_500_000_000, &pose(5.0)), &[1_500_000_000]);
-        let path = folder.write("a.bag", &bag.end(std::slice::from_ref(&told)));
+        let path = folder.write("a.bag", &bag.end(std::slice::from_ref(&described)));
         let (messages, damage) = read_file(&path).unwrap();
         assert_eq!(damage, []);
         let times: Vec<u64> = messages.iter().map(|(_, time, _)| *time).collect();
@@ -184,8 +184,8 @@ fn definitions_have_the_names_of_ros_2() {
 #[test]
 fn a_bag_that_is_cut_or_was_not_closed_is_read_as_far_as_it_goes() {
     let folder = Folder::new();
-    let told = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
-    let first = [told.clone(), message(0, 1, &pose(1.0))].concat();
+    let described = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
+    let first = [described.clone(), message(0, 1, &pose(1.0))].concat();
     let bag = Bag::new(false).chunk("none", &first, &[1]).chunk("none", &message(0, 2, &pose(2.0)), &[2]);
     let bytes = bag.end(&[]);
     let (messages, damage) = read_file(&folder.write("open.bag", &bytes)).unwrap();
@@ -202,14 +202,14 @@ fn a_bag_that_is_cut_or_was_not_closed_is_read_as_far_as_it_goes() {
 }
 
 #[test]
-fn what_does_not_fit_is_told_and_the_rest_is_read() {
+fn unreadable_messages_are_counted_and_the_rest_is_read() {
     let folder = Folder::new();
-    let told = connection(0, "/p", "geometry_msgs/PoseStamped", POSE);
+    let described = connection(0, "/p", "geometry_msgs/PoseStamped", POSE);
     let unknown = connection(1, "/q", "a/B", "C c");
     let contents =
         [message(0, 1, b"short"), message(0, 2, &pose(1.0)), message(1, 3, b"raw"), message(9, 4, b"?")].concat();
     let bag = Bag::new(true).chunk("none", &contents, &[1, 2, 3, 4]).chunk("lzo", b"", &[5]);
-    let path = folder.write("a.bag", &bag.end(&[told, unknown]));
+    let path = folder.write("a.bag", &bag.end(&[described, unknown]));
     let (messages, damage) = read_file(&path).unwrap();
     let found: Vec<(&str, u64)> = messages.iter().map(|(topic, time, _)| (topic.as_str(), *time)).collect();
     assert_eq!(found, [("/p", 2), ("/q", 3), ("", 4)]);

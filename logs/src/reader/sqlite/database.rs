@@ -1,4 +1,4 @@
-//! One database, opened to be read and never to be written.
+//! A rosbag2 database, opened read-only.
 
 use super::rows::{Rows, survey};
 use super::tables;
@@ -13,30 +13,30 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// The most bytes of a header that say how long the database is.
+/// The length of the database header, which contains the database size, bytes.
 const HEADER: usize = 100;
 
-/// A database of rosbag2.
+/// A rosbag2 database.
 #[derive(Debug)]
 pub(crate) struct Database {
-    /// The file, as it was when it was opened.
+    /// The open file.
     file: FileBytes,
     /// One thread reads at a time.
     connection: Mutex<Connection>,
-    /// The numbers that the topics have as channels, by their numbers in the database.
+    /// The channel numbers of the topics, by topic id.
     channels: BTreeMap<i64, u16>,
-    /// The numbers of rows whose messages are not whole, rising.
+    /// The ids of rows with incomplete messages, ascending.
     torn: Vec<i64>,
 }
 
 impl Database {
-    /// Opens the database in the file at `path`, and finds out what it consists of. A packed one was unpacked to `unpacked`.
+    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`.
     ///
     /// # Errors
-    /// What is wrong with it, if no message can be read.
-    pub(crate) fn open(path: &Path, unpacked: Option<&Path>, file: FileBytes) -> Result<(Self, Layout), String> {
-        let told = |error: rusqlite::Error| error.to_string();
-        let connection = connect(unpacked.unwrap_or(path)).map_err(told)?;
+    /// The cause, if no message can be read.
+    pub(crate) fn open(path: &Path, decompressed: Option<&Path>, file: FileBytes) -> Result<(Self, Layout), String> {
+        let text_of = |error: rusqlite::Error| error.to_string();
+        let connection = connect(decompressed.unwrap_or(path)).map_err(text_of)?;
         let mut layout = Layout::default();
         let cut = cut(&file);
         let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
@@ -44,9 +44,9 @@ impl Database {
         layout.damage.extend(beside(path));
         let topics = tables::read_topics(&connection, &mut layout)?;
         let channels = topics.into_iter().collect();
-        survey(&connection, &mut layout).map_err(told)?;
+        survey(&connection, &mut layout).map_err(text_of)?;
         if layout.blocks.is_empty() && !layout.damage.is_empty() && layout.definitions.channel_count() == 0 {
-            return Err("there is no topic in it that can be read".to_owned());
+            return Err("it has no readable topic".to_owned());
         }
         Ok((Self { file, connection: Mutex::new(connection), channels, torn }, layout))
     }
@@ -55,12 +55,12 @@ impl Database {
         self.file.is_cut()
     }
 
-    /// The messages of a run of rows as records of MCAP, and how many of them could not be read.
+    /// The messages of a run of rows as MCAP records, and the number of unreadable ones.
     ///
     /// # Errors
     /// They are too large, or the database cannot be read there.
     pub(crate) fn contents(&self, rows: &Rows) -> Result<(Vec<u8>, u64), ChunkFault> {
-        // A thread that has failed leaves a connection that can be used.
+        // A panicking thread leaves the connection usable.
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
         rows.contents(&connection, &self.torn, &self.channels)
     }
@@ -73,7 +73,7 @@ fn torn_rows(connection: &Connection, file: &FileBytes) -> Vec<i64> {
     root.and_then(|root| Some(Pages::new(file)?.torn_rows(root))).unwrap_or_default()
 }
 
-/// A connection that writes nothing, neither to the database nor beside it, and runs no code that a database brings with it.
+/// A connection that writes neither to the database nor beside it, and runs no code from the database.
 fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let mut uri = "file:".to_owned();
     for &byte in path.as_os_str().as_bytes() {
@@ -86,14 +86,15 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     uri.push_str("?mode=ro&immutable=1");
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(uri, flags)?;
-    // With a schema that could be written, one that is cut is read as far as it goes; nothing can be, as it is read only.
+    // With a writable schema, SQLite reads a truncated database as far as possible; the connection is read-only, so
+    // nothing is written.
     connection.execute_batch(
         "PRAGMA writable_schema = ON; PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;",
     )?;
     Ok(connection)
 }
 
-/// Whether the file is shorter than its header says.
+/// The damage if the file is shorter than its header indicates.
 fn cut(file: &FileBytes) -> Option<Damage> {
     let header = file.read(0..HEADER)?;
     let number = |at: usize| Some(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?));
@@ -101,12 +102,12 @@ fn cut(file: &FileBytes) -> Option<Damage> {
         1 => 65536,
         size => usize::from(size),
     };
-    // The number of pages counts if it was written by whoever wrote last.
+    // The page count is valid if it was written by the last writer.
     let pages = usize::try_from(number(28)?).ok().filter(|_| number(24) == number(92))?;
     (pages.checked_mul(page_size)? > file.len()).then(|| Damage::NoEnd { position: file.len() })
 }
 
-/// What a recorder that was killed has left beside the database, which is not read.
+/// The damage if a killed recorder has left a journal beside the database, which is not read.
 fn beside(path: &Path) -> Option<Damage> {
     ["-wal", "-journal"].iter().find_map(|ending| {
         let mut name = path.as_os_str().to_owned();

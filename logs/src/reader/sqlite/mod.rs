@@ -1,9 +1,9 @@
-//! Databases of rosbag2 (`.db3`), the bags that ROS 2 wrote up to Humble unless told otherwise.
+//! The rosbag2 databases (`.db3`) that ROS 2 wrote by default up to Humble.
 //!
-//! The table `topics` has a row for each topic, the table `messages` a row for each message, and from Iron on
-//! `message_definitions` the definitions of the types. A database is opened as one that nobody writes, so that nothing is left
-//! beside it; it is walked over once by the numbers of its rows, which gives the blocks, and each block is read when its turn
-//! comes. Where rows cannot be read, those behind them are looked for.
+//! The table `topics` has a row per topic, the table `messages` a row per message, and since Iron `message_definitions`
+//! the definitions of the types. A database is opened as immutable, so that no file is created beside it. It is scanned
+//! once by row id to find the blocks, and each block is read on demand. If rows cannot be read, reading continues with
+//! the next readable row.
 
 mod database;
 mod rows;
@@ -16,5 +16,5 @@ mod tests;
 pub(crate) use database::Database;
 pub(crate) use rows::Rows;
 
-/// What a database begins with.
+/// The magic bytes of a database.
 pub(crate) const MAGIC: &[u8] = b"SQLite format 3\0";

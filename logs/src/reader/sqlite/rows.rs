@@ -1,4 +1,4 @@
-//! The rows of the table of messages: found in runs, and read a run at a time.
+//! The rows of the table of messages: found in runs, and read one run at a time.
 
 use crate::reader::block::{Block, Records};
 use crate::reader::damage::{ChunkFault, Damage, LARGEST};
@@ -8,26 +8,26 @@ use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Row, Statement};
 use std::collections::BTreeMap;
 
-/// A run is ended when its messages have so many bytes, or there are so many of them.
+/// The limits of a run: the size of its messages in bytes, and the number of rows.
 const RUN_BYTES: u64 = 1 << 20;
 const RUN_ROWS: u64 = 16 << 10;
-/// So many places where rows cannot be read are gone around.
+/// The maximum number of unreadable gaps that are skipped.
 const MOST_GAPS: u64 = 1000;
 
 /// A run of rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rows {
-    /// The number of the first row.
+    /// The id of the first row.
     first: i64,
-    /// The number of the last row.
+    /// The id of the last row.
     last: i64,
-    /// How many there are.
+    /// The number of rows.
     count: u64,
-    /// The bytes of their messages.
+    /// The size of their messages, bytes.
     pub(crate) size: u64,
 }
 
-/// What is known of a row without its message.
+/// A row without its message.
 struct Place {
     number: i64,
     time: u64,
@@ -42,7 +42,7 @@ impl Place {
     }
 }
 
-/// Walks over all rows, and puts the runs of them into the layout as blocks.
+/// Scans all rows, and adds runs of them to the layout as blocks.
 pub(super) fn survey(connection: &Connection, layout: &mut Layout) -> rusqlite::Result<()> {
     // The length of a message is known without reading it.
     let query = "SELECT rowid, timestamp, length(data) FROM messages WHERE rowid >= ?1 ORDER BY rowid";
@@ -59,7 +59,7 @@ pub(super) fn survey(connection: &Connection, layout: &mut Layout) -> rusqlite::
         match (ended, next) {
             (Ok(()), _) | (_, None) => break,
             (Err(_), Some(lost_from)) => {
-                // A run that is read is one without a gap.
+                // A run is read without gaps.
                 runs.end();
                 gaps += 1;
                 let found = (gaps <= MOST_GAPS).then(|| behind(&mut statement, lost_from.max(0))).flatten();
@@ -83,9 +83,9 @@ fn walk(statement: &mut Statement<'_>, from: i64, mut take: impl FnMut(Place)) -
     Ok(())
 }
 
-/// A number behind `lost` from which on a row can be read; none if no other can be.
+/// The next id after `lost` at which a row can be read; `None` if there is none.
 fn behind(statement: &mut Statement<'_>, lost: i64) -> Option<i64> {
-    // Whether there is a row that can be read, or an error.
+    // Whether there is a readable row, or an error.
     let mut first_from = |from: i64| -> Result<Option<i64>, ()> {
         let mut rows = statement.query([from]).map_err(|_| ())?;
         let row = rows.next().map_err(|_| ())?;
@@ -110,7 +110,7 @@ fn behind(statement: &mut Statement<'_>, lost: i64) -> Option<i64> {
     Some(good)
 }
 
-/// Makes blocks of rows as they come.
+/// Combines rows to blocks.
 struct Runs<'a> {
     layout: &'a mut Layout,
     run: Option<Block>,
@@ -141,8 +141,8 @@ impl Runs<'_> {
 }
 
 impl Rows {
-    /// The messages of the rows as records of MCAP, and how many of them could not be read.
-    /// The rows `torn`, rising, are not whole; `channels` are the numbers that topics have as channels.
+    /// The messages of the rows as MCAP records, and the number of unreadable ones. The rows `torn`, ascending, are
+    /// incomplete; `channels` are the channel numbers of the topics.
     pub(super) fn contents(
         &self,
         connection: &Connection,
@@ -153,7 +153,7 @@ impl Rows {
             return Err(ChunkFault::TooMuch { size: self.size });
         }
         let mut reading = Reading { torn, channels, records: Vec::new(), read: 0, last: None };
-        // The size is the word of the database only.
+        // The size is claimed by the database, so it is not trusted.
         let _ = reading.records.try_reserve(usize::try_from(self.size.min(2 * RUN_BYTES)).unwrap_or(0));
         if reading.all(connection, self).is_err() {
             reading.one_by_one(connection, self).map_err(|_| ChunkFault::Records)?;
@@ -169,13 +169,13 @@ struct Reading<'a> {
     torn: &'a [i64],
     channels: &'a BTreeMap<i64, u16>,
     records: Vec<u8>,
-    /// How many rows were read, and the last of them.
+    /// The number of rows read, and the id of the last one.
     read: u64,
     last: Option<i64>,
 }
 
 impl Reading<'_> {
-    /// Reads all rows of a run, up to one that cannot be read.
+    /// Reads the rows of a run, up to the first unreadable one.
     fn all(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
         let query =
             "SELECT rowid, timestamp, topic_id, data FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid";
@@ -187,7 +187,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Reads the rows behind the last one, each by itself: one whose message cannot be read is left out.
+    /// Reads the rows after the last one individually; unreadable ones are skipped.
     fn one_by_one(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
         let mut next =
             connection.prepare("SELECT rowid FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid LIMIT 1")?;
@@ -195,7 +195,7 @@ impl Reading<'_> {
         let mut from = self.last.map_or(Some(rows.first), |last| last.checked_add(1));
         while let Some(start) = from.filter(|from| *from <= rows.last) {
             let Ok(number) = next.query_row([start, rows.last], |row| row.get::<_, i64>(0)) else { break };
-            // The row is lost if it cannot be read.
+            // An unreadable row is lost.
             let _ = one.query_row([number], |row| self.take(row));
             from = number.checked_add(1);
         }
@@ -213,9 +213,9 @@ impl Reading<'_> {
             _ => return Ok(()),
         };
         let (ValueRef::Blob(data) | ValueRef::Text(data)) = row.get_ref(3)? else { return Ok(()) };
-        // A number that no channel has, where the database does not describe the topic.
+        // A number without a channel, if the database does not describe the topic.
         let channel = self.channels.get(&topic).copied().unwrap_or(0);
-        // Numbers count from 1; those that do not fit begin anew.
+        // Sequence numbers count from 1 and wrap around.
         push_message(&mut self.records, channel, number as u32, time, time, data);
         self.read += 1;
         Ok(())

@@ -1,33 +1,31 @@
-//! What a database says of its topics.
+//! The topics of a database.
 
 use crate::qos;
+use crate::reader::definitions::MOST_CHANNELS;
 use crate::reader::layout::Layout;
 use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
 use rusqlite::{Connection, Row};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The most topics of a log: channels have numbers of 16 bits, and 0 and 65535 stand for none.
-const MOST_TOPICS: usize = 65534;
-/// The name under which rosbag2 keeps its own description of a bag.
+/// The name under which rosbag2 stores the bag's metadata.
 const DESCRIPTION: (&str, &str) = ("rosbag2", "serialized_metadata");
 
-/// Puts the channels of all topics into the layout. Gives the numbers that they have as channels, from 1, by their numbers in
-/// the database.
+/// Adds the channels of all topics to the layout. Returns their channel numbers, from 1, by topic id.
 ///
 /// # Errors
-/// What is wrong with the database, if it is no bag.
+/// The cause, if the database is not a bag.
 pub(super) fn read_topics(connection: &Connection, layout: &mut Layout) -> Result<BTreeMap<i64, u16>, String> {
-    let told = |error: rusqlite::Error| error.to_string();
-    let tables = tables(connection).map_err(told)?;
+    let text_of = |error: rusqlite::Error| error.to_string();
+    let tables = tables(connection).map_err(text_of)?;
     if let Some(missing) = ["topics", "messages"].iter().find(|table| !tables.contains(**table)) {
-        return Err(format!("it has no table `{missing}`, and is no bag of rosbag2"));
+        return Err(format!("it has no table `{missing}`, so it is not a rosbag2 bag"));
     }
     let definitions = match tables.contains("message_definitions") {
         true => definitions(connection).unwrap_or_default(),
         false => BTreeMap::new(),
     };
-    let columns = columns(connection, "topics").map_err(told)?;
+    let columns = columns(connection, "topics").map_err(text_of)?;
     let optional = |column: &str| if columns.contains(column) { column.to_owned() } else { "''".to_owned() };
     let query = format!(
         "SELECT id, name, type, {}, {}, {} FROM topics ORDER BY id",
@@ -35,15 +33,15 @@ pub(super) fn read_topics(connection: &Connection, layout: &mut Layout) -> Resul
         optional("offered_qos_profiles"),
         optional("type_description_hash")
     );
-    let mut statement = connection.prepare(&query).map_err(told)?;
-    let mut rows = statement.query([]).map_err(told)?;
+    let mut statement = connection.prepare(&query).map_err(text_of)?;
+    let mut rows = statement.query([]).map_err(text_of)?;
     let mut numbers = BTreeMap::new();
-    // Of a damaged table what comes before the damage is taken; messages of other topics are told of.
+    // The topics before the damage are kept; messages of other topics are reported.
     while let Ok(Some(row)) = rows.next() {
         let Ok(topic) = row.get::<_, i64>(0) else { continue };
         let number = numbers.len() + 1;
-        let Some(number) = u16::try_from(number).ok().filter(|_| number <= MOST_TOPICS) else {
-            return Err(format!("it has more than {MOST_TOPICS} topics"));
+        let Some(number) = u16::try_from(number).ok().filter(|_| number <= MOST_CHANNELS) else {
+            return Err(format!("it has more than {MOST_CHANNELS} topics"));
         };
         layout.definitions.insert(number, channel(row, &definitions));
         numbers.insert(topic, number);
@@ -55,7 +53,7 @@ pub(super) fn read_topics(connection: &Connection, layout: &mut Layout) -> Resul
     Ok(numbers)
 }
 
-/// The tables; what a query stands behind is none.
+/// The names of the tables. Views are excluded.
 fn tables(connection: &Connection) -> rusqlite::Result<BTreeSet<String>> {
     let mut statement = connection.prepare("SELECT name FROM sqlite_schema WHERE type = 'table' AND rootpage > 0")?;
     statement.query_map([], |row| row.get(0))?.collect()

@@ -7,7 +7,7 @@ use rusqlite::Connection;
 use std::fs;
 use std::path::PathBuf;
 
-/// The tables as rosbag2 makes them up to Humble.
+/// The tables that rosbag2 creates up to Humble.
 const TABLES: &str = "
     CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
         serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
@@ -15,7 +15,7 @@ const TABLES: &str = "
     CREATE INDEX timestamp_idx ON messages (timestamp ASC);
 ";
 
-/// Writes a bag with two topics and gives its path; `messages` are the topic, the time and the bytes of each.
+/// Writes a bag with two topics and returns its path; `messages` are topic, time and bytes.
 fn bag(folder: &Folder, name: &str, messages: &[(i64, u64, Vec<u8>)]) -> PathBuf {
     let path = folder.path().join(name);
     let mut connection = Connection::open(&path).unwrap();
@@ -130,9 +130,9 @@ fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
         }
     }
     assert!(most > 300, "{most}");
-    // A page in the middle that is lost takes its own messages with it, those that go on in it, and at worst those of all pages
-    // under it.
-    let (mut told, mut all) = (0, 0);
+    // A lost page in the middle loses its messages, those that continue on it, and at worst those of all pages under
+    // it.
+    let (mut reported, mut all) = (0, 0);
     for page in 10..60 {
         let mut bytes = whole.clone();
         bytes[page * 4096..][..4096].fill(0xa5);
@@ -140,13 +140,13 @@ fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
         let right = is_of_bag(&messages);
         assert!(right > 150 && messages.len() - right < 10, "{page}: {right} of {}", messages.len());
         all += right;
-        told += usize::from(!damage.is_empty());
+        reported += usize::from(!damage.is_empty());
     }
-    assert!(told > 10 && all > 50 * 350, "{told} {all}");
+    assert!(reported > 10 && all > 50 * 350, "{reported} {all}");
 }
 
 #[test]
-fn what_is_no_bag_is_told_and_nothing_that_it_brings_along_is_run() {
+fn other_databases_are_reported_and_their_code_is_not_run() {
     let folder = Folder::new();
     let made = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -165,7 +165,7 @@ fn what_is_no_bag_is_told_and_nothing_that_it_brings_along_is_run() {
 }
 
 #[test]
-fn what_a_killed_recorder_has_left_beside_a_database_is_told() {
+fn the_journal_of_a_killed_recorder_is_reported() {
     let folder = Folder::new();
     let path = bag(&folder, "a.db3", &many(3));
     folder.write("a.db3-wal", b"more");
@@ -175,30 +175,30 @@ fn what_a_killed_recorder_has_left_beside_a_database_is_told() {
 }
 
 #[test]
-fn files_and_messages_that_are_packed_are_unpacked() {
+fn compressed_files_and_messages_are_decompressed() {
     let folder = Folder::new();
     let pack = |bytes: &[u8]| zstd::bulk::compress(bytes, 1).unwrap();
     let rows = many(50);
-    let packed: Vec<_> = rows.iter().map(|(topic, time, data)| (*topic, *time, pack(data))).collect();
+    let compressed: Vec<_> = rows.iter().map(|(topic, time, data)| (*topic, *time, pack(data))).collect();
     let expected = read_file(&bag(&folder, "plain.db3", &rows)).unwrap();
-    assert_eq!(read_file(&bag(&folder, "messages.db3", &packed)).unwrap(), expected);
+    assert_eq!(read_file(&bag(&folder, "messages.db3", &compressed)).unwrap(), expected);
     let whole = pack(&fs::read(folder.path().join("plain.db3")).unwrap());
     let path = folder.write("plain.db3.zstd", &whole);
     assert_eq!(read_file(&path).unwrap(), expected);
-    assert_eq!(LogFile::open(&path).unwrap().container(), "SQLite, packed with zstd");
+    assert_eq!(LogFile::open(&path).unwrap().container(), "SQLite, compressed with zstd");
     let cut = folder.write("cut.db3.zstd", &whole[..whole.len() / 2]);
     match read_file(&cut) {
-        Ok((_, damage)) => assert!(damage.contains(&Damage::CutPack)),
+        Ok((_, damage)) => assert!(damage.contains(&Damage::TruncatedCompressedFile)),
         Err(error) => assert!(matches!(error, ReadError::Database { .. } | ReadError::Empty { .. }), "{error}"),
     }
-    // A message that begins as a packed one and is none stays as it is.
-    let odd = [crate::reader::packed::ZSTD_MAGIC, b"odd"].concat();
+    // A message that only starts like a compressed one is unchanged.
+    let odd = [crate::reader::compressed::ZSTD_MAGIC, b"odd"].concat();
     let (messages, _) = read_file(&bag(&folder, "odd.db3", &[(7, 1, odd.clone())])).unwrap();
     assert_eq!(messages[0].2, odd);
 }
 
 #[test]
-fn a_folder_is_read_by_its_description_or_without_one() {
+fn a_folder_is_read_with_or_without_metadata() {
     let folder = Folder::new();
     let inner = folder.path().join("bag");
     fs::create_dir(&inner).unwrap();
@@ -218,9 +218,9 @@ fn a_folder_is_read_by_its_description_or_without_one() {
     describe("bag_1.db3");
     assert_eq!(times(), [4]);
     describe("bag/bag_0.db3");
-    assert_eq!(times(), [5], "Foxy and older name files from outside");
-    let packed = zstd::bulk::compress(&fs::read(inner.join("bag_0.db3")).unwrap(), 1).unwrap();
-    fs::write(inner.join("bag_0.db3.zstd"), packed).unwrap();
+    assert_eq!(times(), [5], "names up to Foxy include the bag's folder");
+    let compressed = zstd::bulk::compress(&fs::read(inner.join("bag_0.db3")).unwrap(), 1).unwrap();
+    fs::write(inner.join("bag_0.db3.zstd"), compressed).unwrap();
     fs::remove_file(inner.join("bag_0.db3")).unwrap();
     describe("bag_0.db3, bag_1.db3");
     assert_eq!(times(), [4, 5]);

@@ -1,28 +1,28 @@
-//! Messages of a database that is cut of which a part lies behind the cut. SQLite reads what is missing as zeros.
+//! Incomplete messages of a truncated database, whose missing parts SQLite reads as zeros.
 //!
-//! The table is walked over page by page (SQLite, "Database File Format", sections 1.6 and 1.7): a row that does not fit into its
-//! page goes on in a chain of overflow pages, of which all must be there.
+//! The table is scanned page by page (SQLite, "Database File Format", sections 1.6 and 1.7): a row that does not fit
+//! into its page continues in a chain of overflow pages, which must all be present.
 
 use crate::reader::bytes::FileBytes;
 
-/// What the pages of a table begin with.
+/// The page types of a table.
 const INTERIOR: u8 = 0x05;
 const LEAF: u8 = 0x0d;
-/// The header of the database, in its first page.
+/// The length of the database header, in the first page.
 const FILE_HEADER: usize = 100;
 
 /// The pages of a database.
 pub(super) struct Pages<'a> {
     file: &'a FileBytes,
     size: usize,
-    /// The bytes of a page that are used.
+    /// The usable bytes of a page.
     usable: usize,
-    /// How many of them are there as a whole.
+    /// The number of complete pages.
     whole: usize,
 }
 
 impl<'a> Pages<'a> {
-    /// None if the header makes no sense.
+    /// Opens the pages of a file; `None` if its header is invalid.
     pub(super) fn new(file: &'a FileBytes) -> Option<Self> {
         let header = file.read(0..FILE_HEADER)?;
         let size = match u16::from_be_bytes(header.get(16..18)?.try_into().ok()?) {
@@ -33,11 +33,11 @@ impl<'a> Pages<'a> {
         (size.is_power_of_two() && usable >= 480).then(|| Self { file, size, usable, whole: file.len() / size })
     }
 
-    /// The numbers of the rows of a table that are not whole, rising. `root` is the table's first page.
+    /// The ids of incomplete rows of a table, ascending. `root` is the table's first page.
     pub(super) fn torn_rows(&self, root: usize) -> Vec<i64> {
         let mut torn = Vec::new();
         let mut pending = vec![root];
-        // Pages that lead to each other in a circle are not looked into forever.
+        // Pages may point to each other in a cycle.
         let mut left = self.whole + 1;
         while let Some(number) = pending.pop() {
             let Some(page) = self.page(number) else { continue };
@@ -49,7 +49,7 @@ impl<'a> Pages<'a> {
         torn
     }
 
-    /// Looks into a page of a table, as far as it makes sense.
+    /// Scans a page of a table, as far as it is valid.
     fn look_into(&self, page: &[u8], start: usize, pending: &mut Vec<usize>, torn: &mut Vec<i64>) -> Option<()> {
         let cells = usize::from(u16::from_be_bytes(page.get(start + 3..start + 5)?.try_into().ok()?));
         let kind = *page.get(start)?;
@@ -72,7 +72,7 @@ impl<'a> Pages<'a> {
         Some(())
     }
 
-    /// The number of the row in a cell, if it is torn.
+    /// The id of the row in a cell, if it is incomplete.
     fn torn_row(&self, page: &[u8], cell: usize) -> Option<i64> {
         let (length, used) = varint(page.get(cell..)?)?;
         let (row, more) = varint(page.get(cell + used..)?)?;
@@ -94,7 +94,7 @@ impl<'a> Pages<'a> {
         None
     }
 
-    /// A page, as far as it is there.
+    /// A page, or the existing part of it.
     fn page(&self, number: usize) -> Option<Vec<u8>> {
         let start = number.checked_sub(1)?.checked_mul(self.size)?;
         self.file.read(start..start.checked_add(self.size)?.min(self.file.len()))
@@ -105,7 +105,7 @@ fn number_at(page: &[u8], at: usize) -> Option<usize> {
     usize::try_from(u32::from_be_bytes(page.get(at..at + 4)?.try_into().ok()?)).ok()
 }
 
-/// A number of 1 to 9 bytes, of which all but the ninth tell by their first bit whether another follows; and how many they are.
+/// A varint of 1 to 9 bytes, of which all but the ninth have a continuation bit; and its length.
 fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
     let mut number = 0_u64;
     for (at, &byte) in bytes.iter().take(9).enumerate() {

@@ -1,12 +1,12 @@
-//! The feature matrix of the conformance tests of the MCAP format: every combination of what a writer may do or leave out,
-//! on six small inputs, is read with the right contents.
+//! The feature matrix of the MCAP conformance tests: every combination of optional features of a writer, on six small
+//! inputs, is read with the right contents.
 
 use super::*;
 use crate::reader::record::HEAD;
 use mcap::records::op;
 use std::collections::BTreeSet;
 
-/// What a writer may do or leave out, named as in the matrix.
+/// An optional feature of a writer, named as in the matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Feature {
     UseChunks,
@@ -36,12 +36,12 @@ const FEATURES: [Feature; 10] = [
     AddExtraDataToRecords,
 ];
 
-/// What a file is to hold.
+/// The contents of a file.
 #[derive(Clone, Debug, Default)]
 struct Input {
     schema: bool,
     channel: bool,
-    /// The log times. An only message has sequence number 10 and was published at 1; several count from 0.
+    /// The log times. A single message has sequence number 10 and was published at 1; several are numbered from 0.
     messages: &'static [u64],
     attachment: bool,
     metadata: bool,
@@ -59,7 +59,7 @@ fn inputs() -> [Input; 6] {
     ]
 }
 
-/// All sets of features that make sense for an input.
+/// All sets of features that are valid for an input.
 fn variants(input: &Input) -> Vec<BTreeSet<Feature>> {
     let all = (0..1 << FEATURES.len()).map(|bits: u32| {
         let chosen = FEATURES.iter().enumerate().filter(|(place, _)| bits >> place & 1 == 1);
@@ -86,7 +86,7 @@ fn variants(input: &Input) -> Vec<BTreeSet<Feature>> {
     all.filter(makes_sense).collect()
 }
 
-/// Fields of a record, one behind the other.
+/// The fields of a record.
 #[derive(Clone, Default)]
 struct Body(Vec<u8>);
 
@@ -115,21 +115,21 @@ impl Body {
         self.block(text.as_bytes())
     }
 
-    /// Bytes with their length before them.
+    /// Bytes with their length in front.
     fn block(self, bytes: &[u8]) -> Self {
         self.u32(bytes.len()).bytes(bytes)
     }
 }
 
-/// A file while it is written.
+/// A file being written.
 struct File {
     bytes: Vec<u8>,
-    /// Whether records that may be are made longer than their fields.
+    /// Whether records are padded where that is allowed.
     padded: bool,
 }
 
 impl File {
-    /// Adds a record that may be padded, and gives where it begins and its length.
+    /// Adds a record that may be padded, and returns its position and length.
     fn record(&mut self, opcode: u8, mut body: Body) -> (u64, u64) {
         if self.padded {
             body.0.extend([0x01, 0xff, 0xff]);
@@ -137,7 +137,7 @@ impl File {
         self.exact(opcode, &body)
     }
 
-    /// Adds a record as it is.
+    /// Adds a record without padding.
     fn exact(&mut self, opcode: u8, body: &Body) -> (u64, u64) {
         let start = self.bytes.len() as u64;
         self.bytes.push(opcode);
@@ -146,7 +146,7 @@ impl File {
         (start, (HEAD + body.0.len()) as u64)
     }
 
-    /// Adds a group of the summary, and notes where it lies if it holds anything.
+    /// Adds a group of the summary, and stores its location unless it is empty.
     fn group(&mut self, groups: &mut Vec<(u8, u64, u64)>, opcode: u8, records: impl IntoIterator<Item = Body>) {
         let start = self.bytes.len() as u64;
         for body in records {
@@ -250,7 +250,7 @@ fn file(input: &Input, features: &BTreeSet<Feature>) -> Vec<u8> {
         }
     }
     let footer = Body::default().u64(if has_summary { summary_start } else { 0 }).u64(offsets);
-    // The checksum covers the summary and the footer up to itself, its head included.
+    // The checksum covers the summary and the footer up to the checksum field, including the footer's header.
     let mut covered = file.bytes[summary_start as usize..].to_vec();
     covered.push(op::FOOTER);
     covered.extend(20u64.to_le_bytes());

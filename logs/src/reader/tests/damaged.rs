@@ -1,13 +1,13 @@
-//! Damaged files are read as far as they can be.
+//! Damaged files are read as far as possible.
 
 use super::*;
 use std::collections::BTreeSet;
 
-fn open_bytes(folder: &Folder, bytes: &[u8]) -> Result<(Vec<Seen>, Vec<Damage>), ReadError> {
+fn open_bytes(folder: &Folder, bytes: &[u8]) -> Result<(Vec<ReadMessage>, Vec<Damage>), ReadError> {
     open(&[folder.write("damaged.mcap", bytes)]).map(read_all)
 }
 
-fn read_damaged(bytes: &[u8]) -> (Vec<Seen>, Vec<Damage>) {
+fn read_damaged(bytes: &[u8]) -> (Vec<ReadMessage>, Vec<Damage>) {
     open_bytes(&Folder::new(), bytes).unwrap()
 }
 
@@ -17,7 +17,7 @@ fn summary_of(bytes: &[u8]) -> summary::SummarySection {
 }
 
 #[test]
-fn a_file_cut_anywhere_gives_its_first_messages_and_says_so() {
+fn a_file_truncated_anywhere_gives_its_first_messages_and_is_reported() {
     let folder = Folder::new();
     for options in layouts() {
         let whole = three_chunks(options);
@@ -46,7 +46,8 @@ fn no_flipped_byte_makes_the_reader_panic_or_invent_contents() {
                 let mut bytes = whole.clone();
                 bytes[place] ^= flip;
                 let Ok((seen, _)) = open_bytes(&folder, &bytes) else { continue };
-                // Only chunks have a checksum; one that is flipped to zero checks nothing, but then the data is whole.
+                // Only chunks have a checksum; a checksum flipped to zero disables the check, but then the data is
+                // intact.
                 if layout > 0 {
                     assert!(seen.len() <= 12 && seen.iter().all(|seen| all.contains(&seen.3)), "byte {place}");
                 }
@@ -106,7 +107,8 @@ fn lengths_in_chunks_that_nothing_can_have_lose_these_chunks_only() {
         let whole = three_chunks(options.clone());
         let summary = summary_of(&whole);
         let [_, second, third] = summary.chunk_starts[..] else { panic!() };
-        // Behind the record's head: two times, the size of the contents, their checksum, the compression, their length.
+        // After the record's header: two times, the size of the contents, their checksum, the compression, their
+        // length.
         let size = |chunk: usize| chunk + record::HEAD + 16;
         let name = |chunk: usize| size(chunk) + 12;
         let compression = |chunk: usize| u32::from_le_bytes(whole[name(chunk)..][..4].try_into().unwrap()) as usize;
@@ -127,7 +129,7 @@ fn lengths_in_chunks_that_nothing_can_have_lose_these_chunks_only() {
 }
 
 #[test]
-fn a_chunk_that_is_packed_tighter_than_usual_is_read_whole() {
+fn a_chunk_with_an_unusual_compression_ratio_is_read_whole() {
     for options in layouts() {
         let mut log = TestLog::new(options);
         log.raw("/a", "p/msg/A", 1, &vec![0; 3_000_000]);
@@ -189,10 +191,10 @@ fn an_index_with_a_wrong_checksum_is_not_used() {
 }
 
 #[test]
-fn a_file_that_is_cut_while_it_is_read_says_so_at_whatever_place() {
+fn a_file_truncated_anywhere_while_it_is_read_is_reported() {
     for options in layouts() {
         let mut log = TestLog::new(options);
-        // More blocks than are read ahead.
+        // More blocks than are prefetched.
         for time in 0..40 {
             log.raw("/a", "p/msg/A", time, &noise(time, 1 << 20)).flush();
         }
@@ -213,7 +215,7 @@ fn a_file_that_is_cut_while_it_is_read_says_so_at_whatever_place() {
 }
 
 #[test]
-fn nothing_comes_from_behind_the_place_where_a_file_was_changed() {
+fn nothing_is_read_after_the_position_where_a_file_was_modified() {
     let [cut, whole] = ["/a", "/b"].map(|topic| {
         let mut log = TestLog::new(layouts()[0].clone());
         for time in 0..40 {
@@ -239,7 +241,7 @@ fn nothing_comes_from_behind_the_place_where_a_file_was_changed() {
     assert!(reader.take_damage().is_empty());
 }
 
-/// Bytes that nothing packs.
+/// Incompressible bytes.
 fn noise(seed: u64, count: usize) -> Vec<u8> {
     let next =
         |state: &u64| Some(state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));

@@ -1,4 +1,4 @@
-//! What cannot be read at all is refused with the reason and a cure.
+//! Files that cannot be read at all give an error with the reason and a fix.
 
 use super::*;
 
@@ -10,23 +10,23 @@ fn error(path: PathBuf) -> ReadError {
 }
 
 #[test]
-fn missing_and_empty_files_are_told_apart() {
+fn missing_and_empty_files_have_different_errors() {
     let folder = Folder::new();
     assert!(matches!(error(folder.path().join("none.mcap")), ReadError::Missing { .. }));
     assert!(matches!(error(folder.write("empty.mcap", b"")), ReadError::Empty { .. }));
     assert!(matches!(open(&[]), Err(ReadError::NothingGiven)));
-    assert!(matches!(error(folder.path()), ReadError::Empty { .. }), "a folder stands for the logs in it");
+    assert!(matches!(error(folder.path()), ReadError::Empty { .. }), "a folder is read as the logs in it");
     let bare = Folder::new();
     assert!(matches!(error(bare.path()), ReadError::NotABag { .. }));
 }
 
 #[test]
-fn another_kind_of_file_is_named_with_a_cure() {
+fn another_file_type_is_reported_with_a_fix() {
     let folder = Folder::new();
     let text = error(folder.write("a.bag", b"#ROSBAG V1.2\n\x45\0\0\0op=\x03")).to_string();
     assert!(text.contains("a.bag") && text.contains("ROS 1 bag"), "{text}");
     let text = error(folder.write("a.db3", b"SQLite format 3\0")).to_string();
-    assert!(text.contains("the database cannot be read"), "{text}");
+    assert!(text.contains("cannot read the database"), "{text}");
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn a_log_cut_before_its_first_message_is_an_error() {
 }
 
 #[test]
-fn a_log_without_messages_is_no_error() {
+fn a_log_without_messages_is_valid() {
     let folder = Folder::new();
     for options in layouts() {
         let (seen, damage) = read_all(open(&[folder.write("a.mcap", &TestLog::new(options).finish())]).unwrap());
@@ -73,7 +73,7 @@ fn a_bag_folder_is_read_in_the_order_of_its_description() {
     for outside in ["../bag_0.mcap", "/etc/passwd", "bag/../../bag_0.mcap"] {
         let text = format!("rosbag2_bagfile_information: {{relative_file_paths: [{outside}]}}");
         std::fs::write(&description, text).unwrap();
-        assert!(error(folder.path()).to_string().contains("leads out of the bag"), "{outside}");
+        assert!(error(folder.path()).to_string().contains("is outside of the bag"), "{outside}");
     }
     std::fs::write(&description, "hello: [").unwrap();
     assert!(matches!(error(folder.path()), ReadError::BagDescription { .. }));

@@ -9,11 +9,11 @@ use super::*;
 use crate::test_log::{Folder, TestLog, layouts};
 use std::path::Path;
 
-/// A message as the reader gave it: file, channel's topic, log time and bytes.
-type Seen = (usize, String, u64, Vec<u8>);
+/// A message from the reader: file, topic, log time and bytes.
+type ReadMessage = (usize, String, u64, Vec<u8>);
 
-/// All messages, and all damage that was told.
-fn read_all(mut reader: LogReader) -> (Vec<Seen>, Vec<Damage>) {
+/// All messages, and all reported damage.
+fn read_all(mut reader: LogReader) -> (Vec<ReadMessage>, Vec<Damage>) {
     let files = reader.files().clone();
     let mut damage: Vec<_> = files.iter().flat_map(|file| file.damage().to_vec()).collect();
     let mut seen = Vec::new();
@@ -25,11 +25,11 @@ fn read_all(mut reader: LogReader) -> (Vec<Seen>, Vec<Damage>) {
     (seen, damage)
 }
 
-/// A message as the reader gave it of one file: channel's topic, log time and bytes.
-type SeenInFile = (String, u64, Vec<u8>);
+/// A message from the reader of one file: topic, log time and bytes.
+type MessageInFile = (String, u64, Vec<u8>);
 
-/// All messages of a file, and all damage that was told.
-pub(super) fn read_file(path: &Path) -> Result<(Vec<SeenInFile>, Vec<Damage>), ReadError> {
+/// All messages of a file, and all reported damage.
+pub(super) fn read_file(path: &Path) -> Result<(Vec<MessageInFile>, Vec<Damage>), ReadError> {
     let (seen, damage) = read_all(LogReader::new(vec![LogFile::open(path)?]));
     Ok((seen.into_iter().map(|(_, topic, time, data)| (topic, time, data)).collect(), damage))
 }
@@ -47,6 +47,6 @@ fn three_chunks(options: mcap::WriteOptions) -> Vec<u8> {
     log.finish()
 }
 
-fn times(seen: &[Seen]) -> Vec<u64> {
+fn times(seen: &[ReadMessage]) -> Vec<u64> {
     seen.iter().map(|(_, _, time, _)| *time).collect()
 }

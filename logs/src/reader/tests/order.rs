@@ -1,9 +1,9 @@
-//! Messages come by log time, file and position.
+//! Messages are ordered by log time, file and position.
 
 use super::*;
 use proptest::prelude::*;
 
-/// Where the body of each record with the given opcode begins.
+/// The position of the body of each record with the given opcode.
 fn bodies(file: &[u8], opcode: u8) -> Vec<usize> {
     let mut found = Vec::new();
     let mut position = mcap::MAGIC.len();
@@ -54,7 +54,7 @@ proptest! {
             })
             .collect();
         expected.sort_unstable();
-        let expected: Vec<Seen> = expected
+        let expected: Vec<ReadMessage> = expected
             .into_iter()
             .map(|(time, file, place, topic)| {
                 (file, format!("/topic{topic}"), time, (place as u32).to_le_bytes().to_vec())
@@ -66,13 +66,13 @@ proptest! {
 }
 
 #[test]
-fn a_chunk_header_that_its_index_contradicts_is_not_believed() {
+fn a_chunk_header_that_contradicts_its_index_is_not_used() {
     let folder = Folder::new();
     for options in &layouts()[1..] {
         let mut file = TestLog::new(options.clone());
         file.raw("/a", "p/msg/A", 5, b"5").raw("/a", "p/msg/A", 9, b"9").flush().raw("/a", "p/msg/A", 1, b"1");
         let mut file = file.finish();
-        // The last chunk says that it begins at time 8.
+        // The header of the last chunk claims that it begins at time 8.
         let chunk = *bodies(&file, mcap::records::op::CHUNK).last().unwrap();
         file[chunk..chunk + 8].copy_from_slice(&8u64.to_le_bytes());
         let (seen, damage) = read_all(open(&[folder.write("a.mcap", &file)]).unwrap());
@@ -82,7 +82,7 @@ fn a_chunk_header_that_its_index_contradicts_is_not_believed() {
 }
 
 #[test]
-fn an_index_that_hides_an_early_message_does_not_make_time_run_backwards() {
+fn an_index_that_hides_an_early_message_keeps_log_times_ascending() {
     let folder = Folder::new();
     let mut file = TestLog::new(layouts()[1].clone());
     file.raw("/a", "p/msg/A", 5, b"5").raw("/a", "p/msg/A", 9, b"9").flush().raw("/a", "p/msg/A", 1, b"1");
@@ -100,7 +100,7 @@ fn an_index_that_hides_an_early_message_does_not_make_time_run_backwards() {
 }
 
 #[test]
-fn the_fields_of_a_message_come_through() {
+fn the_fields_of_a_message_are_read() {
     let folder = Folder::new();
     for options in layouts() {
         let mut log = TestLog::new(options);
@@ -123,7 +123,7 @@ fn the_fields_of_a_message_come_through() {
 }
 
 #[test]
-fn more_chunks_than_are_loaded_ahead_all_come() {
+fn more_chunks_than_are_prefetched_are_all_read() {
     let folder = Folder::new();
     let mut log = TestLog::new(layouts()[3].clone().chunk_size(Some(100_000)));
     for time in 0..400u64 {
@@ -136,7 +136,7 @@ fn more_chunks_than_are_loaded_ahead_all_come() {
 }
 
 #[test]
-fn what_a_message_says_does_not_hang_on_those_that_were_read_before_it() {
+fn messages_do_not_depend_on_those_read_before() {
     let folder = Folder::new();
     let message = |time: u64| -> Vec<u8> {
         // Blocks grow, shrink and overlap.
@@ -156,7 +156,7 @@ fn what_a_message_says_does_not_hang_on_those_that_were_read_before_it() {
 }
 
 #[test]
-fn messages_that_are_compressed_by_themselves_are_unpacked() {
+fn individually_compressed_messages_are_decompressed() {
     let folder = Folder::new();
     for options in layouts() {
         let mut log = TestLog::new(options);

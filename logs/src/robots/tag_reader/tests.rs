@@ -1,4 +1,4 @@
-//! Readings in messages whose definitions are written here, and in those of detectors as they are published.
+//! Tag readings from custom message definitions, and from the published definitions of detectors.
 
 use super::*;
 use gridweave_runtime::message::LogTime;
@@ -46,8 +46,10 @@ fn every_element_of_an_array_is_a_reading() {
         fields.range_unit = Some(0.001);
     }))
     .unwrap();
-    let reading =
-        |id: &str, range, stddev| TagReading { tag_id: id.into(), seen: Seen::Range { range, stddev, rssi: 0.0 } };
+    let reading = |id: &str, range, stddev| TagReading {
+        tag_id: id.into(),
+        measurement: Measurement::Range { range, stddev, rssi: 0.0 },
+    };
     assert_eq!(found.readings, [reading("7", 1.5, 0.02), reading("8", 2.5, 0.03)]);
     assert_eq!((found.stamp, found.frame_id.as_str()), (Time { sec: 3, nanosec: 4 }, "robot1/antenna"));
 }
@@ -60,13 +62,13 @@ fn a_signal_strength_is_a_distance_by_the_model() {
         fields.path_loss = path_loss;
     };
     let found = read(&fields(strength)).unwrap();
-    let Seen::Range { range, stddev, rssi } = found.readings[0].seen else { panic!("{found:?}") };
+    let Measurement::Range { range, stddev, rssi } = found.readings[0].measurement else { panic!("{found:?}") };
     assert!((range - 10.0).abs() < 1e-9 && (stddev - 4.605).abs() < 1e-3 && rssi == -60.0);
     let with_stddev = fields(|fields| {
         strength(fields);
         fields.stddev = Some(0.5);
     });
-    let Seen::Range { stddev, .. } = read(&with_stddev).unwrap().readings[1].seen else { panic!() };
+    let Measurement::Range { stddev, .. } = read(&with_stddev).unwrap().readings[1].measurement else { panic!() };
     assert_eq!(stddev, 0.5);
 }
 
@@ -78,8 +80,10 @@ fn a_bearing_is_read_alone_or_beside_the_range() {
         fields.bearing_stddev_field = Some("deviation".into());
     };
     let found = read(&fields(degrees)).unwrap().readings;
-    let bearing =
-        |id: &str, bearing: f64, stddev| TagReading { tag_id: id.into(), seen: Seen::Bearing { bearing, stddev } };
+    let bearing = |id: &str, bearing: f64, stddev| TagReading {
+        tag_id: id.into(),
+        measurement: Measurement::Bearing { bearing, stddev },
+    };
     assert_eq!(found, [bearing("7", 0.6, 0.2), bearing("8", 0.4, 0.3)]);
     let both = |fields: &mut TagFields| {
         degrees(fields);
@@ -90,7 +94,7 @@ fn a_bearing_is_read_alone_or_beside_the_range() {
     };
     let found = read(&fields(both)).unwrap().readings;
     assert_eq!((found.len(), &found[1]), (4, &bearing("7", 0.6, 0.05)));
-    assert!(matches!(&found[2].seen, Seen::Range { range: 2.5, .. }), "{found:?}");
+    assert!(matches!(&found[2].measurement, Measurement::Range { range: 2.5, .. }), "{found:?}");
 }
 
 #[test]
@@ -101,11 +105,11 @@ fn fields_that_are_not_there_are_named() {
     };
     assert!(range("distance").contains("`distance`") && range("distance").contains("distance_mm"));
     assert!(range("a b").contains("no path"));
-    assert!(read(&fields(|_| ())).unwrap_err().contains("nothing says"));
+    assert!(read(&fields(|_| ())).unwrap_err().contains("is set"));
     let no_array = TagFields { each: Some("header".into()), ..fields(|fields| fields.range_field = Some("x".into())) };
-    assert!(read(&no_array).unwrap_err().contains("`header` is no array"));
+    assert!(read(&no_array).unwrap_err().contains("`header` is not an array"));
     let no_id = TagFields { id_field: "dbm".into(), ..fields(|fields| fields.range_field = Some("dbm".into())) };
-    assert!(read(&no_id).unwrap_err().contains("neither a text nor a whole number"));
+    assert!(read(&no_id).unwrap_err().contains("neither a string nor an integer"));
     let unknown =
         TagReader::new(&channel("p/msg/Unknown", ""), &fields(|fields| fields.range_field = Some("x".into())));
     assert!(unknown.unwrap_err().contains("p/msg/Unknown"));
@@ -115,7 +119,7 @@ fn fields_that_are_not_there_are_named() {
 fn a_sensors_range_is_named_by_its_frame_without_the_robot() {
     let name = "sensor_msgs/msg/Range";
     let range = (Header::new(LogTime(1), "robot1/tag7"), 1u8, 0.1f32, 0.1f32, 5.0f32, 1.25f32);
-    // Up to ROS 2 Humble, whose logs may lack definitions; and since Iron, with the variance behind it.
+    // Humble and older logs may lack definitions; since Iron the type has a variance after the range.
     let before = crate::schemas::schema_text(name).unwrap();
     let since = before.replacen("float32 range\n", "float32 range\nfloat32 variance\n", 1);
     assert_ne!(before, since);
@@ -125,13 +129,13 @@ fn a_sensors_range_is_named_by_its_frame_without_the_robot() {
     for (text, bytes, stddev) in cases {
         let reader = TagReader::new(&channel(name, text), &known_fields(name).unwrap()).unwrap();
         let found = reader.read("robot1", &bytes).unwrap();
-        let seen = Seen::Range { range: 1.25, stddev, rssi: 0.0 };
-        assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), seen }]);
+        let measurement = Measurement::Range { range: 1.25, stddev, rssi: 0.0 };
+        assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), measurement }]);
         assert!(reader.read("robot1", b"cut").is_err());
     }
 }
 
-/// The published text of a message of a detector, and those of what it is made of.
+/// The published definition of a detector message, with those of the types that it uses.
 fn published(text: &str, parts: &[(&str, &str)]) -> String {
     let separator = "=".repeat(80);
     let standard = ["geometry_msgs/PoseWithCovarianceStamped", "std_msgs/Header"].map(|name| {
@@ -142,7 +146,7 @@ fn published(text: &str, parts: &[(&str, &str)]) -> String {
     parts.chain(standard).fold(text.to_owned(), |whole, part| whole + &part)
 }
 
-/// A pose of which the position matters: x, y, z and a quaternion.
+/// A pose whose position is checked: x, y, z and a quaternion.
 const POSE: [f64; 7] = [0.5, -0.25, 2.0, 0.0, 0.0, 0.0, 1.0];
 
 #[test]
@@ -161,7 +165,8 @@ fn tags_of_isaac_ros_are_read_by_its_published_definition() {
     let bytes = encode(&(header.clone(), vec![of_tag(5), of_tag(12)])).unwrap();
     let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
     let found = reader.read("robot1", &bytes).unwrap();
-    let seen = |id: &str| TagReading { tag_id: id.into(), seen: Seen::At(Point3::new(0.5, -0.25, 2.0)) };
+    let seen =
+        |id: &str| TagReading { tag_id: id.into(), measurement: Measurement::Position(Point3::new(0.5, -0.25, 2.0)) };
     assert_eq!(found.readings, [seen("36h11:5"), seen("36h11:12")]);
     assert_eq!((found.stamp, found.frame_id.as_str()), (Time { sec: 3, nanosec: 4 }, "camera"));
 }
@@ -179,12 +184,12 @@ fn tags_of_aruco_opencv_are_read_by_its_published_definition() {
     let header = Header::new(LogTime(1), "camera");
     let bytes = encode(&(header, vec![(7u16, POSE)], vec![("board", POSE)])).unwrap();
     let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
-    let seen = Seen::At(Point3::new(0.5, -0.25, 2.0));
-    assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [TagReading { tag_id: "7".into(), seen }]);
+    let measurement = Measurement::Position(Point3::new(0.5, -0.25, 2.0));
+    assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [TagReading { tag_id: "7".into(), measurement }]);
 }
 
 #[test]
-fn frames_of_tags_are_told_from_others() {
+fn frames_of_tags_are_distinguished_from_other_frames() {
     let of = |frame| tag_of_frame(frame);
     assert_eq!((of("tag36h11:5"), of("robot1/36h11:12")), (Some("tag36h11:5"), Some("36h11:12")));
     for other in ["base_link", "robot1/base_link", "a:b", ":1", "a:", "robot1/", ""] {

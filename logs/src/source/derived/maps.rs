@@ -1,4 +1,4 @@
-//! Whole maps, made of maps and the updates that follow them.
+//! Whole maps, derived from maps and their updates.
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
@@ -7,16 +7,16 @@ use crate::robots::{RobotChannels, Role};
 use gridweave_runtime::ros::{OccupancyGridUpdate, decode};
 use gridweave_runtime::stage::{Output, StageError};
 
-/// Makes whole maps of updates, or none.
+/// Derives whole maps from map updates; `None` if that is off.
 pub(super) struct DerivedMaps(Option<UpdatedMaps>);
 
 impl DerivedMaps {
-    /// Whole maps are made if `updates_maps`.
+    /// Whole maps are derived if `updates_maps`.
     pub(super) fn new(updates_maps: bool) -> Self {
         Self(updates_maps.then(UpdatedMaps::default))
     }
 
-    /// Keeps a map whose updates follow, or applies an update to it. Returns whether the robot's map is due to be sent.
+    /// Stores a map that has updates, or applies an update to it. Returns whether the robot's map is due to be sent.
     pub(super) fn update(
         &mut self,
         route: &Route,
@@ -27,7 +27,7 @@ impl DerivedMaps {
         let Some(maps) = self.0.as_mut().filter(|_| output.map.is_read()) else { return false };
         match route.role {
             Role::Map if roles.updates_map(&route.robot) => {
-                // One that cannot be read is warned of by those who need it.
+                // Consumers of the map warn if it cannot be read.
                 if let Ok(map) = decode(data) {
                     maps.keep(&route.robot, &map);
                 }
@@ -36,16 +36,16 @@ impl DerivedMaps {
             Role::MapUpdate => {
                 let updated = match decode::<OccupancyGridUpdate<'_>>(data) {
                     Ok(update) => maps.update(&route.robot, &update).map_err(|problem| problem.to_string()),
-                    Err(_) => Err("they do not fit their type".to_owned()),
+                    Err(_) => Err("they do not match their type".to_owned()),
                 };
-                let left_out = |why| output.warn(format!("updates on `{}` were left out: {why}", route.channel.topic));
+                let left_out = |why| output.warn(format!("updates on `{}` were ignored: {why}", route.channel.topic));
                 updated.map_err(left_out).is_ok_and(|is_due| is_due)
             }
             _ => false,
         }
     }
 
-    /// Updates a map, and sends it if it is due.
+    /// Applies an update, and sends the map if it is due.
     pub(super) fn send_if_due(
         &mut self,
         route: &Route,
@@ -60,7 +60,7 @@ impl DerivedMaps {
         map.map_or(Ok(()), |map| send_map(&route.robot, map, output))
     }
 
-    /// Sends the maps of which updates have come since they were last sent.
+    /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let maps = self.0.iter_mut().flat_map(UpdatedMaps::take_all);
         maps.into_iter().try_for_each(|(robot, map)| send_map(robot, map, output))

@@ -1,5 +1,5 @@
-//! What no message of a log holds as stages take it: poses from transforms and odometry, scans as seen from the robot's base,
-//! readings of tags from messages of other types, and whole maps from updates.
+//! Messages that stages need and no log contains as such: poses from transforms and odometry, scans in the base frame,
+//! tag readings from messages of other types, and whole maps from updates.
 
 mod maps;
 mod poses;
@@ -17,18 +17,19 @@ use poses::DerivedPoses;
 use scans::DerivedScans;
 use tags::DerivedTags;
 
-/// Derives these from messages as they pass.
+/// Derives messages from those that pass.
 pub(super) struct Derived {
     poses: DerivedPoses,
     scans: DerivedScans,
     tags: DerivedTags,
     maps: DerivedMaps,
-    /// The name of a robot's base in tf, if the pipeline gives it.
+    /// The base frame in tf, if the pipeline sets it.
     base_frame: Option<String>,
 }
 
 impl Derived {
-    /// For channels with these roles. Whole maps are made of updates if `updates_maps`.
+    /// Creates the derivations for channels with these roles. Whole maps are derived from map updates if
+    /// `updates_maps`.
     pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels, updates_maps: bool) -> Self {
         let base_frame = robots.tf.as_ref().map(|tf| tf.base_frame.clone());
         Self {
@@ -40,19 +41,19 @@ impl Derived {
         }
     }
 
-    /// Takes other channels. What is known of frames and maps stays.
+    /// Replaces the roles. Known frames and maps are kept.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         self.poses.set_roles(roles);
         self.tags.set_roles(roles);
     }
 
-    /// Learns how cameras and lidars are mounted before it is known whether there are any.
+    /// Tracks the mounting poses of cameras and lidars before any channel with their data is known.
     pub(super) fn expect_sensors(&mut self) {
         self.tags.expect_sensors(self.base_frame.as_deref());
         self.scans.expect_sensors(self.base_frame.as_deref());
     }
 
-    /// Learns frames, and maps with their updates, from a message before the start.
+    /// Learns frames, maps and map updates from a message before the start.
     pub(super) fn learn(&mut self, route: &Route, roles: &RobotChannels, data: &[u8], output: &Output<RobotMessages>) {
         if route.role == Role::Tf
             && let Ok(transforms) = decode::<TFMessage>(data)
@@ -77,7 +78,7 @@ impl Derived {
         self.maps.send_if_due(route, roles, data, output)
     }
 
-    /// Sends what is derived from a message whose map or update was [learnt](Self::learn) before.
+    /// Sends what is derived from a message whose map or map update was already [learnt](Self::learn).
     pub(super) fn send_of_learnt(
         &mut self,
         route: &mut Route,
@@ -98,7 +99,7 @@ impl Derived {
         }
     }
 
-    /// Sends the maps of which updates have come since they were last sent.
+    /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.maps.send_updated(output)
     }
@@ -122,22 +123,22 @@ impl Derived {
         self.tags.send_of_transforms(route, &message, output)
     }
 
-    /// Whether poses were made from transforms or odometry.
+    /// Whether any pose was derived from transforms or odometry.
     pub(super) fn has_inferred_poses(&self) -> bool {
         self.poses.has_inferred()
     }
 
-    /// Whether odometry was sent along which scans can be matched.
+    /// Whether any odometry for scan matching was sent.
     pub(super) fn has_odometry(&self) -> bool {
         self.poses.has_odometry()
     }
 
-    /// Whether readings of tags were made from other messages.
+    /// Whether any tag reading was derived from other messages.
     pub(super) fn has_made_readings(&self) -> bool {
         self.tags.has_made_readings()
     }
 
-    /// Warns of robots whose poses were expected from transforms, and did not come.
+    /// Warns of robots whose poses were expected from transforms and never came.
     pub(super) fn warn_of_missing_poses(&self, output: &Output<RobotMessages>) {
         self.poses.warn_of_missing(output);
     }

@@ -1,4 +1,4 @@
-//! Poses and odometry of robots, from messages that hold a pose and from transforms.
+//! Poses and odometry of robots, derived from messages that contain a pose and from transforms.
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
@@ -8,17 +8,17 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovaria
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
 
-/// Makes poses with covariance of messages of other types, and of transforms.
+/// Derives poses with covariance from messages of other types and from transforms.
 pub(super) struct DerivedPoses {
-    /// Poses from tf, if the pipeline names the frames.
+    /// Poses from tf, if the pipeline sets `robots.tf`.
     tf: Option<TfPoses>,
-    /// Poses of robots that have no topic for them.
+    /// Poses of robots without a pose topic.
     inferred: InferredPoses,
-    /// Whether poses were made from transforms or odometry.
+    /// Whether any pose was derived from transforms or odometry.
     has_inferred: bool,
-    /// The robots with scans and without maps, whose odometry is sent.
+    /// Robots with scans and without maps, whose odometry is sent.
     scanned: BTreeSet<String>,
-    /// Whether odometry was sent along which scans can be matched.
+    /// Whether any odometry for scan matching was sent.
     has_odometry: bool,
 }
 
@@ -33,13 +33,13 @@ impl DerivedPoses {
         }
     }
 
-    /// Takes other channels; frames that are known stay so.
+    /// Replaces the roles. Known frames are kept.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         self.inferred.set_channels(roles);
         self.scanned = roles.scanned().map(str::to_owned).collect();
     }
 
-    /// Learns the frame of a map whose robot has no topic for poses.
+    /// Learns the map frame of a robot without a pose topic.
     pub(super) fn learn_map_frame(&mut self, route: &Route, data: &[u8]) {
         if route.role == Role::Map
             && self.inferred.asks_for_map(&route.robot)
@@ -49,13 +49,13 @@ impl DerivedPoses {
         }
     }
 
-    /// Learns frames from transforms without sending what follows from them.
+    /// Learns frames from transforms without sending anything.
     pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
         self.poses_of_transforms(route, message);
         self.odometry_of_transforms(route, message);
     }
 
-    /// Sends the poses and the odometry that follow from transforms.
+    /// Sends the poses and the odometry derived from transforms.
     pub(super) fn send_of_transforms(
         &mut self,
         route: &Route,
@@ -106,7 +106,7 @@ impl DerivedPoses {
         }
     }
 
-    /// Sends odometry along which scans can be matched.
+    /// Sends odometry for scan matching.
     pub(super) fn send_odometry(
         &mut self,
         route: &Route,
@@ -121,12 +121,12 @@ impl DerivedPoses {
                 self.has_odometry = true;
                 output.odometry.send_bytes(&route.robot, &pose)
             }
-            // Who asks for the pose warns.
+            // The warning is left to the conversion of the pose.
             Err(NoPose) => Ok(()),
         }
     }
 
-    /// Poses from a message of transforms, and how many of these cannot be used.
+    /// The poses from a message of transforms, and the number of unusable transforms.
     fn poses_of_transforms(&mut self, route: &Route, message: &TFMessage) -> (Vec<(String, PoseStamped)>, usize) {
         let Route { robot, channel, .. } = route;
         match &mut self.tf {
@@ -135,25 +135,25 @@ impl DerivedPoses {
         }
     }
 
-    /// Odometry of robots with scans from a message of transforms.
+    /// The odometry of robots with scans, from a message of transforms.
     fn odometry_of_transforms(&mut self, route: &Route, message: &TFMessage) -> Vec<(String, PoseStamped)> {
         self.inferred.odometry(&route.robot, is_static(&route.channel.topic), message)
     }
 
-    /// Whether poses were made from transforms or odometry.
+    /// Whether any pose was derived from transforms or odometry.
     pub(super) fn has_inferred(&self) -> bool {
         self.has_inferred
     }
 
-    /// Whether odometry was sent along which scans can be matched.
+    /// Whether any odometry for scan matching was sent.
     pub(super) fn has_odometry(&self) -> bool {
         self.has_odometry
     }
 
-    /// Warns of robots whose poses were expected from transforms, and did not come.
+    /// Warns of robots whose poses were expected from transforms and never came.
     pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         for robot in self.tf.iter().flat_map(TfPoses::robots_without_pose) {
-            output.warn(format!("tf does not tie the base of {robot} to its map"));
+            output.warn(format!("tf has no transform from the base of {robot} to its map"));
         }
         self.inferred.missing().into_values().for_each(|missing| output.warn(missing));
     }

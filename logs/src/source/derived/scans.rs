@@ -1,37 +1,37 @@
-//! Scans of robots that have no map, as seen from the base of the robot.
+//! Scans of robots without maps, transformed to the base frame.
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{RobotChannels, Scans, Untied, read_scan};
+use crate::robots::{NoTransform, RobotChannels, Scans, read_scan};
 use crate::tf::is_static;
 use gridweave_runtime::ros::TFMessage;
 use gridweave_runtime::stage::{Output, StageError};
 
-/// Transforms scans to the bases of their robots.
+/// Transforms scans to the base frames of their robots.
 pub(super) struct DerivedScans {
-    /// How lidars are mounted; `None` if no robot has, or will have, scans and no map.
+    /// The mounting poses of lidars; `None` if no robot has, or may get, scans and no map.
     scans: Option<Scans>,
 }
 
 impl DerivedScans {
-    /// For robots whose base is called `base_frame`, or as most are.
+    /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
     pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels) -> Self {
         Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame)) }
     }
 
-    /// Learns how lidars are mounted before it is known whether there are any.
+    /// Tracks the mounting poses of lidars before any channel with scans is known.
     pub(super) fn expect_sensors(&mut self, base_frame: Option<&str>) {
         self.scans.get_or_insert_with(|| Scans::new(base_frame));
     }
 
-    /// Learns how lidars are mounted.
+    /// Learns the mounting poses of lidars.
     pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
         if let Some(scans) = &mut self.scans {
             scans.transforms(&route.robot, is_static(&route.channel.topic), message);
         }
     }
 
-    /// Sends a scan as seen from the base of its robot.
+    /// Sends a scan, transformed to the base frame of its robot.
     pub(super) fn send(
         &mut self,
         route: &mut Route,
@@ -46,11 +46,11 @@ impl DerivedScans {
             return Ok(());
         };
         let frame = scan.header.frame_id.clone();
-        match scans.seen_from_base(&route.robot, scan) {
+        match scans.to_base_frame(&route.robot, scan) {
             Ok(scan) => output.scans.send(&route.robot, &scan),
-            Err(Untied) => {
+            Err(NoTransform) => {
                 output.warn(format!(
-                    "scans on `{topic}` were left out: tf does not tie their frame, `{frame}`, to the base of {}",
+                    "scans on `{topic}` were dropped: tf has no transform from their frame `{frame}` to the base of {}",
                     route.robot
                 ));
                 Ok(())

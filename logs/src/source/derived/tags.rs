@@ -1,65 +1,69 @@
-//! Ranges, bearings and positions of tags, from messages of other types and from transforms.
+//! Ranges, bearings and positions of tags, derived from messages of other types and from transforms.
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{RobotChannels, Seen, TagPositions, Untied};
+use crate::robots::{Measurement, NoTransform, RobotChannels, TagPositions};
 use crate::tf::is_static;
 use gridweave_runtime::ros::{Header, TFMessage, TagPosition, TagRange};
 use gridweave_runtime::stage::{Output, StageError};
 use std::collections::BTreeSet;
 
-/// Makes readings of tags of messages of other types, and of transforms.
+/// Derives tag readings from messages of other types and from transforms.
 pub(super) struct DerivedTags {
-    /// Where cameras and other sensors see tags; `None` if there are no such sensors.
+    /// The positions of tags relative to robots; `None` if no sensor gives positions or bearings.
     positions: Option<TagPositions>,
-    /// Whether readings of tags were made from other messages.
+    /// Whether any tag reading was derived from other messages.
     has_made_readings: bool,
 }
 
 impl DerivedTags {
-    /// For robots whose base is called `base_frame`, or as most are.
+    /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
     pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels) -> Self {
         let positions = roles.sees_tags().then(|| TagPositions::new(base_frame, roles.tags_in_tf().clone()));
         Self { positions, has_made_readings: false }
     }
 
-    /// Takes other channels; frames that are known stay so.
+    /// Replaces the roles. Known frames are kept.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         if let Some(positions) = &mut self.positions {
             positions.set_robots(roles.tags_in_tf().clone());
         }
     }
 
-    /// Learns how cameras are mounted before it is known whether there are any.
+    /// Tracks the mounting poses of cameras before any channel with their detections is known.
     pub(super) fn expect_sensors(&mut self, base_frame: Option<&str>) {
         self.positions.get_or_insert_with(|| TagPositions::new(base_frame, BTreeSet::new()));
     }
 
-    /// Learns frames from transforms without sending what follows from them.
+    /// Learns frames from transforms without sending anything.
     pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
-        self.seen_in_transforms(route, message);
+        self.positions_of_transforms(route, message);
     }
 
-    /// Sends the positions of tags that follow from transforms.
+    /// Sends the tag positions derived from transforms.
     pub(super) fn send_of_transforms(
         &mut self,
         route: &Route,
         message: &TFMessage,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        for (robot, position) in self.seen_in_transforms(route, message) {
+        for (robot, position) in self.positions_of_transforms(route, message) {
             self.send_position(&robot, "of an AprilTag", position, output)?;
         }
         Ok(())
     }
 
-    /// Positions of tags from a message of transforms.
-    fn seen_in_transforms(&mut self, route: &Route, message: &TFMessage) -> Vec<(String, Result<TagPosition, Untied>)> {
+    /// The tag positions in a message of transforms.
+    fn positions_of_transforms(
+        &mut self,
+        route: &Route,
+        message: &TFMessage,
+    ) -> Vec<(String, Result<TagPosition, NoTransform>)> {
         let Some(positions) = &mut self.positions else { return Vec::new() };
         positions.transforms(&route.robot, is_static(&route.channel.topic), message)
     }
 
-    /// Sends the readings of tags that a message of another type holds.
+    /// Sends the tag readings in a message of another type.
     pub(super) fn send_readings(
         &mut self,
         route: &Route,
@@ -71,19 +75,19 @@ impl DerivedTags {
         let message = match reader.read(robot, data) {
             Ok(message) => message,
             Err(why) => {
-                output.warn(format!("readings of tags {topic} were left out: {why}"));
+                output.warn(format!("tag readings {topic} were dropped: {why}"));
                 return Ok(());
             }
         };
         for reading in message.readings {
-            match reading.seen {
-                Seen::Range { range, stddev, rssi } => {
+            match reading.measurement {
+                Measurement::Range { range, stddev, rssi } => {
                     self.has_made_readings = true;
                     let header = Header { stamp: message.stamp, frame_id: message.frame_id.clone() };
                     let tag_id = reading.tag_id;
                     output.tags.send(robot, &TagRange { header, tag_id, range, range_stddev: stddev, rssi })?;
                 }
-                Seen::Bearing { bearing, stddev } => {
+                Measurement::Bearing { bearing, stddev } => {
                     let Some(positions) = &self.positions else { continue };
                     let (frame, tag_id) = (&message.frame_id, &reading.tag_id);
                     match positions.bearing(robot, tag_id, message.stamp, frame, (bearing, stddev)) {
@@ -91,12 +95,12 @@ impl DerivedTags {
                             self.has_made_readings = true;
                             output.bearings.send(robot, &bearing)?;
                         }
-                        Err(Untied) => output.warn(format!(
-                            "bearings of tags {topic} were left out: tf does not tie their frame, `{frame}`, to the base of {robot}"
+                        Err(NoTransform) => output.warn(format!(
+                            "tag bearings {topic} were dropped: tf has no transform from their frame `{frame}` to the base of {robot}"
                         )),
                     }
                 }
-                Seen::At(point) => {
+                Measurement::Position(point) => {
                     let Some(positions) = &self.positions else { continue };
                     let frame = &message.frame_id;
                     let position = positions.position(robot, &reading.tag_id, message.stamp, frame, &point);
@@ -111,7 +115,7 @@ impl DerivedTags {
         &mut self,
         robot: &str,
         whose: &str,
-        position: Result<TagPosition, Untied>,
+        position: Result<TagPosition, NoTransform>,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         match position {
@@ -119,16 +123,16 @@ impl DerivedTags {
                 self.has_made_readings = true;
                 output.positions.send(robot, &position)
             }
-            Err(Untied) => {
+            Err(NoTransform) => {
                 output.warn(format!(
-                    "positions {whose} that {robot} sees were left out: tf does not tie its camera to the robot's base"
+                    "positions {whose} seen by {robot} were dropped: tf has no transform from its camera to the robot's base"
                 ));
                 Ok(())
             }
         }
     }
 
-    /// Whether readings of tags were made from other messages.
+    /// Whether any tag reading was derived from other messages.
     pub(super) fn has_made_readings(&self) -> bool {
         self.has_made_readings
     }

@@ -1,29 +1,29 @@
-//! Whole maps out of maps and the updates that come after them.
+//! Whole maps, assembled from maps and their updates.
 
 use gridweave_runtime::ros::{GridPrefix, OccupancyGrid, OccupancyGridUpdate};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// The last maps of the robots whose maps are updated in parts.
+/// The latest maps of the robots whose maps are updated in parts.
 ///
-/// An updated map is due once the updates since it was last sent have brought as many cells as it has, and at the end. So
-/// what is sent is at most as much as what was read, however often a large map is updated in small parts, and the last state
-/// is never lost.
+/// An updated map is due once the updates since it was last sent contain as many cells as the map, and at the end. So
+/// no more cells are sent than were read, however often a large map is updated in small parts, and the last state is
+/// always sent.
 #[derive(Debug, Default)]
 pub(super) struct UpdatedMaps {
     maps: BTreeMap<String, UpdatedMap>,
 }
 
-/// A map with its updates.
+/// A map with its updates applied.
 #[derive(Debug)]
 pub(super) struct UpdatedMap {
     pub(super) prefix: GridPrefix,
     pub(super) cells: Vec<u8>,
-    /// How many cells updates have brought since the map was last sent.
+    /// The number of cells in the updates since the map was last sent.
     brought: usize,
 }
 
-/// Why an update is left out.
+/// The reason why an update is ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum UpdateProblem {
     BeforeMap,
@@ -35,17 +35,17 @@ pub(super) enum UpdateProblem {
 impl fmt::Display for UpdateProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::BeforeMap => "no whole map came before them",
-            Self::WrongSize => "they do not hold as many cells as they say",
-            Self::OutOfBounds => "they reach beyond the last map",
-            Self::OtherFrame => "they are in another frame than the last map",
+            Self::BeforeMap => "no whole map was received before them",
+            Self::WrongSize => "their number of cells does not match their size",
+            Self::OutOfBounds => "they reach beyond the latest map",
+            Self::OtherFrame => "they are in another frame than the latest map",
         })
     }
 }
 
 impl UpdatedMaps {
-    /// Keeps a whole map, which what was updated before is part of. One that does not hold as many cells as it says is
-    /// none.
+    /// Stores a whole map, which replaces the robot's earlier one and its updates. A map whose number of cells does not
+    /// match its size is ignored.
     pub(super) fn keep(&mut self, robot: &str, map: &OccupancyGrid<'_>) {
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
         if prefix.cell_count() != map.data.len() {
@@ -66,17 +66,17 @@ impl UpdatedMaps {
         }
     }
 
-    /// Puts an update into the robot's last map. Whether the map is due.
+    /// Applies an update to the robot's latest map. Returns whether the map is due.
     ///
     /// # Errors
-    /// The update does not fit; nothing has changed.
+    /// The update does not fit the map; nothing has changed.
     pub(super) fn update(&mut self, robot: &str, update: &OccupancyGridUpdate<'_>) -> Result<bool, UpdateProblem> {
         let map = self.maps.get_mut(robot).ok_or(UpdateProblem::BeforeMap)?;
         map.apply(update)?;
         Ok(map.brought > 0 && map.brought >= map.cells.len())
     }
 
-    /// A robot's map if it has been updated since it was last sent; from here on it counts as sent.
+    /// A robot's map if it was updated since it was last sent; from here on it counts as sent.
     pub(super) fn take(&mut self, robot: &str) -> Option<&UpdatedMap> {
         let map = self.maps.get_mut(robot)?;
         (std::mem::take(&mut map.brought) > 0).then_some(&*map)
@@ -150,7 +150,7 @@ mod tests {
         let rest: Vec<_> = maps.take_all().map(|(robot, map)| (robot.to_owned(), map.cells.clone())).collect();
         let n = 0xff;
         assert_eq!(rest, [("r".to_owned(), vec![n, n, n, n, n, 1, 2, n, n, 3, 4, n])]);
-        assert_eq!(maps.maps["r"].prefix.header, header(2), "it is as old as its last update");
+        assert_eq!(maps.maps["r"].prefix.header, header(2), "it has the stamp of its last update");
         assert_eq!(maps.take_all().count(), 0);
     }
 
@@ -163,7 +163,7 @@ mod tests {
         assert_eq!([(); 6].map(|()| due(&mut maps)), [false, false, true, false, false, true]);
         assert_eq!(maps.take_all().count(), 0);
         assert!(!due(&mut maps));
-        // A whole map takes the place of what was updated, whatever its size.
+        // A whole map replaces the updated one, whatever its size.
         let info = MapMetaData { width: 1, height: 2, ..Default::default() };
         maps.keep("r", &OccupancyGrid { header: header(3), info, data: &[1, 2] });
         assert_eq!(maps.take_all().count(), 0);
@@ -190,10 +190,10 @@ mod tests {
         let elsewhere = OccupancyGridUpdate { header: Header::new(LogTime(1), "odom"), ..update(0, 0, 1, 1, &[0]) };
         assert_eq!(wrong(&mut maps, &elsewhere), UpdateProblem::OtherFrame);
         assert_eq!(maps.update("other", &update(0, 0, 1, 1, &[0])).err(), Some(UpdateProblem::BeforeMap));
-        assert!(!maps.update("r", &update(4, 3, 0, 0, &[])).unwrap(), "an empty one is none");
+        assert!(!maps.update("r", &update(4, 3, 0, 0, &[])).unwrap(), "an empty update does not count");
         assert!(maps.maps["r"].cells.iter().all(|cell| *cell == 0xff));
         assert_eq!(maps.take_all().count(), 0);
-        // A map that is none leaves nothing to update.
+        // After an invalid map there is nothing to update.
         let info = MapMetaData { width: 4, height: 3, ..Default::default() };
         maps.keep("r", &OccupancyGrid { header: header(3), info, data: &[0; 5] });
         assert_eq!(wrong(&mut maps, &update(0, 0, 1, 1, &[0])), UpdateProblem::BeforeMap);

@@ -5,6 +5,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+pub(super) use stage::INTERVAL;
 pub use stage::MapFileSource;
 
 use gridweave_runtime::ros::OccupancyGrid;

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// The interval of log times. Files have no time, and 0 is "no time" in ROS, so the first map is logged one interval
 /// after the epoch. The interval is long enough for each map to be processed before the next.
-const INTERVAL: u64 = 1_000_000_000;
+pub(crate) const INTERVAL: u64 = 1_000_000_000;
 
 /// Reads map files; see the [module](super).
 pub struct MapFileSource {

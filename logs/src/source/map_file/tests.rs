@@ -2,7 +2,7 @@ use super::kind;
 use crate::map_file::{self, GridMap};
 use gridweave_runtime::message::{LogTime, Message, MessageFlags};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
-use gridweave_runtime::stage::{Context, StageHarness, RobotTopics, StageError};
+use gridweave_runtime::stage::{Context, RobotTopics, StageError, StageHarness};
 use nalgebra::{Isometry2, Vector2};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Poses of robots that have no topic for them.
+//! Poses of robots without a pose topic.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn odometry_in(frame: &str, x: f64) -> Odometry {
     Odometry { header: Header::new(LogTime(5), frame), pose, ..Default::default() }
 }
 
-/// The robot, the frame and the x of each pose.
+/// The robot, frame and x coordinate of each pose.
 fn poses(run: &Run) -> Vec<(String, String, f64)> {
     let seen = |message: &Message| {
         let pose: PoseWithCovarianceStamped = message.decode().unwrap();
@@ -33,15 +33,15 @@ fn pose(robot: &str, frame: &str, x: f64) -> (String, String, f64) {
 #[test]
 fn a_robot_without_a_pose_topic_gets_its_poses_from_tf() {
     let (_folder, files) = write(|log| {
-        // Frames with the names of their robots, a map that is called otherwise than most, and static transforms.
+        // Frames with robot names, a map frame with an unusual name, and static transforms.
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &map_in("robot1/slam"))
             .add("/tf_static", TFMessage::NAME, 2, &tf("robot1/base_footprint", "robot1/base_link", 2, 0.5))
             .add("/tf", TFMessage::NAME, 3, &tf("robot1/slam", "robot1/odom", 3, 1.0))
             .add("/tf", TFMessage::NAME, 4, &tf("robot1/odom", "robot1/base_footprint", 4, 2.0))
-            // Frames without them, in a namespace; and no base_link.
+            // Frames without robot names, in a namespace, and no base_link.
             .add("/robot2/map", OccupancyGrid::NAME, 5, &map_in("map"))
             .add("/robot2/tf", TFMessage::NAME, 6, &tf("map", "base_footprint", 6, 7.0))
-            // This one has a topic for its poses, and tf does not matter.
+            // A robot with a pose topic, for which tf is not used.
             .add("/robot3/map", OccupancyGrid::NAME, 7, &map_in("robot3/map"))
             .add("/robot3/pose", PoseStamped::NAME, 8, &PoseStamped { pose: at(9.0), ..Default::default() })
             .add("/tf", TFMessage::NAME, 9, &tf("robot3/map", "robot3/base_link", 9, 1.0));
@@ -73,15 +73,15 @@ fn odometry_gives_poses_if_it_is_in_the_frame_of_the_map_and_nothing_else_does()
     assert_eq!((found.len(), run.on("other").len()), (3, 6));
     let warning = run.warnings.keys().find(|warning| warning.contains("no pose of robot2")).unwrap();
     let parts = [
-        "tf does not tie `robot2/base_link`",
+        "tf has no transform from `robot2/base_link`",
         "`/robot2/odom` is in the frame `robot2/odom`",
-        "not that of the map, `robot2/map`",
+        "not in the map frame `robot2/map`",
     ];
     assert!(parts.iter().all(|part| warning.contains(part)), "{warning}");
 }
 
 #[test]
-fn transforms_before_the_start_tie_the_base_after_it() {
+fn transforms_before_the_start_give_poses_after_it() {
     let (_folder, files) = write(|log| {
         let second = 1_000_000_000;
         log.add("/robot1/map", OccupancyGrid::NAME, second, &map_in("robot1/slam"))

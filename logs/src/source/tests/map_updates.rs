@@ -73,7 +73,9 @@ fn stages_see_whole_maps_with_the_updates_in_them() {
     ];
     assert_eq!(maps(&mut source), expected);
     assert_eq!(sent(&mut source, "other").len(), 6, "updates are passed on");
-    for why in ["no whole map was received before them", "they reach beyond the latest map", "they do not match their type"] {
+    for why in
+        ["no whole map was received before them", "they reach beyond the latest map", "they do not match their type"]
+    {
         let warning = format!("updates on `/robot1/map_updates` were ignored: {why}");
         assert_eq!(source.warnings().get(&warning), Some(&1), "{:?}", source.warnings());
     }

@@ -1,4 +1,4 @@
-//! `topology_file_source`: topological maps that were drawn by hand, a JSON file for each robot.
+//! `topology_file_source`: topological maps in JSON files, one file per robot.
 
 mod file;
 mod stage;
@@ -19,10 +19,10 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TopologyFileSourceParameters {
-    /// The topological maps to read: JSON files, one for each robot, as in `{"nodes": [{"x": 0, "y": 0}, {"x": 4, "y": 0}],
-    /// "paths": [{"start": 0, "end": 1}]}`, in metres. A node may have a `kind` and a `probability`, and a path a `length`, a
-    /// `probability`, and the `points` that it passes through, as in `[[0, 0], [4, 0]]`. A robot is called as its file
-    /// without the ending; files that are called alike are told apart by the folders that they lie in.
+    /// The topological maps to read: JSON files, one per robot, as in `{"nodes": [{"x": 0, "y": 0}, {"x": 4, "y": 0}],
+    /// "paths": [{"start": 0, "end": 1}]}`, in metres. A node may have a `kind` and a `probability`, and a path a
+    /// `length`, a `probability`, and the `points` that it passes through, as in `[[0, 0], [4, 0]]`. A robot is named
+    /// after its file without the extension; files with equal names are distinguished by their folders.
     pub files: Vec<PathBuf>,
 }
 
@@ -32,13 +32,13 @@ impl Parameters for TopologyFileSourceParameters {}
 pub fn kind() -> StageKind {
     StageKind::source(
         "topology_file_source",
-        "Reads topological maps that were drawn by hand (JSON), each as the map of a robot. Files tell no time: the maps \
-         are logged a second after each other, the first a second after the epoch, by the robots' names",
+        "Reads topological maps from JSON files, each as the map of a robot. Files have no time: the maps \
+         are logged one second apart, the first one second after the epoch, in the order of the robots' names",
         TopologyFileSource::new,
     )
 }
 
-/// The topological maps of the files.
+/// The outputs of `topology_file_source`.
 pub struct FileTopologies(Out<TopologicalMap>);
 
 impl Outputs for FileTopologies {

@@ -2,28 +2,26 @@
 
 use super::{FileTopologies, TopologyFileSourceParameters, load};
 use crate::names::robot_names;
+use crate::source::map_file::INTERVAL;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::Header;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
 
-/// Files tell no time; see [`MapFileSource`](crate::source::map_file::MapFileSource).
-const INTERVAL: u64 = 1_000_000_000;
-
 /// Reads topological maps; see the [module](super).
 pub struct TopologyFileSource {
-    /// Robots and files, by the robots' names, so that the order in which files are given changes nothing.
+    /// Robots and files, sorted by robot name, so that the order of the files does not matter.
     maps: Vec<(String, PathBuf)>,
     sent: usize,
 }
 
 impl TopologyFileSource {
-    /// Names the robots. The files are read one after the other, each when it is to be sent.
+    /// Names the robots. Each file is read when its map is sent.
     pub fn new(parameters: TopologyFileSourceParameters, context: &Context) -> Result<Self, StageError> {
         let doing = || format!("read the topological maps of stage `{}`", context.stage);
         if parameters.files.is_empty() {
             let help = "give files = [...], a JSON file for each robot";
-            return Err(StageError::new(doing(), "no file is given").with_help(help));
+            return Err(StageError::new(doing(), "no input file").with_help(help));
         }
         let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
         let mut maps: Vec<(String, PathBuf)> = names.into_iter().zip(parameters.files).collect();

@@ -1,7 +1,7 @@
 use super::{kind, load};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::TopologicalMap;
-use gridweave_runtime::stage::{StageHarness, StageError};
+use gridweave_runtime::stage::{StageError, StageHarness};
 use std::fs;
 use std::path::PathBuf;
 

@@ -164,7 +164,7 @@ fn what_cannot_be_taken_is_told_and_the_rest_goes_on() {
 
     let mut maps = robot.publish(&topic("/robot3/map", OccupancyGrid::NAME), Qos::latched(1));
     maps.send(&[0, 1, 0, 0, 1, 2, 3]);
-    assert!(warned(&mut source, "do not fit their type").contains("/robot3/map"));
+    assert!(warned(&mut source, "do not match their type").contains("/robot3/map"));
     maps.send(&map("", 3));
     assert_eq!(sent(&mut source, "map", 1)[0].robot(), "robot3");
     assert!(source.take_messages("map").is_empty());

@@ -150,7 +150,7 @@ impl Comparison {
             match field_differences(expected, got, tolerance, limit.saturating_sub(self.differences.len())) {
                 Ok(found) => {
                     self.count += found.count;
-                    let fields = found.told.into_iter();
+                    let fields = found.listed.into_iter();
                     let fields = fields.map(|field| difference(Some(&field.path), field.expected, field.got));
                     self.differences.extend(fields);
                 }

@@ -1,4 +1,4 @@
-//! What a log holds.
+//! The content of a log.
 
 use super::*;
 
@@ -74,7 +74,7 @@ fn only_the_topics_that_are_asked_for_are_written() {
 }
 
 #[test]
-fn the_input_cannot_pass_for_a_result() {
+fn input_messages_on_the_topic_of_a_result_are_dropped() {
     let mut run = Run::new("");
     run.announce(0, 1, "/map", GRID);
     run.announce(0, 2, "/robot1/lines/segments", "std_msgs/msg/String");
@@ -87,7 +87,7 @@ fn the_input_cannot_pass_for_a_result() {
     assert_eq!(run.log().topics(), ["/robot1/map", "/map"]);
     let warnings = run.sink.warnings();
     let warnings: Vec<_> = warnings.iter().map(|(text, count)| (text.as_str(), *count)).collect();
-    let text = |topic| format!("the input's messages on {topic} were left out: a result of this run has that topic");
+    let text = |topic| format!("the input's messages on {topic} were dropped: a result of this run has that topic");
     assert_eq!(warnings, [(text("/map").as_str(), 2), (text("/robot1/lines/segments").as_str(), 1)]);
 }
 
@@ -124,7 +124,7 @@ fn the_same_messages_give_the_same_bytes() {
 }
 
 #[test]
-fn a_large_message_has_a_chunk_of_its_own() {
+fn a_large_message_has_a_separate_chunk() {
     let mut run = Run::new("chunk_size = 10000");
     for size in [10, 20, 50_000, 10] {
         run.result(2, "/map", 1, &vec![0; size]).unwrap();
@@ -134,7 +134,7 @@ fn a_large_message_has_a_chunk_of_its_own() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_reported() {
     let check = |text: &str| kind().check_parameters(&text.parse().unwrap());
     assert!(check("chunk_size = 4096").unwrap().is_empty());
     assert_eq!(check("chunk_size = 10").unwrap()[0].field, "chunk_size");
@@ -143,10 +143,10 @@ fn parameters_out_of_range_are_told() {
 }
 
 #[test]
-fn a_message_of_which_nothing_is_known_is_an_error() {
+fn a_message_of_unknown_type_is_an_error() {
     let mut run = Run::new("");
     let error = run.result(0, "/other", 1, b"").unwrap_err().to_string();
-    assert!(error.starts_with("cannot write a message on /other: nothing says what type it has"), "{error}");
+    assert!(error.starts_with("cannot write a message on /other: its type is unknown"), "{error}");
     let error = run.input(0, 3, 1, b"").unwrap_err().to_string();
     assert!(error.contains("its channel, 3, was not announced"), "{error}");
 }
@@ -160,7 +160,7 @@ fn an_empty_run_leaves_an_empty_log() {
 }
 
 #[test]
-fn a_log_says_at_its_beginning_what_writes_it_and_at_its_end_from_what() {
+fn a_log_records_the_run_at_its_beginning_and_the_inputs_at_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("in.mcap");
     fs::write(&input, "abc").unwrap();
@@ -178,7 +178,7 @@ fn a_log_says_at_its_beginning_what_writes_it_and_at_its_end_from_what() {
 }
 
 #[test]
-fn a_run_that_fails_says_what_it_was_and_does_not_wait_for_hashes() {
+fn a_failed_run_records_its_pipeline_and_does_not_wait_for_hashes() {
     let mut run = Run::new("recorded_pipeline = '[pipeline]'\nrecorded_files = ['/dev/null']");
     run.announce(0, 1, "/a", GRID);
     run.input(0, 1, 5, b"x").unwrap();
@@ -188,7 +188,7 @@ fn a_run_that_fails_says_what_it_was_and_does_not_wait_for_hashes() {
 }
 
 #[test]
-fn what_a_log_holds_beside_messages_is_passed_on_and_what_explained_it_is_not_what_explains_this_one() {
+fn metadata_is_passed_on_and_earlier_run_records_are_renamed() {
     let metadata = |name: &str| {
         let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
         let pairs = [text("key"), text("value")].concat();

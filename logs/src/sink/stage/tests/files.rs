@@ -1,9 +1,9 @@
-//! What becomes of the file, and of the one that was there before.
+//! The output file, and an earlier file of its name.
 
 use super::*;
 
 #[test]
-fn a_failed_run_leaves_a_log_that_says_so() {
+fn a_failed_run_leaves_a_log_marked_as_incomplete() {
     let mut run = Run::new("");
     run.result(2, "/map", 1, b"grid").unwrap();
     run.sink.node().abort("stage `lines` failed");
@@ -14,7 +14,7 @@ fn a_failed_run_leaves_a_log_that_says_so() {
 }
 
 #[test]
-fn a_run_that_fails_at_once_leaves_the_log_of_an_earlier_run_alone() {
+fn a_run_that_fails_at_once_keeps_the_log_of_an_earlier_run() {
     let mut run = Run::new("");
     fs::write(run.file(), "earlier").unwrap();
     run.sink.node().abort("no input");
@@ -32,7 +32,7 @@ fn a_sink_that_is_dropped_leaves_a_log_that_is_not_complete() {
 }
 
 #[test]
-fn what_was_closed_can_be_read_while_the_run_goes_on() {
+fn closed_chunks_can_be_read_during_the_run() {
     let mut run = Run::new("chunk_size = 1024");
     for time in 0..100 {
         run.result(2, "/map", time, &[7; 100]).unwrap();
@@ -58,7 +58,7 @@ fn a_program_that_has_the_earlier_file_open_keeps_what_it_reads() {
 }
 
 #[test]
-fn a_sink_that_never_ran_leaves_the_earlier_file_alone() {
+fn a_sink_that_never_ran_keeps_the_earlier_file() {
     let run = Run::new("");
     fs::write(run.file(), "earlier").unwrap();
     let Run { folder, sink, .. } = run;
@@ -67,7 +67,7 @@ fn a_sink_that_never_ran_leaves_the_earlier_file_alone() {
 }
 
 #[test]
-fn bad_paths_are_refused_with_what_would_mend_them() {
+fn bad_paths_are_errors_with_a_fix() {
     let folder = tempfile::tempdir().unwrap();
     let error = |path: &Path| make(path, "").err().unwrap().to_string();
     let at = |name: &str| folder.path().join(name);
@@ -78,14 +78,14 @@ fn bad_paths_are_refused_with_what_would_mend_them() {
     );
     assert!(error(folder.path()).ends_with("is a folder; name a file in it"));
     let missing = at("missing");
-    let expected = format!("there is no folder {}; make it, or name a file elsewhere", missing.display());
+    let expected = format!("there is no folder {}; create it, or name a file elsewhere", missing.display());
     assert_eq!(error(&missing.join("out.mcap")), format!("cannot write the log: {expected}"));
     fs::write(at("file"), "").unwrap();
     assert!(error(&at("file").join("out.mcap")).contains("there is no folder"));
 }
 
 #[test]
-fn of_two_sinks_with_one_file_the_second_is_refused_and_touches_nothing() {
+fn a_second_sink_on_one_file_fails_and_changes_nothing() {
     let mut run = Run::new("");
     let error = make(&run.file(), "").err().unwrap().to_string();
     assert!(error.contains("out.mcap is being written by process"), "{error}");
@@ -95,7 +95,7 @@ fn of_two_sinks_with_one_file_the_second_is_refused_and_touches_nothing() {
 }
 
 #[test]
-fn a_failed_run_does_not_take_the_place_of_an_earlier_log() {
+fn a_failed_run_does_not_replace_an_earlier_log() {
     let mut run = Run::new("");
     fs::write(run.file(), "earlier").unwrap();
     run.result(2, "/map", 1, b"grid").unwrap();

@@ -1,6 +1,6 @@
-//! Loads blocks ahead of their use, in threads of their own, within a bound of memory. Those that are only read are loaded when
-//! they are asked for: the system reads ahead by itself, and memory that was used before is faster than a thread with memory of
-//! its own.
+//! Prefetching: blocks that must be decompressed are loaded ahead of their use, in threads, within a memory limit.
+//! Other blocks are loaded on demand: the operating system reads ahead, and reusing memory is faster than a thread with
+//! fresh memory.
 
 use super::block::{Block, LoadedBlock, Memory};
 use super::damage::ChunkFault;
@@ -9,13 +9,13 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-/// At most so many bytes are decompressed ahead of their use, but at least one block.
-const AHEAD_BYTES: u64 = 32 << 20;
+/// The maximum size of the blocks that are loaded ahead, bytes; one block is always allowed.
+const PREFETCH_BYTES: u64 = 32 << 20;
 
-/// A block that is smaller is loaded in less time than a thread takes to start.
+/// Smaller blocks take less time to load than a thread takes to start.
 const WORTH_A_THREAD: u64 = 64 << 10;
 
-/// The place of a block: the file's index, and the block's in its file. Sorts as the blocks lie.
+/// The index of a file, and of a block in it. Ordered by position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct BlockId {
     pub(crate) file: usize,
@@ -24,22 +24,22 @@ pub(crate) struct BlockId {
 
 pub(crate) type Load = Result<LoadedBlock, ChunkFault>;
 
-/// All blocks of some files by the time they begin, loaded one after the other.
-pub(crate) struct Ahead {
+/// The blocks of some files in the order of their first log times, prefetched.
+pub(crate) struct Prefetcher {
     files: Arc<[LogFile]>,
     order: Vec<BlockId>,
-    /// The next block of `order` to be begun.
+    /// The index in `order` of the next block to start.
     next: usize,
-    begun: VecDeque<Begun>,
-    begun_bytes: u64,
+    started: VecDeque<Started>,
+    started_bytes: u64,
     depth: usize,
-    /// Memory of blocks that have been given out: to touch fresh memory takes longer than to read into it.
+    /// Memory of released blocks: reading into it is faster than into fresh memory.
     spare: Vec<Memory>,
-    /// The files in which messages were compressed each by itself.
-    unpacked: BTreeSet<usize>,
+    /// The files that contain individually compressed messages.
+    decompressed: BTreeSet<usize>,
 }
 
-struct Begun {
+struct Started {
     id: BlockId,
     size: u64,
     load: Loading,
@@ -47,11 +47,11 @@ struct Begun {
 
 enum Loading {
     Thread(JoinHandle<Load>),
-    /// It is loaded when it is asked for.
+    /// Loaded on demand.
     Later,
 }
 
-impl Ahead {
+impl Prefetcher {
     pub(crate) fn new(files: Arc<[LogFile]>) -> Self {
         let mut order: Vec<BlockId> = files
             .iter()
@@ -64,15 +64,15 @@ impl Ahead {
             files,
             order,
             next: 0,
-            begun: VecDeque::new(),
-            begun_bytes: 0,
+            started: VecDeque::new(),
+            started_bytes: 0,
             depth: threads + 1,
             spare: Vec::new(),
-            unpacked: BTreeSet::new(),
+            decompressed: BTreeSet::new(),
         }
     }
 
-    /// Leaves all blocks out but the first and the last `count` of each file, and those in which a channel begins.
+    /// Keeps only the first and the last `count` blocks of each file, and those in which a channel begins.
     pub(crate) fn sample(&mut self, count: usize) {
         let files = Arc::clone(&self.files);
         let is_taken = |id: &BlockId| {
@@ -83,19 +83,19 @@ impl Ahead {
         self.order.retain(is_taken);
     }
 
-    /// The least log time in the block that [`take`](Self::take) gives next.
+    /// The least log time in the block that [`take`](Self::take) returns next.
     pub(crate) fn next_time(&self) -> Option<u64> {
-        let id = self.begun.front().map(|begun| begun.id).or_else(|| self.order.get(self.next).copied())?;
+        let id = self.started.front().map(|started| started.id).or_else(|| self.order.get(self.next).copied())?;
         self.block(id).map(|block| block.first_time)
     }
 
     /// The next block, loaded, and its size.
     pub(crate) fn take(&mut self) -> Option<(BlockId, u64, Load)> {
-        self.begin();
-        let Begun { id, size, load } = self.begun.pop_front()?;
-        self.begun_bytes -= size;
+        self.start_all();
+        let Started { id, size, load } = self.started.pop_front()?;
+        self.started_bytes -= size;
         let load = match load {
-            // A thread that has failed has found something in the block that no reader can handle.
+            // A thread panics only on a block that cannot be read.
             Loading::Thread(thread) => thread.join().unwrap_or(Err(ChunkFault::Records)),
             Loading::Later => {
                 let memory = self.memory_for(size);
@@ -103,23 +103,24 @@ impl Ahead {
                 self.block(id)?.load(&file.storage, &file.layout.definitions, memory)
             }
         };
-        if load.as_ref().is_ok_and(|block| block.is_unpacked) {
-            self.unpacked.insert(id.file);
+        if load.as_ref().is_ok_and(|block| block.is_decompressed) {
+            self.decompressed.insert(id.file);
         }
-        self.begin();
+        self.start_all();
         Some((id, size, load))
     }
 
-    /// Takes the memory of a block that has been given out.
-    pub(crate) fn give_back(&mut self, memory: Memory) {
+    /// Takes back the memory of a block for reuse.
+    pub(crate) fn release(&mut self, memory: Memory) {
         self.spare.push(memory);
         let mut size: u64 = self.spare.iter().map(Memory::size).sum();
-        while self.spare.len() > self.depth || size > AHEAD_BYTES {
+        while self.spare.len() > self.depth || size > PREFETCH_BYTES {
             size -= self.spare.remove(0).size();
         }
     }
 
-    /// Memory for a block of some size. A small block takes none of a large one, which would be missing from the bound.
+    /// Reused memory for a block of `size` bytes. A small block gets none of a large one, since the limit would not
+    /// count the rest.
     fn memory_for(&mut self, size: u64) -> Memory {
         let fits = |memory: &Memory| (size..=size.saturating_mul(2)).contains(&memory.size());
         self.spare.iter().rposition(fits).map(|at| self.spare.remove(at)).unwrap_or_default()
@@ -129,22 +130,22 @@ impl Ahead {
         self.files.get(id.file)?.layout.blocks.get(id.block)
     }
 
-    /// Begins to load as many blocks as may be loaded ahead.
-    fn begin(&mut self) {
-        while self.begun.len() < self.depth
+    /// Starts loading blocks up to the limits.
+    fn start_all(&mut self) {
+        while self.started.len() < self.depth
             && let Some(&id) = self.order.get(self.next)
             && let Some(size) = self.block(id).map(Block::size)
-            && (self.begun.is_empty() || self.begun_bytes.saturating_add(size) <= AHEAD_BYTES)
+            && (self.started.is_empty() || self.started_bytes.saturating_add(size) <= PREFETCH_BYTES)
         {
             self.next += 1;
-            self.begun_bytes += size;
+            self.started_bytes += size;
             let load = self.start(id, size);
-            self.begun.push_back(Begun { id, size, load });
+            self.started.push_back(Started { id, size, load });
         }
     }
 
     fn start(&mut self, id: BlockId, size: u64) -> Loading {
-        let is_work = self.unpacked.contains(&id.file) || self.block(id).is_some_and(Block::is_work);
+        let is_work = self.decompressed.contains(&id.file) || self.block(id).is_some_and(Block::is_work);
         if size < WORTH_A_THREAD || !is_work {
             return Loading::Later;
         }
@@ -153,7 +154,7 @@ impl Ahead {
             let file = &files[id.file];
             file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions, memory)
         };
-        // Without a thread to be had the block is loaded when its turn comes.
+        // If no thread can be started, the block is loaded on demand.
         std::thread::Builder::new().name("log block".into()).spawn(load).map_or(Loading::Later, Loading::Thread)
     }
 }
@@ -164,17 +165,17 @@ mod tests {
 
     #[test]
     fn memory_goes_to_blocks_of_about_its_size_and_little_of_it_is_kept() {
-        let mut ahead = Ahead::new(Vec::new().into());
+        let mut prefetcher = Prefetcher::new(Vec::new().into());
         let memory = |size: u64| Memory::with_room_for(size);
-        ahead.give_back(memory(1 << 20));
-        assert_eq!(ahead.memory_for((1 << 20) + 1).size(), 0);
-        assert_eq!(ahead.memory_for((1 << 19) - 1).size(), 0);
-        assert_eq!(ahead.memory_for(1 << 19).size(), 1 << 20);
-        assert_eq!(ahead.memory_for(1 << 19).size(), 0);
-        for size in [1, AHEAD_BYTES + 1, 3, 4 << 20, 4 << 20, AHEAD_BYTES - 5, 8 << 20].repeat(3) {
-            ahead.give_back(memory(size));
-            assert!(ahead.spare.len() <= ahead.depth);
-            assert!(ahead.spare.iter().map(Memory::size).sum::<u64>() <= AHEAD_BYTES);
+        prefetcher.release(memory(1 << 20));
+        assert_eq!(prefetcher.memory_for((1 << 20) + 1).size(), 0);
+        assert_eq!(prefetcher.memory_for((1 << 19) - 1).size(), 0);
+        assert_eq!(prefetcher.memory_for(1 << 19).size(), 1 << 20);
+        assert_eq!(prefetcher.memory_for(1 << 19).size(), 0);
+        for size in [1, PREFETCH_BYTES + 1, 3, 4 << 20, 4 << 20, PREFETCH_BYTES - 5, 8 << 20].repeat(3) {
+            prefetcher.release(memory(size));
+            assert!(prefetcher.spare.len() <= prefetcher.depth);
+            assert!(prefetcher.spare.iter().map(Memory::size).sum::<u64>() <= PREFETCH_BYTES);
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Logs that look alike are those of different robots.
+//! Inference of robot names: logs with the same topics, none of which contains a robot's name, are from different
+//! robots.
 
 use super::file_names::robot_names;
 use super::{Input, NameError};
@@ -11,42 +12,43 @@ use gridweave_runtime::stage::RobotTopics;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The robot of each input: the one that was said, or the one that it is taken for because it looks like another. And what the
-/// user should know of it.
-pub(super) fn name(
+/// The robot of each input: the one that the user gave, or the name of the file if another log has the same topics.
+/// Also returns a note for the user about names that were inferred.
+pub(super) fn infer_robots(
     inputs: &[Input],
     channels: &[Vec<&Channel>],
     robots: &RobotTopics,
 ) -> Result<(Vec<Option<String>>, Option<String>), NameError> {
     let topics: Vec<BTreeSet<&str>> = channels.iter().map(|channels| robotless_topics(channels, robots)).collect();
-    let is_like_another = |number: usize| {
+    let shares_topics = |number: usize| {
         topics.iter().enumerate().any(|(other, topics_of)| other != number && !topics_of.is_disjoint(&topics[number]))
     };
-    let alike: Vec<usize> = (0..inputs.len().min(topics.len()))
-        .filter(|&number| inputs[number].robot.is_none() && is_like_another(number))
+    let unnamed: Vec<usize> = (0..inputs.len().min(topics.len()))
+        .filter(|&number| inputs[number].robot.is_none() && shares_topics(number))
         .collect();
-    let paths: Vec<PathBuf> = alike.iter().map(|&number| named_path(&inputs[number].path)).collect();
+    let paths: Vec<PathBuf> = unnamed.iter().map(|&number| named_path(&inputs[number].path)).collect();
     let names = robot_names(&paths)?;
     let mut named: Vec<Option<String>> = inputs.iter().map(|input| input.robot.clone()).collect();
-    for (&number, name) in alike.iter().zip(&names) {
+    for (&number, name) in unnamed.iter().zip(&names) {
         named[number] = Some(name.clone());
     }
-    let remark = || {
-        let taken: Vec<String> = alike
+    let note = || {
+        let taken: Vec<String> = unnamed
             .iter()
             .zip(&names)
-            .map(|(&number, name)| format!("{} for {name}", inputs[number].path.display()))
+            .map(|(&number, name)| format!("{} to {name}", inputs[number].path.display()))
             .collect();
         format!(
-            "the logs look alike, and each is taken for a robot's: {}; ROBOT=LOG names them otherwise",
+            "the logs have equal topics without robot names, so each is assigned to a robot: {}; ROBOT=LOG sets other names",
             taken.join(", ")
         )
     };
-    let remark = (!alike.is_empty()).then(remark);
-    Ok((named, remark))
+    let note = (!unnamed.is_empty()).then(note);
+    Ok((named, note))
 }
 
-/// The topics of a log by which robots are told apart, if none of them names a robot: `/map`, `/tf`, `/amcl_pose`.
+/// The topics that show that a log is one robot's, such as `/map`, `/tf` and `/amcl_pose`; empty if any topic contains
+/// a robot's name.
 fn robotless_topics<'a>(channels: &[&'a Channel], robots: &RobotTopics) -> BTreeSet<&'a str> {
     let roles = RobotChannels::new(robots.clone(), channels.iter().copied());
     let names_robot = |channel: &&Channel| {
@@ -56,12 +58,12 @@ fn robotless_topics<'a>(channels: &[&'a Channel], robots: &RobotTopics) -> BTree
     if channels.iter().any(names_robot) {
         return BTreeSet::new();
     }
-    let topics = channels.iter().filter(|channel| tells_of_a_robot(channel)).map(|channel| channel.topic.as_str());
+    let topics = channels.iter().filter(|channel| is_of_a_robot(channel)).map(|channel| channel.topic.as_str());
     topics.collect()
 }
 
-/// Whether a channel has a type that a robot has one of: its map, its pose, its transforms, its scans.
-fn tells_of_a_robot(channel: &Channel) -> bool {
+/// Whether a channel's type is one that a robot has one topic of: map, pose, transforms, scans.
+fn is_of_a_robot(channel: &Channel) -> bool {
     const TYPES: [&str; 6] = [
         OccupancyGrid::NAME,
         Odometry::NAME,
@@ -73,8 +75,8 @@ fn tells_of_a_robot(channel: &Channel) -> bool {
     TYPES.contains(&&*full_type_name(&channel.schema_name)) || tf_topic(channel).is_some()
 }
 
-/// The path that a log is called after: the folder of a bag rather than the description in it, and a file without the ending
-/// that says how it is packed.
+/// The path that a log is named after: the folder of a bag instead of its description, and a compressed file without
+/// the extension of the compression.
 fn named_path(path: &Path) -> PathBuf {
     if path.file_name().is_some_and(|name| name == "metadata.yaml") {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -1,4 +1,4 @@
-//! The last message of each latched topic, for those who subscribe later.
+//! Retained messages: the latest message of each latched topic, for late joiners.
 
 use crate::tf::is_static;
 use foxglove::websocket::{ChannelView, Client, ServerListener};
@@ -7,67 +7,68 @@ use gridweave_runtime::ros::{RosMessage, TFMessage, TransformStamped, decode, en
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What was sent last on the latched channels.
+/// The latest messages of the latched channels.
 ///
-/// It is locked while a message is sent, too: otherwise somebody who subscribes meanwhile could get an older message after a
-/// newer one.
+/// The lock is also held while a message is sent: otherwise a client that subscribes at that time could get an older
+/// message after a newer one.
 #[derive(Clone, Default)]
-pub(super) struct KeptMessages(Arc<Mutex<Vec<Kept>>>);
+pub(super) struct RetainedMessages(Arc<Mutex<Vec<Retained>>>);
 
-/// What was sent last on one channel.
-struct Kept {
+/// The latest message of one channel.
+struct Retained {
     channel: Arc<RawChannel>,
     log_time: u64,
     what: What,
 }
 
 enum What {
-    /// The last message counts.
+    /// The latest message replaces the earlier ones.
     Message(Vec<u8>),
-    /// Each message has some of them: by the frame that they tie.
+    /// Transforms, of which the latest of each child frame is retained.
     Transforms(BTreeMap<String, TransformStamped>),
 }
 
-impl KeptMessages {
-    /// Sends a message to all who have subscribed to its channel, and keeps it if that is latched.
+impl RetainedMessages {
+    /// Sends a message to all subscribers of its channel, and retains it if the channel is latched.
     pub(super) fn send(&self, channel: &Arc<RawChannel>, is_latched: bool, log_time: u64, message: &[u8]) {
-        let mut kept = self.lock();
+        let mut retained = self.lock();
         if is_latched {
-            let place = kept.iter().position(|kept| kept.channel.id() == channel.id()).unwrap_or_else(|| {
-                kept.push(Kept { channel: Arc::clone(channel), log_time, what: What::Message(Vec::new()) });
-                kept.len() - 1
-            });
-            kept[place].keep(log_time, message);
+            let place =
+                retained.iter().position(|retained| retained.channel.id() == channel.id()).unwrap_or_else(|| {
+                    retained.push(Retained { channel: Arc::clone(channel), log_time, what: What::Message(Vec::new()) });
+                    retained.len() - 1
+                });
+            retained[place].keep(log_time, message);
         }
         channel.log_with_meta(message, PartialMetadata::with_log_time(log_time));
     }
 
-    /// Sends what is kept of a channel to one who has just subscribed to it.
+    /// Sends the retained messages of a channel to a client that has just subscribed.
     fn send_to(&self, subscriber: Option<SinkId>, channel: ChannelId) {
-        if let Some(kept) = self.lock().iter().find(|kept| kept.channel.id() == channel) {
-            kept.send_to(subscriber);
+        if let Some(retained) = self.lock().iter().find(|retained| retained.channel.id() == channel) {
+            retained.send_to(subscriber);
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Kept>> {
-        // What is kept is whole between any two of its changes.
+    fn lock(&self) -> MutexGuard<'_, Vec<Retained>> {
+        // The retained messages are consistent between any two changes.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Kept {
+impl Retained {
     fn keep(&mut self, log_time: u64, message: &[u8]) {
         self.log_time = log_time;
         let is_transforms = self.channel.schema().is_some_and(|schema| schema.name == TFMessage::NAME);
         let transforms = (is_transforms && is_static(self.channel.topic())).then(|| decode::<TFMessage>(message).ok());
         match (transforms.flatten(), &mut self.what) {
-            (Some(more), What::Transforms(kept)) => kept.extend(by_frame(more)),
+            (Some(more), What::Transforms(retained)) => retained.extend(by_frame(more)),
             (Some(first), what) => *what = What::Transforms(by_frame(first).collect()),
-            (None, What::Message(kept)) => {
-                kept.clear();
-                kept.extend_from_slice(message);
+            (None, What::Message(retained)) => {
+                retained.clear();
+                retained.extend_from_slice(message);
             }
-            // Transforms that cannot be read tell nobody anything.
+            // Transforms that cannot be read are dropped.
             (None, What::Transforms(_)) => {}
         }
     }
@@ -76,8 +77,8 @@ impl Kept {
         let metadata = PartialMetadata::with_log_time(self.log_time);
         match &self.what {
             What::Message(message) => self.channel.log_with_meta_to_sink(message, metadata, subscriber),
-            What::Transforms(kept) => {
-                if let Ok(message) = encode(&TFMessage { transforms: kept.values().cloned().collect() }) {
+            What::Transforms(retained) => {
+                if let Ok(message) = encode(&TFMessage { transforms: retained.values().cloned().collect() }) {
                     self.channel.log_with_meta_to_sink(&message, metadata, subscriber);
                 }
             }
@@ -89,7 +90,7 @@ fn by_frame(message: TFMessage) -> impl Iterator<Item = (String, TransformStampe
     message.transforms.into_iter().map(|transform| (transform.child_frame_id.clone(), transform))
 }
 
-impl ServerListener for KeptMessages {
+impl ServerListener for RetainedMessages {
     fn on_subscribe(&self, client: Client, channel: ChannelView<'_>) {
         self.send_to(client.sink_id(), channel.id());
     }
