@@ -144,7 +144,7 @@ fn a_field_is_found_by_its_path() {
     assert_eq!(find("tags[0].covariance[3]"), "0.0");
     assert_eq!(find("tags[0].covariance"), "[0.0, 0.0, 0.0, 0.0]");
     assert_eq!(find("tags"), "2 elements");
-    for (path, says) in [
+    for (path, text) in [
         ("tag", "the message has no field `tag`; it has header, robot, tags"),
         ("tags[2].x", "`tags` has 2 elements, and no element 2"),
         ("tags[0].id", "`tags[0]` has no field `id`; it has tag_id"),
@@ -156,7 +156,7 @@ fn a_field_is_found_by_its_path() {
         ("tags[-1]", "not a field path"),
         ("a..b", "not a field path"),
     ] {
-        assert!(find(path).starts_with("error: ") && find(path).contains(says), "{path}: {}", find(path));
+        assert!(find(path).starts_with("error: ") && find(path).contains(text), "{path}: {}", find(path));
     }
 }
 

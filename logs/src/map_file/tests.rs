@@ -52,7 +52,7 @@ fn modes_and_negation_read_shades_as_the_map_server_does() {
 }
 
 #[test]
-fn plain_text_and_other_depths_are_read_alike() {
+fn plain_text_and_other_depths_are_read() {
     let (folder, path) = folder(&yaml(""));
     let read = |name: &str, bytes: &[u8]| {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -137,7 +137,7 @@ fn bmp_and_jpeg_are_read() {
 }
 
 #[test]
-fn a_map_comes_back_with_every_digit_of_its_origin() {
+fn a_saved_map_keeps_every_digit_of_its_origin() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a map: \"two\".yaml");
     let position = Point { x: -8.850000000000001, y: 1.0 / 3.0, z: 0.0 };
@@ -161,7 +161,7 @@ fn cells_between_are_saved_by_the_usual_thresholds() {
 
 proptest! {
     #[test]
-    fn what_is_saved_is_what_is_loaded(
+    fn a_saved_map_is_loaded_unchanged(
         width in 1..20_usize,
         values in prop::collection::vec(prop::sample::select(vec![-1_i8, 0, 100]), 20..200),
         resolution in 0.001_f32..2.0,

@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_stays_as_it_was_typed() {
+    fn a_name_is_not_changed() {
         assert_eq!(
             names(&["ground floor.v2.yaml", "2.yaml", "küche-1.yaml", "a\tb.yaml"]).unwrap(),
             ["ground floor.v2", "2", "küche-1", "a_b"]
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_given_twice_is_an_error_under_whatever_name() {
+    fn a_file_given_twice_is_an_error_through_any_path() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.yaml");
         std::fs::write(&file, "").unwrap();

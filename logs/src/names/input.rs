@@ -34,7 +34,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_stands_before_its_path() {
+    fn a_robot_and_its_path_are_separated() {
         assert_eq!(input("robot1=bags/a"), (Some("robot1".into()), "bags/a".into()));
         assert_eq!(input("robot1=a=b.mcap"), (Some("robot1".into()), "a=b.mcap".into()));
         for path in ["bags/a", "bags/x=1/a.mcap", "=a", "robot1="] {

@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn what_renames_nothing_is_an_error_that_says_why() {
+    fn an_invalid_rename_is_an_error_with_the_reason() {
         for (text, why) in [("/map", "no `=`"), ("map=/a", "`map`"), ("/a=/", "`/`"), ("/a=/{robot}/a", "`{robot}`")] {
             let error = text.parse::<TopicRename>().unwrap_err();
             assert!(error.contains(why) && error.contains(text), "{error}");

@@ -46,7 +46,7 @@ impl<'a> PlacedLayer<'a> {
         }
         let resolution = f64::from(map.info.resolution);
         if !(resolution.is_finite() && resolution > 0.0) {
-            return Err("has a resolution that is no positive number");
+            return Err("has a resolution that is not a positive number");
         }
         let transform_world_grid = map.transform_world_map * map.info.origin.planar();
         let pose = transform_world_grid.translation.vector;

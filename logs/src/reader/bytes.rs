@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_that_a_file_does_not_have_is_none_and_so_is_one_that_it_has_no_more() {
+    fn a_part_outside_of_the_file_or_after_a_truncation_is_none() {
         let (folder, file) = file(b"0123456789");
         assert_eq!(file.read(2..5).unwrap(), b"234");
         assert_eq!(file.read(0..10).unwrap().len(), 10);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_and_their_checksum_are_the_same_whatever_memory_they_are_put_into() {
+    fn bytes_and_their_checksum_do_not_depend_on_the_memory() {
         let bytes: Vec<u8> = (0..3 * PIECE + 17).map(|byte| ((byte * 31) >> 4) as u8).collect();
         let (folder, file) = file(&bytes);
         for part in [0..bytes.len(), 5..5, 7..PIECE, 1..PIECE + 1, PIECE..3 * PIECE, bytes.len() - 1..bytes.len()] {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_walked_over_whatever_their_length() {
+    fn records_of_any_length_are_scanned() {
         let mut bytes = Vec::new();
         let lengths = [0, 5, WINDOW - 30, 3 * WINDOW, 40, 2 * WINDOW];
         for (opcode, length) in [op::SCHEMA, op::ATTACHMENT, op::MESSAGE].into_iter().cycle().zip(lengths) {

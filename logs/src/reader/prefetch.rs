@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn memory_goes_to_blocks_of_about_its_size_and_little_of_it_is_kept() {
+    fn memory_is_reused_for_blocks_of_similar_size_up_to_a_limit() {
         let mut prefetcher = Prefetcher::new(Vec::new().into());
         let memory = |size: u64| Memory::with_room_for(size);
         prefetcher.release(memory(1 << 20));

@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_record_that_is_cut_is_none() {
+    fn a_truncated_record_is_none() {
         let mut bytes = vec![5, 3, 0, 0, 0, 0, 0, 0, 0, 7, 8, 9];
         assert_eq!(record_at(&bytes, 0).unwrap().body, [7, 8, 9]);
         assert_eq!(record_at(&bytes, 0).unwrap().end(), bytes.len());

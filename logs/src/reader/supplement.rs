@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn an_attachment_is_read_as_it_is_and_not_at_all_where_it_is_damaged() {
+    fn an_attachment_is_read_unless_it_is_damaged() {
         let body = attachment();
         let read = read_attachment(&body).unwrap();
         assert_eq!((read.log_time, read.create_time, &*read.data), (5, 6, b"abc".as_slice()));

@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lidar_that_hangs_upside_down_turns_the_other_way() {
+    fn a_lidar_mounted_upside_down_turns_the_other_way() {
         let scans = scans([0.0, 0.0], UnitQuaternion::from_euler_angles(PI, 0.0, 0.0));
         let found = scans.to_base_frame("r1", scan("r1/laser")).unwrap();
         assert!(found.yaw.abs() < 1e-9);

@@ -28,7 +28,7 @@ fn the_package_lists_all_its_messages_which_are_those_that_are_written() {
 }
 
 #[test]
-fn the_package_depends_on_what_its_messages_use() {
+fn the_package_depends_on_the_packages_of_its_fields() {
     let mut used = BTreeSet::new();
     for message in messages() {
         let text = fs::read_to_string(package().join("msg").join(message)).unwrap();

@@ -135,7 +135,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn the_first_bytes_can_be_written_anew_and_come_last() {
+    fn the_first_bytes_can_be_rewritten_and_are_written_last() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let mut file = ChunkFile::new(File::create_new(&path).unwrap());
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_flushed_is_when_it_is_dropped() {
+    fn unflushed_data_is_written_on_drop() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         ChunkFile::new(File::create_new(&path).unwrap()).write_all(b"all").unwrap();

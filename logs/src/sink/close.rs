@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_log_is_closed_and_says_why_it_ends() {
+    fn a_partial_log_is_closed_with_the_reason() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         write(&path, 100);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_log_is_not_touched() {
+    fn a_part_that_is_not_a_log_is_not_changed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");
         fs::write(part(&path), "this is no log").unwrap();

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_places_no_frames_leaves_the_input_as_it_is() {
+    fn a_run_without_frames_does_not_change_the_input() {
         assert_eq!(frames("nav_msgs/msg/OccupancyGrid").without(&transforms(&[("world", "robot1/map")])), None);
     }
 }

@@ -163,7 +163,7 @@ fn a_channel_is_announced_before_its_first_message_and_shared_between_files() {
 }
 
 #[test]
-fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
+fn poses_of_all_types_get_a_covariance_and_their_originals_are_passed_on() {
     let covariance = std::array::from_fn(|row| std::array::from_fn(|column| (10 * row + column) as f64));
     let odometry = Odometry {
         header: Header::new(LogTime(7), "odom"),
@@ -208,7 +208,7 @@ fn poses_of_all_types_come_with_their_covariance_and_are_kept_as_they_were() {
 }
 
 #[test]
-fn a_topic_that_fits_with_another_type_goes_to_other_and_is_warned_of() {
+fn a_topic_that_matches_with_another_type_goes_to_other_with_a_warning() {
     let (_folder, files) = write(|log| {
         log.raw("/robot1/map", "nav_msgs/msg/GridCells", 1, b"?").raw("/robot1/map", "nav_msgs/msg/GridCells", 2, b"?");
     });
@@ -230,7 +230,7 @@ fn a_type_name_without_msg_is_known() {
 }
 
 #[test]
-fn tf_gives_poses_and_goes_on_as_it_is() {
+fn poses_are_derived_from_tf_and_tf_is_passed_on() {
     let transforms = |x: f64| TFMessage {
         transforms: vec![TransformStamped {
             header: Header::new(LogTime(5), "map"),
@@ -258,7 +258,7 @@ fn tf_gives_poses_and_goes_on_as_it_is() {
 }
 
 #[test]
-fn what_is_latched_before_the_start_is_carried_over() {
+fn latched_messages_before_the_start_are_sent_at_the_start() {
     let latched = BTreeMap::from([("offered_qos_profiles".to_owned(), "- history: 3\n  durability: 1\n".to_owned())]);
     let second = 1_000_000_000;
     let (_folder, files) = write(|log| {
@@ -296,7 +296,7 @@ fn a_robot_whose_name_is_too_long_and_whose_map_is_needed_is_an_error() {
 }
 
 #[test]
-fn a_source_without_files_says_how_to_give_them() {
+fn a_source_without_files_is_an_error_with_a_fix() {
     let error = try_run(Vec::new(), "", RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("--input"), "{error}");
     let files = vec!["/nowhere/a.mcap".into()];
@@ -340,7 +340,7 @@ fn a_source_that_is_done_has_done_all_its_work() {
 }
 
 #[test]
-fn a_name_that_is_too_long_is_warned_of_where_nobody_needs_it() {
+fn a_name_that_is_too_long_is_only_a_warning_if_the_topic_is_unused() {
     let (long, robot) = (format!("/{}", "x".repeat(128)), "r".repeat(65));
     let (_folder, files) = write(|log| {
         log.add("/robot1/map", OccupancyGrid::NAME, 1, &grid());
@@ -358,7 +358,7 @@ fn a_name_that_is_too_long_is_warned_of_where_nobody_needs_it() {
 }
 
 #[test]
-fn the_thresholds_of_a_map_beside_logs_are_read_as_the_user_says() {
+fn the_thresholds_of_a_map_beside_logs_are_applied_by_the_parameter() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("robot1.yaml");
     let info = MapMetaData { resolution: 0.05, width: 3, height: 1, ..Default::default() };

@@ -132,7 +132,7 @@ fn expected(x: f64) -> PoseStamped {
 }
 
 #[test]
-fn messages_come_by_time_as_those_of_ros_2() {
+fn messages_are_read_by_time_and_converted_to_ros_2() {
     let folder = Folder::new();
     let described = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
     for compression in ["none", "lz4", "bz2"] {
@@ -182,7 +182,7 @@ fn definitions_have_the_names_of_ros_2() {
 }
 
 #[test]
-fn a_bag_that_is_cut_or_was_not_closed_is_read_as_far_as_it_goes() {
+fn a_truncated_or_unclosed_bag_is_read_as_far_as_possible() {
     let folder = Folder::new();
     let described = connection(0, "/robot1/pose", "geometry_msgs/PoseStamped", POSE);
     let first = [described.clone(), message(0, 1, &pose(1.0))].concat();

@@ -45,7 +45,7 @@ fn many(count: u64) -> Vec<(i64, u64, Vec<u8>)> {
 }
 
 #[test]
-fn messages_come_by_time_with_what_is_known_of_their_types() {
+fn messages_are_read_by_time_with_their_types() {
     let folder = Folder::new();
     let pose = encode(&PoseStamped::default()).unwrap();
     let path = bag(
@@ -91,7 +91,7 @@ fn definitions_that_a_database_holds_count() {
 }
 
 #[test]
-fn long_bags_come_in_runs_and_nothing_is_written_beside_them() {
+fn long_bags_are_read_in_runs_and_no_file_is_created() {
     let folder = Folder::new();
     let rows = many(3000);
     let path = bag(&folder, "a#b?c%.db3", &rows);
@@ -108,7 +108,7 @@ fn long_bags_come_in_runs_and_nothing_is_written_beside_them() {
 }
 
 #[test]
-fn a_database_that_is_cut_or_damaged_is_read_as_far_as_it_goes() {
+fn a_truncated_or_damaged_database_is_read_as_far_as_possible() {
     let folder = Folder::new();
     let rows = many(400);
     let whole = fs::read(bag(&folder, "a.db3", &rows)).unwrap();

@@ -139,7 +139,7 @@ fn a_chunk_with_an_unusual_compression_ratio_is_read_whole() {
 }
 
 #[test]
-fn what_a_killed_recorder_has_written_is_read() {
+fn the_log_of_a_killed_recorder_is_read() {
     let folder = Folder::new();
     for options in layouts() {
         let path = folder.path().join("live.mcap");

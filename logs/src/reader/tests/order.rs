@@ -34,7 +34,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn messages_come_by_time_then_file_then_position(
+    fn messages_are_ordered_by_time_then_file_then_position(
         files in prop::collection::vec(
             prop::collection::vec((0u8..3, 0u64..20, prop::bool::weighted(0.2)), 0..40),
             1..4,

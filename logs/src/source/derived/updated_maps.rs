@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_changes_nothing() {
+    fn invalid_updates_change_nothing() {
         let mut maps = maps_with(4, 3);
         let wrong = |maps: &mut UpdatedMaps, update: &OccupancyGridUpdate<'_>| maps.update("r", update).err().unwrap();
         for outside in [

@@ -82,7 +82,7 @@ fn files_that_are_no_maps_are_errors_that_name_them() {
 }
 
 #[test]
-fn unknown_cells_in_grey_205_are_unknown_unless_the_file_is_taken_at_its_word() {
+fn unknown_cells_in_grey_205_are_unknown_unless_thresholds_are_literal() {
     let folder = tempfile::tempdir().unwrap();
     let file = save(folder.path(), "a-b.yaml", &map(0.05, 0.0, &[0, 100, -1]));
     let text = fs::read_to_string(&file).unwrap().replace("free_thresh: 0.196", "free_thresh: 0.25");

@@ -90,7 +90,7 @@ fn updates_before_the_start_are_in_a_map_that_is_sent_at_the_start() {
 }
 
 #[test]
-fn where_messages_are_passed_on_as_they_were_logged_no_map_is_made() {
+fn no_map_is_derived_where_messages_keep_their_logged_names() {
     let (_folder, files) = log();
     let run = run_as_logged(files);
     assert_eq!(run.times("map"), [SECOND, SECOND]);
