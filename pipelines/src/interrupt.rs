@@ -25,7 +25,8 @@ pub(crate) fn hold_back() {
     }
 }
 
-/// Makes a signal set the returned flag, on which the program ends in order; `what_follows` tells the user how. A second signal ends it at once.
+/// Makes a signal set the returned flag, so that the program can end in order; `what_follows` is printed. A second signal ends the
+/// program at once.
 pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBool {
     static HANDLER: AtomicBool = AtomicBool::new(false);
     if !HANDLER.swap(true, Ordering::Relaxed) {

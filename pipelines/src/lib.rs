@@ -41,7 +41,8 @@ pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
     command_with(kinds, |_, _| {})
 }
 
-/// Runs the command line as [`command`] does, and calls `on_warning` for each warning of this process, with its module and its text.
+/// Runs the command line as [`command`] does, and calls `on_warning` for each warning of this process, with its module and
+/// its text.
 pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, on_warning: fn(&str, &str)) -> ExitCode {
     let registry = shipped::registry(kinds);
     match cli::Cli::parse().execute(&registry, on_warning) {

@@ -27,8 +27,8 @@ pub(crate) struct LoggingArgs {
     /// The format of the log lines.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
     log_format: LogFormat,
-    /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not with the
-    /// engine `processes`.
+    /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not
+    /// with the engine `processes`.
     #[arg(long, global = true, value_name = "FILE.json")]
     pub(crate) trace: Option<PathBuf>,
 }
@@ -59,7 +59,8 @@ enum LogFormat {
 }
 
 impl LoggingArgs {
-    /// Starts logging. The trace is complete when the guard is dropped. `on_warning` is called for each warning with its module and text.
+    /// Starts logging. The trace is complete when the guard is dropped. `on_warning` is called for each warning with its
+    /// module and text.
     pub(crate) fn start(&self, on_warning: fn(&str, &str)) -> Result<Option<FlushGuard>> {
         let (trace, guard) = self.trace_layer()?.unzip();
         // Set once, as the subscriber is.
@@ -261,9 +262,9 @@ mod tests {
         static RECEIVED: Mutex<Vec<String>> = Mutex::new(Vec::new());
         let layer = warnings(|module, text| RECEIVED.lock().unwrap().push(format!("{module}: {text}")));
         tracing::subscriber::with_default(tracing_subscriber::registry().with(layer), || {
-            tracing::warn!(target: "zenoh_link_tls::unicast", "{} was not let in", "somebody");
+            tracing::warn!(target: "zenoh_link_tls::unicast", "{} was not let in", "a client");
             tracing::info!(target: "zenoh_link_tls::unicast", "all is well");
         });
-        assert_eq!(*RECEIVED.lock().unwrap(), ["zenoh_link_tls::unicast: somebody was not let in"]);
+        assert_eq!(*RECEIVED.lock().unwrap(), ["zenoh_link_tls::unicast: a client was not let in"]);
     }
 }

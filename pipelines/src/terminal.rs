@@ -30,8 +30,8 @@ pub(crate) fn eprint_line(text: impl Display) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// The greatest width of a line of the results, columns: `COLUMNS` or else the width of the terminal. `None` for a pipe or a file, so
-/// that programs read whole lines.
+/// The greatest width of a line of the results, columns: `COLUMNS` or else the width of the terminal. `None` for a pipe or a
+/// file, so that programs read whole lines.
 pub(crate) fn width() -> Option<usize> {
     let given = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let measured = || terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));

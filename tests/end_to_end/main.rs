@@ -1,6 +1,7 @@
 //! Tests of the command as a user runs it, from its arguments to the files and the shared memory that it leaves.
 //!
-//! All tests run one program: the command with the shipped stages, and with `troubled_stages` that fail when they are configured to.
+//! All tests run one program: the command with the shipped stages, and with `troubled_stages` that fail when they are
+//! configured to.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 

@@ -67,7 +67,7 @@ fn scans_of_robots_of_which_nothing_says_where_they_were_give_no_map() {
     let folder = folder.path();
     logs_with(folder, "/{robot}/scan");
     gridweave(folder, &["info", "scans.mcap"]).assert(0, &["without poses or odometry"]);
-    merge(folder).assert(1, &["nothing says where it was"]);
+    merge(folder).assert(1, &["there is no pose of it"]);
 }
 
 /// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted

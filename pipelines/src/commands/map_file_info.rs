@@ -32,8 +32,8 @@ pub(super) struct MapFileInfo {
     /// Area of cells that are known, but neither free nor occupied, square metres.
     undecided_m2: f64,
     /// What was read otherwise than the thresholds of the file have it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    remark: Option<String>,
+    #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
+    warning: Option<String>,
 }
 
 /// Reads map files.
@@ -46,7 +46,7 @@ pub(super) fn inspect(files: &[PathBuf]) -> Result<Vec<MapFileInfo>> {
 }
 
 fn inspect_one(robot: String, file: &Path) -> Result<MapFileInfo> {
-    let (map, remark) = load_as(file, Thresholds::ByPicture)?;
+    let (map, warning) = load_as(file, Thresholds::ByPicture)?;
     let cell_area = f64::from(map.info.resolution).powi(2);
     let area =
         |is_counted: &dyn Fn(i8) -> bool| cell_area * map.cells.iter().filter(|cell| is_counted(**cell)).count() as f64;
@@ -61,7 +61,7 @@ fn inspect_one(robot: String, file: &Path) -> Result<MapFileInfo> {
         free_m2: area(&is_free),
         occupied_m2: area(&is_occupied),
         undecided_m2: area(&|cell| is_known(cell) && !is_free(cell) && !is_occupied(cell)),
-        remark: remark.map(|remark| remark.to_string()),
+        warning: warning.map(|warning| warning.to_string()),
     })
 }
 
@@ -84,10 +84,10 @@ pub(super) fn to_text(maps: &[MapFileInfo], width: Option<usize>) -> String {
         ]);
     }
     let mut text = table.fit(width);
-    for MapFileInfo { file, remark, .. } in maps {
-        if let Some(remark) = remark {
+    for MapFileInfo { file, warning, .. } in maps {
+        if let Some(warning) = warning {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", wrap(&format!("{}: {remark}", file.display()), 2, width));
+            let _ = writeln!(text, "{}", wrap(&format!("{}: {warning}", file.display()), 2, width));
         }
     }
     text

@@ -204,8 +204,8 @@ fn text_of(path: &Path) -> Result<String> {
     Ok(text.to_owned())
 }
 
-/// Closes the logs of sinks whose processes were killed, with the reason why they are not complete. Logs of other runs are locked, and
-/// what an earlier killed run had left was removed when this run began.
+/// Closes the logs of sinks whose processes were killed, with the reason why they are not complete. Logs of other runs are
+/// locked, and what an earlier killed run had left was removed when this run began.
 fn close_outputs(pipeline: &Pipeline, reason: &str) {
     for log in outputs::logs(pipeline) {
         match close_log(&log, reason) {

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 ///
-/// An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being written
-/// by another run.
+/// An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being
+/// written by another run.
 pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let inputs = inputs(pipeline);
     let outputs = outputs(pipeline, options);

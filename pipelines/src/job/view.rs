@@ -41,8 +41,8 @@ pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str
     Ok(format!("ws://{host}:{port}"))
 }
 
-/// Finds a free port of the host, since the stage may be in another process and could not report the one it has chosen. 0 if there is
-/// none, or no such host, which the stage reports.
+/// Finds a free port of the host, since the stage may be in another process and could not report the one it has chosen. 0 if
+/// there is none, or no such host, which the stage reports.
 fn free_port(host: &str) -> u16 {
     let host = host.trim_start_matches('[').trim_end_matches(']');
     TcpListener::bind((host, 0)).and_then(|listener| listener.local_addr()).map_or(0, |address| address.port())

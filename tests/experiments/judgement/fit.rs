@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 use gridweave_stages::registration::judgement::{COUNT, Term, posterior};
 use nalgebra::{DMatrix, DVector};
 
-/// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that the data leave
-/// open.
+/// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that the
+/// data leave open.
 const REGULARISATION: f64 = 1.0;
 /// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not recorded.
 const SIMULATED: f64 = 0.5;
@@ -151,8 +151,8 @@ pub(super) struct Weights {
 impl Weights {
     /// The likeliest ones.
     pub(super) fn fit(examples: &[&Example]) -> Result<Self> {
-        // What is the right place inexactly, and what is an alias, would be taken for wrong; and buildings whose parts are alike are for
-        // the aliases.
+        // What is the right place inexactly, and what is an alias, would be taken for wrong; and buildings whose parts are
+        // alike are for the aliases.
         let is_clear = |example: &Example| !example.is_inexact() && !example.is_aliased() && !example.has_parts_alike();
         let clear: Vec<&Example> = examples.iter().copied().filter(|example| is_clear(example)).collect();
         let count = |is_related: bool, is_simulated: bool| {

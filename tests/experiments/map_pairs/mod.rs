@@ -26,9 +26,9 @@ use std::path::PathBuf;
 /// Arguments of the experiment `map-pairs`.
 #[derive(Debug, Args)]
 pub(super) struct MapPairsArgs {
-    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a `LOG.truth.json` that names
-    /// common places, of which the last maps are taken. What two
-    /// names have in common up to the first `_` or `-` is one building, which is never paired with itself.
+    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a `LOG.truth.json`
+    /// that names common places, of which the last maps are taken. What two names have in common up to the first `_` or `-`
+    /// is one building, which is never paired with itself.
     folders: Vec<PathBuf>,
     /// Pairs of parts of maps of different buildings.
     #[arg(long, default_value_t = 1000)]

@@ -38,7 +38,8 @@ pub(crate) struct Pair {
 struct Truth {
     /// In map b and in map a: x and y of each, metres.
     common: Vec<[f64; 4]>,
-    /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th percentile, metres.
+    /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th percentile,
+    /// metres.
     #[serde(default)]
     rigid_median: f64,
     #[serde(default)]
@@ -111,8 +112,8 @@ impl Pair {
         self.truth.common.is_empty()
     }
 
-    /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond what the
-    /// best rigid transform leaves.
+    /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond
+    /// what the best rigid transform leaves.
     pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
         let Truth { rigid_median, rigid_p90, .. } = &self.truth;
         let errors = self.errors(transform_a_b);

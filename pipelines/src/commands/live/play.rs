@@ -65,20 +65,20 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let player = Player { context: running.pipeline.context(stage), ..player };
     let stop = stop_on_interrupt("no more messages are sent");
     let stopped = Arc::new(AtomicBool::new(false));
-    let feed = ExternalSender::join(&running.run, &running.pipeline, stage)?;
-    if !feed.wait_for_readers(READY_TIMEOUT) {
+    let sender = ExternalSender::join(&running.run, &running.pipeline, stage)?;
+    if !sender.wait_for_readers(READY_TIMEOUT) {
         bail!("the stages that read `{}` do not connect", running.pipeline.stages[stage].name);
     }
     let is_over = || stop.load(Ordering::Relaxed) || !running.run.is_running();
     let pace = Rc::new(RefCell::new(Pace::new(args.rate)));
-    let links = || player.links(&running, stage, &feed, &pace);
-    let result = watch_while(&is_over, &stopped, &feed.stopper(), || player.play_all(&links, &pace, &stopped));
+    let links = || player.links(&running, stage, &sender, &pace);
+    let result = watch_while(&is_over, &stopped, &sender.stopper(), || player.play_all(&links, &pace, &stopped));
     let messages = pace.borrow().messages;
     match result {
         Err(_) if stopped.load(Ordering::Relaxed) => {}
         other => other?,
     }
-    let is_taken = feed.wait_until_taken(READY_TIMEOUT);
+    let is_taken = sender.wait_until_taken(READY_TIMEOUT);
     print_line(format_args!("played {messages} messages into {}", running.name()))?;
     if !running.run.is_running() {
         bail!("the run ended before the log did");
@@ -112,7 +112,7 @@ fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
 fn watch_while<T>(
     is_over: &(impl Fn() -> bool + Sync),
     stopped: &AtomicBool,
-    feed: &SenderStopper,
+    sender: &SenderStopper,
     work: impl FnOnce() -> T,
 ) -> T {
     let done = AtomicBool::new(false);
@@ -121,7 +121,7 @@ fn watch_while<T>(
             while !done.load(Ordering::Relaxed) {
                 if is_over() {
                     stopped.store(true, Ordering::Relaxed);
-                    feed.stop();
+                    sender.stop();
                 }
                 thread::sleep(LOOK_INTERVAL);
             }
@@ -161,14 +161,14 @@ impl Player<'_> {
         &self,
         running: &Running,
         stage: usize,
-        feed: &ExternalSender,
+        sender: &ExternalSender,
         pace: &Rc<RefCell<Pace>>,
     ) -> Result<Vec<OutputEnd>> {
         let kind = self.registry.get(SOURCE).context("this program cannot read logs")?;
         let spec = &running.pipeline.stages[stage];
         let links = kind.outputs.iter().map(|output| {
             let port = spec.kind.outputs.iter().position(|port| port.name == output.name);
-            let link = port.and_then(|port| feed.output(port));
+            let link = port.and_then(|port| sender.output(port));
             let has_stamp = matches!(output.port_type, PortType::Ros(name) if begins_with_header(name));
             let paced = |link| -> Box<dyn OutputSink> { Box::new(Paced { pace: Rc::clone(pace), link, has_stamp }) };
             let sink = link.map(paced);

@@ -27,8 +27,8 @@ use watched::WatchedRun;
 /// Arguments of `gridweave view`.
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// The address to serve the page on. Every program that can connect to it can see the page: 0.0.0.0:PORT lets other machines in.
-    /// Port 0 is any free port.
+    /// The address to serve the page on. Every program that can connect to it can see the page: 0.0.0.0:PORT lets other
+    /// machines in. Port 0 is any free port.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8766")]
     address: SocketAddr,
     #[command(flatten)]
