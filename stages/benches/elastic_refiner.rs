@@ -1,8 +1,9 @@
-//! How long it takes to bend the maps of two robots, and of a team, beside what it takes to find how two maps lie.
+//! Time of the non-rigid refinement of two maps, and of the maps of many robots, compared with the search of one
+//! relative pose.
 //!
 //!     cargo bench -p gridweave-stages --bench elastic_refiner
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod building;
@@ -18,10 +19,10 @@ const RUNS: usize = 7;
 /// Cells along a side, and metres of the building that a robot has seen.
 const CELLS: usize = 800;
 const KNOWN: f64 = 38.0;
-/// Metres from robot to robot of a team: neighbours share half of what they see.
+/// Distance of neighbouring robots, metres: they share half of what they see.
 const APART: f64 = 19.0;
 
-/// A map, where it lies, and its walls.
+/// A map with its pose and its walls.
 struct Placed {
     map: (GridGeometry, Vec<i8>),
     walls: WallMap,
@@ -50,8 +51,11 @@ fn main() {
         align_maps(&a, &b, &MapAlignerParameters::default()).unwrap();
         start.elapsed().as_secs_f64()
     });
-    println!("To find how two maps of {CELLS} x {CELLS} cells lie takes {:.0} ms.\n", 1000.0 * aligned);
-    println!("| robots | deformation, m | nodes | median, ms | by that |\n| --- | --- | --- | --- | --- |");
+    println!(
+        "The search of the relative pose of two maps of {CELLS} x {CELLS} cells takes {:.0} ms.\n",
+        1000.0 * aligned
+    );
+    println!("| robots | deformation, m | nodes | median, ms | relative |\n| --- | --- | --- | --- | --- |");
     for (robots, displacement) in [(2, 0.0), (2, 0.2), (16, 0.0), (16, 0.2)] {
         let side = if robots > 2 { 4 } else { 1 };
         let placed: Vec<Placed> = (0..robots)

@@ -3,7 +3,7 @@
 //!
 //!     cargo bench -p gridweave-stages --bench frame_solver
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, unreachable_pub)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};

@@ -1,9 +1,9 @@
-//! How long the stages of group mapping take: the energy of the Radon transform, a whole Radon alignment, algorithm 1, the
+//! Times of the stages of group mapping: the energy of the Radon transform, a whole Radon alignment, algorithm 1, the
 //! probabilistic Voronoi diagram, and the matching of two of them.
 //!
 //!     cargo bench -p gridweave-stages --bench group_mapping
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod building;
@@ -11,7 +11,7 @@ mod building;
 use gridweave_stages::merge::grid_fuser::layout::Lattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::published::edge_matcher::{EdgeMatcherParameters, edges, match_edges};
-use gridweave_stages::published::entropy_fuser::{fuse, lay_over};
+use gridweave_stages::published::entropy_fuser::{common_grid, fuse};
 use gridweave_stages::published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
 use gridweave_stages::published::radon_aligner::{
     NamedMap, PreparedMap, RadonAlignerParameters, WallPoints, align, energy,
@@ -61,7 +61,7 @@ fn main() {
         report(
             "entropy filter of two maps",
             time(|| {
-                let over = lay_over(&maps, lattice.max_cells).0.unwrap();
+                let over = common_grid(&maps, lattice.max_cells).0.unwrap();
                 let mut fused = vec![0; over.cell_count()];
                 fuse(&maps, &over, &table, &mut fused);
                 fused

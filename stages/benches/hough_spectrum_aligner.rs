@@ -1,8 +1,8 @@
-//! How long the Hough spectrum of a map takes, and how long it takes to lay two maps on each other by it.
+//! Time of the Hough spectrum of a map, and of the alignment of two maps by it.
 //!
 //!     cargo bench -p gridweave-stages --bench hough_spectrum_aligner
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod building;

@@ -1,8 +1,8 @@
-//! How long it takes to align two maps without a first guess, by their size.
+//! Time of the alignment of two maps without an initial guess, by their size.
 //!
 //!     cargo bench -p gridweave-stages --bench map_aligner
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod building;

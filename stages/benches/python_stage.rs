@@ -1,4 +1,4 @@
-//! What a stage in Python costs beside one in Rust that does the same: maps go in, and the same maps come out.
+//! Costs of a stage in Python compared with one in Rust that does the same: maps in, the same maps out.
 //!
 //!     cargo bench -p gridweave-stages --bench python_stage
 //!

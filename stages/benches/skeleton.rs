@@ -1,8 +1,8 @@
-//! How long it takes to make the skeleton of a map's free space, by the size of the map.
+//! Time of the skeleton of a map's free space, by the size of the map.
 //!
 //!     cargo bench -p gridweave-stages --bench skeleton
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod building;

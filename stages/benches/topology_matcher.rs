@@ -1,8 +1,8 @@
-//! How long it takes to lay two topological maps on each other, by the number of their nodes.
+//! Time of the matching of two topological maps, by the number of their nodes.
 //!
 //!     cargo bench -p gridweave-stages --bench topology_matcher
 
-// A bench that cannot go on has nothing better to do than to stop.
+// An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_stages::shared::geometry::{Point2, pose};
@@ -20,7 +20,7 @@ fn main() {
         let b = Topology { nodes: a.nodes.iter().map(|node| truth.inverse() * node).collect(), ..a.clone() };
         let parameters = TopologyMatcherParameters::default();
         let found = exhaustive(&a, &b, &parameters);
-        assert!((found.places[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
+        assert!((found.poses[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
         let times = |run: &dyn Fn()| {
             let mut times: Vec<f64> = (0..RUNS)
                 .map(|_| {

@@ -1,4 +1,4 @@
-//! The map of one robot: built from its scans, selected among all that it has published, and cleaned.
+//! The map of one robot: built from its scans, selected from all that it has published, and cleaned.
 
 pub mod map_cleaner;
 pub mod map_selector;
@@ -6,7 +6,7 @@ pub mod scan_mapper;
 
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![map_cleaner::kind(), map_selector::kind(), scan_mapper::kind()]
 }

@@ -1,32 +1,32 @@
-//! The acceptance index omega: the share of the cells on which two maps that are laid on each other agree, of those that both
+//! The acceptance index omega of two aligned maps: the share of the cells on which they agree, of those that both
 //! know.
 //!
-//! It is the criterion by which the published mergers that search by the maps alone judge what they found: Birk and Carpin,
-//! "Merging occupancy grid maps from multiple robots", Proceedings of the IEEE 94 (2006), and Carpin, "Fast and accurate map
-//! merging for multi-robot systems", Autonomous Robots 25 (2008). Free space, of which maps have most, agrees with free space
-//! wherever it is laid, and two maps that hardly overlap agree on what little they share: a high index alone is no proof.
+//! It is the criterion of the published mergers that use the maps only: Birk and Carpin, "Merging occupancy grid maps
+//! from multiple robots", Proceedings of the IEEE 94 (2006), and Carpin, "Fast and accurate map merging for
+//! multi-robot systems", Autonomous Robots 25 (2008). Free space, most of a map, agrees with free space at any pose,
+//! and two maps that hardly overlap agree on the little they share: a high index alone is no proof.
 
 use crate::shared::geometry::{Grid, Pose2, UNKNOWN, is_free, is_known, is_occupied};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::iter::Sum;
 
-/// Counts of the cells of map b whose centres lie on cells of map a, where both maps say either free or occupied.
+/// Counts of the cells of map b whose centres are on cells of map a, where both maps are either free or occupied.
 ///
-/// Cells that are known, but neither free nor occupied, are on nobody's side, and not counted.
+/// Cells that are known, but neither free nor occupied, are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AcceptanceIndex {
-    /// Cells that both maps take for free, or both for occupied.
+    /// Cells that are free in both maps, or occupied in both.
     pub agree: u64,
-    /// Cells that one map takes for free and the other for occupied.
+    /// Cells that are free in one map and occupied in the other.
     pub disagree: u64,
 }
 
 impl AcceptanceIndex {
-    /// Counts the cells of map b, laid on map a by `T_a_b`.
+    /// Counts the cells of map b, transformed to map a by `T_a_b`.
     ///
-    /// Every cell of b is looked up in a, so that a finer map is better given as b. None are counted where the transform holds
-    /// a value that is no finite number.
+    /// Every cell of b is looked up in a, so a finer map is better given as b. None are counted if the transform is
+    /// not finite.
     pub fn new(a: &Grid<'_>, b: &Grid<'_>, transform_a_b: &Pose2) -> Self {
         let (from, to) = (&b.geometry, &a.geometry);
         // From cells of b to cells of a.
@@ -54,7 +54,7 @@ impl AcceptanceIndex {
         }
     }
 
-    /// The cells that were counted.
+    /// Number of counted cells.
     pub fn known_in_both(&self) -> u64 {
         self.agree + self.disagree
     }
@@ -75,7 +75,7 @@ impl Sum for AcceptanceIndex {
     }
 }
 
-/// The value of the cell that a place in cells falls in; unknown outside of the grid.
+/// Value of the cell at a position in cells; unknown outside of the grid.
 fn value_in_cells(grid: &Grid<'_>, place: &Vector2<f64>) -> i8 {
     let (width, height) = (grid.geometry.width, grid.geometry.height);
     let on_it = place.x >= 0.0 && place.y >= 0.0 && place.x < width as f64 && place.y < height as f64;

@@ -1,4 +1,4 @@
-//! Methods of other authors as they published them, to compare with and to wire into pipelines of one's own.
+//! Methods of other authors as published, for comparison and for use in pipelines.
 
 pub mod acceptance_index;
 pub mod edge_matcher;
@@ -12,7 +12,7 @@ pub mod uncertain_transform;
 
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![
         edge_matcher::kind(),

@@ -1,10 +1,11 @@
-//! Maps of a building whose direction is known exactly, without a drive: what the direction of walls is measured on.
+//! Drawn maps of buildings with exactly known wall directions, without a drive, to measure the estimate of the
+//! direction.
 //!
-//! A random building of rooms, doors and furniture is laid over the middle of a grid, turned as asked; what lies beyond
+//! A random building of rooms, doors and furniture is centred on a grid and turned by a given angle; what is beyond
 //! the grid is cut off. Its walls are drawn in one of several [styles](WallStyle), or scanned by a lidar from many
-//! places. What is wrong with the drawn walls is what is wrong with the maps of lasers: cells are missing one by one and
-//! in whole stretches that furniture hides, walls waver slowly (scans that were laid a little askew) and from cell to cell
-//! (noise of ranges), there is furniture at odd angles, and single cells are occupied where nothing stands.
+//! positions. The errors of the drawn walls are those of maps of lasers: single cells and whole stretches behind
+//! furniture are missing, walls waver slowly (scans with small pose errors) and from cell to cell (range noise),
+//! there is furniture at odd angles, and single cells are occupied at random.
 
 use super::floor_plan::{BuildingSize, FloorPlan};
 use super::room::WALL;
@@ -19,7 +20,7 @@ use rand_distr::StandardNormal;
 
 /// Between the two faces of a wall under [`WallStyle::TwoFaces`], metres.
 const FACE_DISTANCE: f64 = 0.12;
-/// A wall wavers slowly: its displacement is drawn anew after this way, metres, and linear between.
+/// Spacing of the random displacements of a slowly wavering wall, metres; it is linear between.
 const WAVER_LENGTH: f64 = 0.5;
 /// The lengths of the stretches that furniture hides, metres.
 const HIDDEN_LENGTH: (f64, f64) = (0.2, 1.0);
@@ -33,13 +34,13 @@ pub enum WallStyle {
     Thick,
     /// Lines of single cells that waver.
     Noisy,
-    /// The two faces of each wall, 12 cm apart, each a line of single cells that wavers on its own.
+    /// The two faces of each wall, 12 cm apart, each a line of single cells that wavers independently.
     TwoFaces,
-    /// What a lidar has seen from many places, laid at poses that are a little wrong.
+    /// A lidar scan from many positions, with small pose errors.
     Scanned,
 }
 
-/// What map is drawn.
+/// Settings of a drawn map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnMapSettings {
     /// How the walls look.
@@ -48,9 +49,9 @@ pub struct DrawnMapSettings {
     pub width: usize,
     /// Cells along y.
     pub height: usize,
-    /// Metres a cell.
+    /// Resolution, metres per cell.
     pub resolution: f64,
-    /// The direction of the building's x axis in the map frame, radians. Walls run along it and across it.
+    /// Direction of the building's x axis in the map frame, radians. Walls are along it and across it.
     pub yaw: f64,
     /// Size of the building along its corridor, metres, 10 or more.
     pub building_width: f64,
@@ -144,7 +145,7 @@ pub fn draw_map(settings: &DrawnMapSettings, seed: u64) -> SnapshotMap {
     SnapshotMap { geometry, cells: drawing.cells }
 }
 
-/// A map in the making.
+/// A map under construction.
 struct Drawing {
     geometry: GridGeometry,
     transform_map_building: Pose2,

@@ -1,15 +1,15 @@
-//! How a robot follows its way: poses at a fixed rate, with limits of speed, acceleration and turn rate.
+//! Drive of a robot along its path: poses at a fixed rate, with limits of speed, acceleration and turn rate.
 
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 
 /// Poses, scans and readings come at 10 Hz.
 pub const TICK_SECONDS: f64 = 0.1;
-/// The robot looks towards the point of its way this far ahead, metres.
+/// Distance of the point on the path that the robot turns towards, metres.
 const LOOK_AHEAD: f64 = 0.35;
-/// It turns on the spot when the way goes off further than this, radians.
+/// The robot turns on the spot if the path deviates by more than this, radians.
 const TURN_ON_THE_SPOT: f64 = 1.0;
 
-/// What a robot's drive is limited by.
+/// Limits of a robot's drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DriveLimits {
     /// Metres a second.
@@ -22,10 +22,11 @@ pub(super) struct DriveLimits {
     pub(super) duration: f64,
 }
 
-/// Follows a way; gives a pose (in the frame of the way) every [`TICK_SECONDS`], at least one unless the way is empty.
+/// Follows a path; returns a pose (in the frame of the path) every [`TICK_SECONDS`], at least one unless the path is
+/// empty.
 ///
-/// The robot stays on the way, looks a little ahead, slows down where it bends and turns on the spot where it doubles
-/// back.
+/// The robot stays on the path, turns towards a point a little ahead, slows down in curves and turns on the spot
+/// where the path reverses.
 pub(super) fn drive(way: &[Point2], limits: &DriveLimits) -> Vec<Pose2> {
     let mut track = Track { way, leg: 0, along: 0.0 };
     let Some(mut place) = track.point(0.0) else { return Vec::new() };
@@ -46,7 +47,7 @@ pub(super) fn drive(way: &[Point2], limits: &DriveLimits) -> Vec<Pose2> {
     poses
 }
 
-/// A place on a way: so far along one of its legs.
+/// A position on a path, as a distance along one of its legs.
 struct Track<'a> {
     way: &'a [Point2],
     leg: usize,
@@ -71,7 +72,7 @@ impl Track<'_> {
         }
     }
 
-    /// The point `ahead` metres further on the way; its end if the way ends before.
+    /// The point `ahead` metres further on the path; its end if the path ends before.
     fn point(&self, ahead: f64) -> Option<Point2> {
         let mut place = Track { way: self.way, leg: self.leg, along: self.along };
         if ahead > 0.0 {

@@ -38,7 +38,7 @@ impl Layout {
     }
 }
 
-/// What a building is asked to be, metres.
+/// Requested dimensions of a building, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BuildingSize {
     /// Along x.
@@ -134,8 +134,8 @@ impl FloorPlan {
         plan
     }
 
-    /// Adds the images of the rooms and walls from the given ones on, after half a turn. `sum` is the sum of a point and
-    /// its image.
+    /// Adds the images of the rooms and walls from the given ones on, after half a turn. `sum` is the sum of a point
+    /// and its image.
     fn turn_half(&mut self, first_room: usize, first_wall: usize, sum: &Point2) {
         let turned = |point: &Point2| Point2::from(sum.coords - point.coords);
         let image = |bounds: &Rectangle| Rectangle { min: turned(&bounds.max), max: turned(&bounds.min) };

@@ -1,4 +1,4 @@
-//! Where a robot can stand: the distance from the nearest obstacle, on a raster over the building.
+//! Positions at which a robot can stand: the distance from the nearest obstacle, on a raster over the building.
 
 use super::floor_plan::FloorPlan;
 use super::shape::{Rectangle, Solid};
@@ -23,13 +23,13 @@ pub(super) struct FreeSpace {
 }
 
 impl FreeSpace {
-    /// The free space of a building, as far as it can be driven to from its first corridor.
+    /// The free space of a building that can be reached from its first corridor.
     pub(super) fn of(plan: &FloorPlan) -> Self {
         let entrance = plan.corridors.first().map_or(plan.bounds.centre(), Rectangle::centre);
         Self::new(&plan.bounds, &plan.solids, &entrance)
     }
 
-    /// The free space between solids. What can be driven to from near `start` is reachable.
+    /// The free space between solids. What can be reached from near `start` is reachable.
     pub(super) fn new(bounds: &Rectangle, solids: &[Solid], start: &Point2) -> Self {
         let columns = (bounds.width() / CELL).ceil().max(1.0) as usize;
         let rows = (bounds.height() / CELL).ceil().max(1.0) as usize;
@@ -116,17 +116,17 @@ impl FreeSpace {
         f64::from(self.clearance[index])
     }
 
-    /// Whether a robot can stand at a point and can be driven there.
+    /// Whether a robot can stand at a point and can reach it.
     pub(super) fn is_reachable(&self, point: &Point2) -> bool {
         self.is_reachable_at(self.index(point))
     }
 
-    /// Whether a robot can be driven to a raster cell.
+    /// Whether a robot can reach a raster cell.
     pub(super) fn is_reachable_at(&self, index: usize) -> bool {
         self.reachable[index]
     }
 
-    /// The places within `area` that a robot can be driven to, row by row.
+    /// The points within `area` that a robot can reach, row by row.
     pub(super) fn places_in(&self, area: &Rectangle) -> Vec<Point2> {
         let low = ((area.min - self.min) / CELL).map(|v| v.max(0.0) as usize);
         let high = ((area.max - self.min) / CELL).map(|v| v.max(0.0) as usize);

@@ -1,4 +1,4 @@
-//! Furniture and pillars, placed so that a robot still gets everywhere.
+//! Furniture and pillars, placed so that a robot still reaches every room.
 //!
 //! A piece either stands against a wall or leaves a passage on all its sides; pieces leave a passage between each
 //! other, and doors stay clear. So no piece can cut a room in two.

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_beams_of_a_sector_lie_evenly_about_straight_ahead() {
+    fn the_beams_of_a_sector_are_symmetric_about_straight_ahead() {
         let beams = scan(&Lidar { beams: 100, field_of_view: 1.0, reach: 30.0, noise: 0.0, dropped: 0.0 });
         let angles: Vec<f64> = beams.iter().map(|beam| beam.angle).collect();
         assert_eq!(angles.len(), 100);

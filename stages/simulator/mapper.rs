@@ -1,4 +1,4 @@
-//! A robot's own map: an occupancy grid from scans laid at the poses that the robot believes in.
+//! A robot's own map: an occupancy grid from scans at the poses that it estimates.
 
 use super::lidar::Beam;
 use super::shape::Rectangle;
@@ -6,7 +6,8 @@ use crate::shared::geometry::{GridGeometry, Point2, Pose2};
 use crate::shared::scan_grid::{BeamEvidence, CellBeam, ScanGrid, SnapshotMap};
 use nalgebra::Vector2;
 
-/// A beam's end has the log-odds of 70 %, and a cell that it has passed those of 40 %. Log-odds are held within 1.8 % and 98.2 %.
+/// A beam's end has the log-odds of 70 %, and a cell that it has passed those of 40 %. Log-odds are clamped to 1.8 %
+/// and 98.2 %.
 const EVIDENCE: BeamEvidence = BeamEvidence { hit: 0.85, miss: -0.4, least: -4.0, most: 4.0 };
 
 /// An occupancy grid that grows with scans.
@@ -28,7 +29,7 @@ impl Mapper {
         Self { grid: ScanGrid::over(geometry, EVIDENCE), beams: Vec::new() }
     }
 
-    /// Adds a scan taken at `robot_pose` of the map frame. What lies outside of the grid is left out.
+    /// Adds a scan taken at `robot_pose` of the map frame. What is outside of the grid is ignored.
     pub(super) fn add_scan(&mut self, robot_pose: &Pose2, beams: &[Beam]) {
         let origin = self.grid.to_cells(&Point2::from(robot_pose.translation.vector));
         let heading = robot_pose.rotation.angle();
@@ -41,12 +42,12 @@ impl Mapper {
         self.grid.add_scan(&self.beams);
     }
 
-    /// The map so far, cut to the cells that are known; `None` if there are none.
+    /// The map so far, cropped to its known cells; `None` if there are none.
     pub(super) fn snapshot(&self) -> Option<SnapshotMap> {
         self.grid.snapshot()
     }
 
-    /// The map so far, with the cells that are not known.
+    /// The map so far, including unknown margins.
     pub(super) fn whole(&self) -> SnapshotMap {
         self.grid.whole()
     }

@@ -1,17 +1,17 @@
-//! Test worlds: buildings, robots that drive and map them, and the truth that a merge is measured against.
+//! Simulated worlds: buildings, robots that drive and map them, and the truth for the evaluation of a merge.
 //!
-//! [`simulate`] makes all of it from [`SimulatorParameters`] and a seed, in the order of the files here: a [`FloorPlan`] with
-//! rooms, doors and furniture; a route and a drive for every robot; lidar scans of the true world; poses with the drift
-//! that a SLAM system leaves; a growing occupancy grid per robot, in a map frame of its own; and range readings of radio
-//! tags on the walls. The same parameters and seed give the same simulation, bit by bit, on any number of threads:
-//! everything that is random has a stream of random numbers of its own.
+//! [`simulate`] creates all of it from [`SimulatorParameters`] and a seed, in the order of the files here: a
+//! [`FloorPlan`] with rooms, doors and furniture; a route and a drive for every robot; lidar scans of the true world;
+//! poses with the drift of a SLAM system; a growing occupancy grid per robot, in its own map frame; and range
+//! readings of radio tags on the walls. The same parameters and seed give the same simulation, bit by bit, on any
+//! number of threads: every random quantity has its own stream of random numbers.
 //!
 //! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
 //! `/robotN/tag_ranges` and `/tf`; and the [`Truth`] on `/truth`.
 //!
-//! [`draw_map`] makes a single map of a building whose direction is known exactly, without a drive.
+//! [`draw_map`] creates a single map of a building with an exactly known direction, without a drive.
 //!
-//! Nothing moves in these worlds but the robots, which do not see each other; floors are flat, and glass is not there.
+//! Nothing moves in these worlds but the robots, which do not see each other; floors are flat, and there is no glass.
 
 mod drawn_map;
 mod drive;

@@ -1,24 +1,24 @@
-//! The drift of a SLAM system's poses.
+//! Drift of a SLAM system's poses.
 //!
-//! Heading and distance take a random walk over the way driven, and what has gathered decays over a length of way, as
-//! loop closures take drift back. The error of every coordinate is so a mean-reverting random walk (an
-//! Ornstein-Uhlenbeck process in the length of the way): maps are bent a little, and do not drift away.
+//! Heading and distance have random walks over the driven distance, and the accumulated error decays over a length,
+//! as loop closures correct drift. The error of every coordinate is thus a mean-reverting random walk (an
+//! Ornstein-Uhlenbeck process in the driven distance): maps are deformed a little, and do not drift away.
 
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
-/// How poses drift.
+/// Parameters of the drift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drift {
     /// Standard deviation after one metre of driving: of the heading in radians, and of the distance in metres. It grows
     /// with the root of the way. A turn of one radian counts as a tenth of a metre.
     pub(super) deviation: f64,
-    /// The length of way over which an error decays to 37 %, metres; 0 for no correction.
+    /// Driven distance over which an error decays to 37 %, metres; 0 for no correction.
     pub(super) correction_length: f64,
 }
 
-/// What a SLAM system believes the poses `truth` to be. The first is exact.
+/// Estimated poses for the true poses `truth`. The first is exact.
 pub(super) fn estimate_poses(truth: &[Pose2], drift: &Drift, random: &mut impl Rng) -> Vec<Pose2> {
     let Some(first) = truth.first() else { return Vec::new() };
     let mut estimates = Vec::with_capacity(truth.len());

@@ -1,4 +1,4 @@
-//! The parameters of a simulation.
+//! Parameters of a simulation.
 
 use super::floor_plan::{BuildingSize, Layout};
 use super::lidar::Lidar;
@@ -8,14 +8,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// A map has at most this many cells while it is made.
+/// Largest number of cells of a map under construction.
 const MOST_CELLS: f64 = 6e7;
 
-/// What is simulated.
+/// Parameters of a simulation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulatorParameters {
-    /// How many robots there are. They are called `robot1`, `robot2`, ...
+    /// Number of robots. They are named `robot1`, `robot2`, ...
     #[schemars(range(min = 1, max = 64))]
     pub robots: u32,
     /// Size of the building along its corridors, metres. In a building of the default size three robots
@@ -69,33 +69,32 @@ pub struct SimulatorParameters {
     /// Share of the lidar's beams that return nothing although they meet something.
     #[schemars(range(min = 0.0, max = 0.99))]
     pub dropped_beams: f64,
-    /// Drift of the poses that a robot believes in: standard deviation after one metre of driving, of the heading in
-    /// radians and of the distance in metres; it grows with the root of the way. 0 makes poses exact.
+    /// Drift of the poses that a robot estimates: standard deviation after one metre of driving, of the heading in
+    /// radians and of the distance in metres; it grows with the square root of the distance. 0 makes poses exact.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub drift: f64,
-    /// The length of way over which loop closures take an error back to 37 %, metres. 0 lets drift grow without end,
-    /// and makes the truth of a merge a matter of where one looks.
+    /// Driven distance over which loop closures reduce an error to 37 %, metres. 0 lets drift grow without bound, so
+    /// the true relative pose depends on the part of the map.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub correction_length: f64,
-    /// Metres a cell of the maps. Several values are given to the robots in turn.
+    /// Resolution of the maps, metres per cell. Several values are given to the robots in turn.
     #[schemars(inner(range(min = 0.005, max = 1.0)))]
     pub resolution: Vec<f64>,
     /// Whether the scans of the lidars are logged as well.
     pub scans: bool,
-    /// Share of a map's free cells that are drawn occupied, as people's legs, dust and glass leave them.
+    /// Share of a map's free cells that are set to occupied, as by people's legs, dust and glass.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub specks: f64,
     /// How many maps each robot sends, growing, at the ends of equal parts of its drive.
     #[schemars(range(min = 1, max = 1000))]
     pub snapshots: u32,
-    /// The robots' map frames are turned against the walls by at most this, radians. 0 lays all maps along the walls.
+    /// Largest rotation of the robots' map frames against the walls, radians. 0 aligns all maps with the walls.
     #[schemars(range(min = 0.0, max = PI))]
     pub map_yaw: f64,
-    /// The origins of the map frames lie at most this far from where the robots start, in x and in y, metres.
+    /// Largest offset of the origins of the map frames from the starts of the robots, in x and in y, metres.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub map_offset: f64,
-    /// How many radio tags there are on the walls. Robots share enough of them with about one in 8 square metres of
-    /// floor.
+    /// Number of radio tags on the walls. Robots share enough of them with about one in 8 square metres of floor.
     #[schemars(range(min = 0, max = 10000))]
     pub tags: u32,
     /// The longest distance at which a tag is read, metres. The paper's is 3 m.

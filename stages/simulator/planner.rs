@@ -1,18 +1,18 @@
-//! The way from one place to another: A* over the raster of free space, kept away from walls, and then smoothed.
+//! Path planning: A* over the raster of free space, with a cost near walls, and then smoothing.
 
 use super::free_space::{FREE_CLEARANCE, FreeSpace, ROBOT_RADIUS};
 use crate::shared::geometry::Point2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// How much dearer a metre is where a robot only just fits than in the open.
+/// Cost of a metre where a robot only just fits, relative to open space.
 const WALL_COST: f64 = 3.0;
 /// Costs are whole numbers, so that they have an order: tenths of a millimetre.
 const UNITS_PER_METRE: f64 = 10_000.0;
 /// Passes of smoothing.
 const SMOOTHING: usize = 40;
 
-/// The cheapest way between two places, as points about 0.1 m apart; `None` if one cannot be reached from the other.
+/// The cheapest path between two points, as points about 0.1 m apart; `None` if one cannot be reached from the other.
 /// Near walls a metre costs more.
 pub(super) fn plan_path(space: &FreeSpace, from: &Point2, to: &Point2) -> Option<Vec<Point2>> {
     let (start, goal) = (space.index(from), space.index(to));
@@ -59,8 +59,8 @@ fn trace(space: &FreeSpace, parents: &[usize], goal: usize) -> Vec<Point2> {
     path
 }
 
-/// Takes the corners of the raster out of a way: every point moves towards the middle of its neighbours for as long as
-/// a robot fits there. The ends stay.
+/// Smooths the corners of the raster: every point moves towards the midpoint of its neighbours as long as a robot
+/// fits there. The ends stay.
 pub(super) fn smooth_path(space: &FreeSpace, path: &mut [Point2]) {
     for _ in 0..SMOOTHING {
         for index in 1..path.len().saturating_sub(1) {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_leads_round_a_wall_and_never_where_the_robot_does_not_fit() {
+    fn a_path_goes_round_a_wall_and_keeps_the_clearance_of_the_robot() {
         let space = space();
         let mut way = plan_path(&space, &Point2::new(1.0, 1.0), &Point2::new(4.0, 0.6)).unwrap();
         smooth_path(&space, &mut way);

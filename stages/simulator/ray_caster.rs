@@ -1,4 +1,4 @@
-//! How far one sees in a direction: rays against the sides of solids, found through a grid of buckets.
+//! Ray casting against the sides of solids, found through a grid of buckets.
 
 use super::shape::{Rectangle, Solid};
 use crate::shared::geometry::Point2;
@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 /// The side of a bucket, metres.
 const BUCKET: f64 = 0.5;
 
-/// The sides of solids, sorted into square buckets so that a ray tests only what lies along it.
+/// The sides of solids, sorted into square buckets so that a ray tests only those along it.
 #[derive(Clone, Debug)]
 pub(super) struct RayCaster {
     min: Point2,
@@ -54,8 +54,8 @@ impl RayCaster {
         Self { min: bounds.min, columns, rows, starts, sides }
     }
 
-    /// The distance from `origin` to the first side in the direction `angle` (radians, building frame), metres;
-    /// `None` if there is none within `reach`, or if `origin` lies outside of the building.
+    /// Distance from `origin` to the first side in the direction `angle` (radians, building frame), metres; `None` if
+    /// there is none within `reach`, or if `origin` is outside of the building.
     pub(super) fn cast(&self, origin: &Point2, angle: f64, reach: f64) -> Option<f64> {
         let direction = Vector2::new(angle.cos(), angle.sin());
         let start = (origin - self.min) / BUCKET;
@@ -89,8 +89,8 @@ impl RayCaster {
         }
     }
 
-    /// Whether nothing stands between two points. A side nearer than 3 cm to `to` does not count, so that what is fixed
-    /// to a wall can be seen.
+    /// Whether nothing is between two points. A side nearer than 3 cm to `to` does not count, so that an object fixed
+    /// to a wall is visible.
     pub(super) fn sees(&self, from: &Point2, to: &Point2) -> bool {
         let way = to - from;
         self.cast(from, way.y.atan2(way.x), way.norm() - 0.03).is_none()
@@ -112,7 +112,7 @@ impl RayCaster {
     }
 }
 
-/// How far along the ray it leaves its first bucket on one axis, metres.
+/// Distance along the ray at which it leaves its first bucket on one axis, metres.
 fn first_crossing(start: f64, direction: f64, step: f64) -> f64 {
     let share = start - start.floor();
     match direction {

@@ -1,4 +1,4 @@
-//! One robot's part of a simulation: its drive, and what it believes and logs.
+//! One robot of a simulation: its drive, its estimates and its log.
 
 use super::drive::{DriveLimits, drive};
 use super::lidar::Beam;
@@ -22,26 +22,26 @@ const TURN_RATE: f64 = 1.2;
 /// The value of a cell that is drawn occupied by chance, per cent.
 const SPECK: i8 = 100;
 
-/// What one robot has logged, by ticks of [`TICK_SECONDS`](super::TICK_SECONDS) from the start.
+/// Log of one robot, by ticks of [`TICK_SECONDS`](super::TICK_SECONDS) from the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotLog {
     /// Its name: `robot1`, `robot2`, ...
     pub name: String,
-    /// `T_building_map`: where its map frame is.
+    /// Pose of its map frame in the building, `T_building_map`.
     pub transform_building_map: Pose2,
-    /// Where it was in the building, a pose a tick.
+    /// True poses in the building, one per tick.
     pub true_poses: Vec<Pose2>,
-    /// Where it believes it was in its map frame, a pose a tick.
+    /// Estimated poses in its map frame, one per tick.
     pub poses: Vec<Pose2>,
-    /// The tags it has read, with their ticks.
+    /// The tags that it has read, with their ticks.
     pub readings: Vec<(usize, TagReading)>,
-    /// What its lidar has measured, a scan a tick; none if scans are not logged.
+    /// Scans of its lidar, one per tick; none if scans are not logged.
     pub(super) scans: Vec<Vec<Beam>>,
     /// The maps it has sent, with the ticks of their last scans.
     pub maps: Vec<(usize, SnapshotMap)>,
 }
 
-/// Lets one robot drive through its rooms, map them and read tags.
+/// Simulates the drive of one robot through its rooms, its map and its tag readings.
 pub(super) fn simulate_robot(
     world: &World,
     robot: usize,
@@ -76,7 +76,7 @@ pub(super) fn simulate_robot(
     Ok(RobotLog { name, transform_building_map, true_poses, poses, readings, scans, maps })
 }
 
-/// A map frame near the start of the drive, turned at random: `T_building_map`.
+/// A map frame near the start of the drive, with a random rotation: `T_building_map`.
 fn map_frame(start: &Pose2, world: &World, robot: usize, parameters: &SimulatorParameters) -> Pose2 {
     let mut random = world.random(Stream::MapFrame(robot));
     let mut offset = || between(&mut random, -parameters.map_offset, parameters.map_offset);
@@ -117,7 +117,7 @@ fn map_building(
     maps
 }
 
-/// Draws a share of the free cells occupied.
+/// Sets a share of the free cells to occupied.
 fn add_specks(map: &mut SnapshotMap, share: f64, random: &mut impl Rng) {
     if share > 0.0 {
         for cell in map.cells.iter_mut().filter(|cell| is_free(**cell)) {

@@ -1,4 +1,4 @@
-//! A map of a building scanned from many places, laid at poses that are right but for a small error each.
+//! A map of a building scanned from many positions, with small errors of their poses.
 
 use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
@@ -11,10 +11,10 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
 
-/// How a building is scanned.
+/// Parameters of the scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanSettings {
-    /// How many scans are taken, each from a place of its own.
+    /// Number of scans, each from another position.
     pub count: usize,
     /// Beams of a scan, over a full circle.
     pub beams: usize,
@@ -44,8 +44,8 @@ impl Default for ScanSettings {
     }
 }
 
-/// The map of a building that is scanned from random places where a robot can stand. Its grid is the given one; what
-/// lies beyond is left out.
+/// The map of a building that is scanned from random positions at which a robot can stand, on the given grid. What is
+/// beyond is ignored.
 pub(super) fn scan_building(
     plan: &FloorPlan,
     transform_map_building: &Pose2,

@@ -11,7 +11,8 @@ use crate::shared::geometry::{Point2, PointIndex, Pose2};
 use gridweave_runtime::stage::Parameters as _;
 use rayon::prelude::*;
 
-/// Metres between places that two robots both have driven through, and how near the second passes by where the first was.
+/// Distance between points that two robots both have driven through, and the largest distance of their paths there,
+/// metres.
 const COMMON_SPACING: f64 = 0.5;
 
 /// A simulation.
@@ -21,17 +22,17 @@ pub struct Simulation {
     pub plan: FloorPlan,
     /// Its tags.
     pub tags: Vec<Tag>,
-    /// What each robot has logged.
+    /// Log of each robot.
     pub robots: Vec<RobotLog>,
-    /// What a merge is measured against.
+    /// Truth for the evaluation of a merge.
     pub truth: Truth,
 }
 
-/// Makes a building, lets the robots drive through it, and says what is true. The same parameters and seed give the
-/// same simulation on any number of threads.
+/// Creates a building, simulates the robots in it, and computes the truth. The same parameters and seed give the same
+/// simulation on any number of threads.
 ///
 /// # Errors
-/// A parameter is out of its range, or the robots have no way to go or see nothing.
+/// A parameter is out of its range, or the robots have no path or see nothing.
 pub fn simulate(parameters: &SimulatorParameters, seed: u64) -> Result<Simulation, SimulationError> {
     if let Some(error) = parameters.check().into_iter().next() {
         return Err(error.into());
@@ -69,15 +70,15 @@ fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
     }
 }
 
-/// The two robots between which common places are told: `robot10` comes before `robot2`.
+/// The two robots whose common places are in the truth: `robot10` comes before `robot2`.
 fn first_two_by_name(robots: &[RobotLog]) -> Option<[&RobotLog; 2]> {
     let mut by_name: Vec<&RobotLog> = robots.iter().collect();
     by_name.sort_by(|one, other| one.name.cmp(&other.name));
     by_name.first_chunk().copied()
 }
 
-/// Places that two robots both have driven through, as the map of the first shows them and as that of the second does: what a
-/// robot sees of a place is drawn as far off as it believes to be itself.
+/// Points that two robots both have driven through, in the map of the first and in that of the second: a robot's map
+/// is displaced by the error of its pose.
 fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
     let place = |pose: &Pose2| Point2::from(pose.translation.vector);
     let driven: Vec<Point2> = first.true_poses.iter().map(place).collect();
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn common_places_are_one_place_where_poses_are_exact_and_lie_apart_where_they_drift() {
+    fn common_places_coincide_with_exact_poses_and_differ_with_drift() {
         let apart = |drift: f64| {
             let truth = simulate(&SimulatorParameters { drift, ..small() }, 3).unwrap().truth;
             assert!(truth.common.len() > 10, "{}", truth.common.len());
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_tells_tags_frames_and_centres() {
+    fn the_truth_contains_tags_frames_and_centres() {
         let simulation = simulate(&small(), 2).unwrap();
         let truth = &simulation.truth;
         assert_eq!(truth.frames[0].1, Pose2::identity());

@@ -14,7 +14,7 @@ use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Sourc
 
 /// When simulated logs begin: 14 November 2023, 22:13:20 UTC.
 const START: LogTime = LogTime(1_700_000_000_000_000_000);
-/// A map is sent so long after its last scan, seconds.
+/// Delay of a map after its last scan, seconds.
 const MAP_DELAY: f64 = TICK_SECONDS / 2.0;
 
 /// The stage kind `simulator`.
@@ -47,7 +47,7 @@ impl Outputs for SimulatedLog {
             truth: ports.output_on(
                 "/truth",
                 "truth",
-                "Where the maps and the tags lie in the first robot's map frame. Sent once, before everything else.",
+                "The poses of the maps and the positions of the tags in the first robot's map frame. Sent once, before everything else.",
             ),
         }
     }
@@ -60,7 +60,7 @@ struct Simulator {
     playback: Option<Playback>,
 }
 
-/// A simulation, and how much of it has been sent.
+/// A simulation, and the position in its messages.
 struct Playback {
     simulation: Simulation,
     events: Vec<Event>,
@@ -75,7 +75,7 @@ struct Event {
     what: What,
 }
 
-/// What is logged: its place in the robot's list.
+/// A logged item, by its index in the robot's list.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum What {
     Pose(usize),
@@ -175,7 +175,7 @@ fn send_reading(
     output.tags.send(&log.name, &message)
 }
 
-/// Sends a scan with a beam for each direction; those that have not returned measure nothing.
+/// Sends a scan with all directions; beams without an echo have no range.
 fn send_scan(
     output: &Output<SimulatedLog>,
     log: &RobotLog,

@@ -1,8 +1,8 @@
 //! Radio tags on walls, and the readings of their range.
 //!
-//! The model: a tag is read when it is within reach of the robot's middle and nothing stands between. The range has
-//! Gaussian noise; some readings are lost, and some have come over a reflection and are too long by 0.3 m to 2 m. The
-//! signal strength falls with the square of the distance, from -45 dBm at one metre, with a deviation of 2 dB.
+//! The model: a tag is read when it is within reach of the robot's centre and in line of sight. The range has
+//! Gaussian noise; some readings are lost, and some are reflected and too long by 0.3 m to 2 m. The signal strength
+//! falls with the square of the distance, from -45 dBm at one metre, with a deviation of 2 dB.
 
 use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;

@@ -1,4 +1,4 @@
-//! What a merge is measured against.
+//! Truth for the evaluation of a merge.
 
 use crate::shared::geometry::{Point2, Pose2};
 use gridweave_runtime::message::LogTime;
@@ -15,8 +15,8 @@ pub struct Truth {
     pub tags: Vec<(String, Point2)>,
     /// The middle of each robot's last map, in its own map frame, metres.
     pub centres: Vec<(String, Point2)>,
-    /// Places that the first two robots by name both have driven through, as the map of the first shows them and as that of the second
-    /// does, each in its own map frame, metres.
+    /// Points that the first two robots by name both have driven through, in the map of the first and in that of the
+    /// second, each in its own map frame, metres.
     pub common: Vec<[Point2; 2]>,
 }
 
@@ -53,7 +53,7 @@ mod tests {
     use crate::shared::geometry::pose;
 
     #[test]
-    fn the_message_says_all_of_the_truth() {
+    fn the_message_contains_the_whole_truth() {
         let truth = Truth {
             resolution: 0.05,
             frames: vec![("robot1".into(), Pose2::identity()), ("robot2".into(), pose(1.0, 2.0, 0.5))],

@@ -1,4 +1,4 @@
-//! What the robots of a simulation share: the building, its tags, and random numbers.
+//! Common parts of the robots of a simulation: the building, its tags, and random numbers.
 
 use super::floor_plan::FloorPlan;
 use super::free_space::FreeSpace;
@@ -29,7 +29,7 @@ pub enum SimulationError {
     },
 }
 
-/// What the robots share.
+/// Common parts of the robots.
 pub(super) struct World {
     pub(super) plan: FloorPlan,
     pub(super) space: FreeSpace,
@@ -38,7 +38,7 @@ pub(super) struct World {
     seed: u64,
 }
 
-/// What random numbers are for. Every purpose has a stream of its own, so that to change one thing changes no other.
+/// Purposes of random numbers. Every purpose has its own stream, so that to change one thing changes no other.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stream {
     Building,
@@ -62,7 +62,7 @@ impl World {
         Self { plan, space, caster, tags, seed }
     }
 
-    /// The world as it is for one robot, for which furniture of some rooms stands elsewhere; tags are on the walls.
+    /// The world of one robot, with the furniture of some rooms rearranged; tags are on the walls.
     pub(super) fn rearranged(&self, robot: usize, parameters: &SimulatorParameters) -> Self {
         let mut random = self.random(Stream::Furniture(robot));
         let plan = self.plan.rearranged(parameters.moved, &parameters.building(), &mut random);
@@ -90,7 +90,7 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
         Stream::Lidar(robot) => (5, robot),
         Stream::Tags(robot) => (6, robot),
         Stream::Specks(robot) => (7, robot),
-        // Behind the streams of the most robots that there are.
+        // After the streams of the largest number of robots.
         Stream::Furniture(robot) => (0, 64 + robot),
     };
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,4 +1,5 @@
-//! Topological maps: the skeleton of the free space, the graph of its places, and hypotheses from matching two graphs.
+//! Topological maps: the skeleton of the free space, the graph of its nodes and paths, and hypotheses from matching
+//! two graphs.
 
 pub mod skeleton;
 pub mod topology_extractor;
@@ -6,7 +7,7 @@ pub mod topology_matcher;
 
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this room.
+/// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {
     vec![topology_extractor::kind(), topology_matcher::kind()]
 }

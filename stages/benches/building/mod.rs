@@ -16,8 +16,8 @@ pub(crate) fn draw(cells: usize, known: f64, yaw: f64) -> (GridGeometry, Vec<i8>
     draw_deformed(cells, known, &pose(0.0, 0.0, yaw), 0.0)
 }
 
-/// The map of a robot that has seen a square of `known` metres around the origin of its frame, and that displaces what it shows
-/// by up to `most` metres along x and along y, in waves that are longer than a building.
+/// The map of a robot that has seen a square of `known` metres around the origin of its frame, deformed by up to
+/// `most` metres along x and along y, in waves that are longer than a building.
 pub(crate) fn draw_deformed(
     cells: usize,
     known: f64,

@@ -1,14 +1,14 @@
-//! From a map as it is drawn to its walls and the space between them.
+//! Reduces a map to its walls and the space between them.
 
 use super::MapCleanerParameters;
 use super::objects::loose_cells;
 use super::passages::wide_known_space;
 use crate::shared::geometry::{CellBox, Grid, UNKNOWN, is_known, is_occupied};
 
-/// Clears what is no wall out of `cells`, which hold the same as `grid`: what becomes unknown says nothing for or against a
-/// place at which two maps may lie.
+/// Sets everything that is no wall to unknown in `cells`, a copy of the cells of `grid`: unknown cells are no
+/// evidence for or against a relative pose of two maps.
 ///
-/// - Occupied cells that belong to no wall: people, legs of chairs, dust, and the ends of beams that met nothing.
+/// - Occupied cells that belong to no wall: people, legs of chairs, dust, and the ends of beams without a hit.
 /// - Known space that is narrower than a robot, such as rays through glass and open doors. Walls stay.
 pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8]) {
     let radius = (0.5 * parameters.min_passage / grid.geometry.resolution).min(1e6) as usize;

@@ -1,7 +1,8 @@
-//! Takes out of a map what is no wall, for the stages that compare maps; the merged map keeps what the robots saw.
+//! Removes everything that is no wall from a map, for the stages that compare maps; the merged map keeps what the
+//! robots saw.
 //!
-//! Where walls lie is the same for every robot and on every day. People, legs of furniture, dust and what a beam made of
-//! glass are not: they speak against right places, and for wrong ones.
+//! Walls are the same for every robot and on every day. People, legs of furniture, dust and reflections in glass are
+//! not: they are evidence against right poses, and for wrong ones.
 //!
 //! - [`clean`]: objects that are too small for walls, and known space that is too narrow, become unknown.
 

@@ -1,9 +1,9 @@
-//! The objects that the occupied cells of a map belong to.
+//! Connected objects of the occupied cells of a map.
 
 use super::MapCleanerParameters;
 use crate::shared::geometry::{Cell, Grid};
 
-/// Occupied cells that belong together, as far as it matters what they are.
+/// Bounding box and size of connected occupied cells.
 #[derive(Clone, Copy, Debug)]
 struct Object {
     cells: usize,
@@ -51,7 +51,7 @@ pub(super) fn loose_cells(grid: &Grid<'_>, parameters: &MapCleanerParameters) ->
     (0..cells.len()).filter(|index| is_loose(*index, &mut sets)).map(|index| cells[index]).collect()
 }
 
-/// Sets of numbers that are joined to larger ones.
+/// Disjoint sets of numbers that are joined to larger ones.
 struct DisjointSets {
     parents: Vec<usize>,
 }

@@ -1,26 +1,26 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the map cleaner. What takes them expects values that have passed [`check`](Parameters::check).
+/// Parameters of the map cleaner. Functions expect values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MapCleanerParameters {
-    /// Occupied cells that lie within this distance along x and along y belong to one object, metres; never less than two
-    /// cells, so that a wall that lacks single cells stays whole.
+    /// Occupied cells within this distance along x and along y belong to one object, metres; never less than two
+    /// cells, so that a wall without single cells stays whole.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub link: f64,
-    /// An object is a wall if the box round it is at least so long from corner to corner, metres; legs, people and dust are
-    /// shorter.
+    /// Least diagonal of the bounding box of a wall, metres; legs, people and dust are shorter.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub min_wall_length: f64,
-    /// The least share of that length that cells of the object would fill if they stood in a row. Single cells that
-    /// lie near each other by chance fill less.
+    /// Least share of that diagonal that the cells of a wall would fill in a row. Single cells that are near each
+    /// other by chance fill less.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_fill: f64,
-    /// Known space that is narrower than this is left out, metres: the rays of a lidar through glass and open doors.
+    /// Least width of known space, metres; narrower space is removed, such as the rays of a lidar through glass and
+    /// open doors.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub min_passage: f64,
 }

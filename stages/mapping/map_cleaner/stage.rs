@@ -1,18 +1,18 @@
-//! The stage: cleans every map that comes.
+//! The stage: cleans every map.
 
 use super::{MapCleanerParameters, clean};
 use crate::shared::geometry::Grid;
 use gridweave_runtime::ros::{GridPrefix, OccupancyGrid};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct CleanedMaps {
     map: Out<OccupancyGrid<'static>>,
 }
 
 impl Outputs for CleanedMaps {
     fn declare(ports: &mut OutputPorts) -> Self {
-        Self { map: ports.output("map", "The robots' maps with walls and the space between them alone.") }
+        Self { map: ports.output("map", "The robots' maps, reduced to walls and the space between them.") }
     }
 }
 

@@ -47,7 +47,7 @@ fn a_wall_that_lacks_cells_stays_whole() {
 }
 
 #[test]
-fn a_ray_through_a_window_is_taken_out_and_a_door_is_not() {
+fn a_ray_through_a_window_is_removed_and_a_door_is_not() {
     // Below row 20 a room; above it a ray of two cells and a corridor of a metre, seen through gaps of the wall.
     let is_ray = |column: usize, row: usize| row > 20 && (14..16).contains(&column);
     let is_corridor = |column: usize, row: usize| row > 20 && (25..45).contains(&column);
@@ -78,7 +78,7 @@ proptest! {
 
 proptest! {
     #[test]
-    fn space_is_wide_where_a_square_of_known_cells_lies(
+    fn space_is_wide_inside_a_square_of_known_cells(
         width in 1usize..14, height in 1usize..14, radius in 1usize..4,
         values in prop::collection::vec(prop::sample::select(vec![-1_i8, 0, 0, 0, 0, 100]), 14 * 14),
         inner in 0usize..6,

@@ -1,12 +1,12 @@
-//! How much of a map has changed.
+//! Share of a map that has changed.
 
 use crate::shared::geometry::{Grid, is_known, is_occupied};
 use std::ops::Range;
 
-/// Two grids share their cells if no corner lies farther from one of the other's than this, in cells.
+/// Largest offset of a corner of two grids that share their cells, in cells.
 const TOLERANCE: f64 = 0.01;
 
-/// The number of cells that are unknown, occupied, or neither in one map and not in the other. What a grid does not reach is
+/// Number of cells that are unknown, occupied, or neither in one map and not in the other. Cells outside a grid are
 /// unknown. None if the cells of the maps do not coincide.
 pub fn changed_cells(before: &Grid<'_>, after: &Grid<'_>) -> Option<usize> {
     let (column, row) = offset(before, after)?;
@@ -20,7 +20,7 @@ pub fn changed_cells(before: &Grid<'_>, after: &Grid<'_>) -> Option<usize> {
             let one = &before.cells[number * before.geometry.width..][columns.clone()];
             let other = number.wrapping_add_signed(-row) * after.geometry.width + first;
             let other = &after.cells[other..other + columns.len()];
-            // Most rows are as they were.
+            // Most rows are unchanged.
             if one != other {
                 changed += one.iter().zip(other).filter(|(one, other)| kind_of(**one) != kind_of(**other)).count();
             }
@@ -31,7 +31,7 @@ pub fn changed_cells(before: &Grid<'_>, after: &Grid<'_>) -> Option<usize> {
     Some(changed + known_outside(before, &rows, &columns) + known_outside(after, &rows_after, &columns_after))
 }
 
-/// The number of known cells that do not lie in some rows and columns.
+/// Number of known cells outside of some rows and columns.
 fn known_outside(grid: &Grid<'_>, rows: &Range<usize>, columns: &Range<usize>) -> usize {
     let of_row = |(row, cells): (usize, &[i8])| match rows.contains(&row) {
         true => known_cells(&cells[..columns.start]) + known_cells(&cells[columns.end..]),
@@ -40,12 +40,12 @@ fn known_outside(grid: &Grid<'_>, rows: &Range<usize>, columns: &Range<usize>) -
     grid.cells.chunks_exact(grid.geometry.width.max(1)).enumerate().map(of_row).sum()
 }
 
-/// The cell of `before` that cell (0, 0) of `after` is, if the cells coincide.
+/// The cell of `before` that coincides with cell (0, 0) of `after`, if the cells coincide.
 fn offset(before: &Grid<'_>, after: &Grid<'_>) -> Option<(isize, isize)> {
     let resolution = before.geometry.resolution;
     let to_before = before.geometry.origin.inverse() * after.geometry.origin;
     let place = to_before.translation.vector / resolution;
-    // How far the cell that is farthest from the corner is off.
+    // Offset of the cell that is farthest from the corner.
     let longest = after.geometry.width.max(after.geometry.height) as f64;
     let scale = after.geometry.resolution / resolution;
     let off =
@@ -54,7 +54,7 @@ fn offset(before: &Grid<'_>, after: &Grid<'_>) -> Option<(isize, isize)> {
     is_near.then(|| (place.x.round() as isize, place.y.round() as isize))
 }
 
-/// The part of `0..count` that another range of `other` numbers has too which begins at `offset`.
+/// The part of `0..count` in common with a range of `other` numbers that begins at `offset`.
 fn common(count: usize, other: usize, offset: isize) -> Range<usize> {
     let start = offset.max(0) as usize;
     let end = other.checked_add_signed(offset).unwrap_or(0).min(count);
@@ -73,7 +73,7 @@ fn kind_of(value: i8) -> u8 {
     u8::from(is_known(value)) + u8::from(is_occupied(value))
 }
 
-/// How many cells are known.
+/// Number of known cells.
 pub fn known_cells(cells: &[i8]) -> usize {
     // So few are counted together that a byte holds their number, and many bytes are added at once.
     cells.chunks(128).map(|cells| usize::from(cells.iter().map(|value| u8::from(is_known(*value))).sum::<u8>())).sum()

@@ -1,12 +1,12 @@
-//! Picks of the maps that robots send those that tell something, so that a merge costs what the robots have seen and not
-//! how often they tell of it.
+//! Selects the maps that differ enough from the one before, so that a merge costs in proportion to the known area,
+//! and not to the rate of the maps.
 //!
-//! A robot publishes its map every few seconds, and hardly anything in it differs from the one before. Places are searched
-//! and judged on maps that have changed by a share of what was known; and at the end on the last map of each robot, whatever
-//! has changed in it. As maps grow, each that is picked knows more than the one before by that share, so that their number
-//! goes with the logarithm of what is known.
+//! A robot publishes its map every few seconds, and hardly anything in it differs from the one before. Relative poses
+//! are searched and judged on maps that have changed by a share of the known area; and at the end on the last map of
+//! each robot, whatever has changed in it. As maps grow, each selected one knows more than the one before by that
+//! share, so their number grows with the logarithm of the known area.
 //!
-//! - [`changed_cells`]: how much of a map is another than in the one before.
+//! - [`changed_cells`]: number of cells that differ from the map before.
 
 mod change;
 mod parameters;
@@ -25,9 +25,9 @@ use stage::MapSelector;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "map_selector",
-        "Passes on the maps that tell something: of each robot the first, then each that has changed by at least \
+        "Passes on the maps that differ enough: of each robot the first, then each that has changed by at least \
          `min_change` since the one passed on before, and at the end the last. The stages that compare and fuse maps need \
-         not look at those that lie between.",
+         not process those between.",
         |parameters: MapSelectorParameters, _| Ok(MapSelector::new(parameters)),
     )
     .inputs("map", "The robots' maps.", MapSelector::receive_map)

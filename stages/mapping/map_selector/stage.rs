@@ -1,4 +1,4 @@
-//! The stage: keeps of each robot the map that came last and the one that was passed on last.
+//! The stage: keeps for each robot the latest map and the one that was passed on last.
 
 use super::{MapSelectorParameters, changed_cells, known_cells};
 use crate::shared::geometry::Grid;
@@ -7,18 +7,18 @@ use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeSet;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct SelectedMaps {
     map: Out<OccupancyGrid<'static>>,
 }
 
 impl Outputs for SelectedMaps {
     fn declare(ports: &mut OutputPorts) -> Self {
-        Self { map: ports.output("map", "Those of the robots' maps that tell something, as they came.") }
+        Self { map: ports.output("map", "The robots' maps that differ enough from the one before, unchanged.") }
     }
 }
 
-/// Picks the maps of robots.
+/// Selects the maps of robots.
 pub(super) struct MapSelector {
     parameters: MapSelectorParameters,
     last: RobotMaps<()>,
@@ -40,7 +40,7 @@ impl MapSelector {
     ) -> Result<(), StageError> {
         let robot = map.robot();
         if !self.last.keep(&map, output, |_| ()) {
-            // That the robot is there must be known, to say that it is not merged.
+            // That the robot exists must be known, to report that it is not merged.
             return output.map.send_bytes(robot, map.message().bytes());
         }
         let before = self.passed_on.get(robot).zip(self.last.get(robot));
@@ -54,7 +54,7 @@ impl MapSelector {
         output.map.send_bytes(robot, map.message().bytes())
     }
 
-    /// Whether a map has changed so much that it is passed on.
+    /// Whether a map has changed enough to be passed on.
     fn has_changed(&self, before: &RobotMap<usize>, map: &Grid<'_>) -> bool {
         let changed = changed_cells(&before.grid(), map);
         changed.is_none_or(|changed| {
@@ -63,7 +63,7 @@ impl MapSelector {
         })
     }
 
-    /// The last maps are those that a merge is judged by.
+    /// The last maps are those of the final merge.
     pub(super) fn finish(&mut self, output: &Output<SelectedMaps>) -> Result<(), StageError> {
         let last = self.waiting.iter().filter_map(|robot| Some((robot, self.last.get(robot)?)));
         last.into_iter().try_for_each(|(robot, map)| output.map.send_bytes(robot, map.bytes()))

@@ -53,7 +53,7 @@ fn how_probable_an_obstacle_is_does_not_count() {
     assert_eq!(share(&(geometry, cells), &(geometry, wall)), 1.0);
 }
 
-/// The numbers of the maps of two robots, in turn, that are passed on of those that know so many columns; and at the end.
+/// The indices of the maps of two robots, in turn, that are passed on if they know so many columns; and at the end.
 fn passed_on(known: &[usize], min_change: f64) -> (Vec<usize>, Vec<usize>) {
     let mut stage = StageHarness::new(&kind(), &format!("min_change = {min_change:?}")).unwrap();
     let take = |stage: &mut StageHarness| -> Vec<usize> {
@@ -89,7 +89,7 @@ fn the_first_map_each_that_has_changed_and_the_last_are_passed_on() {
 }
 
 #[test]
-fn what_is_no_map_is_passed_on_so_that_its_robot_is_known() {
+fn an_invalid_map_is_passed_on_so_that_its_robot_is_known() {
     let mut stage = StageHarness::new(&kind(), "").unwrap();
     let info = MapMetaData { resolution: 0.05, width: 40, height: 10, ..Default::default() };
     let too_short = OccupancyGrid { info, data: &[0; 7], ..Default::default() };
@@ -101,7 +101,7 @@ fn what_is_no_map_is_passed_on_so_that_its_robot_is_known() {
 
 proptest! {
     #[test]
-    fn what_waits_is_less_than_what_is_asked_for_and_the_last_is_never_lost(
+    fn waiting_changes_are_less_than_min_change_and_the_last_map_is_never_lost(
         known in prop::collection::vec(0usize..40, 1..30), min_change in 0.0..2.0,
     ) {
         let (during, last) = passed_on(&known, min_change);

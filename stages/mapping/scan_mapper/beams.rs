@@ -1,4 +1,4 @@
-//! The beams of a scan, as the base of the robot sees them.
+//! Beams of a scan, in the frame of the robot's base.
 
 use super::ScanMapperParameters;
 use crate::shared::geometry::{Pose2, pose};
@@ -7,30 +7,30 @@ use gridweave_runtime::ros::RangeScan;
 /// A beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseBeam {
-    /// Its direction from that of the base, radians.
+    /// Direction relative to the base, radians.
     pub angle: f64,
-    /// How far it shows what is there, metres.
+    /// Distance up to which it shows what is there, metres.
     pub range: f64,
-    /// Whether it has met something at its end.
+    /// Whether it has hit something at its end.
     pub is_hit: bool,
-    /// When it was sent, seconds from the first one on.
+    /// Time since the first beam, seconds.
     pub delay: f64,
 }
 
-/// The beams of a scan that tell something.
+/// The valid beams of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanBeams {
-    /// Where the lidar is in the frame of the base.
+    /// Pose of the lidar in the frame of the base.
     pub transform_base_lidar: Pose2,
     /// In the order in which they were sent.
     pub beams: Vec<BaseBeam>,
-    /// Seconds from the first beam of the scan to the last one, whether they tell something or not; 0 if it is not known.
+    /// Seconds from the first beam of the scan to the last one, valid or not; 0 if it is unknown.
     pub duration: f64,
 }
 
 impl ScanBeams {
-    /// Those of a scan. What is nearer than the lidar measures, and what is no number, tells nothing; what is farther, or infinite,
-    /// has met nothing (REP 117). `None` if the scan says what cannot be.
+    /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those above its
+    /// maximum, or infinite, have hit nothing (REP 117). `None` if the scan is invalid.
     pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Option<Self> {
         let RangeScan { x, y, yaw, angle_min, angle_increment, time_increment, .. } = *scan;
         let numbers = [x, y, yaw, angle_min, angle_increment, time_increment];
@@ -38,7 +38,7 @@ impl ScanBeams {
             return None;
         }
         let (nearest, farthest) = (f64::from(scan.range_min), f64::from(scan.range_max));
-        // A lidar that tells no limit has none.
+        // A lidar that reports no limit has none.
         let farthest = if farthest > nearest { farthest } else { f64::INFINITY };
         let seen = |range: f64| match range {
             range if range < nearest.max(f64::MIN_POSITIVE) => None,
@@ -61,7 +61,7 @@ impl ScanBeams {
         Some(Self { transform_base_lidar: pose(x, y, yaw), beams, duration })
     }
 
-    /// How many beams have met something.
+    /// Number of beams with a hit.
     pub fn hits(&self) -> usize {
         self.beams.iter().filter(|beam| beam.is_hit).count()
     }

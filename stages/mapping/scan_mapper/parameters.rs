@@ -1,4 +1,4 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use crate::shared::log_odds::log_odds;
 use crate::shared::scan_grid::BeamEvidence;
@@ -6,49 +6,49 @@ use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How scans are drawn.
+/// Parameters of the scan mapper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScanMapperParameters {
-    /// Metres a cell.
+    /// Resolution of the map, metres per cell.
     #[schemars(range(min = 0.005, max = 1.0))]
     pub resolution: f64,
-    /// The probability that a cell is occupied in which a beam has ended.
+    /// Probability that a cell is occupied at the end of a beam.
     #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub hit_probability: f64,
-    /// The probability that a cell is occupied that a beam has passed.
+    /// Probability that a cell is occupied that a beam has passed.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub miss_probability: f64,
-    /// No cell is held to be occupied with a greater probability than this.
+    /// Upper bound of the probability that a cell is occupied.
     #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub max_probability: f64,
-    /// No cell is held to be occupied with a smaller probability than this.
+    /// Lower bound of the probability that a cell is occupied.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
-    /// What a beam has met farther away is not drawn, metres; the beam shows free space so far. The lidar's own limit counts as
-    /// well.
+    /// Hits farther away than this are not added, metres; the beam is free up to there. The lidar's own limit applies
+    /// as well.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1000))]
     pub max_range: f64,
-    /// A beam that has met nothing within the lidar's limit shows free space so far, metres. 0 leaves such beams out: many lidars
-    /// give the same for glass and for black paint.
+    /// Length of free space of a beam without a hit within the lidar's limit, metres. 0 ignores such beams: many
+    /// lidars report the same for glass and for black paint.
     #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1000))]
     pub free_without_echo: f64,
-    /// A map is sent so often, seconds, if anything was drawn; and at the end.
+    /// Time between maps, seconds, if anything was added; one is sent at the end, too.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub interval: f64,
-    /// Where the robot was is known if there is a pose not longer before a beam than this, seconds, and one after it.
+    /// Largest age of the pose before a beam, seconds, if there is one after it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_pose_age: f64,
-    /// Without a pose for so long after the first scan, seconds, scans are matched along odometry.
+    /// Time without a pose after the first scan, seconds, after which scans are matched along odometry.
     #[schemars(range(min = 0.0, max = 8.0))]
     pub wait_for_poses: f64,
-    /// Along odometry a scan is matched and drawn whenever the robot has driven so far, metres.
+    /// Along odometry a scan is matched and added whenever the robot has moved by this distance, metres.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 10))]
     pub step: f64,
-    /// Or has turned by so much, radians.
+    /// Or has turned by this angle, radians.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 3.2))]
     pub step_yaw: f64,
-    /// Standard deviation of odometry, as a share of the way and of the turn since the last scan that was matched.
+    /// Standard deviation of odometry, as a share of the distance and of the turn since the last matched scan.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub odometry_deviation: f64,
 }
@@ -74,7 +74,7 @@ impl Default for ScanMapperParameters {
 }
 
 impl ScanMapperParameters {
-    /// What beams say of cells.
+    /// Log-odds that beams add to cells.
     pub fn evidence(&self) -> BeamEvidence {
         let of = |probability: f64| log_odds(probability) as f32;
         BeamEvidence {

@@ -1,18 +1,18 @@
-//! One robot, its scans, and where it was.
+//! One robot with its scans and poses.
 
-use super::{DrawnMap, Motion, ScanBeams, ScanMapperParameters, TooLarge, match_scan};
+use super::{Motion, ScanBeams, ScanMap, ScanMapperParameters, TooLarge, match_scan};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::tags::tag_localizer::{PoseTrack, Position};
 use gridweave_runtime::message::LogTime;
 use std::collections::VecDeque;
 
-/// Scans wait for a pose behind them for at most so long, seconds: poses are kept as long.
+/// Scans wait for a later pose for at most this long, seconds: poses are kept as long.
 const PATIENCE: f64 = 10.0;
 
-/// By what it is known where the robot is.
+/// Source of the robot's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
-    /// Nothing was said yet, or odometry alone, and not for long.
+    /// No messages so far, or odometry only, and not for long.
     NotYet,
     /// By poses in its map.
     ByPoses,
@@ -20,20 +20,20 @@ enum Known {
     ByOdometry,
 }
 
-/// What became of a scan.
+/// Outcome of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fate {
-    /// It is in the map, or need not be: another from nearly the same place is, or it is the last.
+pub(super) enum ScanOutcome {
+    /// It is in the map, or need not be: another one from nearly the same pose is, or it is the last.
     Used,
-    /// Nothing says where the robot was.
+    /// No pose of the robot is known.
     NoPose,
-    /// The walls did not tell where it belongs: it was laid where odometry has it.
+    /// The walls do not constrain its pose: it was added at the pose by odometry.
     NotMatched,
-    /// The map would have got too large.
+    /// The map would get too large.
     TooLarge,
 }
 
-/// A robot whose map is drawn.
+/// A robot whose map is built.
 pub(super) struct Robot {
     known: Known,
     poses: PoseTrack,
@@ -42,16 +42,16 @@ pub(super) struct Robot {
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
     first_scan: Option<LogTime>,
-    pub(super) map: DrawnMap,
-    /// Where the odometry of a robot without poses began lies in its map.
+    pub(super) map: ScanMap,
+    /// Pose in the map at which the odometry of a robot without poses began.
     transform_map_odometry: Pose2,
-    /// Where odometry had the robot when the last scan was matched.
+    /// Pose by odometry at the last matched scan.
     last_step: Option<Pose2>,
-    /// When the last scan that is in the map was made.
+    /// Time of the last scan in the map.
     pub(super) drawn_until: Option<LogTime>,
-    /// When the first one was made.
+    /// Time of the first scan in the map.
     pub(super) first_drawn: Option<LogTime>,
-    /// The last scan in the map that was sent.
+    /// Time of the last scan in the map that was sent.
     pub(super) sent_until: Option<LogTime>,
 }
 
@@ -64,7 +64,7 @@ impl Robot {
             frame: None,
             waiting: VecDeque::new(),
             first_scan: None,
-            map: DrawnMap::new(parameters),
+            map: ScanMap::new(parameters),
             transform_map_odometry: Pose2::identity(),
             last_step: None,
             drawn_until: None,
@@ -73,13 +73,14 @@ impl Robot {
         }
     }
 
-    /// Takes up a scan that was made at a time.
+    /// Adds a scan with its time.
     pub(super) fn add_scan(&mut self, time: LogTime, scan: ScanBeams) {
         self.first_scan.get_or_insert(time);
         self.waiting.push_back((time, scan));
     }
 
-    /// Takes up a pose in the map. `false` if it is not used, as the map is drawn by odometry already, or as it is late.
+    /// Adds a pose in the map. Returns `false` if it is not used, as the map is built by odometry already, or as it
+    /// is late.
     pub(super) fn add_pose(&mut self, time: LogTime, pose: &Pose2) -> bool {
         if self.known == Known::ByOdometry {
             return false;
@@ -88,22 +89,22 @@ impl Robot {
         self.poses.add(time, position(pose))
     }
 
-    /// Takes up where odometry has the robot. `false` if it is late.
+    /// Adds a pose by odometry. Returns `false` if it is late.
     pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2) -> bool {
         self.odometry.add(time, position(pose))
     }
 
-    /// Whether poses of its own are to be sent, as nobody else has any.
+    /// Whether the stage sends poses of the robot, as it has no others.
     pub(super) fn is_by_odometry(&self) -> bool {
         self.known == Known::ByOdometry
     }
 
-    /// Where it is in its map when odometry has it at a pose.
+    /// Pose in the map for a pose by odometry.
     pub(super) fn in_map(&self, odometry: &Pose2) -> Pose2 {
         self.transform_map_odometry * odometry
     }
 
-    /// Begins to match scans along odometry, if poses were waited for long enough or none will come.
+    /// Starts to match scans along odometry, if no poses came for long enough or none will come.
     pub(super) fn decide(&mut self, parameters: &ScanMapperParameters, is_end: bool) {
         let (Known::NotYet, Some(first), Some(latest)) = (self.known, self.first_scan, self.odometry.latest_time())
         else {
@@ -114,9 +115,14 @@ impl Robot {
         }
     }
 
-    /// Draws the scans for whose beams it is known where the robot was, and at the end of the log those that are left as well. Tells
-    /// `fate` of each.
-    pub(super) fn draw(&mut self, parameters: &ScanMapperParameters, is_end: bool, mut fate: impl FnMut(Fate)) {
+    /// Adds the scans for whose beams poses are known, and at the end of the log the remaining ones as well. Calls
+    /// `outcome` for each.
+    pub(super) fn draw(
+        &mut self,
+        parameters: &ScanMapperParameters,
+        is_end: bool,
+        mut outcome: impl FnMut(ScanOutcome),
+    ) {
         loop {
             let latest = match self.known {
                 Known::NotYet => None,
@@ -130,47 +136,47 @@ impl Robot {
                 return;
             }
             let Some((time, scan)) = self.waiting.pop_front() else { return };
-            fate(match self.known {
-                // The last scan of a log has no pose behind its end.
-                _ if !is_due && latest.is_some_and(|latest| latest >= time) => Fate::Used,
-                _ if !is_due => Fate::NoPose,
-                Known::NotYet => Fate::NoPose,
+            outcome(match self.known {
+                // The last scan of a log has no pose after its end.
+                _ if !is_due && latest.is_some_and(|latest| latest >= time) => ScanOutcome::Used,
+                _ if !is_due => ScanOutcome::NoPose,
+                Known::NotYet => ScanOutcome::NoPose,
                 Known::ByPoses => self.draw_by_poses(time, &scan, parameters),
                 Known::ByOdometry => self.draw_by_odometry(time, &scan, parameters),
             });
         }
     }
 
-    fn draw_by_poses(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> Fate {
+    fn draw_by_poses(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> ScanOutcome {
         let at = |delay: f64| pose_at(&self.poses, time.plus_seconds(delay), parameters);
-        // Where the beginning and the end of a scan are known, what lies between is.
+        // If the poses at the beginning and the end of a scan are known, those between are.
         if at(0.0).is_none() || at(scan.duration).is_none() {
-            return Fate::NoPose;
+            return ScanOutcome::NoPose;
         }
         match self.map.draw(scan, at) {
             Ok(()) => {
                 self.drawn_until = Some(time);
-                Fate::Used
+                ScanOutcome::Used
             }
-            Err(TooLarge) => Fate::TooLarge,
+            Err(TooLarge) => ScanOutcome::TooLarge,
         }
     }
 
-    fn draw_by_odometry(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> Fate {
-        let Some(start) = pose_at(&self.odometry, time, parameters) else { return Fate::NoPose };
-        let mut fate = Fate::Used;
+    fn draw_by_odometry(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> ScanOutcome {
+        let Some(start) = pose_at(&self.odometry, time, parameters) else { return ScanOutcome::NoPose };
+        let mut outcome = ScanOutcome::Used;
         if let Some(last) = self.last_step {
             let moved = last.inverse() * start;
             let motion = Motion { way: moved.translation.vector.norm(), turn: moved.rotation.angle().abs() };
             if motion.way < parameters.step && motion.turn < parameters.step_yaw {
-                return Fate::Used;
+                return ScanOutcome::Used;
             }
             let guess = self.transform_map_odometry * start;
-            // Beams of one scan lie to each other as odometry has it.
+            // The relative poses of the beams of one scan are those of odometry.
             let still = self.without_motion(time, scan, &start, parameters);
             match match_scan(&self.map, &still, &guess, motion, parameters) {
                 Some(found) => self.transform_map_odometry = found * start.inverse(),
-                None => fate = Fate::NotMatched,
+                None => outcome = ScanOutcome::NotMatched,
             }
         }
         self.last_step = Some(start);
@@ -179,13 +185,13 @@ impl Robot {
         match self.map.draw(scan, at) {
             Ok(()) => {
                 self.drawn_until = Some(time);
-                fate
+                outcome
             }
-            Err(TooLarge) => Fate::TooLarge,
+            Err(TooLarge) => ScanOutcome::TooLarge,
         }
     }
 
-    /// The scan as a robot would have made it that stood still at `start`.
+    /// The scan of a robot that stands still at `start`.
     fn without_motion(
         &self,
         time: LogTime,

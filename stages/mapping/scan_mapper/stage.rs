@@ -1,6 +1,6 @@
 //! The stage `scan_mapper`.
 
-use super::robot::{Fate, Robot};
+use super::robot::{Robot, ScanOutcome};
 use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::tags::tag_localizer::time_of;
@@ -13,16 +13,16 @@ use std::collections::{BTreeMap, BTreeSet};
 pub fn kind() -> StageKind {
     StageKind::stage(
         "scan_mapper",
-        "Draws the maps of robots from the scans of their lidars, for robots without maps: at the poses that a localizer has found, \
-         or, where there is odometry only, each scan matched with those before it. It closes no loops: where a SLAM can be run, its \
-         map is better.",
+        "Builds the maps of robots from the scans of their lidars, for robots without maps: at the poses of a localizer, or, with \
+         odometry only, each scan registered on the earlier ones. There is no loop closure: where a SLAM can be run, its map is \
+         better.",
         |parameters: ScanMapperParameters, _| {
             Ok(ScanMapper { parameters, robots: BTreeMap::new(), with_map: BTreeSet::new() })
         },
     )
     .optional_input("pose", "poses of the robots in their maps", ScanMapper::receive_pose)
-    .optional_input("odometry", "where odometry has robots without poses", ScanMapper::receive_odometry)
-    .input("scan", "scans, seen from the bases of the robots", ScanMapper::receive_scan)
+    .optional_input("odometry", "odometry of robots without poses", ScanMapper::receive_odometry)
+    .input("scan", "scans, relative to the bases of the robots", ScanMapper::receive_scan)
     .optional_input(
         "map",
         "maps that robots have sent themselves: none is drawn for these from there on",
@@ -77,7 +77,7 @@ impl ScanMapper {
         let pose = message.pose.pose.planar();
         if !is_finite(&pose) || !robot.add_pose(time, &pose) {
             output.warn(format!(
-                "poses of {} are left out that are no numbers, or late, or came after its map was begun by odometry",
+                "poses of {} that are not finite, late, or after the start of its map by odometry are left out",
                 message.robot()
             ));
             return Ok(());
@@ -95,7 +95,7 @@ impl ScanMapper {
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let pose = message.pose.pose.planar();
         if !is_finite(&pose) || !robot.add_odometry(time, &pose) {
-            output.warn(format!("odometry of {} is left out that is no number, or late", message.robot()));
+            output.warn(format!("odometry of {} that is not finite or late is left out", message.robot()));
             return Ok(());
         }
         robot.decide(&parameters, false);
@@ -115,14 +115,14 @@ impl ScanMapper {
         let scan = ScanBeams::of(&message, &self.parameters);
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let Some(scan) = scan else {
-            output.warn(format!("scans of {} are left out whose angles or times are no numbers", message.robot()));
+            output.warn(format!("scans of {} with angles or times that are not finite are left out", message.robot()));
             return Ok(());
         };
         robot.add_scan(time, scan);
         self.draw_and_send(message.robot(), false, output)
     }
 
-    /// A robot has a map of its own: whoever lays maps on each other must not get another one in its place.
+    /// A robot has sent its own map, which must not be replaced by another.
     fn receive_map(
         &mut self,
         message: Received<'_, OccupancyGrid<'_>>,
@@ -135,14 +135,14 @@ impl ScanMapper {
         self.with_map.insert(name.to_owned());
         if self.robots.remove(name).is_some_and(|robot| robot.sent_until.is_some()) {
             output.warn(format!(
-                "{name} has sent a map after one was drawn from its scans: from there on its own counts. What was found with the \
-                 drawn one holds only if both are in one frame"
+                "{name} has sent a map after one was built from its scans: from then on its own map is used. Results from the \
+                 other one are valid only if both are in one frame"
             ));
         }
         Ok(())
     }
 
-    /// The robot of a name, new if nothing has come from it yet. There must be a name. `None` as well if it has a map of its own.
+    /// The robot of a name, created at its first message. There must be a name. `None` as well if it has its own map.
     fn robot(&mut self, name: &str, output: &Output<Drawn>) -> Option<&mut Robot> {
         if name.is_empty() {
             output.warn("scans and poses without a robot are left out");
@@ -154,16 +154,18 @@ impl ScanMapper {
         Some(self.robots.entry(name.to_owned()).or_insert_with(|| Robot::new(&self.parameters)))
     }
 
-    /// Draws what can be drawn, and sends the map if it is time.
+    /// Adds the scans with known poses, and sends the map if it is time.
     fn draw_and_send(&mut self, name: &str, is_end: bool, output: &Output<Drawn>) -> Result<(), StageError> {
         let Some(robot) = self.robots.get_mut(name) else { return Ok(()) };
-        robot.draw(&self.parameters, is_end, |fate| match fate {
-            Fate::Used => {}
-            Fate::NoPose => output.warn(format!("scans of {name} were left out: nothing says where it was")),
-            Fate::NotMatched => {
-                output.warn(format!("scans of {name} fit its map nowhere near, and were laid where odometry has them"));
+        robot.draw(&self.parameters, is_end, |outcome| match outcome {
+            ScanOutcome::Used => {}
+            ScanOutcome::NoPose => {
+                output.warn(format!("scans of {name} were left out: there is no pose of it for their time"))
             }
-            Fate::TooLarge => output.warn(format!("scans of {name} were left out: its map would get too large")),
+            ScanOutcome::NotMatched => {
+                output.warn(format!("scans of {name} do not fit its map, and were added at their poses by odometry"));
+            }
+            ScanOutcome::TooLarge => output.warn(format!("scans of {name} were left out: its map would get too large")),
         });
         let Some(drawn_until) = robot.drawn_until else { return Ok(()) };
         let since = robot.sent_until.unwrap_or(*robot.first_drawn.get_or_insert(drawn_until));
@@ -200,7 +202,7 @@ fn send_map(name: &str, robot: &Robot, drawn_until: LogTime, output: &Output<Dra
     output.map.send_grid(name, &prefix, |blank| blank.copy_cells(&map.cells))
 }
 
-/// The frame of a robot's map: that of its poses, and without any the usual one.
+/// Frame of a robot's map: that of its poses, or else the usual one.
 fn map_frame(name: &str, robot: &Robot) -> String {
     robot.frame.clone().unwrap_or_else(|| format!("{name}/map"))
 }

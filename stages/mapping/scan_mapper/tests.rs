@@ -51,7 +51,8 @@ fn to_wall(point: &Point2) -> f64 {
     WALLS.into_iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// A drive round the box in the room, with a turn on the way: where the base is at a time, in the frame of the building.
+/// A drive around the box in the room, with a turn on the way: the pose of the base at a time, in the frame of the
+/// building.
 fn truth(seconds: f64) -> Pose2 {
     let angle = 0.2 * seconds;
     pose(2.0 - 3.0 * angle.cos(), 1.8 * angle.sin() - 0.3, 1.5 * (0.7 * seconds).sin() + angle)
@@ -116,7 +117,7 @@ struct Drawn {
     free: usize,
 }
 
-/// Measures a map whose frame lies in the building as told.
+/// Measures a map with the given pose of its frame in the building.
 fn measure(map: &Message, transform_building_map: &Pose2) -> Drawn {
     let map: OccupancyGrid<'_> = map.decode().unwrap();
     let grid = Grid::new(GridGeometry::from(&map.info), map.cells()).unwrap();
@@ -135,7 +136,7 @@ fn map_frame() -> Pose2 {
     pose(7.0, -3.0, 1.1)
 }
 
-/// A drive with poses at 20 Hz, the scans of which say that their beams were so many seconds apart.
+/// A drive with poses at 20 Hz, whose scans report the given time between beams.
 fn drive_by_poses(time_increment: f64) -> (Bench, Option<Message>) {
     let mut bench = Bench::new("interval = 3");
     for tick in 0..200 {
@@ -159,7 +160,7 @@ fn walls_are_within_a_cell_of_where_they_are_though_the_robot_turns_during_a_sca
     let drawn = measure(&map, &map_frame());
     assert!(drawn.greatest < CELL, "{}", drawn.greatest);
     assert!(drawn.occupied > 500 && drawn.free > 15_000, "{} {}", drawn.occupied, drawn.free);
-    // The last scan had no pose behind its end.
+    // The last scan has no pose after its end.
     assert!(bench.0.warnings().values().all(|times| *times <= 1), "{:?}", bench.0.warnings());
     assert!(bench.0.take_messages("pose").is_empty(), "the poses are known already");
 
@@ -218,7 +219,7 @@ fn odometry_does_not_count_where_there_are_poses() {
     assert!(drawn.greatest < CELL, "{}", drawn.greatest);
     assert!(bench.0.take_messages("pose").is_empty());
     let warnings = bench.0.warnings();
-    assert!(warnings.keys().any(|warning| warning.contains("nothing says where it was")), "{warnings:?}");
+    assert!(warnings.keys().any(|warning| warning.contains("there is no pose of it")), "{warnings:?}");
 }
 
 #[test]
@@ -258,7 +259,7 @@ fn what_a_lidar_cannot_have_measured_is_no_wall() {
 }
 
 #[test]
-fn a_robot_whose_scans_show_nothing_has_no_map_and_that_is_told() {
+fn a_robot_whose_scans_show_nothing_has_no_map_and_a_warning() {
     let mut bench = Bench::new("");
     for tick in 0..3 {
         let seconds = 0.1 * f64::from(tick);
@@ -274,7 +275,7 @@ fn a_robot_whose_scans_show_nothing_has_no_map_and_that_is_told() {
 }
 
 #[test]
-fn nonsense_is_told_and_leaves_the_rest() {
+fn invalid_messages_are_reported_and_leave_the_rest() {
     let mut bench = Bench::new("");
     let good = scan(0.0);
     for tick in 0..4 {
@@ -293,19 +294,19 @@ fn nonsense_is_told_and_leaves_the_rest() {
     let (map, _) = bench.map(1.0);
     assert!(measure(&map.unwrap(), &Pose2::identity()).greatest < CELL);
     let warnings = bench.0.warnings();
-    for expected in ["no numbers", "too large", "without a robot", "in frame `elsewhere`"] {
+    for expected in ["not finite", "too large", "without a robot", "in frame `elsewhere`"] {
         assert!(warnings.keys().any(|warning| warning.contains(expected)), "{expected}: {warnings:?}");
     }
     assert_eq!(RangeScan::NAME, "gridweave_msgs/msg/RangeScan");
 }
 
 #[test]
-fn a_robot_of_which_nothing_says_where_it_was_has_no_map() {
+fn a_robot_without_poses_and_odometry_has_no_map() {
     let mut bench = Bench::new("");
     (0..300).for_each(|tick| bench.scan(0.1 * f64::from(tick), &scan(0.0)));
     let (map, count) = bench.map(30.0);
     assert!(map.is_none() && count == 0);
-    assert!(bench.0.warnings().keys().any(|warning| warning.contains("nothing says where it was")));
+    assert!(bench.0.warnings().keys().any(|warning| warning.contains("there is no pose of it")));
 }
 
 #[test]

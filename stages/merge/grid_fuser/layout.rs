@@ -55,7 +55,7 @@ const DOUBT: &str = "does the origin of each map fit the poses of its robot?";
 
 /// Computes the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left
 /// out.
-pub fn lay_out(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
+pub fn layout_of(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
     let mut layout = Layout { geometry: None, takes_part: Vec::with_capacity(maps.len()) };
     let (mut whole, mut known): (Option<Extent>, f64) = (None, 0.0);
     for (map, area) in maps {
@@ -139,11 +139,11 @@ mod tests {
         Grid::new(geometry(6, cells.len() / 6), cells).unwrap()
     }
 
-    fn lay_out_at(grid: Grid<'_>, poses: &[Pose2]) -> Layout {
+    fn layout_at(grid: Grid<'_>, poses: &[Pose2]) -> Layout {
         let area = KnownArea::of(&grid);
         let maps: Vec<_> =
             poses.iter().map(|&transform_world_map| (PlacedGrid::rigid(grid, transform_world_map), &area)).collect();
-        lay_out(&maps, &LATTICE)
+        layout_of(&maps, &LATTICE)
     }
 
     #[rustfmt::skip]
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_grid_is_cropped_and_coincides_with_the_reference_cells() {
-        let layout = lay_out_at(grid(&CELLS), &[Pose2::identity()]);
+        let layout = layout_at(grid(&CELLS), &[Pose2::identity()]);
         let laid = layout.geometry.unwrap();
         assert_eq!((laid.width, laid.height), (3, 2));
         let (mine, theirs) =
@@ -166,8 +166,8 @@ mod tests {
 
     #[test]
     fn nothing_known_gives_no_grid() {
-        assert_eq!(lay_out_at(grid(&[-1; 24]), &[Pose2::identity()]).geometry, None);
-        assert_eq!(lay_out(&[], &LATTICE).geometry, None);
+        assert_eq!(layout_at(grid(&[-1; 24]), &[Pose2::identity()]).geometry, None);
+        assert_eq!(layout_of(&[], &LATTICE).geometry, None);
     }
 
     #[test]
@@ -175,11 +175,11 @@ mod tests {
         let absurd =
             [pose(f64::NAN, 0.0, 0.0), pose(f64::INFINITY, 0.0, 0.0), pose(3e3, 0.0, 0.0), pose(1e300, 0.0, 0.0)];
         for bad in absurd {
-            let layout = lay_out_at(grid(&CELLS), &[Pose2::identity(), bad, pose(1.0, 0.0, 0.3)]);
+            let layout = layout_at(grid(&CELLS), &[Pose2::identity(), bad, pose(1.0, 0.0, 0.3)]);
             assert_eq!(layout.takes_part.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true], "{bad:?}");
             assert!(layout.geometry.unwrap().width < 40);
         }
-        let many_cells = lay_out_at(grid(&CELLS), &[Pose2::identity(), pose(60.0, 60.0, 0.0)]);
+        let many_cells = layout_at(grid(&CELLS), &[Pose2::identity(), pose(60.0, 60.0, 0.0)]);
         let too_many = Err(LeftOut::TooManyCells(1_000_000));
         assert_eq!(many_cells.takes_part, [Ok(()), too_many], "1200 x 1200 cells are more than a million");
     }
@@ -190,7 +190,7 @@ mod tests {
         let known = vec![0; 6 * 4];
         let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
         let at = |x: f64, y: f64| (PlacedGrid::rigid(grid, pose(x, y, 0.0)), &area);
-        let layout = lay_out(&[at(0.0, 0.0), at(300.0, 300.0), at(150.0, 150.0)], &lattice);
+        let layout = layout_of(&[at(0.0, 0.0), at(300.0, 300.0), at(150.0, 150.0)], &lattice);
         assert_eq!(layout.takes_part, [Ok(()), Err(LeftOut::Unknown), Ok(())]);
         assert!(layout.geometry.unwrap().cell_count() < 10_000_000);
     }
@@ -199,7 +199,7 @@ mod tests {
         #[test]
         fn every_known_cell_is_on_the_grid(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
             let transform_world_map = pose(x, y, yaw);
-            let laid = lay_out_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
+            let laid = layout_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
             for cell in [Cell { column: 2, row: 1 }, Cell { column: 3, row: 1 }, Cell { column: 1, row: 2 }] {
                 let centre = transform_world_map * geometry(6, 4).centre(cell);
                 prop_assert!(laid.cell(&centre).is_some());

@@ -2,7 +2,7 @@
 
 use super::agreement::Agreement;
 use super::evidence::EvidenceTable;
-use super::layout::{Lattice, lay_out};
+use super::layout::{Lattice, layout_of};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
 use crate::shared::geometry::Point2;
 use crate::shared::placement::Placement;
@@ -162,7 +162,7 @@ impl GridFuser {
             max_extent: self.parameters.max_extent,
             max_cells: self.parameters.max_cells,
         };
-        let layout = lay_out(&maps, &lattice);
+        let layout = layout_of(&maps, &lattice);
         for (frame, takes_part) in placed.iter().zip(&layout.takes_part) {
             if let Err(reason) = takes_part {
                 output.warn(format!("the map of {} is not in the fused one: {reason}", frame.robot));

@@ -1,29 +1,29 @@
-//! An edge of a topological map, as edges are compared.
+//! An edge of a topological map, for the comparison with others.
 
 use crate::shared::geometry::Point2;
 use gridweave_runtime::ros::{TopologicalMap, TopologicalPath};
 use nalgebra::Vector2;
 
-/// As many points of an edge stand for its shape.
+/// Number of points of the shape of an edge.
 pub(super) const SHAPE_POINTS: usize = 17;
 
-/// What an edge is compared by.
+/// An edge with the features by which it is compared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edge {
-    /// Metres along it.
+    /// Length, metres.
     pub length: f64,
-    /// That it is there, 0 to 1.
+    /// Probability that it exists, 0 to 1.
     pub probability: f64,
-    /// Whether each of its two ends is a dead end, from which no other edge leads.
+    /// Whether each of its two ends is a dead end, without another edge.
     pub is_dead_end: [bool; 2],
     /// The mean of its points, metres, map frame.
     pub middle: Point2,
-    /// Points at even distances along it from its first end to its last, from the middle.
+    /// Points at even distances along it from its first end to its last, relative to the mean.
     pub shape: [Vector2<f64>; SHAPE_POINTS],
 }
 
-/// The edges of a topological map that are at least `min_length` metres long. Paths that lead nowhere or hold values that are
-/// no finite numbers are left out.
+/// The edges of a topological map that are at least `min_length` metres long. Paths with an invalid node or values
+/// that are not finite are left out.
 pub fn edges(map: &TopologicalMap, min_length: f64) -> Vec<Edge> {
     let mut degrees = vec![0usize; map.nodes.len()];
     for node in map.paths.iter().flat_map(|path| [path.start, path.end]) {

@@ -1,33 +1,33 @@
-//! Where most votes lie together.
+//! The translation with most votes.
 
 use super::Vote;
 use nalgebra::{Matrix2, Vector2};
 
-/// Rounds in which the middle of the votes is moved to their mean.
+/// Rounds in which the centre of the votes is moved to their mean.
 const ROUNDS: usize = 5;
 
-/// The best translation elsewhere lies at least as many radii away.
+/// Least distance of the second-best translation, in radii.
 const ELSEWHERE: f64 = 3.0;
 
-/// The outcome of a vote.
+/// Result of a vote.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Election {
-    /// The mean of the votes for the translation that most are for, metres.
+    /// Mean of the votes for the winning translation, metres.
     pub translation: Vector2<f64>,
-    /// How they spread, square metres.
+    /// Covariance of these votes, square metres.
     pub spread: Matrix2<f64>,
-    /// The votes for it, by their places in the list.
+    /// Indices of these votes in the list.
     pub votes: Vec<usize>,
     /// Their weight, metres.
     pub weight: f64,
-    /// The weight of the votes for the best translation elsewhere.
+    /// Weight of the votes for the second-best translation.
     pub weight_elsewhere: f64,
 }
 
 impl Election {
-    /// Counts votes, of which those within `radius` metres are for one translation. `None` if nobody votes.
+    /// Counts votes; those within `radius` metres are for the same translation. `None` without votes.
     pub fn of(votes: &[Vote], radius: f64) -> Option<Self> {
-        // By x, so that the neighbours of a vote lie near it in the list.
+        // Sorted by x, so that the neighbours of a vote are near it in the list.
         let mut by_x: Vec<usize> = (0..votes.len()).collect();
         by_x.sort_by(|one, other| {
             votes[*one].translation.x.total_cmp(&votes[*other].translation.x).then(one.cmp(other))
@@ -43,7 +43,7 @@ impl Election {
         };
         let weight = |place: &Vector2<f64>| near(place).map(|vote| votes[vote].weight).sum::<f64>();
         let weights: Vec<f64> = votes.iter().map(|vote| weight(&vote.translation)).collect();
-        // Of equal ones the first.
+        // Of equals the first.
         let best_of = |places: &mut dyn Iterator<Item = usize>| {
             places.fold(None, |best: Option<usize>, one| match best {
                 Some(best) if weights[best] >= weights[one] => Some(best),
@@ -77,8 +77,8 @@ impl Election {
         })
     }
 
-    /// What the best translation elsewhere gathers of the votes of this one.
-    pub fn runner_up(&self) -> f64 {
+    /// Weight of the second-best translation as a share of that of the winner.
+    pub fn second_best(&self) -> f64 {
         if self.weight > 0.0 { self.weight_elsewhere / self.weight } else { 1.0 }
     }
 }

@@ -1,30 +1,29 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the edge matcher. What takes them expects values that have passed [`check`](Parameters::check).
+/// Parameters of the edge matcher. Functions expect values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EdgeMatcherParameters {
-    /// Edges shorter than this are left out, metres: all short edges are alike.
+    /// Least length of an edge, metres: all short edges are alike.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub min_length: f64,
-    /// Two edges may be alike if their lengths differ by no more than this share of the longer one.
+    /// Largest difference of the lengths of similar edges, as a share of the longer one.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub length_tolerance: f64,
-    /// Two edges are alike if their points lie within this distance of each other, with the middles of both laid on each other,
-    /// metres (root of the mean square).
+    /// Largest distance of the points of similar edges with their centroids aligned, metres (root mean square).
     #[schemars(range(min = 0.0, max = 1e2))]
     pub shape_tolerance: f64,
-    /// Votes within this distance of each other are for one translation, metres.
+    /// Largest distance of votes for one translation, metres.
     #[schemars(range(min = 1e-3, max = 1e2))]
     pub vote_radius: f64,
-    /// The least number of edges of each map that vote for the translation that is taken.
+    /// Least number of edges of each map that vote for an accepted translation.
     #[schemars(range(min = 1))]
     pub min_edges: usize,
-    /// The most that the best translation elsewhere may gather of the votes of the one that is taken.
+    /// Largest weight of the second-best translation, as a share of that of an accepted one.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_runner_up: f64,
 }

@@ -1,4 +1,5 @@
-//! The stage: keeps the edges of each robot's map and the rotation of each pair, and matches a pair when these have changed.
+//! The stage: keeps the edges of each robot's map and the rotation of each pair, and matches a pair when these
+//! change.
 
 use super::{Edge, EdgeMatcherParameters, edges, match_edges};
 use crate::shared::geometry::row_by_row;
@@ -9,7 +10,7 @@ use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, Stag
 use nalgebra::UnitComplex;
 use std::collections::BTreeMap;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct Alignments {
     alignment: Out<Alignment>,
 }
@@ -64,7 +65,7 @@ impl EdgeMatcher {
     ) -> Result<(), StageError> {
         let alignment = alignment.into_content();
         if alignment.accepted && !(alignment.yaw.is_finite() && alignment.covariance[8] >= 0.0) {
-            output.warn("an alignment was left out: its rotation or the variance of that is no number");
+            output.warn("an alignment was left out: its rotation or its variance is not finite");
             return Ok(());
         }
         let pair = RobotPair::of(&alignment);
@@ -76,7 +77,7 @@ impl EdgeMatcher {
         }
     }
 
-    /// Pairs of which a map has come after the rotation, or not at all.
+    /// Pairs of which a map came after the rotation, or not at all.
     pub(super) fn finish(&mut self, output: &Output<Alignments>) -> Result<(), StageError> {
         let is_newer = |robot: &String, matched| self.maps.get(robot).is_none_or(|map| map.came > matched);
         let waiting = self.rotations.iter().filter(|(pair, rotation)| {
@@ -113,7 +114,7 @@ impl EdgeMatcher {
         };
         let mut alignment = Alignment {
             covariance: row_by_row(&found.covariance),
-            score: (1.0 - found.runner_up).clamp(0.0, 1.0),
+            score: (1.0 - found.second_best).clamp(0.0, 1.0),
             accepted: true,
             ..refused(format!("{}\n\n{}", found.reason(), rotation.reason))
         };

@@ -1,4 +1,4 @@
-//! Edges of made-up and of drawn maps, and the stage from outside.
+//! Edges of made-up and of drawn maps, and the stage as a whole.
 
 use super::*;
 use crate::published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 const NODES: [(f64, f64); 7] = [(0.0, 0.0), (4.0, 0.5), (4.0, 5.0), (9.0, 0.0), (9.5, 7.0), (1.0, 3.0), (12.0, 2.0)];
 const PATHS: [(usize, usize); 6] = [(0, 1), (1, 2), (1, 3), (3, 4), (2, 5), (3, 6)];
 
-/// The map of the place in a frame of its own: straight paths, each as probable as is said.
+/// The map of the building in its own frame: straight paths with the given probabilities.
 fn made_up(transform_place_map: &Pose2, probability: impl Fn(usize) -> f64) -> TopologicalMap {
     let place = |node: usize| transform_place_map.inverse() * Point2::new(NODES[node].0, NODES[node].1);
     let node = |number: usize| {
@@ -52,7 +52,7 @@ proptest! {
         let found = match_edges(&a, &b, &truth.rotation, 1e-4, &parameters).unwrap();
         prop_assert!((found.transform_a_b.translation.vector - truth.translation.vector).norm() < 1e-6);
         prop_assert_eq!(found.edges, [PATHS.len(); 2]);
-        prop_assert!(found.runner_up < 0.5);
+        prop_assert!(found.second_best < 0.5);
     }
 
     #[test]
@@ -63,7 +63,7 @@ proptest! {
         let rotation = UnitComplex::new(yaw + 0.01);
         let forth = match_edges(&a, &b, &rotation, 1e-4, &parameters).unwrap().transform_a_b;
         let back = match_edges(&b, &a, &rotation.inverse(), 1e-4, &parameters).unwrap().transform_a_b;
-        // Both turn about the same places, by the means of votes that lie a little apart.
+        // Both turn about the same points, by the means of votes that differ a little.
         prop_assert!(((forth * back).translation.vector).norm() < 0.05, "{}", forth * back);
     }
 }
@@ -83,7 +83,7 @@ fn edges_with_other_ends_or_of_another_shape_or_length_are_not_paired() {
         edge
     };
     assert_eq!(count(reversed(edge.clone())), 1, "an edge has no direction");
-    assert_eq!(count(Edge { is_dead_end: [false, true], ..edge.clone() }), 0, "the dead end lies elsewhere");
+    assert_eq!(count(Edge { is_dead_end: [false, true], ..edge.clone() }), 0, "the dead end is elsewhere");
     assert_eq!(count(Edge { is_dead_end: [false, false], ..edge.clone() }), 0);
     assert_eq!(count(Edge { length: 1.3 * edge.length, ..edge.clone() }), 0);
     let mut bent = edge.clone();
@@ -100,16 +100,16 @@ fn probable_edges_outvote_improbable_ones() {
         Election::of(&votes, 0.3).unwrap()
     };
     let (strong, weak) = (of(2.0), of(0.4));
-    assert!((strong.translation.x - 0.05).abs() < 1e-9 && (strong.runner_up() - 0.5).abs() < 1e-9, "{strong:?}");
-    assert!((weak.translation.x - 9.05).abs() < 1e-9 && (weak.runner_up() - 0.4).abs() < 1e-9, "{weak:?}");
+    assert!((strong.translation.x - 0.05).abs() < 1e-9 && (strong.second_best() - 0.5).abs() < 1e-9, "{strong:?}");
+    assert!((weak.translation.x - 9.05).abs() < 1e-9 && (weak.second_best() - 0.4).abs() < 1e-9, "{weak:?}");
     assert!((strong.spread[(0, 0)] - 0.0025).abs() < 1e-9 && strong.spread[(1, 1)] == 0.0);
     assert_eq!((strong.votes.as_slice(), Election::of(&[], 0.3)), (&[0, 1][..], None));
     let nothing = [vote(1.0, 0.0), vote(5.0, 0.0)];
-    assert_eq!(Election::of(&nothing, 0.3).unwrap().runner_up(), 1.0, "votes without weight decide nothing");
+    assert_eq!(Election::of(&nothing, 0.3).unwrap().second_best(), 1.0, "votes without weight decide nothing");
 }
 
 #[test]
-fn what_cannot_be_told_is_refused() {
+fn ambiguous_translations_are_refused() {
     let parameters = EdgeMatcherParameters::default();
     let a = edges(&made_up(&Pose2::identity(), |_| 1.0), 1.0);
     let refused = |b: &[Edge], rotation: f64| match_edges(&a, b, &UnitComplex::new(rotation), 0.0, &parameters);
@@ -130,7 +130,7 @@ fn what_cannot_be_told_is_refused() {
 }
 
 #[test]
-fn paths_that_lead_nowhere_or_are_no_numbers_are_left_out() {
+fn invalid_paths_are_left_out() {
     let good = made_up(&Pose2::identity(), |_| 1.0);
     let count = |change: &dyn Fn(&mut TopologicalPath)| {
         let mut map = good.clone();
@@ -177,7 +177,7 @@ fn the_diagrams_of_two_maps_of_one_office_are_matched_to_some_cells() {
 fn rotation(yaw: f64, accepted: bool) -> Alignment {
     let covariance = row_by_row(&Matrix3::from_diagonal(&Vector3::new(9.0, 9.0, 1e-4)));
     let (a, b, reason) = ("robot1".to_owned(), "robot2".to_owned(), "by some means".to_owned());
-    // What is said of the translation is wrong.
+    // The translation of the message is wrong.
     let (x, y) = (100.0, 100.0);
     Alignment { a, b, x, y, yaw, covariance, accepted, reason, method: "radon".into(), ..Default::default() }
 }
@@ -227,7 +227,7 @@ fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_refused() {
     assert!(EdgeMatcherParameters::default().check().is_empty());
     let wrong = EdgeMatcherParameters { min_edges: 0, vote_radius: 0.0, ..Default::default() };
     assert_eq!(wrong.check().len(), 2);

@@ -1,23 +1,23 @@
-//! Pairs of edges that are alike, and the translations that they vote for.
+//! Pairs of similar edges, and the translations that they vote for.
 
 use super::EdgeMatcherParameters;
 use super::edge::{Edge, SHAPE_POINTS};
 use nalgebra::{UnitComplex, Vector2};
 
-/// What two edges that are alike say.
+/// The vote of two similar edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vote {
-    /// The places of the edges of map a and of map b in their lists.
+    /// Indices of the edges of map a and of map b.
     pub edges: [usize; 2],
-    /// The translation that lays the middle of the edge of b, turned, on that of a, metres.
+    /// The translation that aligns the centroid of the edge of b, turned, with that of a, metres.
     pub translation: Vector2<f64>,
     /// The length of the shorter edge times both probabilities, metres.
     pub weight: f64,
-    /// How far the points of both edges are apart then, the root of the mean square, metres.
+    /// Root mean square distance of the points of both edges then, metres.
     pub residual: f64,
 }
 
-/// The votes of all pairs of edges that are alike once map b is turned, by the edges of a and then of b.
+/// Votes of all pairs of edges that are similar once map b is turned, by the edges of a and then of b.
 pub fn votes(a: &[Edge], b: &[Edge], rotation: &UnitComplex<f64>, parameters: &EdgeMatcherParameters) -> Vec<Vote> {
     let turned: Vec<[Vector2<f64>; SHAPE_POINTS]> =
         b.iter().map(|edge| edge.shape.map(|point| rotation * point)).collect();
@@ -42,8 +42,8 @@ pub fn votes(a: &[Edge], b: &[Edge], rotation: &UnitComplex<f64>, parameters: &E
     votes
 }
 
-/// How far the points of two edges are apart, the root of the mean square, in the better of both directions in which the
-/// ends are of the same degrees; without end if they are in none.
+/// Root mean square distance of the points of two edges, in the better of both directions in which the ends are of
+/// the same degrees, metres; infinite if there is none.
 fn residual(a: &Edge, b: &Edge, turned_b: &[Vector2<f64>; SHAPE_POINTS]) -> f64 {
     let root = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
         let squares: f64 = a.shape.iter().zip(points).map(|(a, b)| (a - b).norm_squared()).sum();

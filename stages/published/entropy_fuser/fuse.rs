@@ -4,30 +4,31 @@ use crate::shared::geometry::{Grid, GridGeometry, UNKNOWN, is_known, most_cells_
 use crate::shared::log_odds::LogOdds;
 use rayon::prelude::*;
 
-/// How far cells of two maps may lie apart and still be taken for the same, in cells: what coordinates lose by rounding.
+/// Largest distance of cells of two maps that count as the same, in cells: the rounding errors of coordinates.
 const SAME_CELL: f64 = 0.01;
 
-/// The log-odds of a cell of which two maps say `a` and `b`: their sum where its entropy is not above that of the better one,
-/// else the better one; the first of equally good ones.
+/// Log-odds of a cell with the log-odds `a` and `b` in two maps: their sum if its entropy is not above that of the
+/// better one, else the better one; the first of equally good ones.
 ///
-/// The entropy of a cell falls with the absolute value of its log-odds, so that these are compared.
+/// The entropy of a cell falls with the absolute value of its log-odds, so these are compared.
 pub fn entropy_filter(a: f32, b: f32) -> f32 {
     let (sum, better) = (a + b, if b.abs() > a.abs() { b } else { a });
     if sum.abs() >= better.abs() { sum } else { better }
 }
 
-/// Why a map is no part of the fused one.
+/// Why a map is not in the fused one.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LeftOut {
-    /// Its cells are not those of the others.
-    #[error("its cells do not lie on those of the maps before it; does it come from `uncertain_transform`?")]
+    /// Its cells are not on the lattice of the others.
+    #[error("its cells are not on the lattice of the earlier maps; is it a map of `uncertain_transform`?")]
     OtherLattice,
-    /// The fused map would have more cells than it may have.
-    #[error("the fused map would have more than {0:.0} cells; does the map lie where it should?")]
+    /// The fused map would have too many cells.
+    #[error("the fused map would have more than {0:.0} cells; is the pose of the map right?")]
     TooLarge(f64),
 }
 
-/// The cells of a map in another that lies on the same lattice: the column and row of its first cell, in cells of the other.
+/// Offset of the cells of a map in another one on the same lattice: column and row of its first cell, in cells of the
+/// other.
 fn offset(of: &GridGeometry, within: &GridGeometry) -> Result<(i64, i64), LeftOut> {
     let relative = within.origin.inverse() * of.origin;
     let longest = of.width.max(of.height).max(1) as f64;
@@ -41,40 +42,40 @@ fn offset(of: &GridGeometry, within: &GridGeometry) -> Result<(i64, i64), LeftOu
     }
 }
 
-/// The grid over all maps that lie on the lattice of the first, and whether each of them does. `None` without a map.
-pub fn lay_over(maps: &[Grid<'_>], max_cells: u64) -> (Option<GridGeometry>, Vec<Result<(), LeftOut>>) {
+/// The grid over all maps on the lattice of the first, and whether each of them is on it. `None` without a map.
+pub fn common_grid(maps: &[Grid<'_>], max_cells: u64) -> (Option<GridGeometry>, Vec<Result<(), LeftOut>>) {
     let mut over: Option<GridGeometry> = None;
     let mut known = 0.0;
     let join = |map: &Grid<'_>| {
-        let Some(laid) = &over else {
+        let Some(covered) = &over else {
             over = Some(map.geometry);
             return Ok(());
         };
-        let (column, row) = offset(&map.geometry, laid)?;
+        let (column, row) = offset(&map.geometry, covered)?;
         let (left, low) = (column.min(0), row.min(0));
-        let right = (laid.width as i64).max(column + map.geometry.width as i64);
-        let high = (laid.height as i64).max(row + map.geometry.height as i64);
+        let right = (covered.width as i64).max(column + map.geometry.width as i64);
+        let high = (covered.height as i64).max(row + map.geometry.height as i64);
         let (width, height) = ((right - left) as usize, (high - low) as usize);
-        known += map.geometry.cell_count() as f64 + laid.cell_count() as f64;
+        known += map.geometry.cell_count() as f64 + covered.cell_count() as f64;
         let most = most_cells_over(known).min(max_cells as f64);
         if width as f64 * height as f64 > most {
             return Err(LeftOut::TooLarge(most));
         }
-        let corner = pose(left as f64 * laid.resolution, low as f64 * laid.resolution, 0.0);
-        over = Some(GridGeometry { width, height, resolution: laid.resolution, origin: laid.origin * corner });
+        let corner = pose(left as f64 * covered.resolution, low as f64 * covered.resolution, 0.0);
+        over = Some(GridGeometry { width, height, resolution: covered.resolution, origin: covered.origin * corner });
         Ok(())
     };
     let takes_part = maps.iter().map(join).collect();
     (over, takes_part)
 }
 
-/// Fuses maps, earlier ones first, into the cells of `geometry`, which lies over all of them: see [`lay_over`]. A map that does
-/// not lie on its lattice takes no part.
+/// Fuses maps, earlier ones first, into the cells of `geometry`, which covers all of them: see [`common_grid`]. A map
+/// off its lattice is left out.
 pub fn fuse(maps: &[Grid<'_>], geometry: &GridGeometry, table: &LogOdds, fused: &mut [i8]) {
     let placed: Vec<(i64, i64, &Grid<'_>)> =
         maps.iter().filter_map(|map| offset(&map.geometry, geometry).ok().map(|(x, y)| (x, y, map))).collect();
     let width = geometry.width.max(1);
-    // What no map knows is no number.
+    // Unknown cells are NaN.
     let row_of_sums = || vec![f32::NAN; width];
     fused.par_chunks_mut(width).enumerate().for_each_init(row_of_sums, |sums, (row, cells)| {
         sums.fill(f32::NAN);
@@ -84,7 +85,7 @@ pub fn fuse(maps: &[Grid<'_>], geometry: &GridGeometry, table: &LogOdds, fused: 
                 continue;
             }
             let values = &map.cells[row * map.geometry.width..(row + 1) * map.geometry.width];
-            // A map that lies on the lattice and beyond the grid is cut.
+            // A map on the lattice that extends beyond the grid is cropped.
             let (skip, first) = ((-left).max(0) as usize, (*left).max(0) as usize);
             for (sum, value) in sums.iter_mut().skip(first).zip(values.iter().skip(skip)) {
                 if is_known(*value) {

@@ -1,16 +1,16 @@
-//! Fuses maps that lie on the cells of one lattice by the entropy filter.
+//! Fuses maps on the cells of one lattice by the entropy filter.
 //!
-//! The last step of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a topological approach to map merging for multiple
-//! robots" (IEEE Robotics and Automation Magazine, June 2014), section "Map Fusion with the Entropy Filter": the log-odds of
-//! two maps (equation 7) are added, and the sum is kept only where its entropy is not above that of the better input. Where
-//! the maps agree the sum is more certain than both, and is kept; where they contradict each other it is less certain, and the
-//! map counts that is more certain. So a wall that one map has blurred, since it did not know where it lies, does not
-//! take away what the other one knows.
+//! The last step of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a topological approach to map merging for
+//! multiple robots" (IEEE Robotics and Automation Magazine, June 2014), section "Map Fusion with the Entropy Filter":
+//! the log-odds of two maps (equation 7) are added, and the sum is kept only where its entropy is not above that of
+//! the better input. Where the maps agree the sum is more certain than both, and is kept; where they contradict each
+//! other it is less certain, and the more certain map counts. So a wall that is blurred in one map, whose pose is
+//! uncertain, does not reduce the evidence of the other.
 //!
 //! What the paper leaves open, and how it is decided here:
-//! - **More than two maps** are fused one after the other: the reference robot's first, and then by the robots' names. The
-//!   filter keeps or drops whole values, so that the order matters where three maps contradict each other.
-//! - **Two maps that are as certain of the opposite**: the sum says nothing, and the earlier map counts.
+//! - **More than two maps** are fused one after the other: the reference robot's first, and then by the robots'
+//!   names. The filter keeps or drops whole values, so the order matters where three maps contradict each other.
+//! - **Two maps of equal certainty for opposite states**: the sum is 0, and the earlier map counts.
 //! - **Unknown cells** have log-odds of 0: the other map counts. A cell that no map knows stays unknown.
 //!
 //! - [`entropy_filter`]: the filter on one cell.
@@ -22,7 +22,7 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub use fuse::{LeftOut, entropy_filter, fuse, lay_over};
+pub use fuse::{LeftOut, common_grid, entropy_filter, fuse};
 pub use parameters::EntropyFuserParameters;
 
 use gridweave_runtime::stage::StageKind;

@@ -1,20 +1,20 @@
-//! The parameters of the stage.
+//! Parameters of the stage.
 
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the entropy fuser. What takes them expects values that have passed [`check`](Parameters::check).
+/// Parameters of the entropy fuser. Functions expect values that have passed [`check`](Parameters::check).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EntropyFuserParameters {
-    /// Probability that a cell is occupied when a map says 100; greater values are cut to it.
+    /// Probability that a cell of value 100 is occupied; greater ones are clamped to it.
     #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub max_probability: f64,
-    /// Probability that a cell is occupied when a map says 0; lesser values are cut to it.
+    /// Probability that a cell of value 0 is occupied; lesser ones are clamped to it.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
-    /// The most cells that the fused map may have; a map that would make it larger is left out with a warning.
+    /// Largest number of cells of the fused map; a map that would make it larger is left out with a warning.
     #[schemars(range(min = 1, max = u32::MAX))]
     pub max_cells: u64,
 }

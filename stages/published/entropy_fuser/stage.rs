@@ -1,6 +1,6 @@
 //! The stage: keeps each robot's last map, and fuses those of placed robots.
 
-use super::{EntropyFuserParameters, fuse, lay_over};
+use super::{EntropyFuserParameters, common_grid, fuse};
 use crate::shared::geometry::Grid;
 use crate::shared::log_odds::LogOdds;
 use crate::shared::robot_maps::RobotMaps;
@@ -8,7 +8,7 @@ use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RobotFrames};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct FusedMap {
     map: Out<OccupancyGrid<'static>>,
 }
@@ -27,7 +27,7 @@ pub(super) struct EntropyFuser {
     max_cells: u64,
     maps: RobotMaps<()>,
     frames: RobotFrames,
-    /// When a map or frames came that are in no fused map.
+    /// Time of a map or frames that are in no fused map.
     changed: Option<LogTime>,
 }
 
@@ -84,7 +84,7 @@ impl EntropyFuser {
         let placed = self.placed();
         let maps: Vec<_> = placed.iter().filter_map(|robot| self.maps.get(robot)).collect();
         let grids: Vec<Grid<'_>> = maps.iter().map(|map| map.grid()).collect();
-        let (over, takes_part) = lay_over(&grids, self.max_cells);
+        let (over, takes_part) = common_grid(&grids, self.max_cells);
         for (robot, takes_part) in placed.iter().zip(&takes_part) {
             if let Err(reason) = takes_part {
                 output.warn(format!("the map of {robot} is not in the fused one: {reason}"));

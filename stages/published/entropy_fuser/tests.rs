@@ -44,12 +44,12 @@ fn agreement_adds_and_of_a_contradiction_the_more_certain_side_is_kept() {
 }
 
 #[test]
-fn maps_are_fused_where_they_lie() {
+fn maps_are_fused_at_their_positions() {
     let (a, b) = ([100, 0, 70, -1], [0, 70, 100, -1, 30, -1]);
     let a = Grid::new(geometry(4, 1, 0.0, 0.0), &a).unwrap();
     // One column right of the first, and one row below.
     let b = Grid::new(geometry(3, 2, 0.05, -0.05), &b).unwrap();
-    let (over, takes_part) = lay_over(&[a, b], 1000);
+    let (over, takes_part) = common_grid(&[a, b], 1000);
     let over = over.unwrap();
     assert_eq!((over.width, over.height, takes_part), (4, 2, vec![Ok(()); 2]));
     let mut fused = vec![7; 8];
@@ -59,13 +59,13 @@ fn maps_are_fused_where_they_lie() {
 }
 
 #[test]
-fn a_map_that_does_not_lie_on_the_lattice_is_left_out() {
+fn a_map_off_the_lattice_is_left_out() {
     let a = Grid::new(geometry(4, 2, 0.0, 0.0), &[0; 8]).unwrap();
     let with = |change: &dyn Fn(&mut GridGeometry)| {
         let mut geometry = geometry(4, 2, 0.1, 0.0);
         change(&mut geometry);
         let b = Grid { geometry, cells: &[100; 8] };
-        lay_over(&[a, b], 1000).1[1]
+        common_grid(&[a, b], 1000).1[1]
     };
     assert_eq!(with(&|_| ()), Ok(()));
     assert_eq!(with(&|geometry| geometry.origin = pose(0.11, 0.0, 0.0)), Err(LeftOut::OtherLattice));
@@ -75,8 +75,11 @@ fn a_map_that_does_not_lie_on_the_lattice_is_left_out() {
     assert_eq!(with(&|geometry| geometry.resolution = 0.06), Err(LeftOut::OtherLattice));
     assert_eq!(with(&|geometry| geometry.origin = pose(50.0, 50.0, 0.0)), Err(LeftOut::TooLarge(1000.0)));
     let far = Grid { geometry: geometry(4, 2, 5e4, 5e4), cells: &[100; 8] };
-    assert!(matches!(lay_over(&[a, far], 4_000_000_000).1[1], Err(LeftOut::TooLarge(_))), "next to nothing is known");
-    assert_eq!(lay_over(&[], 1000), (None, vec![]));
+    assert!(
+        matches!(common_grid(&[a, far], 4_000_000_000).1[1], Err(LeftOut::TooLarge(_))),
+        "next to nothing is known"
+    );
+    assert_eq!(common_grid(&[], 1000), (None, vec![]));
 }
 
 /// A stage that is given maps of two cells, and what it sends.
@@ -120,7 +123,7 @@ fn the_stage_fuses_the_maps_of_one_time_once_and_the_reference_counts_first() {
 }
 
 #[test]
-fn the_stage_tells_which_map_is_left_out() {
+fn a_map_that_is_left_out_is_reported() {
     let mut run = Run(StageHarness::new(&kind(), "max_cells = 3").unwrap());
     run.map(1, "b", &[0, 0]);
     run.map(1, "a", &[0, 0, 0, 100]);
@@ -129,7 +132,7 @@ fn the_stage_tells_which_map_is_left_out() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_refused() {
     assert!(EntropyFuserParameters::default().check().is_empty());
     let wrong = EntropyFuserParameters { min_probability: 0.6, max_cells: 0, ..Default::default() };
     assert_eq!(wrong.check().len(), 2);

@@ -1,4 +1,4 @@
-//! From two maps to the places where one may lie on the other.
+//! Relative poses of two maps from their spectra.
 
 use super::rotation::{Rotation, rotations};
 use super::translation::{Shift, project, shifts};
@@ -10,7 +10,7 @@ use nalgebra::{Isometry2, Matrix3, UnitComplex, Vector2, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// The places where map b may lie on map a, in the order in which they were found.
+/// Relative poses of map b in map a, in the order in which they were found.
 ///
 /// # Errors
 /// A map has no walls, or is too large.
@@ -29,7 +29,7 @@ pub fn align_spectra(
     let opposite = |rotation: Rotation| [rotation, Rotation { angle: rotation.angle + PI, ..rotation }];
     let turned: Vec<Rotation> = found.into_iter().flat_map(opposite).collect();
 
-    // Projections are sharp along the walls only: both maps are turned so that most walls of a run along the axes.
+    // Projections are sharp only along the walls: both maps are turned so that most walls of a are along the axes.
     let along = spectrum_a.main_direction();
     let [x_a, y_a] = project(&walls_a, -along, cell);
     let known = known_area(&a.grid).min(known_area(&b.grid));
@@ -60,7 +60,7 @@ impl Place {
         let middle = turn * b.middle.coords;
         let translation = a.middle.coords + axes * Vector2::new(self.x.metres, self.y.metres) - middle;
         let deviations = Vector3::new(self.x.deviation, self.y.deviation, self.rotation.deviation);
-        // The rotation is about the middle of map b, and moves the origin of its frame.
+        // The rotation is about the centre of map b, and moves the origin of its frame.
         let arm = -quarter_turn(&middle);
         let axes = axes.to_rotation_matrix().into_inner();
         let jacobian = Matrix3::new(axes.m11, axes.m12, arm.x, axes.m21, axes.m22, arm.y, 0.0, 0.0, 1.0);

@@ -1,23 +1,23 @@
-//! Lays maps on each other by their Hough spectra: Carpin, "Fast and accurate map merging for multi-robot systems", Autonomous
+//! Aligns maps by their Hough spectra: Carpin, "Fast and accurate map merging for multi-robot systems", Autonomous
 //! Robots 25 (2008).
 //!
-//! The spectrum of a map says how much its walls run along each direction, wherever they are; so the cross-correlation of two
-//! spectra gives the rotation without the translation, up to half a turn. The translation then comes one axis at a time from
-//! the cross-correlation of the maps' projections. No search goes over all places, which makes it the quickest way to lay
-//! maps on each other without a guess.
+//! The spectrum of a map is the amount of wall along each direction, at any position; so the cross-correlation of two
+//! spectra gives the rotation without the translation, up to half a turn. The translation then comes one axis at a
+//! time from the cross-correlation of the maps' projections. There is no exhaustive search, which makes it the
+//! fastest way to align maps without an initial guess.
 //!
 //! - [`WallCells`]: the occupied cells of a map.
 //! - [`HoughSpectrum`]: `HS(theta)`, and [`rotations`]: the peaks of the circular cross-correlation of two of them.
 //! - [`Projection`]: the X and the Y spectrum, and [`shifts`]: the peaks of the cross-correlation of two of them.
-//! - [`align_spectra`]: all of it. Each place gets its acceptance index.
+//! - [`align_spectra`]: all of it. Each pose gets its acceptance index.
 //!
-//! Not in the paper: peaks are interpolated between steps; the projections are taken along the main direction of map a's walls;
-//! and every place has a covariance, from the half widths of the three peaks that it stands on. It says how sharp these are,
-//! and nothing of whether the place is the right one.
+//! Not in the paper: peaks are interpolated between steps; the projections are along the main direction of map a's
+//! walls; and every pose has a covariance, from the half widths of its three peaks. It is the sharpness of these, and
+//! no measure of whether the pose is right.
 //!
-//! There is no verification but the acceptance index: the method merges wrongly where maps agree at a wrong place, as in
-//! buildings whose rooms are alike, and where two robots share little, their projections are mostly of what they do not
-//! share. Where walls run along many directions or along none, the spectra are flat, and the rotation is a guess.
+//! There is no verification but the acceptance index: the method merges wrongly where maps agree at a wrong pose, as
+//! in buildings with similar rooms, and where two robots share little, their projections are mostly of what they do
+//! not share. Where walls have many directions or none, the spectra are flat, and the rotation is arbitrary.
 
 mod align;
 mod parameters;
@@ -44,9 +44,9 @@ use gridweave_runtime::stage::StageKind;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "hough_spectrum_aligner",
-        "Lays the maps of each pair of robots on each other by their Hough spectra, after Carpin (2008): the cross-correlation of \
-         the spectra gives the rotation, that of the projections on two axes the translation. The place with the best acceptance \
-         index omega is taken if that is high enough; nothing else is checked, so that maps which agree at a wrong place are \
+        "Aligns the maps of each pair of robots by their Hough spectra, after Carpin (2008): the cross-correlation of \
+         the spectra gives the rotation, that of the projections on two axes the translation. The pose with the best acceptance \
+         index omega is taken if that is high enough; nothing else is checked, so maps that agree at a wrong pose are \
          merged wrongly.",
         |parameters: HoughSpectrumParameters, _| Ok(PairAligner::new(parameters)),
     )

@@ -1,4 +1,4 @@
-//! The method as a whole, on drawn maps, and the stage from outside.
+//! The method on drawn maps, and the stage as a whole.
 
 use super::*;
 use crate::shared::geometry::{Grid, GridGeometry, pose, turn_difference};
@@ -89,7 +89,7 @@ proptest! {
 }
 
 #[test]
-fn maps_of_one_place_are_laid_on_each_other_at_any_angle() {
+fn maps_of_one_building_are_aligned_at_any_angle() {
     let office = FloorPlan::office();
     let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
     for yaw in [0.0, 0.61, 1.571, 2.345, -2.9] {
@@ -130,7 +130,7 @@ fn a_hall_fits_both_ways_round() {
 }
 
 #[test]
-fn maps_without_walls_and_too_large_ones_are_told_and_a_single_cell_lies_anywhere() {
+fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
     let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
     let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
     let (empty, mut cells) = ([0; 100], [0; 100]);
@@ -174,7 +174,7 @@ fn the_stage_aligns_every_pair_at_the_end_and_ranks_what_it_has_found() {
 }
 
 #[test]
-fn what_is_refused_says_why() {
+fn a_refusal_has_a_reason() {
     let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
     let other = FloorPlan::another_office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(1.0, 6.0, 1.4));
     let part = FloorPlan::office().draw(seen(-0.2, -0.2, 4.0, 4.0), drawing(1.0, 6.0, 1.4));
@@ -192,7 +192,7 @@ fn what_is_refused_says_why() {
 }
 
 #[test]
-fn wrong_parameters_are_told() {
+fn parameters_out_of_range_are_refused() {
     for text in [
         "rotation_step = 0.0",
         "min_omega = 1.1",

@@ -1,8 +1,8 @@
-//! When the best hypothesis is accepted.
+//! Criterion by which the best hypothesis is accepted.
 
 use super::Hypothesis;
 
-/// What is asked of the best hypothesis.
+/// Requirements on the best hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Criterion {
     /// Its least omega, 0 to 1.
@@ -11,18 +11,18 @@ pub struct Criterion {
     pub min_overlap: f64,
 }
 
-/// What became of the hypotheses of a pair of maps.
+/// Verdict on the hypotheses of a pair of maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// Whether the best is accepted.
     pub accepted: bool,
-    /// What speaks for it, or why it is refused.
+    /// Reason for the user.
     pub reason: String,
 }
 
 impl Criterion {
-    /// Puts the best first: the greatest omega of those that overlap enough, then the others. Of equals the one with more
-    /// cells in common comes first, and of those the first that was found.
+    /// Sorts the best first: the greatest omega of those that overlap enough, then the others. Of equals the one with
+    /// more cells in common comes first, and of those the first that was found.
     pub fn rank(&self, hypotheses: &mut [Hypothesis]) {
         let overlaps = |one: &Hypothesis| one.overlap >= self.min_overlap;
         hypotheses.sort_by(|one, other| {
@@ -36,10 +36,10 @@ impl Criterion {
     pub fn judge(&self, ranked: &[Hypothesis]) -> Judgement {
         let Some(best) = ranked.first() else { return refused("the maps fit nowhere".to_owned()) };
         let (omega, overlap) = (best.index.omega(), 100.0 * best.overlap);
-        let found = format!("omega {omega:.3} at the best place, where {overlap:.0} % of the smaller map overlap");
+        let found = format!("omega {omega:.3} at the best pose, where {overlap:.0} % of the smaller map overlap");
         if best.overlap < self.min_overlap {
             return refused(format!(
-                "the maps overlap too little: {found}\nmissing: {:.0} % of overlap (min_overlap)\ntry: drive one robot on where the \
+                "the maps overlap too little: {found}\nmissing: {:.0} % of overlap (min_overlap)\ntry: let one robot drive where the \
                  other was",
                 100.0 * self.min_overlap
             ));
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_said() {
+    fn a_refusal_names_what_is_missing() {
         for (hypotheses, accepted, text) in [
             (vec![], false, "fit nowhere"),
             (vec![hypothesis(9, 0, 0.01)], false, "overlap too little: omega 1.000"),

@@ -1,14 +1,14 @@
-//! What the published aligners share that lay the maps of two robots on each other by the maps alone and believe what they
-//! find by the acceptance index.
+//! Common parts of the published aligners that use the maps of two robots only, and verify their results by the
+//! acceptance index.
 //!
-//! They search, rank what they have found by omega (see [`AcceptanceIndex`](crate::published::acceptance_index::AcceptanceIndex)), and
-//! accept the best if its omega is high enough. Nothing else stands between them and a wrong merge: maps of different
-//! buildings, and buildings that look alike at several places, may have a high omega at a wrong place. `merge_verifier` looks
-//! at what omega does not.
+//! They search, rank their hypotheses by omega (see
+//! [`AcceptanceIndex`](crate::published::acceptance_index::AcceptanceIndex)), and accept the best if its omega is
+//! high enough. There is no other check against a wrong merge: maps of different buildings, and self-similar
+//! buildings, may have a high omega at a wrong pose. `merge_verifier` uses more evidence.
 //!
-//! - [`Hypothesis`]: a place that was found, and its index.
-//! - [`Criterion`]: ranks hypotheses, and says whether the best is accepted and why.
-//! - [`PairAligner`]: the stage round a [`Method`].
+//! - [`Hypothesis`]: a relative pose with its index.
+//! - [`Criterion`]: ranks hypotheses, and decides whether the best is accepted.
+//! - [`PairAligner`]: the stage of a [`Method`].
 
 mod criterion;
 mod hypothesis;

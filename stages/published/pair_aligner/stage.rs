@@ -1,4 +1,4 @@
-//! The stage round a method: maps in, what was found for every pair of robots out.
+//! The stage of a method: maps in, hypotheses for every pair of robots out.
 
 use super::{Criterion, Hypothesis};
 use crate::registration::search::{NamedMap, SearchRefusal};
@@ -7,25 +7,25 @@ use crate::shared::robot_maps::RobotMaps;
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 
-/// A way to lay two maps on each other.
+/// A method to align two maps.
 pub trait Method {
-    /// What alignments say that they were found by.
+    /// Name of the method in alignments.
     const NAME: &'static str;
 
-    /// The places where map b may lie on map a, in any order.
+    /// Relative poses of map b in map a, in any order.
     ///
     /// # Errors
     /// Maps on which the method cannot work.
     fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<Hypothesis>, SearchRefusal>;
 
-    /// When the best of them is accepted.
+    /// Criterion by which the best of them is accepted.
     fn criterion(&self) -> Criterion;
 
-    /// How many of them are sent, at most.
+    /// Largest number of them that is sent.
     fn max_hypotheses(&self) -> usize;
 }
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub struct Found {
     alignment: Out<Alignment>,
     hypotheses: Out<Alignment>,
@@ -36,19 +36,19 @@ impl Outputs for Found {
         Self {
             alignment: ports.output(
                 "alignment",
-                "The best place for each pair of robots, accepted or refused by its acceptance index omega, which is its score; or why \
+                "The best hypothesis for each pair of robots, accepted or refused by its acceptance index omega, which is its score; or why \
                  there is none. Sent at the end.",
             ),
             hypotheses: ports.output(
                 "hypotheses",
-                "The best few places for each pair of robots, ranked by omega and marked as provisional: for icp_refiner and \
+                "The best few hypotheses for each pair of robots, ranked by omega and marked as provisional: for icp_refiner and \
                  merge_verifier. Nothing where there is none.",
             ),
         }
     }
 }
 
-/// Keeps each robot's last map, and lays those of every pair on each other when all have come.
+/// Keeps each robot's last map, and aligns those of every pair when all have arrived.
 pub struct PairAligner<M> {
     method: M,
     maps: RobotMaps<()>,
@@ -60,10 +60,10 @@ impl<M: Method> PairAligner<M> {
         Self { method, maps: RobotMaps::default() }
     }
 
-    /// Keeps a map.
+    /// Stores a map.
     ///
     /// # Errors
-    /// None: a map that cannot be used is warned of.
+    /// None: an invalid map gives a warning.
     pub fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,

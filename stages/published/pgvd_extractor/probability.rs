@@ -1,13 +1,13 @@
-//! How probably a point is on the skeleton, given the cells that define it.
+//! Probability that a point is on the skeleton, given the cells that define it.
 
 use crate::shared::geometry::{Cell, Grid, is_free, is_known};
 use nalgebra::Vector2;
 
-/// Cells that define a point lie no farther beyond the nearest one than this, in cells: on a grid no two distances are the same.
+/// Largest distance of the defining cells beyond the nearest one, in cells: on a grid no two distances are equal.
 const AS_NEAR: f64 = 1.5;
 
-/// That the cell of a skeleton is on it, 0 to 1: that it is free, and that two cells on either side, about `clearance` metres
-/// away, are occupied. Cells beyond the grid are as unknown ones.
+/// Probability that the cell of a skeleton is on it, 0 to 1: that it is free, and that two cells on either side,
+/// about `clearance` metres away, are occupied. Cells beyond the grid count as unknown.
 pub fn point_probability(grid: &Grid<'_>, cell: Cell, clearance: f64) -> f64 {
     let most = grid.geometry.width.max(grid.geometry.height) as f64;
     let radius = (clearance / grid.geometry.resolution).clamp(0.0, most);
@@ -36,7 +36,7 @@ pub fn point_probability(grid: &Grid<'_>, cell: Cell, clearance: f64) -> f64 {
     free * first * other.map_or(0.5, |(_, occupied)| *occupied)
 }
 
-/// Of a cell's value; one half where it is unknown.
+/// Probability of a cell's value; one half where it is unknown.
 fn probability_of_occupied(value: i8) -> f64 {
     if is_known(value) { f64::from(value) / 100.0 } else { 0.5 }
 }

@@ -1,4 +1,4 @@
-//! The stage: makes the diagram of every map that differs from the robot's last.
+//! The stage: computes the diagram of every map that differs from the robot's last.
 
 use super::{PgvdExtractorParameters, point_probability};
 use crate::shared::geometry::{Cell, Grid};
@@ -8,14 +8,14 @@ use gridweave_runtime::ros::{Header, OccupancyGrid, Point, TopologicalMap, Topol
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use rayon::prelude::*;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct Diagrams {
     topological_map: Out<TopologicalMap>,
 }
 
 impl Outputs for Diagrams {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let summary = "The diagram of each map that has changed: its ends and junctions, and the ways between them, with their \
+        let summary = "The diagram of each map that has changed: its ends and junctions, and the paths between them, with their \
                        probabilities.";
         Self { topological_map: ports.output("topological_map", summary) }
     }
@@ -49,8 +49,8 @@ impl PgvdExtractor {
     }
 }
 
-/// The diagram of a map, in its frame, without header and robot. Nodes and paths are those of its skeleton; none if
-/// there is no free space that is wide enough.
+/// Diagram of a map, in its frame, without header and robot. Nodes and paths are those of its skeleton; none if no
+/// free space is wide enough.
 pub fn topological_map(grid: &Grid<'_>, parameters: &PgvdExtractorParameters) -> TopologicalMap {
     let Some((graph, distances)) = skeleton_graph(grid, &parameters.skeleton()) else {
         return TopologicalMap::default();

@@ -121,7 +121,7 @@ fn the_stage_sends_the_diagram_of_each_map_that_has_changed() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_refused() {
     assert!(PgvdExtractorParameters::default().check().is_empty());
     let wrong = PgvdExtractorParameters { min_spur: -1.0, min_probability: 1.5, ..Default::default() };
     assert_eq!(wrong.check().len(), 2);

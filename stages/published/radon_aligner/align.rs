@@ -1,4 +1,4 @@
-//! The whole of it: rotation, four hypotheses, translation, similarity.
+//! Rotation, four hypotheses, translation and similarity.
 
 use super::{Profile, QuarterEnergy, RadonAlignerParameters, RadonRefusal, RotationPeak, Shift, WallPoints, energy};
 use crate::published::acceptance_index::AcceptanceIndex;
@@ -7,10 +7,10 @@ use nalgebra::{Matrix2, Matrix3, Rotation2, UnitComplex, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// As many known cells of map b stand for all where many places are compared.
+/// Approximate number of known cells of map b by which many poses are compared.
 const SAMPLE: usize = 6000;
 
-/// What is made of one map alone.
+/// Data of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedMap {
     points: WallPoints,
@@ -18,20 +18,20 @@ pub struct PreparedMap {
     known: usize,
 }
 
-/// How map b lies on map a, as far as the method can tell.
+/// Relative pose of two maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadonAlignment {
     /// `T_a_b`.
     pub transform_a_b: Pose2,
-    /// Covariance of (x, y, yaw), metres and radians: yaw from the width of the peak over the angle, the place of the middle
-    /// of b's walls from those of the two profiles' peaks.
+    /// Covariance of (x, y, yaw), metres and radians: yaw from the width of the peak over the angle, the position of
+    /// the centroid of b's walls from those of the two profiles' peaks.
     pub covariance: Matrix3<f64>,
-    /// How the directions fit.
+    /// Correlation of the directions.
     pub peak: RotationPeak,
     /// The acceptance index at the transform, 0 to 1.
     pub similarity: f64,
-    /// The acceptance indices of the four hypotheses at their best places, by the number of quarter turns; 0 where a
-    /// hypothesis has no place with enough in common.
+    /// Acceptance indices of the four hypotheses at their best poses, by the number of quarter turns; 0 where a
+    /// hypothesis has no pose with enough in common.
     pub similarities: [f64; 4],
 }
 
@@ -50,7 +50,7 @@ impl PreparedMap {
 }
 
 impl RadonAlignment {
-    /// What speaks for it, in plain words.
+    /// Reason for the user.
     pub fn reason(&self) -> String {
         let mut others = self.similarities.to_vec();
         others.sort_by(|one, other| other.total_cmp(one));
@@ -63,22 +63,22 @@ impl RadonAlignment {
     }
 }
 
-/// A map with its name and what was made of it.
+/// A map with its name and data.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedMap<'a> {
-    /// Whose it is.
+    /// Name of the robot.
     pub robot: &'a str,
     /// Its cells.
     pub grid: Grid<'a>,
-    /// What was made of it, with the same number of angles for all maps.
+    /// Its data, with the same number of angles for all maps.
     pub prepared: &'a PreparedMap,
 }
 
-/// Lays map b on map a.
+/// Aligns map b with map a.
 ///
 /// # Errors
-/// A map has no walls or is too large, the directions of the walls do not fit, or the maps have too little in common or agree on
-/// too little of it at the best place.
+/// A map has no walls or is too large, the directions of the walls do not fit, or the maps have too little in common
+/// or agree on too little of it at the best pose.
 pub fn align(
     a: &NamedMap<'_>,
     b: &NamedMap<'_>,
@@ -103,7 +103,7 @@ pub fn align(
     let places: Vec<Option<Place>> =
         (0..4).into_par_iter().map(|turns| best_place(turns, &peak, a, b, &sample.grid(), parameters)).collect();
     let similarities = std::array::from_fn(|turns| places[turns].as_ref().map_or(0.0, |place| place.similarity));
-    // Of equal ones the first.
+    // Of equals the first.
     let better = |best: Option<Place>, one: Place| match best {
         Some(best) if best.similarity >= one.similarity => Some(best),
         _ => Some(one),
@@ -122,20 +122,20 @@ pub fn align(
     })
 }
 
-/// The best place at one of the four rotations.
+/// The best pose at one of the four rotations.
 #[derive(Clone, Debug)]
 struct Place {
     transform_a_b: Pose2,
     similarity: f64,
-    /// The direction of the first of the two axes of the walls, in the frame of map a.
+    /// Direction of the first of the two axes of the walls, in the frame of map a.
     axis: UnitComplex<f64>,
     /// The deviations along both axes, metres.
     deviations: [f64; 2],
 }
 
 impl Place {
-    /// The covariance of the transform. The middle of b's walls is as uncertain as the profiles are; the frame's origin is
-    /// farther away from there.
+    /// Covariance of the transform. The centroid of b's walls is as uncertain as the profiles are; the frame's origin
+    /// is farther away from there.
     fn covariance(&self, peak: &RotationPeak, b: &NamedMap<'_>) -> Matrix3<f64> {
         let points = b.prepared.points.points();
         let count = points.len().max(1) as f64;
@@ -149,7 +149,7 @@ impl Place {
     }
 }
 
-/// The place at which the maps agree best at one of the four rotations, if they have enough in common anywhere.
+/// The pose at which the maps agree best at one of the four rotations, if they have enough in common anywhere.
 fn best_place(
     turns: usize,
     peak: &RotationPeak,
@@ -203,7 +203,7 @@ fn best_place(
     })
 }
 
-/// A map of fewer cells, each of which says what the cell at its middle says.
+/// A map of fewer cells, each with the value of the cell at its centre.
 struct Sample {
     geometry: GridGeometry,
     cells: Vec<i8>,

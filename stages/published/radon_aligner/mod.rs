@@ -1,5 +1,5 @@
-//! Finds how two maps lie to each other by the directions of their walls: the rotation from the Radon transforms of both
-//! maps, the translation from their projections.
+//! Estimates the relative pose of two maps by the directions of their walls: the rotation from the Radon transforms
+//! of both maps, the translation from their projections.
 //!
 //! The first step of the map merger of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a topological approach to map
 //! merging for multiple robots" (IEEE Robotics and Automation Magazine, June 2014), section "Uncertain Rotation Alignment" and
@@ -22,12 +22,12 @@
 //!   correlated, the best shifts of both axes are laid together in all ways, and the index is taken where it is greatest. A
 //!   place at which the maps share little does not count, as the index is a share of whatever they have in common.
 //!
-//! The method does not verify what it finds: free space agrees with free space wherever two buildings are laid on each other,
-//! so that unrelated maps pass, too, and rooms that look alike are confused. For comparison, and as the first step of
-//! `pipelines/group_mapping.toml`; a merge that matters takes `map_aligner` and `merge_verifier`.
+//! The method has no verification: free space agrees with free space at any pose of two buildings, so unrelated maps
+//! pass, too, and similar rooms are confused. For comparison, and as the first step of
+//! `pipelines/group_mapping.toml`; where a merge matters, use `map_aligner` and `merge_verifier`.
 //!
 //! - [`WallPoints`], [`energy`]: the Radon transform's energy over half a turn.
-//! - [`QuarterEnergy`], [`RotationPeak`]: two energies laid on each other.
+//! - [`QuarterEnergy`], [`RotationPeak`]: the correlation of two energies.
 //! - [`Profile`]: projections, and the shifts at which they fit.
 //! - [`align`]: all of it.
 
@@ -56,7 +56,7 @@ use stage::RadonAligner;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "radon_aligner",
-        "Finds how the maps of each pair of robots lie to each other by the directions of their walls: the energies of their Radon \
+        "Estimates the relative pose of the maps of each pair of robots by the directions of their walls: the energies of their Radon \
          transforms give the rotation up to quarter turns, projections on the walls' axes the translation, and of the four \
          rotations the one is taken at which the maps agree best where they overlap (Saeedi et al., \"Group mapping\"). The \
          rotation's variance comes from the width of the peak. Nothing is verified: unrelated maps can pass.",

@@ -1,10 +1,10 @@
-//! Two energies over the angle laid on each other: the rotation, up to quarter turns.
+//! Correlation of two energies over the angle: the rotation, up to quarter turns.
 
 use super::peak_shape::PeakShape;
 use std::f64::consts::FRAC_PI_2;
 
-/// The standard deviation of a rotation as a share of the width of its peak: the place of a peak is told more exactly than the
-/// peak is wide. In seven pairs of real maps the errors were 0.003 to 0.14 of the width.
+/// Standard deviation of a rotation as a share of the width of its peak: the position of a peak is more accurate than
+/// its width. In seven pairs of real maps the errors were 0.003 to 0.14 of the width.
 const DEVIATION_OF_WIDTH: f64 = 0.1;
 
 /// The energy of a map over a quarter turn, without its mean, in units of its own deviation.
@@ -13,7 +13,7 @@ pub struct QuarterEnergy {
     values: Vec<f64>,
 }
 
-/// How far the directions of two maps are turned against each other.
+/// Rotation between the directions of two maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotationPeak {
     /// The rotation that takes the directions of map b to those of map a, radians from 0 to a quarter turn.

@@ -176,7 +176,7 @@ fn the_stage_aligns_a_pair_when_a_map_has_changed() {
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_refused() {
     assert!(RadonAlignerParameters::default().check().is_empty());
     let wrong = RadonAlignerParameters { angle_step: 0.0, shifts: 0, min_overlap: f64::NAN, ..Default::default() };
     assert_eq!(wrong.check().len(), 3);

@@ -1,4 +1,4 @@
-//! From two maps to the places where one may lie on the other.
+//! Relative poses of two maps by random walks.
 
 use super::walk::{WalkEnd, walk};
 use super::{ClassifiedMap, RandomWalkParameters, dissimilarity};
@@ -11,8 +11,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// The places where map b may lie on map a, each away from the others, those of least dissimilarity first. The same maps,
-/// parameters and seed give the same places.
+/// Relative poses of map b in map a, each apart from the others, those of least dissimilarity first. The same maps,
+/// parameters and seed give the same poses.
 ///
 /// # Errors
 /// A map has no walls, or is too large.
@@ -57,7 +57,7 @@ fn classified(
     Ok(ClassifiedMap::new(raster, parameters.max_points))
 }
 
-/// Walks over the places of one map on another: x and y of the middle of map b from that of map a, and the rotation.
+/// Walks over the relative poses of two maps: x and y of the centre of map b from that of map a, and the rotation.
 struct Walks<'a> {
     a: &'a ClassifiedMap,
     b: &'a ClassifiedMap,
@@ -67,7 +67,7 @@ struct Walks<'a> {
 
 impl Walks<'_> {
     fn walk(&self, number: usize) -> WalkEnd {
-        // A stream for each walk, so that it does not matter which thread goes it.
+        // A random stream for each walk, so that the threads do not matter.
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(number as u64);
         let sector = TAU / self.parameters.walks as f64;
@@ -91,7 +91,7 @@ impl Walks<'_> {
         Isometry2::from_parts(translation.into(), turn)
     }
 
-    /// Where a walk has ended, and the covariance: the spread of its last moves, and at least that of its shortest moves.
+    /// End of a walk, and the covariance: the spread of its last moves, and at least that of its shortest moves.
     fn transform(&self, end: &WalkEnd) -> (Pose2, Matrix3<f64>) {
         let transform = self.at(&end.place);
         let arm = -quarter_turn(&(transform.rotation * self.b.middle().coords));

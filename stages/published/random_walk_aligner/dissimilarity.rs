@@ -1,4 +1,4 @@
-//! The dissimilarity psi of two maps that are laid on each other.
+//! Dissimilarity psi of two maps at a relative pose.
 
 use super::DistanceMap;
 use crate::registration::search::{Content, Raster};
@@ -70,8 +70,7 @@ impl ClassifiedMap {
 /// `psi` = sum over the classes c of `d(a, b, c) + d(b, a, c)`, metres, where `d(a, b, c)` is the mean Manhattan distance from
 /// a cell of class c in map a to the nearest one of that class in map b: Carpin, Birk and Jucikas 2005, and Birk and Carpin 2006.
 ///
-/// Distances are taken along the axes of the map in which they are looked up. A class of which a map has no cell says
-/// nothing.
+/// Distances are along the axes of the map in which they are looked up. A class without a cell in a map is ignored.
 pub fn dissimilarity(a: &ClassifiedMap, b: &ClassifiedMap, transform_a_b: &Pose2) -> f64 {
     let transform_b_a = transform_a_b.inverse();
     let of_class = |content| {

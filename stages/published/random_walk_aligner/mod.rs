@@ -1,20 +1,23 @@
-//! Lays maps on each other by random walks: Carpin, Birk and Jucikas, "On map merging", Robotics and Autonomous Systems 53
-//! (2005), and Birk and Carpin, "Merging occupancy grid maps from multiple robots", Proceedings of the IEEE 94 (2006).
+//! Aligns maps by random walks: Carpin, Birk and Jucikas, "On map merging", Robotics and Autonomous Systems 53
+//! (2005), and Birk and Carpin, "Merging occupancy grid maps from multiple robots", Proceedings of the IEEE 94
+//! (2006).
 //!
-//! What is minimised is the dissimilarity psi: how far it is, in the mean, from a cell of one map to the nearest one of the
-//! same class in the other, both ways. Other than a count of cells it falls smoothly towards the place where the maps agree.
+//! The dissimilarity psi is minimised: the mean distance from a cell of one map to the nearest one of the same class
+//! in the other, in both directions. Unlike a count of cells it falls smoothly towards the pose at which the maps
+//! agree.
 //!
-//! - [`DistanceMap`]: how far it is from anywhere to a class of cells, in two sweeps.
-//! - [`dissimilarity`]: psi at a place.
+//! - [`DistanceMap`]: distance from any cell to a class of cells, in two sweeps.
+//! - [`dissimilarity`]: psi at a relative pose.
 //! - [`walk`]: the adaptive random walk.
-//! - [`align_by_walks`]: several walks from rotations all round, and what they came to.
+//! - [`align_by_walks`]: several walks from rotations all round, and their results.
 //!
-//! The papers let one walk run until it is stopped, and psi take all cells. Here there are several shorter walks with bounds
-//! of their own, over cells that are chosen evenly, in cells wider than those of the maps; the covariance is the spread of
-//! the last accepted moves, which says how fine the walk was when it ended, and nothing of whether the place is the right one.
+//! The papers let one walk run until it is stopped, and psi use all cells. Here there are several shorter walks with
+//! bounds, over cells that are evenly sampled, in cells wider than those of the maps; the covariance is the spread of
+//! the last accepted moves, which is the resolution of the walk at its end, and no measure of whether the pose is
+//! right.
 //!
-//! There is no verification but the acceptance index, and psi draws maps to where they overlap most: robots that share
-//! little are laid wrongly on each other, and where such maps agree by chance, they are merged so.
+//! There is no verification but the acceptance index, and psi favours poses with a large overlap: robots that share
+//! little are aligned wrongly, and if such maps agree by chance, they are merged so.
 
 mod align;
 mod dissimilarity;
@@ -38,9 +41,9 @@ use gridweave_runtime::stage::StageKind;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "random_walk_aligner",
-        "Lays the maps of each pair of robots on each other by random walks, after Carpin and Birk (2005, 2006): they go to where \
-         the cells of each map are nearest to those of the same class in the other. The place with the best acceptance index \
-         omega is taken if that is high enough; nothing else is checked, so that maps which agree at a wrong place are merged \
+        "Aligns the maps of each pair of robots by random walks, after Carpin and Birk (2005, 2006): they minimise the distances \
+         from the cells of each map to those of the same class in the other. The pose with the best acceptance index \
+         omega is taken if that is high enough; nothing else is checked, so maps that agree at a wrong pose are merged \
          wrongly.",
         |parameters: RandomWalkParameters, context| Ok(PairAligner::new(RandomWalk { parameters, seed: context.seed })),
     )

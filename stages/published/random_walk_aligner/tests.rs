@@ -53,7 +53,7 @@ fn dissimilarity_is_the_same_both_ways_round_where_axes_agree() {
 }
 
 #[test]
-fn maps_of_one_place_are_laid_on_each_other_at_any_angle() {
+fn maps_of_one_building_are_aligned_at_any_angle() {
     let a = office(ALL, 0.4);
     for yaw in [0.5, -2.9] {
         let b = office(ALL, yaw);
@@ -65,7 +65,7 @@ fn maps_of_one_place_are_laid_on_each_other_at_any_angle() {
 }
 
 #[test]
-fn maps_without_walls_and_too_large_ones_are_told_and_a_single_cell_lies_anywhere() {
+fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
     let office = office(ALL, 0.4);
     let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
     let (empty, mut cells) = ([0; 100], [-1; 100]);
@@ -106,7 +106,7 @@ fn the_stage_walks_with_its_seed_and_every_pair_by_itself() {
 }
 
 #[test]
-fn wrong_parameters_are_told() {
+fn parameters_out_of_range_are_refused() {
     for text in [
         "cell = 0.0",
         "walks = 0",

@@ -1,11 +1,12 @@
-//! Carries maps into the world by uncertain transforms: what is uncertain in where a map lies becomes blur in what it says.
+//! Transforms maps into the world by uncertain transforms: the uncertainty of a map's pose becomes blur of its cells.
 //!
-//! Algorithm 1 ("Linearized uncertainty propagation") of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a topological
-//! approach to map merging for multiple robots" (IEEE Robotics and Automation Magazine, June 2014). A point `m` of a map goes to
-//! `n = R m + t`, and gets the covariance `S_n = J S_tr J^T`, where `S_tr` is that of the transform and J the derivative of n by
-//! (x, y, psi) (equation 4 of the paper); the transformed map, in log-odds (equation 7), is convolved there with the
-//! Gaussian `N(n, S_n)` (equation 6). The turn's part of S_n grows with the distance from the origin of the map's frame, so
-//! that the blur is small where the two maps are tied and grows away from there.
+//! Algorithm 1 ("Linearized uncertainty propagation") of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a
+//! topological approach to map merging for multiple robots" (IEEE Robotics and Automation Magazine, June 2014). A
+//! point `m` of a map is transformed to `n = R m + t`, with the covariance `S_n = J S_tr J^T`, where `S_tr` is that
+//! of the transform and J the derivative of n with respect to (x, y, psi) (equation 4 of the paper); the transformed
+//! map, in log-odds (equation 7), is convolved there with the Gaussian `N(n, S_n)` (equation 6). The rotation's part
+//! of S_n grows with the distance from the origin of the map's frame, so the blur is small where the two maps are
+//! connected and grows away from there.
 //!
 //! What the paper leaves open, and how it is decided here:
 //! - **The transformed map** is looked up cell by cell as in `grid_fuser`, since carrying cells forward and rounding leaves
@@ -21,8 +22,8 @@
 //!   the reference robot among them, whose map is not blurred by it.
 //! - **Unknown cells** have log-odds of 0, as in the paper. A wall may so reach into what its robot has not seen, as far as the
 //!   wall may lie there. Such a cell stays unknown where less than half a percent is left of what it would say.
-//! - **Bounds**: a place less certain than `max_deviation` is blurred as if it were that certain, since the cost goes with the
-//!   square of the blur, and says next to nothing in any case.
+//! - **Bounds**: a point less certain than `max_deviation` is blurred with that deviation, since the cost grows with
+//!   the square of the blur, and its evidence is negligible in any case.
 //!
 //! - [`PointCovariance`]: S_n at any place.
 //! - [`Kernel`]: the Gaussian on cells, cut.
@@ -52,12 +53,12 @@ use stage::UncertainTransform;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "uncertain_transform",
-        "Carries the map of every placed robot into the world, and blurs it there by how uncertain its frame is: algorithm 1 of \
-         Saeedi et al., \"Group mapping\". All maps come on the cells of one lattice, that of the reference robot's map, so \
+        "Transforms the map of every placed robot into the world, and blurs it by the covariance of its frame: algorithm 1 of \
+         Saeedi et al., \"Group mapping\". All maps are sent on the cells of one lattice, that of the reference robot's map, so \
          that they can be fused cell by cell.",
         |parameters: UncertainTransformParameters, _| Ok(UncertainTransform::new(parameters)),
     )
     .input("map", "The robots' maps.", UncertainTransform::receive_map)
-    .input("frames", "Where the maps lie, and how surely.", UncertainTransform::receive_frames)
+    .input("frames", "The poses of the maps, with covariances.", UncertainTransform::receive_frames)
     .build()
 }

@@ -1,31 +1,31 @@
-//! How uncertain a transformed point is.
+//! Covariance of a transformed point.
 
 use crate::shared::geometry::{Point2, Pose2, point_jacobian};
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen};
 
-/// The covariance of transformed points, by where they come to lie: `S_n = J S_tr J^T`.
+/// Covariance of transformed points, by their position: `S_n = J S_tr J^T`.
 #[derive(Clone, Copy, Debug)]
 pub struct PointCovariance {
-    /// Of the transform, (x, y, yaw), metres and radians.
+    /// Covariance of the transform, (x, y, yaw), metres and radians.
     covariance: Matrix3<f64>,
     transform: Pose2,
-    /// What every place has beyond that along each axis, square metres.
+    /// Variance that is added along each axis, square metres.
     cell_variance: f64,
-    /// The greatest variance in any direction, square metres.
+    /// Largest variance in any direction, square metres.
     most: f64,
 }
 
 impl PointCovariance {
-    /// Of points that a transform with a covariance carries into cells of `resolution` metres. No standard deviation is
-    /// above `max_deviation` metres. `None` if the covariance is none: a value is no finite number, or a variance is
-    /// below 0.
+    /// Covariance of points after a transform with a covariance, into cells of `resolution` metres. No standard
+    /// deviation is above `max_deviation` metres. `None` if the covariance is invalid: a value is not finite, or a
+    /// variance is below 0.
     pub fn new(transform: &Pose2, covariance: &Matrix3<f64>, resolution: f64, max_deviation: f64) -> Option<Self> {
         let is_finite = covariance.iter().chain(transform.translation.vector.iter()).all(|value| value.is_finite());
         if !(is_finite && transform.rotation.angle().is_finite()) {
             return None;
         }
         let symmetric = (covariance + covariance.transpose()) / 2.0;
-        // Rounding makes the least variance of a covariance a little less than it is.
+        // Rounding makes the least variance of a covariance slightly smaller.
         let least = -1e-9 * (1.0 + symmetric.norm());
         if SymmetricEigen::new(symmetric).eigenvalues.iter().any(|variance| *variance < least) {
             return None;
@@ -34,7 +34,7 @@ impl PointCovariance {
         Some(Self { covariance: symmetric, transform: *transform, cell_variance, most: max_deviation.powi(2) })
     }
 
-    /// The covariance of a point that comes to lie at `n`, square metres.
+    /// Covariance of a point transformed to `n`, square metres.
     pub fn at(&self, n: &Point2) -> Matrix2<f64> {
         let jacobian = point_jacobian(&self.transform, &self.transform.inverse_transform_point(n));
         let covariance = jacobian * self.covariance * jacobian.transpose();
@@ -43,8 +43,8 @@ impl PointCovariance {
         covariance * share + Matrix2::from_diagonal_element(self.cell_variance)
     }
 
-    /// The greatest standard deviation of all points in the convex hull of some, metres: it is reached at one of them, as
-    /// the variance in any direction is a convex function of the place.
+    /// Largest standard deviation of all points in the convex hull of some, metres: it is reached at one of them, as
+    /// the variance in any direction is a convex function of the position.
     pub fn greatest_deviation(&self, corners: &[Point2]) -> f64 {
         corners.iter().map(|corner| greatest_variance(&self.at(corner))).fold(0.0, f64::max).sqrt()
     }

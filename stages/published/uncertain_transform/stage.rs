@@ -1,4 +1,4 @@
-//! The stage: keeps each robot's last map, and carries it into the world when it or its frame has changed.
+//! The stage: keeps each robot's last map, and transforms it into the world when it or its frame has changed.
 
 use super::{UncertainTransformParameters, transform};
 use crate::merge::grid_fuser::layout::Lattice;
@@ -10,7 +10,7 @@ use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, Stag
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct TransformedMaps {
     map: Out<OccupancyGrid<'static>>,
 }
@@ -23,12 +23,12 @@ impl Outputs for TransformedMaps {
     }
 }
 
-/// Carries the maps of robots into the world.
+/// Transforms the maps of robots into the world.
 pub(super) struct UncertainTransform {
     parameters: UncertainTransformParameters,
     maps: RobotMaps<KnownArea>,
     frames: RobotFrames,
-    /// What each robot's map was sent with: the number of the map, its frame, and the lattice.
+    /// Number, frame and lattice of each robot's map that was sent.
     sent: BTreeMap<String, (u64, RobotFrame, (Point2, f64))>,
 }
 
@@ -75,7 +75,7 @@ impl UncertainTransform {
                 }
                 Ok(None) => {}
                 Err(problem) => {
-                    output.warn(format!("the map of {} was not carried into the world: {problem}", frame.robot));
+                    output.warn(format!("the map of {} was not transformed into the world: {problem}", frame.robot));
                 }
             }
         }

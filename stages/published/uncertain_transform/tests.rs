@@ -136,7 +136,7 @@ fn a_deviation_is_no_greater_than_the_most_that_is_allowed() {
 }
 
 #[test]
-fn what_is_no_covariance_is_told() {
+fn an_invalid_covariance_is_reported() {
     let frame = Pose2::identity();
     for wrong in [diagonal(0.1, 0.1, 0.1) * -1.0, diagonal(f64::NAN, 0.0, 0.0), diagonal(f64::INFINITY, 0.0, 0.0)] {
         assert!(PointCovariance::new(&frame, &wrong, 0.05, 1.0).is_none());
@@ -159,7 +159,7 @@ fn carried(map: &DrawnMap, frame: Pose2, covariance: &Matrix3<f64>) -> Transform
 }
 
 #[test]
-fn a_map_whose_frame_is_sure_comes_out_as_it_is() {
+fn a_map_with_a_certain_frame_is_unchanged() {
     let map = office(0.1);
     let grid = Grid::new(map.geometry, &map.cells).unwrap();
     let carried = carried(&map, Pose2::identity(), &Matrix3::zeros());
@@ -233,7 +233,7 @@ fn the_stage_sends_maps_of_placed_robots_on_one_lattice_when_they_have_changed()
     absurd.2[(0, 0)] = f64::NAN;
     assert_eq!(place(&mut stage, &[("a", Pose2::identity(), Matrix3::zeros()), absurd]), []);
     assert!(
-        stage.warnings().keys().any(|text| text.contains("the map of b was not carried")),
+        stage.warnings().keys().any(|text| text.contains("the map of b was not transformed")),
         "{:?}",
         stage.warnings()
     );
@@ -242,7 +242,7 @@ fn the_stage_sends_maps_of_placed_robots_on_one_lattice_when_they_have_changed()
 }
 
 #[test]
-fn parameters_out_of_range_are_told() {
+fn parameters_out_of_range_are_refused() {
     assert!(UncertainTransformParameters::default().check().is_empty());
     let wrong = UncertainTransformParameters {
         resolution: Some(0.0),

@@ -1,8 +1,8 @@
-//! Algorithm 1: a map carried into the world and blurred there.
+//! Algorithm 1: transforms a map into the world and blurs it there.
 
 use super::{Kernel, PointCovariance, UncertainTransformParameters, convolve};
 use crate::merge::grid_fuser::evidence::EvidenceTable;
-use crate::merge::grid_fuser::layout::{Lattice, LeftOut, lay_out};
+use crate::merge::grid_fuser::layout::{Lattice, LeftOut, layout_of};
 use crate::merge::grid_fuser::{Fused, KnownArea, PlacedGrid, inverse};
 use crate::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
 use crate::shared::log_odds::LogOdds;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// A map in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transformed {
-    /// Where its cells lie, along the axes of the world.
+    /// Geometry of its cells, along the axes of the world.
     pub geometry: GridGeometry,
     /// Row by row: -1 unknown, 0 free to 100 occupied.
     pub cells: Vec<i8>,
@@ -21,19 +21,19 @@ pub struct Transformed {
 /// Why a map is not transformed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NotTransformed {
-    /// The covariance of its frame is none.
-    #[error("the covariance of its frame is none: a value is no finite number, or a variance is below 0")]
+    /// The covariance of its frame is invalid.
+    #[error("the covariance of its frame is invalid: a value is not finite, or a variance is below 0")]
     Covariance,
-    /// Its cells cannot be laid out.
+    /// Its grid is invalid.
     #[error(transparent)]
     LeftOut(#[from] LeftOut),
 }
 
-/// Carries a map into the world by a transform with a covariance of (x, y, yaw), onto the cells of a lattice. `None` if nothing
-/// of it is known.
+/// Transforms a map into the world by a transform with a covariance of (x, y, yaw), onto the cells of a lattice.
+/// `None` if nothing of it is known.
 ///
 /// # Errors
-/// The covariance is none, or the map would have too many cells.
+/// The covariance is invalid, or the map would have too many cells.
 pub fn transform(
     map: &PlacedGrid<'_>,
     area: &KnownArea,
@@ -44,7 +44,7 @@ pub fn transform(
     let resolution = lattice.resolution;
     let covariance = PointCovariance::new(&map.transform_world_map, covariance, resolution, parameters.max_deviation)
         .ok_or(NotTransformed::Covariance)?;
-    let layout = lay_out(&[(*map, area)], lattice);
+    let layout = layout_of(&[(*map, area)], lattice);
     layout.takes_part.into_iter().collect::<Result<(), LeftOut>>()?;
     let Some(sharp) = layout.geometry else { return Ok(None) };
 

@@ -83,7 +83,7 @@ impl IcpRefiner {
         output: &Output<RefinedAlignments>,
     ) -> Result<(), StageError> {
         if !(first_guess.x.is_finite() && first_guess.y.is_finite() && first_guess.yaw.is_finite()) {
-            output.warn("a first guess was left out: it holds a value that is no finite number");
+            output.warn("a first guess was left out: a value of it is not finite");
             return Ok(());
         }
         let robot = first_guess.robot();

@@ -1,4 +1,4 @@
-//! The distance from free cells to what is not free.
+//! Distance transform of the free space.
 
 use super::{FreeSpace, Window};
 use crate::shared::geometry::Cell;
@@ -13,8 +13,8 @@ const MOST_NARROW: u16 = 181;
 /// So many steps along the row are made before it is asked whether more are needed.
 const TOGETHER: usize = 4;
 
-/// The distance from the centre of each free cell to the centre of the nearest cell that is not free. What lies beyond the
-/// grid is not free.
+/// Distance from the centre of each free cell to the centre of the nearest cell that is not free. Cells beyond the
+/// grid are not free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceMap {
     pub(super) window: Window,
@@ -23,10 +23,10 @@ pub struct DistanceMap {
 }
 
 impl DistanceMap {
-    /// The exact distances: along columns first, and from these along rows. That is the separation of Felzenszwalb and
-    /// Huttenlocher ("Distance transforms of sampled functions", 2012); but the least along a row is found by looking, as far as
-    /// the distance goes and many cells at a time, which for the distances of buildings is several times as fast as the envelope
-    /// of parabolas.
+    /// Computes the exact distances: along columns first, and from these along rows. That is the separation of
+    /// Felzenszwalb and Huttenlocher ("Distance transforms of sampled functions", 2012); but the least along a row is
+    /// searched directly, as far as the distance extends and many cells at a time, which for the distances of
+    /// buildings is several times as fast as the envelope of parabolas.
     pub fn of(space: FreeSpace) -> Self {
         let FreeSpace { window, cells } = space;
         let along_columns = distances_along_columns(&cells, window.stride);
@@ -40,18 +40,18 @@ impl DistanceMap {
         Self { window, distances }
     }
 
-    /// The distance at a cell, metres; 0 where it is not free, or not on the grid.
+    /// Distance at a cell, metres; 0 where it is not free, or not on the grid.
     pub fn distance(&self, cell: Cell) -> f64 {
         self.window.index(cell).map_or(0.0, |index| self.at(index))
     }
 
-    /// The distance at a cell of the window, metres.
+    /// Distance at a cell of the window, metres.
     pub(super) fn at(&self, index: usize) -> f64 {
         f64::from(self.distances[index]) * self.window.geometry.resolution
     }
 }
 
-/// How many cells each is from the nearest one of its column that is not free.
+/// Distance of each cell from the nearest one of its column that is not free, in cells.
 fn distances_along_columns(cells: &[u8], stride: usize) -> Vec<u16> {
     let mut distances = vec![0u16; cells.len()];
     for start in (stride..cells.len()).step_by(stride) {
@@ -69,9 +69,9 @@ fn distances_along_columns(cells: &[u8], stride: usize) -> Vec<u16> {
     distances
 }
 
-/// Squared distances along columns of one row, as they are read while distances along the row are found: with as many cells that
-/// are not free before the row and behind it as the row has, and [`CHUNK`] more behind it. Beyond the cells that bound a stretch
-/// of free ones, nothing is nearer than they.
+/// Squared distances along columns of one row, padded by as many cells that are not free before and after the row as
+/// the row has, and [`CHUNK`] more after it. Beyond the cells that bound a stretch of free ones, nothing is nearer
+/// than they.
 #[derive(Default)]
 struct Squares {
     /// Cut at [`i16::MAX`]: twice as many are looked at together as of `wide`.
@@ -103,8 +103,8 @@ impl Squares {
     }
 }
 
-/// Distances in the plane for a row, from those along columns: for each cell the least over all cells of the row. Farther cells
-/// are looked at only as long as they can be nearer than what was found, for some cells at a time.
+/// Distances in the plane for a row, from those along columns: for each cell the least over all cells of the row.
+/// Farther cells are tested only as long as they can be nearer than the best so far, several at a time.
 fn distances_of_row(along_columns: &[u16], distances: &mut [f32], squares: &mut Squares) {
     let stride = along_columns.len();
     squares.fill(along_columns);
@@ -165,7 +165,7 @@ fn least_wide(squares: &[f32], first: usize, stride: usize) -> [f32; CHUNK] {
     least
 }
 
-/// The lesser of two numbers, of which none is not a number: one instruction, many at a time.
+/// The lesser of two numbers, neither of which is NaN: one instruction, many at a time.
 fn lesser(one: f32, other: f32) -> f32 {
     if one < other { one } else { other }
 }

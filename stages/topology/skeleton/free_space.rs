@@ -13,8 +13,8 @@ pub struct FreeSpace {
 }
 
 impl FreeSpace {
-    /// The free cells of a grid. Holes in it, whether they are occupied or unknown, are free as well if they cover at most
-    /// `max_hole` square metres and do not reach the border of the grid. None if no cell is free.
+    /// The free cells of a grid. Holes, occupied or unknown, become free as well if they cover at most `max_hole`
+    /// square metres and do not reach the border of the grid. None if no cell is free.
     pub fn of(grid: &Grid<'_>, max_hole: f64) -> Option<Self> {
         let window = Window::new(grid.geometry, CellBox::holding(grid, is_free)?);
         let mut cells = vec![0; window.cell_count()];
@@ -40,8 +40,8 @@ struct Run {
     hole_cells: usize,
 }
 
-/// Makes those holes free that have at most `most` cells. Cells of a hole hang together by their sides. The rim hangs together
-/// with what is around the window, and is no hole.
+/// Fills the holes of at most `most` cells. Cells of a hole are connected by their sides. The rim is connected with
+/// what is around the window, and is no hole.
 fn fill_holes(cells: &mut [u8], stride: usize, most: usize) {
     if most == 0 {
         return;

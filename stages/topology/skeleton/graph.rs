@@ -4,54 +4,54 @@ use super::trace::trace;
 use super::{DistanceMap, Skeleton};
 use crate::shared::geometry::Cell;
 
-/// What a node of a skeleton is.
+/// Kind of a node of a skeleton.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeKind {
-    /// A way ends here; or it is a place from which no way leads.
+    /// An end of a path; or an isolated point.
     End,
-    /// Three ways or more meet.
+    /// A junction of three paths or more.
     Junction,
-    /// A place of a way that leads back to itself and meets no other: where it is widest.
+    /// The widest point of a closed path that meets no other.
     Loop,
 }
 
 /// A node of a skeleton.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkeletonNode {
-    /// Where it is; of a junction of several cells, the one that is farthest from obstacles.
+    /// Position; of a junction of several cells, the one that is farthest from obstacles.
     pub cell: Cell,
-    /// What it is.
+    /// Kind of the node.
     pub kind: NodeKind,
-    /// The distance to the nearest cell that is not free, metres.
+    /// Distance to the nearest cell that is not free, metres.
     pub clearance: f64,
 }
 
-/// A way between two nodes of a skeleton.
+/// A path between two nodes of a skeleton.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonPath {
-    /// The places of its first and last node in [`SkeletonGraph::nodes`].
+    /// Indices of its first and last node in [`SkeletonGraph::nodes`].
     pub nodes: [usize; 2],
-    /// The cells that it passes through from the first node to the last, both of them among these. Neighbours in this list
-    /// are neighbours on the grid, but for junctions of several cells, of which only one is named.
+    /// Cells from the first node to the last, including both. Neighbours in this list are neighbours on the grid,
+    /// except at junctions of several cells, of which only one is listed.
     pub cells: Vec<Cell>,
-    /// Metres. The steps of the grid are smoothed out.
+    /// Length, metres. The steps of the grid are smoothed.
     pub length: f64,
 }
 
-/// The ends and junctions of a skeleton, and the ways between them.
+/// The ends and junctions of a skeleton, and the paths between them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkeletonGraph {
-    /// Row by row as they were found.
+    /// Row by row.
     pub nodes: Vec<SkeletonNode>,
     /// In the order of their first nodes.
     pub paths: Vec<SkeletonPath>,
 }
 
-/// The length of a way through cells is measured from each to the one that comes so many later.
+/// Number of cells from one end of a chord to the other when the length of a path is measured.
 const CHORD: usize = 5;
 
 impl SkeletonGraph {
-    /// The graph of a skeleton, which was made from these distances.
+    /// Graph of a skeleton with its distances.
     pub fn of(skeleton: &Skeleton, distances: &DistanceMap) -> Self {
         let (window, traced) = (&skeleton.window, trace(skeleton, distances));
         let nodes = traced.nodes.iter().map(|&(place, kind)| SkeletonNode {
@@ -67,7 +67,7 @@ impl SkeletonGraph {
     }
 }
 
-/// The length of a way through cells of `resolution` metres, by chords: cell by cell, slanted ways would come out too long.
+/// Length of a path through cells of `resolution` metres, by chords: cell by cell, slanted paths would be too long.
 pub fn way_length(cells: &[Cell], resolution: f64) -> f64 {
     let chosen = (0..cells.len()).step_by(CHORD).chain(cells.len().checked_sub(1));
     let chosen: Vec<Cell> = chosen.map(|place| cells[place]).collect();

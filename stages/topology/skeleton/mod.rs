@@ -1,14 +1,14 @@
-//! The skeleton of a map's free space, and the graph of places and ways that it makes.
+//! Skeleton of a map's free space, and its graph of nodes and paths.
 //!
-//! The generalized Voronoi diagram of a map is the set of free places that are equally far from two obstacles or more (Choset
-//! and Burdick, "Sensor-based exploration: the hierarchical generalized Voronoi graph", 2000). On a grid it is a line one
-//! cell wide that hangs together as the free space does:
+//! The generalized Voronoi diagram of a map is the set of free points at equal distance from two obstacles or more
+//! (Choset and Burdick, "Sensor-based exploration: the hierarchical generalized Voronoi graph", 2000). On a grid it
+//! is a line one cell wide with the connectivity of the free space:
 //!
 //! - [`FreeSpace`]: the free cells of a grid, small holes filled.
 //! - [`DistanceMap`]: the distance from each of them to the nearest cell that is not free.
-//! - [`Skeleton`]: what is left when free cells are taken away, those nearest to obstacles first, as long as the rest hangs
-//!   together as before.
-//! - [`SkeletonGraph`]: its ends and junctions as nodes and what lies between them as paths, without spurs.
+//! - [`Skeleton`]: the cells that remain when free cells are removed, those nearest to obstacles first, as long as
+//!   the connectivity is unchanged.
+//! - [`SkeletonGraph`]: its ends and junctions as nodes and the lines between them as paths, without spurs.
 //!
 //! [`skeleton_graph`] does all of it.
 
@@ -31,17 +31,16 @@ pub use window::Window;
 
 use crate::shared::geometry::Grid;
 
-/// What belongs to the skeleton of a map.
+/// Parameters of the skeleton of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkeletonParameters {
-    /// Objects and unknown spots in free space that cover no more than this are taken for free, square metres: the skeleton
+    /// Largest area of objects and unknown spots in free space that are treated as free, square metres: the skeleton
     /// would go round each of them.
     pub max_hole: f64,
-    /// The skeleton does not pass where an obstacle or an unknown cell is nearer than this, metres: half the width of the
-    /// narrowest way.
+    /// Least distance of the skeleton from obstacles and unknown cells, metres: half the width of the narrowest path.
     pub min_clearance: f64,
-    /// A way that leads from a junction to an end is left out if it reaches less far than this beyond what a square corner
-    /// would give, metres; see [`SkeletonGraph::prune`].
+    /// A path from a junction to an end is a spur if it extends less than this beyond a square corner, metres; see
+    /// [`SkeletonGraph::prune`].
     pub min_spur: f64,
 }
 
@@ -51,8 +50,8 @@ impl Default for SkeletonParameters {
     }
 }
 
-/// The skeleton of a grid's free space as a graph, with what it was made from. None if no free cell has the clearance that is
-/// asked for.
+/// The skeleton of a grid's free space as a graph, with its distances. None if no free cell has the required
+/// clearance.
 pub fn skeleton_graph(grid: &Grid<'_>, parameters: &SkeletonParameters) -> Option<(SkeletonGraph, DistanceMap)> {
     let distances = DistanceMap::of(FreeSpace::of(grid, parameters.max_hole)?);
     let skeleton = Skeleton::of(&distances, parameters.min_clearance);

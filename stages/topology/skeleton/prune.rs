@@ -1,17 +1,18 @@
-//! Takes spurs out of a skeleton.
+//! Removes spurs from a skeleton.
 
 use super::{NodeKind, SkeletonGraph, SkeletonPath};
 use std::f64::consts::SQRT_2;
 
 impl SkeletonGraph {
-    /// Takes out spurs: ways from a junction to an end that come from corners and rough walls, and lead nowhere.
+    /// Removes spurs: dead ends from corners and rough walls.
     ///
-    /// A way of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to `l + e` from the
-    /// junction. A square corner reaches `sqrt(2) * r`, whatever the size of the room. The way is a spur if it reaches less than
-    /// `min_spur` metres farther than that. All spurs that there are go at once, so that a corridor that ends between two
-    /// corners ends in the middle. A junction that is left with two ways becomes a part of one, with one way an end, and with
-    /// none a place by itself; then spurs are looked for again, until there are none. At last a way between two ends that meets no
-    /// other is one place if it is shorter than the clearance there: a room.
+    /// A path of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to `l
+    /// + e` from the junction. A square corner extends to `sqrt(2) * r`, whatever the size of the room. The path is a
+    /// spur if it extends less than `min_spur` metres beyond that. All spurs are removed at once, so that a corridor
+    /// that ends between two corners ends in the middle. A junction that is left with two paths becomes a part of
+    /// one, with one path an end, and with none an isolated node; then spurs are sought again, until there are none.
+    /// At last a path between two ends that meets no other is one node if it is shorter than the clearance there: a
+    /// room.
     pub fn prune(&mut self, min_spur: f64) {
         while self.take_out_spurs(min_spur) {
             self.join_ways();
@@ -19,14 +20,14 @@ impl SkeletonGraph {
         self.join_ends();
     }
 
-    /// How many ways lead from each node; one that leads back to it counts twice.
+    /// Number of paths at each node; one that returns to it counts twice.
     pub fn degrees(&self) -> Vec<usize> {
         let mut degrees = vec![0; self.nodes.len()];
         self.paths.iter().flat_map(|path| path.nodes).for_each(|node| degrees[node] += 1);
         degrees
     }
 
-    /// Whether there were any.
+    /// Removes all spurs. Returns whether there were any.
     fn take_out_spurs(&mut self, min_spur: f64) -> bool {
         let degrees = self.degrees();
         let mut is_gone = vec![false; self.nodes.len()];
@@ -43,7 +44,7 @@ impl SkeletonGraph {
         is_gone.contains(&true)
     }
 
-    /// Makes one way of two that meet at a junction where no other does.
+    /// Joins two paths at a junction without others.
     fn join_ways(&mut self) {
         let mut ways: Vec<Vec<usize>> = vec![Vec::new(); self.nodes.len()];
         for (number, path) in self.paths.iter().enumerate() {
@@ -70,7 +71,7 @@ impl SkeletonGraph {
         self.drop_nodes(&is_gone);
     }
 
-    /// Makes one place of two ends, if nothing but a way that is shorter than the clearance ties them.
+    /// Joins two ends to one node, if they are connected by nothing but a path that is shorter than the clearance.
     fn join_ends(&mut self) {
         let degrees = self.degrees();
         let mut is_gone = vec![false; self.nodes.len()];
@@ -87,7 +88,7 @@ impl SkeletonGraph {
         self.drop_nodes(&is_gone);
     }
 
-    /// Drops nodes that no way leads to.
+    /// Removes nodes without paths.
     fn drop_nodes(&mut self, is_gone: &[bool]) {
         let mut left = 0;
         let mut numbers = Vec::with_capacity(is_gone.len());
@@ -112,7 +113,7 @@ impl SkeletonPath {
         self.cells.reverse();
     }
 
-    /// Goes on behind `node`, where it ends or begins, by a way that does so, too.
+    /// Appends a path that begins or ends at `node`.
     fn go_on(&mut self, node: usize, mut by: Self) {
         if self.nodes[1] != node {
             self.turn_round();

@@ -194,7 +194,7 @@ fn corridors_that_cross_meet_at_a_junction() {
 }
 
 #[test]
-fn a_corridor_that_leads_round_is_a_loop() {
+fn a_closed_corridor_is_a_loop() {
     let mut round = rooms(220, 220, &[[10, 10, 210, 210]]);
     for row in 30..190 {
         round.1[row * 220 + 30..row * 220 + 190].fill(100);

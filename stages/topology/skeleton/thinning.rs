@@ -1,4 +1,4 @@
-//! From free space to a line one cell wide.
+//! Thinning of free space to a line one cell wide.
 
 use super::{DistanceMap, Window};
 use rayon::prelude::*;
@@ -15,27 +15,27 @@ const BAND: usize = 32;
 /// Cells of a row that are looked through together.
 const PIECE: usize = 16;
 
-/// A skeleton: lines one cell wide that hang together as the free space did.
+/// A skeleton: lines one cell wide with the connectivity of the free space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Skeleton {
     pub(super) window: Window,
     /// 1 for each cell of the window that is on the skeleton, 0 for others.
     pub(super) cells: Vec<u8>,
-    /// The places in `cells` that are on the skeleton, row by row.
+    /// Indices in `cells` that are on the skeleton, row by row.
     pub(super) places: Vec<u32>,
 }
 
 impl Skeleton {
-    /// The skeleton of all cells that are at least `min_clearance` metres from what is not free.
+    /// Skeleton of all cells that are at least `min_clearance` metres from cells that are not free.
     ///
-    /// Cells are taken away one by one, those nearest to obstacles first, as long as the rest hangs together as before: its
-    /// pieces by sides and corners, its holes by sides alone (distance-ordered homotopic thinning: Pudney 1998). Cells
-    /// of ridges stay at first, so that the lines reach as far as the ridges, and are then thinned from four
-    /// sides by turns until no cell but the end of a line could be taken away.
+    /// Cells are removed one by one, those nearest to obstacles first, as long as the connectivity is unchanged: of
+    /// its pieces by sides and corners, of its holes by sides only (distance-ordered homotopic thinning: Pudney
+    /// 1998). Cells of ridges stay at first, so that the lines extend as far as the ridges, and are then thinned from
+    /// the four sides alternately until no cell but the end of a line could be removed.
     pub fn of(distances: &DistanceMap, min_clearance: f64) -> Self {
         let window = distances.window.clone();
         let least = (min_clearance / window.geometry.resolution).max(1.0) as f32;
-        // A place in the window is kept in 32 bits; a map with more cells than that has no skeleton.
+        // An index in the window is kept in 32 bits; a map with more cells than that has no skeleton.
         if u32::try_from(window.cell_count()).is_err() {
             return Self { cells: vec![0; window.cell_count()], window, places: Vec::new() };
         }
@@ -90,7 +90,7 @@ impl Band {
         for (row, kinds) in (number * BAND..).zip(kinds.chunks_exact_mut(stride)) {
             // The rim is never free.
             if let Some(rows) = row.checked_sub(1).and_then(|above| all.get(above * stride..(row + 2) * stride)) {
-                tell_kinds(rows, least, kinds);
+                classify(rows, least, kinds);
             }
         }
         for (cell, kind) in cells.iter_mut().zip(&*kinds) {
@@ -131,9 +131,9 @@ impl Band {
     }
 }
 
-/// Tells the kinds of the cells of the middle one of three rows of distances: [`NARROW`] with less clearance than `least`,
+/// Classifies the cells of the middle one of three rows of distances: [`NARROW`] with less clearance than `least`,
 /// [`RIDGE`], or beyond that a step of the distance.
-fn tell_kinds(rows: &[f32], least: f32, kinds: &mut [u32]) {
+fn classify(rows: &[f32], least: f32, kinds: &mut [u32]) {
     let (stride, inner) = (kinds.len(), kinds.len() - 2);
     // The cells to the left of those within the rim, these, and those to the right.
     let three = |row: usize| [0, 1, 2].map(|from| &rows[row * stride + from..][..inner]);
@@ -152,13 +152,13 @@ fn tell_kinds(rows: &[f32], least: f32, kinds: &mut [u32]) {
     }
 }
 
-/// Takes away of `rest` all that can be but the ends of lines.
+/// Removes from `rest` all removable cells except the ends of lines.
 fn thin_from_four_sides(cells: &mut [u8], mut rest: Vec<u32>, stride: usize) {
     let mut side_cells: Vec<u32> = Vec::new();
     loop {
         let before = rest.len();
         for side in [-(stride as isize), stride as isize, -1, 1] {
-            // Only what is open to this side now, or a line two cells wide would be taken away from its end.
+            // Only cells that are open to this side now, or a line two cells wide would be removed from its end.
             side_cells.clear();
             side_cells.extend(rest.iter().filter(|place| cells[(**place as usize).wrapping_add_signed(side)] == 0));
             for &place in &side_cells {
@@ -186,7 +186,7 @@ pub(super) fn neighbourhood(cells: &[u8], place: usize, stride: usize) -> u8 {
     (nine & 0b111 | nine >> 5 & 0b1000 | nine >> 6 & 0b1_0000 | nine >> 11 & 0b1110_0000) as u8
 }
 
-/// Whether all hangs together as before without a cell that has these neighbours.
+/// Whether the connectivity is unchanged without a cell with these neighbours.
 pub(super) fn is_removable(neighbours: u8) -> bool {
     REMOVABLE[neighbours as usize]
 }

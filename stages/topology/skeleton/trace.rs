@@ -1,4 +1,4 @@
-//! From the cells of a skeleton to nodes and the chains of cells between them.
+//! Traces the cells of a skeleton to nodes and chains of cells between them.
 
 use super::{DistanceMap, NodeKind, Skeleton};
 use std::collections::BTreeMap;
@@ -32,9 +32,9 @@ struct Tracer {
     traced: Traced,
 }
 
-/// Finds the ends, the junctions, the cells that stand alone, and the ways between them. Cells that touch by a side are
-/// neighbours, and cells that touch by a corner unless both touch a third by a side. Cells with three neighbours or more that
-/// are neighbours of each other make one junction.
+/// Finds the ends, the junctions, the isolated cells, and the paths between them. Cells that touch by a side are
+/// neighbours, and cells that touch by a corner unless both touch a third by a side. Cells with three neighbours or
+/// more that are neighbours of each other make one junction.
 pub(super) fn trace(skeleton: &Skeleton, distances: &DistanceMap) -> Traced {
     let mut tracer = Tracer {
         cells: skeleton.cells.clone(),

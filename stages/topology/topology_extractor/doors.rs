@@ -1,8 +1,8 @@
-//! The doors of a way.
+//! Doors of a path.
 
-/// The places of a way at which it is narrow, and `widening` times wider before and behind: where each lies in `clearances`, the
-/// distances from the way to the nearest obstacle, step by step. A narrow stretch gives its middle. Doors are no wider than
-/// `max_width`, in the same unit.
+/// Indices of the narrow points of a path that is `widening` times wider before and after, in `clearances`, the
+/// distances from the path to the nearest obstacle, step by step. Of a narrow stretch it is the middle. Doors are no
+/// wider than `max_width`, in the same unit.
 pub fn doors(clearances: &[f64], max_width: f64, widening: f64) -> Vec<usize> {
     let mut found = Vec::new();
     // How wide the way has been since the last narrow place, and, once it is narrow after that, where.

@@ -1,20 +1,20 @@
-//! From an occupancy grid to places and ways.
+//! Extracts the nodes and paths of an occupancy grid.
 
 use super::{TopologyExtractorParameters, doors, simplify};
 use crate::shared::geometry::{Cell, Grid, Point2};
 use crate::topology::skeleton::{DistanceMap, NodeKind, SkeletonGraph, SkeletonPath, skeleton_graph, way_length};
 use gridweave_runtime::ros::{Point, TopologicalNode, TopologicalPath};
 
-/// The places of a map and the ways between them, as a topological map holds them.
+/// Nodes of a map and the paths between them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topology {
-    /// Ends, junctions and loops, as the skeleton has them, and then doors.
+    /// Ends, junctions and loops of the skeleton, and then doors.
     pub nodes: Vec<TopologicalNode>,
-    /// Each by few points: what lies between is at most a cell away from their straight connections.
+    /// Each by few points: the others are at most a cell away from their straight connections.
     pub paths: Vec<TopologicalPath>,
 }
 
-/// Finds the places of a map and the ways between them. An empty map has none.
+/// Extracts the nodes of a map and the paths between them. An empty map has none.
 pub fn extract(grid: &Grid<'_>, parameters: &TopologyExtractorParameters) -> Topology {
     let Some((graph, distances)) = skeleton_graph(grid, &parameters.skeleton()) else { return Topology::default() };
     let is_kept = kept_nodes(&graph, parameters.min_piece);
@@ -70,7 +70,7 @@ impl Topology {
         self.nodes.len() as u32 - 1
     }
 
-    /// Adds the way between two nodes, cut at its doors.
+    /// Adds the path between two nodes, split at its doors.
     fn add_way(
         &mut self,
         grid: &Grid<'_>,

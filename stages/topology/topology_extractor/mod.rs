@@ -1,12 +1,12 @@
-//! Finds the places of a map and the ways between them: from an occupancy grid to a topological map.
+//! Extracts a topological map from an occupancy grid: its nodes and the paths between them.
 //!
-//! The ways are the skeleton of the free space (see [`skeleton`](crate::topology::skeleton)), its ends and junctions are places, and so
-//! are doors: where a way is narrow, and wide before and behind. Wang, Wang, Liu and Zheng ("An efficient method of
-//! multi-robots topological map building") draw such maps by hand.
+//! The paths are the skeleton of the free space (see [`skeleton`](crate::topology::skeleton)), its ends and junctions
+//! are nodes, and so are doors: where a path is narrow, and wide before and after. Wang, Wang, Liu and Zheng ("An
+//! efficient method of multi-robots topological map building") draw such maps by hand.
 //!
 //! - [`extract`]: all of it.
-//! - [`doors`]: where along a way they are.
-//! - [`simplify`]: a way by few points.
+//! - [`doors`]: their positions along a path.
+//! - [`simplify`]: a path by few points.
 
 mod doors;
 mod extract;
@@ -29,8 +29,8 @@ use stage::TopologyExtractor;
 pub fn kind() -> StageKind {
     StageKind::stage(
         "topology_extractor",
-        "Finds the places of a map and the ways between them: the lines that keep the same distance from the walls to both sides, \
-         with their ends, junctions and doors.",
+        "Extracts the topological map of a map: the lines at the same distance from the walls to both sides, as paths between \
+         their ends, junctions and doors.",
         |parameters: TopologyExtractorParameters, _| Ok(TopologyExtractor { parameters }),
     )
     .input("map", "The robots' maps.", TopologyExtractor::receive_map)

@@ -1,9 +1,9 @@
-//! A way by few points.
+//! A path by few points.
 
 use crate::shared::geometry::Point2;
 
-/// Those of the points of a way, the first and the last among them, from whose straight connections the others are at most
-/// `tolerance` away (Douglas and Peucker 1973).
+/// A subset of the points of a path, including the first and the last, whose straight connections are at most
+/// `tolerance` away from the others (Douglas and Peucker 1973).
 pub fn simplify(points: &[Point2], tolerance: f64) -> Vec<Point2> {
     let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
     let mut kept = vec![points[0]];

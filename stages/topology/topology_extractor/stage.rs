@@ -1,22 +1,22 @@
-//! The stage: a topological map for every map that comes.
+//! The stage: a topological map for every map.
 
 use super::{Topology, TopologyExtractorParameters, extract};
 use crate::shared::geometry::Grid;
 use gridweave_runtime::ros::{OccupancyGrid, TopologicalMap};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct TopologicalMaps {
     topology: Out<TopologicalMap>,
 }
 
 impl Outputs for TopologicalMaps {
     fn declare(ports: &mut OutputPorts) -> Self {
-        Self { topology: ports.output("topology", "The places of each map and the ways between them.") }
+        Self { topology: ports.output("topology", "The nodes of each map and the paths between them.") }
     }
 }
 
-/// Finds the places and ways of the maps of robots.
+/// Extracts topological maps from the maps of robots.
 pub(super) struct TopologyExtractor {
     pub(super) parameters: TopologyExtractorParameters,
 }

@@ -28,7 +28,7 @@ fn the_doors_of_an_office_are_found_however_it_is_turned() {
 }
 
 #[test]
-fn paths_lead_from_node_to_node() {
+fn paths_connect_nodes() {
     let (topology, _) = office(0.4);
     assert!(topology.paths.len() > 15, "{}", topology.paths.len());
     for path in &topology.paths {

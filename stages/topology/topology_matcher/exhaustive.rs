@@ -1,47 +1,50 @@
-//! Every node on every node, at every turn.
+//! Exhaustive search: every node on every node, at every turn.
 
-use super::place::distinct;
-use super::{Place, Topology, TopologyMatcherParameters};
+use super::matched_pose::distinct;
+use super::{MatchedPose, Topology, TopologyMatcherParameters};
 use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, UnitComplex, Vector2};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// So many places are made exact for each that is asked for: some of them turn out to be one.
+/// Number of poses that are refined for each requested one: some of them turn out to be the same.
 const PLACES_FOR_EACH: usize = 2;
 
-/// What was found by trying all.
+/// Result of the exhaustive search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exhaustive {
-    /// How often a node was laid on a node: nodes of a, times nodes of b, times turns.
+    /// Number of trials: nodes of a, times nodes of b, times turns.
     pub trials: u64,
-    /// The best places, each away from the others.
-    pub places: Vec<Place>,
+    /// The best poses, each apart from the others.
+    pub poses: Vec<MatchedPose>,
 }
 
-/// Turns map b by steps from 0 to 360 degrees, both of them tried, and at each turn lays every node of it on every node of map a;
-/// the places at which the most pairs of paths coincide (equation 2). Steps of 2 degrees are 181 turns; 4 and 7 nodes are then
-/// 5068 trials.
+/// Turns map b by steps from 0 to 360 degrees, including both, and at each turn puts every node of it on every node
+/// of map a; returns the poses at which most pairs of paths coincide (equation 2). Steps of 2 degrees are 181 turns;
+/// 4 and 7 nodes are then 5068 trials.
 ///
-/// Paths that could coincide at a turn, wherever the maps lie, are few. They are found first, and counted at each trial.
+/// Paths that could coincide at a turn, at any translation, are few. They are found first, and counted at each trial.
 pub fn exhaustive(a: &Topology, b: &Topology, parameters: &TopologyMatcherParameters) -> Exhaustive {
     let turns = (TAU / parameters.turn_step).round() as usize + 1;
     let trials = (a.nodes.len() * b.nodes.len()) as u64 * turns as u64;
     let most = PLACES_FOR_EACH * parameters.max_hypotheses;
-    let best: Vec<Place> = (0..turns)
+    let best: Vec<MatchedPose> = (0..turns)
         .into_par_iter()
         .flat_map_iter(|turn| {
             let rotation = UnitComplex::new(turn as f64 * parameters.turn_step);
             let best = best_of_turn(a, b, rotation, most, parameters);
-            best.into_iter().map(move |trial| trial.place(rotation))
+            best.into_iter().map(move |trial| trial.matched_pose(rotation))
         })
         .collect();
     let best = distinct(best, most, b, parameters);
-    let places = best.into_iter().filter_map(|place| Place::at(a, b, place.transform_a_b, parameters)).collect();
-    Exhaustive { trials, places: distinct(places, parameters.max_hypotheses, b, parameters) }
+    let poses = best
+        .into_iter()
+        .filter_map(|matched_pose| MatchedPose::at(a, b, matched_pose.transform_a_b, parameters))
+        .collect();
+    Exhaustive { trials, poses: distinct(poses, parameters.max_hypotheses, b, parameters) }
 }
 
-/// Two paths that coincide at some translation: those that lay their first and their second ends on each other.
+/// Two paths that coincide at some translation: those that align their first and their second ends.
 #[derive(Clone, Copy)]
 struct Candidate {
     first: Vector2<f64>,
@@ -58,9 +61,9 @@ struct Trial {
 }
 
 impl Trial {
-    /// As a place, how sure it is not being known.
-    fn place(&self, rotation: UnitComplex<f64>) -> Place {
-        Place {
+    /// As a pose without a covariance.
+    fn matched_pose(&self, rotation: UnitComplex<f64>) -> MatchedPose {
+        MatchedPose {
             transform_a_b: Pose2::from_parts(self.translation.into(), rotation),
             covariance: Matrix3::zeros(),
             similarity: self.similarity,
@@ -69,7 +72,7 @@ impl Trial {
     }
 }
 
-/// At most `most` trials at which the most paths coincide at a turn, each away from the others.
+/// At most `most` trials at which most paths coincide at a turn, each apart from the others.
 fn best_of_turn(
     a: &Topology,
     b: &Topology,
@@ -133,7 +136,7 @@ impl Candidate {
 /// Counts the paths that coincide at a translation.
 fn trial(translation: Vector2<f64>, candidates: &[Candidate], tolerance: f64) -> Trial {
     let mut trial = Trial { translation, similarity: 0, distance: 0.0 };
-    // Where both ends lie within the tolerance, so does their middle.
+    // If both ends are within the tolerance, so is their midpoint.
     let start = candidates.partition_point(|candidate| candidate.middle_x() < translation.x - tolerance);
     let near = candidates[start..].iter().take_while(|candidate| candidate.middle_x() <= translation.x + tolerance);
     let most = tolerance * tolerance;

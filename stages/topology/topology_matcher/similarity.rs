@@ -1,10 +1,10 @@
-//! How much alike two topological maps are at a place.
+//! Similarity of two topological maps at a relative pose.
 
 use super::Topology;
 use crate::shared::geometry::{Point2, Pose2};
 
-/// A path of map a and a path of map b that lie on each other, each by the numbers of its nodes: the first ends lie on each
-/// other, and so do the second ones.
+/// A path of map a and a path of map b that coincide, each by the indices of its nodes: their first ends coincide,
+/// and their second ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathPair {
     /// The nodes of the path in map a.

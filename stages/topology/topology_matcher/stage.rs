@@ -1,9 +1,9 @@
-//! The stage: keeps each robot's last topological map, and lays those of each pair on each other.
+//! The stage: keeps each robot's last topological map, and matches those of each pair.
 
 use super::icp_svd::IcpSvd;
 use super::judge::{Judgement, judge};
+use super::matched_pose::MatchedPose;
 use super::parameters::{MatchingMethod, TopologyMatcherParameters};
-use super::place::Place;
 use super::{Topology, exhaustive, icp_svd};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_pair::RobotPair;
@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{Alignment, Header, TopologicalMap};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
 
-/// What the stage sends.
+/// Outputs of the stage.
 pub(super) struct Matches {
     alignment: Out<Alignment>,
     hypotheses: Out<Alignment>,
@@ -19,9 +19,9 @@ pub(super) struct Matches {
 
 impl Outputs for Matches {
     fn declare(ports: &mut OutputPorts) -> Self {
-        let alignment = "How the maps of each pair of robots lie to each other, and whether that is used. The score is the share of \
+        let alignment = "The relative pose of the maps of each pair of robots, and whether it is used. The score is the share of \
                          the paths of the map with fewer that coincide with paths of the other.";
-        let hypotheses = "The best places of each pair, ranked and marked as provisional, for icp_refiner and merge_verifier; \
+        let hypotheses = "The best poses of each pair, ranked and marked as provisional, for icp_refiner and merge_verifier; \
                           the same score.";
         Self { alignment: ports.output("alignment", alignment), hypotheses: ports.output("hypotheses", hypotheses) }
     }
@@ -33,7 +33,7 @@ struct Kept {
     topology: Topology,
 }
 
-/// Lays topological maps of robots on each other.
+/// Matches the topological maps of robots.
 pub(super) struct TopologyMatcher {
     parameters: TopologyMatcherParameters,
     maps: BTreeMap<String, Kept>,
@@ -92,52 +92,55 @@ impl TopologyMatcher {
             );
             return output.alignment.send("", &Alignment { reason, ..of_pair });
         }
-        let (places, work) = self.places(a, b, output);
-        let Judgement { accepted, score, reason } = judge(a, b, &places, &self.parameters);
+        let (poses, work) = self.poses(a, b, output);
+        let Judgement { accepted, score, reason } = judge(a, b, &poses, &self.parameters);
         let verdict = Alignment { score, accepted, reason: format!("{reason}\n\n{work}"), ..of_pair.clone() };
-        output.alignment.send("", &placed(verdict, places.first()))?;
-        for (rank, place) in (0..).zip(&places) {
+        output.alignment.send("", &placed(verdict, poses.first()))?;
+        for (rank, matched_pose) in (0..).zip(&poses) {
             let hypothesis = Alignment {
-                score: score * place.similarity as f64 / places[0].similarity.max(1) as f64,
+                score: score * matched_pose.similarity as f64 / poses[0].similarity.max(1) as f64,
                 accepted: true,
                 provisional: true,
                 rank,
-                hypotheses: places.len() as u32,
-                reason: format!("{} paths coincide, their ends {:.2} m apart", place.similarity, place.rms),
+                hypotheses: poses.len() as u32,
+                reason: format!(
+                    "{} paths coincide, their ends {:.2} m apart",
+                    matched_pose.similarity, matched_pose.rms
+                ),
                 ..of_pair.clone()
             };
-            output.hypotheses.send("", &placed(hypothesis, Some(place)))?;
+            output.hypotheses.send("", &placed(hypothesis, Some(matched_pose)))?;
         }
         Ok(())
     }
 
-    /// The best places of a pair, and what was done to find them.
-    fn places(&self, a: &Topology, b: &Topology, output: &Output<Matches>) -> (Vec<Place>, String) {
+    /// The best poses of a pair, and a description of the search.
+    fn poses(&self, a: &Topology, b: &Topology, output: &Output<Matches>) -> (Vec<MatchedPose>, String) {
         match self.parameters.method {
             MatchingMethod::Exhaustive => {
                 let found = exhaustive(a, b, &self.parameters);
                 output.count("trials", found.trials);
                 let work = format!("{} trials: {} nodes on {} nodes", found.trials, b.nodes.len(), a.nodes.len());
-                (found.places, work)
+                (found.poses, work)
             }
             MatchingMethod::IcpSvd => {
-                let (runs, places) = icp_svd(a, b, &self.parameters);
+                let (runs, poses) = icp_svd(a, b, &self.parameters);
                 output.count("iterations", runs.iter().map(|run| run.errors.len() as u64).sum());
-                (places, runs.iter().enumerate().map(told).collect::<Vec<_>>().join("\n"))
+                (poses, runs.iter().enumerate().map(run_text).collect::<Vec<_>>().join("\n"))
             }
         }
     }
 }
 
-fn placed(alignment: Alignment, place: Option<&Place>) -> Alignment {
-    let Some(place) = place else { return alignment };
-    let mut alignment = Alignment { covariance: row_by_row(&place.covariance), ..alignment };
-    alignment.set_transform_a_b(&place.transform_a_b);
+fn placed(alignment: Alignment, matched_pose: Option<&MatchedPose>) -> Alignment {
+    let Some(matched_pose) = matched_pose else { return alignment };
+    let mut alignment = Alignment { covariance: row_by_row(&matched_pose.covariance), ..alignment };
+    alignment.set_transform_a_b(&matched_pose.transform_a_b);
     alignment
 }
 
 /// A run with its error by iteration.
-fn told((number, run): (usize, &IcpSvd)) -> String {
+fn run_text((number, run): (usize, &IcpSvd)) -> String {
     let errors: Vec<String> = run.errors.iter().map(|error| format!("{error:.3}")).collect();
     let end = if run.converged { "converged after" } else { "not converged after" };
     format!("start {number}: {end} {} iterations; error by iteration, m²: {}", errors.len(), errors.join(" "))

@@ -22,8 +22,8 @@ fn four(transform_seven_four: &Pose2) -> Topology {
     Topology { nodes: nodes.into(), paths: vec![[0, 1], [1, 2], [2, 3]] }
 }
 
-fn degrees(place: &Place) -> f64 {
-    turn_difference(place.transform_a_b.rotation.angle(), 0.0, TAU).to_degrees().rem_euclid(360.0)
+fn degrees(matched_pose: &MatchedPose) -> f64 {
+    turn_difference(matched_pose.transform_a_b.rotation.angle(), 0.0, TAU).to_degrees().rem_euclid(360.0)
 }
 
 #[test]
@@ -31,29 +31,31 @@ fn four_and_seven_nodes_take_5068_trials_and_both_symmetric_answers_are_found() 
     let truth = pose(2.0, -1.0, 136f64.to_radians());
     let found = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default());
     assert_eq!(found.trials, 5068);
-    let best: Vec<&Place> = found.places.iter().filter(|place| place.similarity == 3).collect();
-    assert_eq!(best.len(), 2, "{:?}", found.places);
+    let best: Vec<&MatchedPose> = found.poses.iter().filter(|matched_pose| matched_pose.similarity == 3).collect();
+    assert_eq!(best.len(), 2, "{:?}", found.poses);
     let mut turns = [degrees(best[0]), degrees(best[1])];
     turns.sort_by(f64::total_cmp);
     assert!((turns[0] - 136.0).abs() < 1e-6 && (turns[1] - 316.0).abs() < 1e-6, "{turns:?}");
-    assert!(best.iter().any(|place| (place.transform_a_b.inverse() * truth).translation.vector.norm() < 1e-9));
-    let judgement = judge(&seven(), &four(&truth), &found.places, &TopologyMatcherParameters::default());
+    assert!(
+        best.iter().any(|matched_pose| (matched_pose.transform_a_b.inverse() * truth).translation.vector.norm() < 1e-9)
+    );
+    let judgement = judge(&seven(), &four(&truth), &found.poses, &TopologyMatcherParameters::default());
     assert!(!judgement.accepted, "{}", judgement.reason);
 }
 
 #[test]
-fn a_place_is_left_at_its_turn_and_node_if_that_is_asked_for() {
+fn a_pose_is_not_refined_without_refine() {
     let truth = pose(2.0, -1.0, 136.7f64.to_radians());
     let parameters = TopologyMatcherParameters { refine: false, ..Default::default() };
     let found = exhaustive(&seven(), &four(&truth), &parameters);
-    let turn = degrees(&found.places[0]);
+    let turn = degrees(&found.poses[0]);
     assert!((turn / 2.0 - (turn / 2.0).round()).abs() < 1e-9, "{turn}");
     let exact = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default());
-    assert!(exact.places[..2].iter().any(|place| (degrees(place) - 136.7).abs() < 1e-6));
+    assert!(exact.poses[..2].iter().any(|matched_pose| (degrees(matched_pose) - 136.7).abs() < 1e-6));
 }
 
 #[test]
-fn icp_ends_at_the_place_that_is_near_its_start() {
+fn icp_converges_to_the_pose_near_its_start() {
     let truth = pose(2.0, -1.0, 0.5);
     let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
     let run = icp_svd_from(&seven(), &b, pose(0.0, 0.0, 0.0), &TopologyMatcherParameters::default());
@@ -68,9 +70,11 @@ fn one_start_is_misled_by_half_a_turn_and_several_are_not() {
     let truth = pose(3.0, 1.0, 2.4);
     let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
     let error = |starts: usize| {
-        let (runs, places) = icp_svd(&seven(), &b, &TopologyMatcherParameters { starts, ..Default::default() });
+        let (runs, poses) = icp_svd(&seven(), &b, &TopologyMatcherParameters { starts, ..Default::default() });
         assert_eq!(runs.len(), starts);
-        places.first().map_or(f64::MAX, |place| (place.transform_a_b.inverse() * truth).rotation.angle().abs())
+        poses
+            .first()
+            .map_or(f64::MAX, |matched_pose| (matched_pose.transform_a_b.inverse() * truth).rotation.angle().abs())
     };
     assert!(error(1) > 0.5);
     assert!(error(12) < 1e-6);
@@ -101,25 +105,25 @@ proptest! {
         let by_trials = |turn: usize| {
             let rotation = nalgebra::UnitComplex::new(turn as f64 * parameters.turn_step);
             let (a, b, parameters) = (&a, &b, &parameters);
-            let places = a.nodes.iter().flat_map(move |node_a| b.nodes.iter().map(move |node_b| {
+            let poses = a.nodes.iter().flat_map(move |node_a| b.nodes.iter().map(move |node_b| {
                 let translation = node_a.coords - rotation * node_b.coords;
                 coinciding(a, b, &Pose2::from_parts(translation.into(), rotation), parameters.tolerance).len()
             }));
-            places.max().unwrap_or(0)
+            poses.max().unwrap_or(0)
         };
         let most = (0..181).map(by_trials).max().unwrap_or(0);
-        prop_assert_eq!(found.places.first().map_or(0, |place| place.similarity), most);
+        prop_assert_eq!(found.poses.first().map_or(0, |matched_pose| matched_pose.similarity), most);
     }
 
     #[test]
-    fn exchanged_maps_lie_at_the_inverse(a in random_map(), x in -9.0..9.0, y in -9.0..9.0, yaw in -3.0..3.0) {
+    fn exchanged_maps_have_the_inverse_pose(a in random_map(), x in -9.0..9.0, y in -9.0..9.0, yaw in -3.0..3.0) {
         let truth = pose(x, y, yaw);
         let b = Topology { nodes: a.nodes.iter().map(|node| truth.inverse() * node).collect(), ..a.clone() };
         let parameters = TopologyMatcherParameters::default();
         let (forth, back) = (exhaustive(&a, &b, &parameters), exhaustive(&b, &a, &parameters));
-        let identity = forth.places[0].transform_a_b * back.places[0].transform_a_b;
+        let identity = forth.poses[0].transform_a_b * back.poses[0].transform_a_b;
         prop_assert!(identity.translation.vector.norm() < 1e-6 && identity.rotation.angle().abs() < 1e-6);
-        prop_assert!((forth.places[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
+        prop_assert!((forth.poses[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
     }
 }
 
@@ -138,11 +142,11 @@ fn the_covariance_is_that_of_nodes_that_err() {
     let (mut seen, mut said, runs) = (Matrix3::zeros(), Matrix3::zeros(), 1500);
     for _ in 0..runs {
         let (a, b) = (erring(&seven()), erring(&seven()));
-        let place = Place::at(&a, &b, Pose2::identity(), &parameters).unwrap();
-        let off = place.transform_a_b;
+        let matched_pose = MatchedPose::at(&a, &b, Pose2::identity(), &parameters).unwrap();
+        let off = matched_pose.transform_a_b;
         let error = Vector3::new(off.translation.x, off.translation.y, off.rotation.angle());
         seen += error * error.transpose() / f64::from(runs);
-        said += place.covariance / f64::from(runs);
+        said += matched_pose.covariance / f64::from(runs);
     }
     for index in 0..3 {
         let ratio = said[(index, index)] / seen[(index, index)];
@@ -171,7 +175,7 @@ fn sent(parameters: &str, maps: &[(&str, TopologicalMap)]) -> (Vec<Alignment>, V
 }
 
 #[test]
-fn maps_that_fit_at_one_place_are_accepted() {
+fn maps_that_fit_at_one_pose_are_accepted() {
     let truth = pose(2.0, -1.0, 1.0);
     let b = Topology { nodes: seven().nodes.iter().map(|node| truth.inverse() * node).collect(), ..seven() };
     for (method, name) in [("exhaustive", "topology+exhaustive"), ("icp_svd", "topology+icp_svd")] {
@@ -194,7 +198,7 @@ fn maps_that_fit_at_one_place_are_accepted() {
 }
 
 #[test]
-fn a_refusal_says_what_is_missing() {
+fn a_refusal_names_what_is_missing() {
     let b = message("robot2", &four(&pose(0.0, 0.0, 1.0)));
     let (alignments, hypotheses, _) = sent("", &[("robot1", message("robot1", &seven())), ("robot2", b.clone())]);
     assert!(!alignments[0].accepted && alignments[0].reason.contains("min_paths"), "{}", alignments[0].reason);
@@ -210,7 +214,7 @@ fn a_refusal_says_what_is_missing() {
 }
 
 #[test]
-fn icp_tells_its_error_by_iteration() {
+fn icp_reports_its_error_by_iteration() {
     let maps = [("robot1", message("robot1", &seven())), ("robot2", message("robot2", &seven()))];
     let (alignments, ..) = sent("method = \"icp_svd\"\nstarts = 2", &maps);
     assert!(

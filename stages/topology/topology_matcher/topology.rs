@@ -15,17 +15,17 @@ pub struct Topology {
 /// Why a message cannot be used as a topological map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TopologyError {
-    /// A position is no number.
-    #[error("the position of node {0} holds a value that is no finite number")]
+    /// A position is not finite.
+    #[error("the position of node {0} is not finite")]
     Position(usize),
-    /// A path without a node.
-    #[error("path {path} leads to node {node}, and there are {nodes}, counted from 0")]
+    /// A path to a node that does not exist.
+    #[error("path {path} has node {node}, but there are only {nodes}, counted from 0")]
     NoSuchNode {
-        /// The number of the path.
+        /// Index of the path.
         path: usize,
-        /// The node that it names.
+        /// The node of the path.
         node: u32,
-        /// How many nodes there are.
+        /// Number of nodes.
         nodes: usize,
     },
 }
@@ -34,7 +34,7 @@ impl Topology {
     /// The nodes and paths of a message.
     ///
     /// # Errors
-    /// A position is no finite number, or a path leads to a node that is not there.
+    /// A position is not finite, or a path has a node that does not exist.
     pub fn from_message(map: &TopologicalMap) -> Result<Self, TopologyError> {
         let nodes: Vec<Point2> = map.nodes.iter().map(|node| Point2::new(node.x, node.y)).collect();
         if let Some(node) = nodes.iter().position(|node| !(node.x.is_finite() && node.y.is_finite())) {
@@ -50,7 +50,8 @@ impl Topology {
         Ok(Self { nodes, paths })
     }
 
-    /// The paths that can be told apart from others by their ends: those longer than twice the tolerance from end to end.
+    /// The paths that are distinguished from others by their ends: those longer than twice the tolerance from end to
+    /// end.
     pub(super) fn long_paths(&self, tolerance: f64) -> impl Iterator<Item = [usize; 2]> {
         let is_long = move |ends: &[usize; 2]| (self.nodes[ends[0]] - self.nodes[ends[1]]).norm() > 2.0 * tolerance;
         self.paths.iter().copied().filter(is_long)

@@ -1,36 +1,36 @@
-//! A map that grows with the scans that are drawn on it.
+//! A map that is built from scans, and grows with them.
 
 use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::{Point2, Pose2};
 use crate::shared::scan_grid::{BeamEvidence, CellBeam, ScanGrid, SnapshotMap};
 use nalgebra::Vector2;
 
-/// A map has at most this many cells.
+/// Largest number of cells of a map.
 const MOST_CELLS: f64 = 1e8;
-/// When a map has to grow it grows by so much more, metres: most scans then fit.
+/// Margin by which a map grows beyond what it must, metres: most scans then fit.
 const SPARE: f64 = 5.0;
 
-/// What the map of a robot has come to.
+/// The map of a robot so far.
 #[derive(Clone, Debug)]
-pub struct DrawnMap {
+pub struct ScanMap {
     resolution: f64,
     evidence: BeamEvidence,
     /// `None` before the first scan.
     grid: Option<ScanGrid>,
 }
 
-/// A scan lies so far away that the map would get too many cells.
+/// A scan is so far away that the map would get too many cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
-impl DrawnMap {
+impl ScanMap {
     /// An empty map.
     pub fn new(parameters: &ScanMapperParameters) -> Self {
         Self { resolution: parameters.resolution, evidence: parameters.evidence(), grid: None }
     }
 
-    /// Draws a scan of a robot whose base was at `transform_map_base(delay)` so many seconds after the first beam. Beams of times at
-    /// which that is not known are left out.
+    /// Adds a scan of a robot whose base was at `transform_map_base(delay)` at that many seconds after the first
+    /// beam. Beams at times without a pose are left out.
     ///
     /// # Errors
     /// The map would get too large; it stays as it was.
@@ -98,12 +98,12 @@ impl DrawnMap {
         Ok(self.grid.insert(grid))
     }
 
-    /// The map so far, cut to what is known; `None` if nothing is.
+    /// The map so far, cropped to its known part; `None` if nothing is known.
     pub fn snapshot(&self) -> Option<SnapshotMap> {
         self.grid.as_ref()?.snapshot()
     }
 
-    /// The map so far within so many metres of a place; `None` if nothing was drawn there.
+    /// The map so far within `reach` metres of a point; `None` if nothing was added there.
     pub fn around(&self, place: &Point2, reach: f64) -> Option<SnapshotMap> {
         self.grid.as_ref()?.around(place, reach)
     }

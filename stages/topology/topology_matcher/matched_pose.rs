@@ -1,24 +1,24 @@
-//! Where two topological maps may lie to each other.
+//! A relative pose of two topological maps.
 
 use super::{Topology, TopologyMatcherParameters, coinciding};
 use crate::shared::geometry::{PointPair, Pose2, fit_rigid};
 use nalgebra::Matrix3;
 
-/// A place of map b on map a.
+/// A relative pose of map b in map a, with the paths that coincide.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct MatchedPose {
     /// `T_a_b`.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw) of `T_a_b`, metres and radians.
     pub covariance: Matrix3<f64>,
-    /// How many pairs of paths coincide: equation 2.
+    /// Number of pairs of paths that coincide: equation 2.
     pub similarity: usize,
     /// Root mean square of the distances between the ends of paths that coincide, metres.
     pub rms: f64,
 }
 
-impl Place {
-    /// The place at `transform_a_b`, made exact on the paths that coincide there if that is asked for. None if no paths
+impl MatchedPose {
+    /// The pose `transform_a_b`, refined on the paths that coincide there if the parameters say so. None if no paths
     /// coincide.
     pub fn at(
         a: &Topology,
@@ -30,13 +30,13 @@ impl Place {
         if !parameters.refine {
             return Some(Self { transform_a_b, ..found });
         }
-        // At the exact place more paths may coincide, and some that lay at the border of the tolerance no longer.
+        // At the refined pose more paths may coincide, and some at the border of the tolerance no longer do.
         let again = Self::fitted(a, b, &found.transform_a_b, parameters);
         let better = again.filter(|again| again.similarity >= found.similarity);
         Some(better.unwrap_or(Self { transform_a_b, ..found }))
     }
 
-    /// The place that lays the ends of the paths that coincide at `transform_a_b` on each other (least squares).
+    /// The pose that aligns the ends of the paths that coincide at `transform_a_b` (least squares).
     fn fitted(
         a: &Topology,
         b: &Topology,
@@ -53,7 +53,7 @@ impl Place {
         let points =
             ends.iter().map(|[one, other]| PointPair { a: a.nodes[*one], b: b.nodes[*other], weight: 1.0 / variance });
         let fit = fit_rigid(&points.collect::<Vec<_>>())?;
-        // What the nodes are farther apart than their deviation allows is to be seen in the covariance.
+        // If the nodes are farther apart than their deviation allows, the covariance is increased.
         let excess = (fit.rms * fit.rms / (2.0 * variance)).max(1.0);
         Some(Self {
             transform_a_b: fit.transform_a_b,
@@ -63,7 +63,7 @@ impl Place {
         })
     }
 
-    /// Whether another place is the same but for little.
+    /// Whether another pose is nearly the same.
     fn is_near(&self, other: &Self, b: &Topology, parameters: &TopologyMatcherParameters) -> bool {
         let (one, another) = (self.transform_a_b, other.transform_a_b);
         let apart = (one * b.centre() - another * b.centre()).norm();
@@ -71,18 +71,23 @@ impl Place {
     }
 }
 
-/// The best of the places, by the number of paths that coincide and then by how exactly, each away from those before it: at
-/// most `count`. Of equals the first in the list comes first.
-pub fn distinct(places: Vec<Place>, count: usize, b: &Topology, parameters: &TopologyMatcherParameters) -> Vec<Place> {
-    let mut sorted = places;
+/// The best poses, by the number of paths that coincide and then by their accuracy, each apart from those before it:
+/// at most `count`. Of equals the first in the list comes first.
+pub fn distinct(
+    poses: Vec<MatchedPose>,
+    count: usize,
+    b: &Topology,
+    parameters: &TopologyMatcherParameters,
+) -> Vec<MatchedPose> {
+    let mut sorted = poses;
     sorted.sort_by(|one, other| other.similarity.cmp(&one.similarity).then(one.rms.total_cmp(&other.rms)));
-    let mut kept: Vec<Place> = Vec::new();
-    for place in sorted {
+    let mut kept: Vec<MatchedPose> = Vec::new();
+    for matched_pose in sorted {
         if kept.len() == count {
             break;
         }
-        if !kept.iter().any(|better| better.is_near(&place, b, parameters)) {
-            kept.push(place);
+        if !kept.iter().any(|better| better.is_near(&matched_pose, b, parameters)) {
+            kept.push(matched_pose);
         }
     }
     kept
