@@ -1,4 +1,4 @@
-//! Asks a module in Python what its stage is.
+//! Asks a module in Python for the ports and parameters of its stage.
 
 use super::INTERPRETER;
 use gridweave_runtime::stage::ParameterError;
@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What a module says of its stage, in JSON. The module is imported for that.
+/// Ports and parameters of the stage of a module, in JSON. The module is imported for that.
 pub(super) fn describe(python: &OsStr, module: &str) -> Result<String, ParameterError> {
     let mut command = Command::new(python);
     command.args(["-m", "gridweave.describe", module]).stdin(Stdio::null());
@@ -19,7 +19,7 @@ pub(super) fn describe(python: &OsStr, module: &str) -> Result<String, Parameter
     let errors = String::from_utf8_lossy(&ended.stderr);
     if ended.status.success() {
         return String::from_utf8(ended.stdout)
-            .map_err(|error| ParameterError::new("module", format!("says of its stage what is no text: {error}")));
+            .map_err(|error| ParameterError::new("module", format!("describes its stage by invalid text: {error}")));
     }
     let is_missing = |name: &str| errors.contains(&format!("No module named {name}"));
     if is_missing("gridweave") || is_missing("'gridweave'") {
@@ -29,6 +29,6 @@ pub(super) fn describe(python: &OsStr, module: &str) -> Result<String, Parameter
         );
         return Err(ParameterError::new("module", help));
     }
-    let last = errors.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing");
+    let last = errors.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it printed nothing");
     Err(ParameterError::new("module", format!("cannot be asked for its stage: {last}\n{}", errors.trim_end())))
 }

@@ -1,8 +1,8 @@
 //! `python`: a stage that is written in Python.
 //!
 //! The package `gridweave` in [`stages/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe
-//! MODULE`, it says what the stage takes and gives, and `python -m gridweave.run MODULE FOLDER` is its program. What goes on
-//! between the two is that of every [`program`].
+//! MODULE`, it prints the ports and parameters of the stage, and `python -m gridweave.run MODULE FOLDER` is its program. The
+//! protocol between the two is that of every [`program`].
 
 mod describe;
 
@@ -14,78 +14,80 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What every stage in Python has beside the parameters of its own.
+/// Parameters of every stage in Python, besides its own.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PythonParameters {
-    /// What has the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a module that
-    /// Python can import such as `my_stages.lines`; with `:NAME` behind it where it has several.
+    /// Module with the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a module
+    /// that Python can import such as `my_stages.lines`; followed by `:NAME` if it has several stages.
     module: String,
-    /// What the module says of its ports and parameters, in JSON. It is asked for when left out, which is what you want.
+    /// Ports and parameters of the module, in JSON. By default the module is asked for them.
     interface: Option<String>,
 }
 
 impl Parameters for PythonParameters {}
 
-/// Those of a parameter's name that every stage in Python has.
+/// Names of the parameters of every stage in Python.
 const OWN: [&str; 2] = ["module", "interface"];
 
-/// The variable of the environment that names the interpreter, where it is not the `python3` of PATH. A pipeline file cannot: it
-/// may come from anywhere.
+/// Environment variable with the interpreter, if it is not the `python3` of PATH. A pipeline file cannot set it, as it may be
+/// untrusted.
 const INTERPRETER: &str = "GRIDWEAVE_PYTHON";
 
-/// `python`: what the module that it names says.
+/// The kind `python`, whose ports and parameters are those of its module.
 pub fn kind() -> StageKind {
     StageKind::dynamic::<PythonParameters>(
         "python",
-        "A stage in Python, in a process of its own: the module says what it takes, gives and does. `gridweave kinds FILE.py` shows \
-         that.",
+        "A stage in Python, in a process of its own, with the ports and parameters of the module. `gridweave kinds FILE.py` shows \
+         them.",
         ask,
     )
 }
 
-/// By module and given interface: the kinds that were asked for, each with its interface.
+/// Cache of kinds with their interfaces, by module and given interface.
 static ASKED: Mutex<BTreeMap<[String; 2], (&'static StageKind, String)>> = Mutex::new(BTreeMap::new());
 
 fn ask(given: &toml::Table, folder: &Path) -> Result<ResolvedStage, ParameterError> {
     let module = text(given, "module")?.filter(|module| !module.is_empty());
-    let module =
-        module.ok_or_else(|| ParameterError::new("module", "must say what has the stage, such as \"lines.py\""))?;
+    let module = module
+        .ok_or_else(|| ParameterError::new("module", "must name the module of the stage, such as \"lines.py\""))?;
     // The same wherever it is run from.
     let shown = module.rsplit_once('/').map_or(module, |(_, file)| file);
     let module = match file_of(module) {
         Some(file) => format!("{}{}", absolute(folder, file)?, &module[file.len()..]),
         None => module.to_owned(),
     };
-    let told = text(given, "interface")?;
-    let key = [module.clone(), told.unwrap_or_default().to_owned()];
-    // What a thread that has panicked has asked for is right all the same.
+    let given_interface = text(given, "interface")?;
+    let key = [module.clone(), given_interface.unwrap_or_default().to_owned()];
+    // The cache is valid even if a thread has panicked.
     let mut asked = ASKED.lock().unwrap_or_else(PoisonError::into_inner);
-    let (kind, interface) = match asked.get(&key) {
+    let (kind, json) = match asked.get(&key) {
         Some(known) => known.clone(),
         None => {
             let python = std::env::var_os(INTERPRETER).filter(|python| !python.is_empty()).unwrap_or("python3".into());
-            let said = told.map_or_else(|| describe::describe(&python, &module), |told| Ok(told.to_owned()))?;
-            let interface = read(&said)?;
+            let json = given_interface.map_or_else(
+                || describe::describe(&python, &module),
+                |given_interface| Ok(given_interface.to_owned()),
+            )?;
+            let interface = read(&json)?;
             let arguments = ["-m", "gridweave.run", &module].map(Into::into).to_vec();
             let launch = Launch { program: PathBuf::from(python), arguments };
             let kind = program::kind_of("python", shown, interface, launch);
-            asked.insert(key, (kind, said.clone()));
-            (kind, said)
+            asked.insert(key, (kind, json.clone()));
+            (kind, json)
         }
     };
-    let parameters = [("module", module), ("interface", interface)];
+    let parameters = [("module", module), ("interface", json)];
     Ok(ResolvedStage {
         kind,
         parameters: parameters.map(|(key, value)| (key.to_owned(), value.into())).into_iter().collect(),
     })
 }
 
-/// What a module says, with the parameters that all stages in Python have before its own.
-fn read(said: &str) -> Result<Interface, ParameterError> {
-    let wrong =
-        |problem: String| ParameterError::new("module", format!("says of its stage what none can be: {problem}"));
-    let mut interface = Interface::read(said).map_err(wrong)?;
+/// Reads the interface of a module, and adds the parameters of every stage in Python before its own.
+fn read(json: &str) -> Result<Interface, ParameterError> {
+    let wrong = |problem: String| ParameterError::new("module", format!("describes an invalid stage: {problem}"));
+    let mut interface = Interface::read(json).map_err(wrong)?;
     let schema = interface.parameters.ensure_object();
     let own = PythonParameters::schema();
     let mut properties = own.get("properties").and_then(|all| all.as_object()).cloned().unwrap_or_default();
@@ -105,7 +107,7 @@ fn text<'a>(given: &'a toml::Table, name: &'static str) -> Result<Option<&'a str
     value.as_str().map(Some).ok_or_else(|| ParameterError::new(name, "must be a text"))
 }
 
-/// The file that a module is, without the name of a stage behind it.
+/// The file of a module, without the name of a stage; none if it is no file.
 fn file_of(module: &str) -> Option<&str> {
     let place = module.split_once(':').map_or(module, |(place, _)| place);
     place.ends_with(".py").then_some(place)
@@ -149,8 +151,8 @@ mod tests {
     fn what_cannot_be_asked_is_told_with_the_parameter_that_is_wrong() {
         let empty = Path::new("");
         let problem = |text: &str| ask(&text.parse().unwrap(), empty).unwrap_err().to_string();
-        assert!(problem("").contains("`module` must say what has the stage"));
+        assert!(problem("").contains("`module` must name the module of the stage"));
         assert!(problem("module = 1").contains("`module` must be a text"));
-        assert!(problem("module = \"a.py\"\ninterface = \"{}\"").contains("says of its stage what none can be"));
+        assert!(problem("module = \"a.py\"\ninterface = \"{}\"").contains("describes an invalid stage"));
     }
 }

@@ -37,7 +37,7 @@ pub struct SimulatorParameters {
     /// Pieces of furniture a square metre of a room. Where pieces would block a way there are fewer.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub clutter: f64,
-    /// How the rooms are laid out: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
+    /// Layout of the rooms: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
     /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at random in
     /// all but the last.
     pub layout: Layout,

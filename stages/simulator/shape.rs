@@ -53,7 +53,7 @@ impl Rectangle {
         Self { min: Point2::new(self.min.x - by, self.min.y - by), max: Point2::new(self.max.x + by, self.max.y + by) }
     }
 
-    /// Whether a point lies in it or on its border.
+    /// Whether it contains a point, including its border.
     pub fn contains(&self, point: &Point2) -> bool {
         (self.min.x..=self.max.x).contains(&point.x) && (self.min.y..=self.max.y).contains(&point.y)
     }

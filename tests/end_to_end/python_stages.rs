@@ -209,7 +209,7 @@ impl Python {
             ),
             ("inputs = [\"log.map\"]", "inputs = [\"log.pose\"]", "nav_msgs/msg/OccupancyGrid"),
             ("module = \"invert.py\"", "module = \"invert.py\"\npython = \"/bin/sh\"", "unknown parameter `python`"),
-            ("module = \"invert.py\"", "", "must say what has the stage"),
+            ("module = \"invert.py\"", "", "must name the module of the stage"),
         ];
         for (from, to, says) in cases {
             fs::write(self.file("wrong.toml"), PIPELINE.replacen(from, to, 1)).unwrap();

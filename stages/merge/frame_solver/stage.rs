@@ -5,7 +5,7 @@ use super::messages::{hold, is_same, prefixed, robot_frames, verdicts};
 use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
 use super::tree::Tree;
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, Verdict, Verdicts};
+use gridweave_runtime::ros::{Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, Verdict, Verdicts};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,8 +15,8 @@ pub fn kind() -> StageKind {
         "frame_solver",
         "Estimates the pose of every robot's map in the reference robot's map, from alignments of pairs. Alignments that \
          contradict others along a cycle are left out; robots that cannot be placed with confidence are not merged, and \
-         the reason is given. If the pipeline names no reference, it is the first robot by name of those known when the \
-         first two are merged, and stays so.",
+         the reason is given. If the pipeline names no reference, it is the first robot by name, of those with a usable \
+         map that are known when the first two are merged, and stays so.",
         |parameters, context| Ok(FrameSolver::new(parameters, context)),
     )
     .optional_input(
@@ -70,6 +70,8 @@ struct FrameSolver {
     wanted: Option<String>,
     /// All known robots, and the names of their map frames in the merged tree of frames.
     robots: BTreeSet<String>,
+    /// What is wrong with the maps of robots that have sent none that can be used.
+    unusable_maps: BTreeMap<String, GridError>,
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
     reference: Option<String>,
@@ -87,6 +89,7 @@ impl FrameSolver {
             parameters,
             wanted: context.reference.clone(),
             robots: BTreeSet::new(),
+            unusable_maps: BTreeMap::new(),
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
             reference: None,
@@ -98,7 +101,7 @@ impl FrameSolver {
         }
     }
 
-    /// A map changes the solution if its robot or the name of its frame is new.
+    /// A map changes the solution if its robot, the name of its frame, or that it can be used is new.
     fn receive_map(
         &mut self,
         map: Received<'_, OccupancyGrid<'_>>,
@@ -113,7 +116,15 @@ impl FrameSolver {
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
-        if is_new || is_renamed { self.solve_and_send(output) } else { Ok(()) }
+        let is_usable_at_last = match map.check() {
+            Ok(()) => self.unusable_maps.remove(robot).is_some(),
+            Err(error) if is_new => {
+                self.unusable_maps.insert(robot.to_owned(), error);
+                false
+            }
+            Err(_) => false,
+        };
+        if is_new || is_renamed || is_usable_at_last { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// An alignment changes the solution if it differs from the last one of its pair.
@@ -155,11 +166,19 @@ impl FrameSolver {
         self.reference = match &self.wanted {
             Some(wanted) => self.robots.get(wanted).cloned(),
             None if is_settled || self.is_settled => self.reference.take(),
-            None => self.robots.first().cloned(),
+            None => {
+                let mut with_maps = self.robots.iter().filter(|robot| !self.unusable_maps.contains_key(*robot));
+                with_maps.next().or_else(|| self.robots.first()).cloned()
+            }
         };
         self.is_settled |= is_settled;
         if let Some(reference) = &self.reference {
             self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
+            for (robot, error) in &self.unusable_maps {
+                if let Some(reason) = self.solution.unmerged.get_mut(robot) {
+                    *reason = format!("its map cannot be used: {error}");
+                }
+            }
         }
         match self.send(output, false)? {
             true => self.send_verdicts(output),

@@ -224,8 +224,8 @@ mod tests {
         fn the_reference_map_is_unchanged(cells in cells(13, 9), x in -99.0..99.0, y in -99.0..99.0) {
             let source = geometry(13, 9, 0.05, pose(x, y, 0.0));
             let grid = Grid::new(source, &cells).unwrap();
-            let (laid, fused) = fuse_all(&[PlacedGrid::rigid(grid, Pose2::identity())]);
-            prop_assert_eq!(laid, source);
+            let (fused_geometry, fused) = fuse_all(&[PlacedGrid::rigid(grid, Pose2::identity())]);
+            prop_assert_eq!(fused_geometry, source);
             prop_assert_eq!(fused, cells);
         }
 
@@ -259,8 +259,8 @@ mod tests {
             let cells = vec![0; 20 * 20];
             let grid = Grid::new(geometry(20, 20, 0.05, pose(0.3, -0.2, 0.7)), &cells).unwrap();
             let map = PlacedGrid::rigid(grid, pose(x, y, yaw));
-            let (laid, fused) = fuse_all(&[map]);
-            for row in fused.chunks(laid.width) {
+            let (fused_geometry, fused) = fuse_all(&[map]);
+            for row in fused.chunks(fused_geometry.width) {
                 let first = row.iter().position(|value| *value == 0).unwrap_or(0);
                 let behind = row.iter().rposition(|value| *value == 0).map_or(0, |last| last + 1);
                 prop_assert!(row.get(first..behind).unwrap_or_default().iter().all(|value| *value == 0));
@@ -276,8 +276,8 @@ mod tests {
         let coarse = Grid::new(geometry(2, 2, 0.1, Pose2::identity()), &coarse).unwrap();
         let fine = Grid::new(geometry(2, 2, 0.05, pose(-0.1, 0.0, 0.0)), &fine).unwrap();
         let maps = [fine, coarse].map(|grid| PlacedGrid::rigid(grid, Pose2::identity()));
-        let (laid, fused) = fuse_all(&maps);
-        assert_eq!((laid.width, laid.height, laid.resolution), (6, 4, 0.05));
+        let (fused_geometry, fused) = fuse_all(&maps);
+        assert_eq!((fused_geometry.width, fused_geometry.height, fused_geometry.resolution), (6, 4, 0.05));
         #[rustfmt::skip]
         assert_eq!(fused, [
              0,  0,  0,  0, 100, 100,
@@ -291,9 +291,9 @@ mod tests {
     fn the_yaw_of_a_grids_origin_is_applied() {
         let cells = [100, 0, 0, 0, 0, 0];
         let turned = Grid::new(geometry(3, 2, 1.0, pose(0.0, 0.0, std::f64::consts::FRAC_PI_2)), &cells).unwrap();
-        let (laid, fused) = fuse_all(&[PlacedGrid::rigid(turned, Pose2::identity())]);
-        assert_eq!((laid.width, laid.height), (2, 3));
-        assert!((laid.origin.translation.x + 2.0).abs() < 1e-12);
+        let (fused_geometry, fused) = fuse_all(&[PlacedGrid::rigid(turned, Pose2::identity())]);
+        assert_eq!((fused_geometry.width, fused_geometry.height), (2, 3));
+        assert!((fused_geometry.origin.translation.x + 2.0).abs() < 1e-12);
         assert_eq!(fused, [0, 100, 0, 0, 0, 0]);
     }
 }

@@ -157,10 +157,10 @@ mod tests {
     #[test]
     fn the_grid_is_cropped_and_coincides_with_the_reference_cells() {
         let layout = layout_at(grid(&CELLS), &[Pose2::identity()]);
-        let laid = layout.geometry.unwrap();
-        assert_eq!((laid.width, laid.height), (3, 2));
+        let geometry_of_layout = layout.geometry.unwrap();
+        assert_eq!((geometry_of_layout.width, geometry_of_layout.height), (3, 2));
         let (mine, theirs) =
-            (laid.centre(Cell { column: 0, row: 0 }), geometry(6, 4).centre(Cell { column: 1, row: 1 }));
+            (geometry_of_layout.centre(Cell { column: 0, row: 0 }), geometry(6, 4).centre(Cell { column: 1, row: 1 }));
         assert!((mine - theirs).norm() < 1e-12);
     }
 
@@ -199,10 +199,10 @@ mod tests {
         #[test]
         fn every_known_cell_is_on_the_grid(x in -9.0..9.0, y in -9.0..9.0, yaw in -4.0..4.0) {
             let transform_world_map = pose(x, y, yaw);
-            let laid = layout_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
+            let geometry_of_layout = layout_at(grid(&CELLS), &[transform_world_map]).geometry.unwrap();
             for cell in [Cell { column: 2, row: 1 }, Cell { column: 3, row: 1 }, Cell { column: 1, row: 2 }] {
                 let centre = transform_world_map * geometry(6, 4).centre(cell);
-                prop_assert!(laid.cell(&centre).is_some());
+                prop_assert!(geometry_of_layout.cell(&centre).is_some());
             }
         }
     }

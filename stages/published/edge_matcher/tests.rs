@@ -86,9 +86,9 @@ fn edges_with_other_ends_or_of_another_shape_or_length_are_not_paired() {
     assert_eq!(count(Edge { is_dead_end: [false, true], ..edge.clone() }), 0, "the dead end is elsewhere");
     assert_eq!(count(Edge { is_dead_end: [false, false], ..edge.clone() }), 0);
     assert_eq!(count(Edge { length: 1.3 * edge.length, ..edge.clone() }), 0);
-    let mut bent = edge.clone();
-    bent.shape[4..12].iter_mut().for_each(|point| point.y += 0.5);
-    assert_eq!(count(bent), 0);
+    let mut deformed = edge.clone();
+    deformed.shape[4..12].iter_mut().for_each(|point| point.y += 0.5);
+    assert_eq!(count(deformed), 0);
 }
 
 #[test]

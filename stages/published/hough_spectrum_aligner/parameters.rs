@@ -9,36 +9,36 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct HoughSpectrumParameters {
-    /// The spectra are taken at directions that lie about so far apart, radians.
+    /// Approximate spacing of the directions of the spectra, radians.
     #[schemars(range(min = 1e-4, max = FRAC_PI_2))]
     pub rotation_step: f64,
     /// The width of the lines whose cells are counted for the spectra and projections, metres; never less than a cell of
     /// either map.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub cell: f64,
-    /// So many peaks of the cross-correlation of both spectra are followed up, the highest ones. Each stands for two rotations,
-    /// half a turn apart.
+    /// Number of the highest peaks of the cross-correlation of both spectra that are used. Each gives two rotations, half a
+    /// turn apart.
     #[schemars(range(min = 1, max = 100))]
     pub rotations: usize,
     /// Peaks nearer to a higher one than this are left out, radians.
     #[schemars(range(min = 0.0, max = FRAC_PI_2))]
     pub apart_yaw: f64,
-    /// So many peaks of the cross-correlation of the projections on each axis are followed up. The paper takes the highest.
+    /// Number of peaks of the cross-correlation of the projections on each axis that are used. The paper takes the highest.
     #[schemars(range(min = 1, max = 100))]
     pub translations: usize,
     /// Peaks nearer to a higher one than this are left out, metres.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub apart: f64,
-    /// The least acceptance index omega at which the best place is accepted. In maps that were drawn from laser scans in six
-    /// buildings, pairs that came to lie rightly had 0.97 and more, and maps of different buildings up to 0.951; other maps, of
-    /// mostly free space, have more at wrong places.
+    /// Least acceptance index omega of an accepted pose. In maps that were built from laser scans in six buildings, right
+    /// poses had 0.97 and more, and those of different buildings up to 0.951; other maps, of mostly free space, have more at
+    /// wrong poses.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_omega: f64,
-    /// The least share of the smaller map of which the other must say something. The paper asks for none, and maps
-    /// that share a few cells nearly always agree on them.
+    /// Least share of the smaller map at which the other must be known. The paper requires none, and maps that share a few
+    /// cells nearly always agree on them.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_overlap: f64,
-    /// At most so many places are sent for a pair of maps.
+    /// Largest number of hypotheses that are sent for a pair of maps.
     #[schemars(range(min = 1, max = 1000))]
     pub max_hypotheses: usize,
     /// A map whose walls are spread over more than this in x or in y is not aligned, metres.

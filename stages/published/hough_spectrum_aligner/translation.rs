@@ -1,4 +1,4 @@
-//! The translations at which the projections of two maps lie on each other.
+//! Translations at which the projections of two maps correlate.
 
 use super::WallCells;
 use super::peak::{Peak, highest};

@@ -27,7 +27,7 @@ pub struct RadonAlignerParameters {
     /// best ones of unrelated maps up to 0.945.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_similarity: f64,
-    /// Maps whose walls lie farther apart than this are not aligned, metres.
+    /// Largest extent of the walls of a map that is aligned, metres.
     #[schemars(range(min = 1.0, max = 1e4))]
     pub max_extent: f64,
 }

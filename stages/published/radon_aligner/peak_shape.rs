@@ -16,8 +16,8 @@ impl PeakShape {
     /// The shape of the peak at 0 of the values `at`, which are looked at up to `most` steps on both sides.
     pub(super) fn of(at: impl Fn(isize) -> f64, most: usize) -> Self {
         let (before, height, after) = (at(-1), at(0), at(1));
-        let bend = before - 2.0 * height + after;
-        let offset = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+        let second_difference = before - 2.0 * height + after;
+        let offset = if second_difference < 0.0 { 0.5 * (before - after) / second_difference } else { 0.0 };
         let half_width = |side: isize| {
             let below = (1..=most as isize).find(|step| at(side * step) < 0.5 * height);
             below.map_or(most as f64, |step| {

@@ -2,16 +2,16 @@
 
 use super::peak_shape::PeakShape;
 
-/// Walls stand out of what lies within this distance, metres.
+/// Radius of the mean that is subtracted from a profile, metres.
 const SURROUNDINGS: f64 = 1.0;
 
-/// Two peaks lie farther apart than this, metres.
+/// Least distance of two peaks, metres.
 const APART: f64 = 0.25;
 
 /// The longest profile, in bins.
 const MOST_BINS: f64 = 4096.0;
 
-/// How much wall lies at each place along an axis, more than in its surroundings.
+/// Amount of wall at each position along an axis, above the mean of its surroundings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Where the first bin begins, metres along the axis.

@@ -12,16 +12,16 @@ pub struct RandomWalkParameters {
     /// The side of a cell in which distances are taken, metres; never less than one and a half cells of either map.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub cell: f64,
-    /// At most so many cells of each class and map take part in the dissimilarity psi, evenly chosen.
+    /// Largest number of cells of each class and map in the dissimilarity psi, evenly sampled.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub max_points: usize,
-    /// So many walks are made for each pair of maps, which begin at rotations all round, with the middles of the maps on each other.
+    /// Number of walks for each pair of maps, which begin at evenly spaced rotations, with the centres of the maps aligned.
     #[schemars(range(min = 1, max = 10_000))]
     pub walks: usize,
-    /// A walk ends after so many trials.
+    /// Largest number of trials of a walk.
     #[schemars(range(min = 1, max = 10_000_000))]
     pub max_trials: usize,
-    /// A walk ends when it has found nothing better in so many trials.
+    /// Number of trials without an improvement after which a walk ends.
     #[schemars(range(min = 1, max = 10_000_000))]
     pub patience: usize,
     /// The standard deviation of the first moves in x and in y, metres.
@@ -30,29 +30,30 @@ pub struct RandomWalkParameters {
     /// The standard deviation of the first turns, radians.
     #[schemars(range(min = 1e-3, max = PI))]
     pub first_turn: f64,
-    /// The mean and the deviations of further moves are those of so many accepted ones before; after as many refusals in a row
-    /// the deviations are halved.
+    /// Number of accepted moves whose mean and deviations are those of further moves; after as many refusals in a row the
+    /// deviations are halved.
     #[schemars(range(min = 1, max = 10_000))]
     pub history: usize,
     /// The probability that a move is accepted which makes psi worse, so that a walk can leave a local minimum.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub accept_worse: f64,
-    /// Places are the same if the middle of the map is moved by less than this, metres, and it is turned by less than `apart_yaw`.
+    /// Two poses are the same if the centre of the map is moved by less than this, metres, and it is turned by less than
+    /// `apart_yaw`.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub apart: f64,
     /// See `apart`, radians.
     #[schemars(range(min = 0.0, max = PI))]
     pub apart_yaw: f64,
-    /// The least acceptance index omega at which the best place is accepted. In maps that were drawn from laser scans in six
-    /// buildings, pairs that came to lie rightly had 0.97 and more, and maps of different buildings up to 0.951; other maps, of
-    /// mostly free space, have more at wrong places.
+    /// Least acceptance index omega of an accepted pose. In maps that were built from laser scans in six buildings, right
+    /// poses had 0.97 and more, and those of different buildings up to 0.951; other maps, of mostly free space, have more at
+    /// wrong poses.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_omega: f64,
-    /// The least share of the smaller map of which the other must say something. The papers ask for none, and maps
-    /// that share a few cells nearly always agree on them.
+    /// Least share of the smaller map at which the other must be known. The papers require none, and maps that share a few
+    /// cells nearly always agree on them.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_overlap: f64,
-    /// At most so many places are sent for a pair of maps.
+    /// Largest number of hypotheses that are sent for a pair of maps.
     #[schemars(range(min = 1, max = 1000))]
     pub max_hypotheses: usize,
     /// A map whose known part is longer than this in x or in y is not aligned, metres.

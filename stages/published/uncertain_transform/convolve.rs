@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Cells along the side of a tile, which has one covariance.
 pub const TILE: usize = 8;
-/// Where the least standard deviation is as many cells, the kernel is laid on cells twice as wide: it is as smooth there as a
+/// Least standard deviation, in cells, at which the kernel is applied to cells twice as wide: it is as smooth there as a
 /// kernel of half as many is on the cells themselves.
 const WIDE: f64 = 4.0;
 
@@ -81,9 +81,9 @@ impl Tile<'_> {
     }
 }
 
-/// Where a map says something, by tiles.
+/// Known cells of a map, by tiles.
 struct KnownTiles {
-    /// How many tiles say something below and left of each corner of a tile.
+    /// Number of tiles with known cells below and left of each corner of a tile.
     sums: Vec<u32>,
     columns: usize,
     rows: usize,
@@ -107,7 +107,7 @@ impl KnownTiles {
         Self { sums, columns, rows }
     }
 
-    /// Whether any cell says something within `reach` cells of a tile, as far as whole tiles tell.
+    /// Whether any cell is known within `reach` cells of a tile, rounded up to whole tiles.
     fn within(&self, tile_column: usize, tile_row: usize, reach: usize) -> bool {
         let tiles = reach.div_ceil(TILE);
         let stride = self.columns + 1;

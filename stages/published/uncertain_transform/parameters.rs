@@ -14,10 +14,10 @@ pub struct UncertainTransformParameters {
     /// Metres. A place whose standard deviation is greater is blurred as if it had this one. The time goes with its square.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub max_deviation: f64,
-    /// Probability that a cell is occupied when a map says 100; greater values are cut to it.
+    /// Probability that a cell of value 100 is occupied; greater ones are clamped to it.
     #[schemars(extend("exclusiveMinimum" = 0.5, "exclusiveMaximum" = 1))]
     pub max_probability: f64,
-    /// Probability that a cell is occupied when a map says 0; lesser values are cut to it.
+    /// Probability that a cell of value 0 is occupied; lesser ones are clamped to it.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 0.5))]
     pub min_probability: f64,
     /// Metres. The longest side that a map may have in the world; one that would be longer is left out with a warning.

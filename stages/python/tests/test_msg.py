@@ -93,7 +93,7 @@ class OwnTypeTest(unittest.TestCase):
     def test_to_define_it_again_changes_nothing_and_otherwise_it_is_refused(self):
         first = msg.define("own_msgs/msg/Twice", "string name\n")
         self.assertIs(msg.define("own_msgs/msg/Twice", "string  name"), first)
-        for name, text, says in (
+        for name, text, text_of_error in (
             ("own_msgs/msg/Twice", "string name\nint8 more", "is known already"),
             ("nav_msgs/msg/OccupancyGrid", "string name", "is known already"),
             ("own_msgs/Room", "string name", "no name of a message type"),
@@ -102,7 +102,7 @@ class OwnTypeTest(unittest.TestCase):
             ("own_msgs/msg/Bad", "string", "cannot be read"),
             ("own_msgs/msg/Two", "int8 a\n" + "=" * 80 + "\nMSG: a/B\nint8 b", "several types"),
         ):
-            with self.subTest(text), self.assertRaisesRegex(ValueError, says):
+            with self.subTest(text), self.assertRaisesRegex(ValueError, text_of_error):
                 msg.define(name, text)
         self.assertNotIn("own_msgs/msg/Lost", msg._STORE.types)
 

@@ -15,15 +15,15 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 
 
 class ReadmeTest(unittest.TestCase):
-    def test_the_class_sends_what_it_says(self):
+    def test_the_class_of_the_readme_works(self):
         function, corners, own_type, source = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
         self.assertIn(function.strip(), (EXAMPLES / "invert.py").read_text())
         self.assertIn(source.strip(), (EXAMPLES / "circle.py").read_text())
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "Room.msg").write_text("string name\n")
-            told = {"__file__": f"{folder}/room_types.py"}
-            exec(textwrap.dedent(own_type), told)
-            self.assertEqual(told["Room"](name="kitchen").name, "kitchen")
+            namespace = {"__file__": f"{folder}/room_types.py"}
+            exec(textwrap.dedent(own_type), namespace)
+            self.assertEqual(namespace["Room"](name="kitchen").name, "kitchen")
             path = Path(folder) / "corners.py"
             path.write_text(corners)
             sent, warned = [], []

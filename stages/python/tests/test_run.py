@@ -25,7 +25,7 @@ from gridweave import Input, Output, Parameter, Stage
 from gridweave.msg.nav_msgs import OccupancyGrid
 
 class Troubled(Stage):
-    """Does what it is told."""
+    """Has the trouble that its parameters select."""
     map = Input(OccupancyGrid)
     out = Output(OccupancyGrid)
     what = Parameter("copy")
@@ -33,7 +33,7 @@ class Troubled(Stage):
 
     def __init__(self):
         self.kept = []
-        print("what a stage prints is no bell")
+        print("what a stage prints rings no doorbell")
 
     def on_map(self, map, about):
         getattr(self, self.what)(map, about)
@@ -61,7 +61,7 @@ class Troubled(Stage):
         self.out.send(OccupancyGrid(data=[int(kept.sum()) for kept in self.kept]), "all")
 
     def abort(self, reason):
-        self.warn(f"told: {reason}")
+        self.warn(f"aborted: {reason}")
 '''
 
 
@@ -116,17 +116,17 @@ class Host:
                 return answers, (said, payload.decode())
             answers.append((said, robot, payload))
 
-    def ring(self, bell):
+    def ring(self, event):
         try:
-            os.write(self.process.stdin.fileno(), bell)
+            os.write(self.process.stdin.fileno(), event)
         except BrokenPipeError:
             pass
 
     def start(self, **parameters):
         interface = json.dumps(load(self.module).interface())
-        told = {"stage": "troubled", "parameters": parameters, "seed": 2**63, "reference": None, "robots": {}, "inputs": [],
+        start = {"stage": "troubled", "parameters": parameters, "seed": 2**63, "reference": None, "robots": {}, "inputs": [],
                 "interface": interface}
-        return self.call(What.START, json.dumps(told).encode())
+        return self.call(What.START, json.dumps(start).encode())
 
     def end(self):
         self.process.stdin.close()
@@ -155,13 +155,13 @@ class RunTest(unittest.TestCase):
     def decoded(self, answers):
         return [msg.decode(OccupancyGrid, memoryview(data)).data.tolist() for _, _, data in answers]
 
-    def test_what_comes_in_goes_out_about_the_same_robot_and_the_program_ends_when_it_is_told_no_more(self):
+    def test_messages_keep_their_robot_and_the_program_ends_with_the_calls(self):
         self.assertEqual(self.host.start(), ([], (What.DONE, "")))
         for size in (1, 100, 100_000):
             answers, end = self.host.call(What.MESSAGE, self.grid([1] * size))
             self.assertEqual((self.decoded(answers), answers[0][1], end), ([[1] * size], b"robot1", (What.DONE, "")))
         status, errors = self.host.end()
-        self.assertEqual((status, errors), (0, "what a stage prints is no bell\n"))
+        self.assertEqual((status, errors), (0, "what a stage prints rings no doorbell\n"))
 
     def test_more_than_there_is_room_for_comes_in_order(self):
         self.host.start(what="many")
@@ -172,7 +172,7 @@ class RunTest(unittest.TestCase):
         self.host.start(what="keep")
         for number in range(3 * HELD):
             self.assertEqual(self.host.call(What.MESSAGE, self.grid([number] * 5000))[1], (What.DONE, ""))
-        with self.subTest("sums are too large for cells, which is told"):
+        with self.subTest("sums are too large for cells, which is reported"):
             _, (said, text) = self.host.call(What.FINISH)
             self.assertEqual(said, What.FAILED)
             self.assertIn("`data` takes int8", text)
@@ -184,7 +184,7 @@ class RunTest(unittest.TestCase):
         self.assertEqual((said, end[0]), (What.WARNING, What.DONE))
         self.assertIn(b"messages on the input `map` that cannot be read are left out", text)
 
-    def test_an_error_is_told_with_where_it_comes_from(self):
+    def test_an_error_is_reported_with_its_origin(self):
         self.host.start(what="wrong")
         _, (said, text) = self.host.call(What.MESSAGE, self.grid([1]))
         self.assertEqual(said, What.FAILED)
@@ -197,7 +197,7 @@ class RunTest(unittest.TestCase):
         _, (said, text) = self.host.call(What.MESSAGE, self.grid([1]))
         self.assertEqual((said, text.splitlines()[0]), (What.FAILED, "SystemExit: 3"))
 
-    def test_a_program_that_is_killed_is_seen_at_its_bell(self):
+    def test_a_killed_program_is_noticed_at_its_doorbell(self):
         self.host.start(what="kill")
         self.assertEqual(self.host.call(What.MESSAGE, self.grid([1])), ([], None))
         self.assertEqual(self.host.end()[0], -signal.SIGKILL)
@@ -208,14 +208,14 @@ class RunTest(unittest.TestCase):
         self.host.process.send_signal(signal.SIGTERM)
         self.assertEqual(self.host.call(What.MESSAGE, self.grid([1]))[1], (What.DONE, ""))
 
-    def test_an_abort_is_told_to_the_stage(self):
+    def test_an_abort_reaches_the_stage(self):
         self.host.start()
         answers, end = self.host.call(What.ABORT, b"the disk is full")
-        self.assertEqual((answers[0][2], end[0]), (b"told: the disk is full", What.DONE))
+        self.assertEqual((answers[0][2], end[0]), (b"aborted: the disk is full", What.DONE))
 
     def test_another_interface_than_the_pipeline_knows_is_refused(self):
-        told = {"stage": "a", "parameters": {}, "seed": 0, "reference": None, "robots": {}, "inputs": [], "interface": "{}"}
-        _, (said, text) = self.host.call(What.START, json.dumps(told).encode())
+        start = {"stage": "a", "parameters": {}, "seed": 0, "reference": None, "robots": {}, "inputs": [], "interface": "{}"}
+        _, (said, text) = self.host.call(What.START, json.dumps(start).encode())
         self.assertEqual(said, What.FAILED)
         self.assertIn("other ports or parameters", text)
 
@@ -236,7 +236,7 @@ class Counter(Stage):
         self.out.send(OccupancyGrid(), log_time=99)
 
     def abort(self, reason):
-        self.warn(f"told: {reason}")
+        self.warn(f"aborted: {reason}")
 '''
 
 
@@ -258,7 +258,7 @@ class SourceTest(unittest.TestCase):
         self.assertEqual(([said for said, *_ in answers], end), ([What.OUTPUT, What.END], (What.DONE, "")))
         self.assertEqual(self.host.call(What.NEXT), ([(What.END, b"", b"")], (What.DONE, "")))
 
-    def test_log_times_that_fall_are_told_with_the_line(self):
+    def test_falling_log_times_are_reported_with_the_line(self):
         self.host.start(times=[10, 9])
         self.host.call(What.NEXT)
         answers, (said, text) = self.host.call(What.NEXT)
@@ -266,10 +266,10 @@ class SourceTest(unittest.TestCase):
         self.assertIn("ValueError: the log time 9 ns comes after 10 ns", text)
         self.assertIn("self.out.send(OccupancyGrid(data=[time])", text)
 
-    def test_an_abort_is_told_to_a_source(self):
+    def test_an_abort_reaches_a_source(self):
         self.host.start()
         answers, end = self.host.call(What.ABORT, b"the disk is full")
-        self.assertEqual((answers[0][2], end[0]), (b"told: the disk is full", What.DONE))
+        self.assertEqual((answers[0][2], end[0]), (b"aborted: the disk is full", What.DONE))
 
 
 if __name__ == "__main__":

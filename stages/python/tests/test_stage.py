@@ -1,4 +1,4 @@
-"""What a stage says of itself, and what it does with a message."""
+"""The interface of a stage, and how it handles a message."""
 
 import tempfile
 import unittest
@@ -44,13 +44,13 @@ class StageTest(unittest.TestCase):
         self.sent, self.warned = [], []
         return kind.begin(parameters, Context(seed=3), lambda *what: self.sent.append(what), self.warned.append)
 
-    def test_a_class_says_its_ports_and_parameters(self):
-        told = Corners.interface()
-        self.assertEqual(told["summary"], "Sends the pose of each map's corner.")
-        self.assertEqual(told["inputs"][0]["type"], "nav_msgs/msg/OccupancyGrid")
-        self.assertTrue(told["inputs"][0]["many"])
-        self.assertEqual([port["name"] for port in told["outputs"]], ["corner"])
-        properties = told["parameters"]["properties"]
+    def test_a_class_has_ports_and_parameters(self):
+        interface = Corners.interface()
+        self.assertEqual(interface["summary"], "Sends the pose of each map's corner.")
+        self.assertEqual(interface["inputs"][0]["type"], "nav_msgs/msg/OccupancyGrid")
+        self.assertTrue(interface["inputs"][0]["many"])
+        self.assertEqual([port["name"] for port in interface["outputs"]], ["corner"])
+        properties = interface["parameters"]["properties"]
         self.assertEqual(properties["height"], {"type": "number", "default": 0.5, "description": "metres", "minimum": 0.0,
                                                 "exclusiveMaximum": 9.0})
         self.assertEqual(properties["way"]["enum"], ["outer", "inner"])
@@ -90,8 +90,8 @@ class StageTest(unittest.TestCase):
             def on_map(self, map, about):
                 pass
 
-        for kind, says in ((Deaf, "no method on_map"), (Idle, "no input `map`")):
-            with self.assertRaisesRegex(TypeError, says):
+        for kind, text in ((Deaf, "no method on_map"), (Idle, "no input `map`")):
+            with self.assertRaisesRegex(TypeError, text):
                 kind.interface()
 
     def test_a_parameter_of_a_type_that_no_file_can_hold_is_refused(self):
@@ -107,8 +107,8 @@ class StageTest(unittest.TestCase):
 
         self.assertEqual(invert(OccupancyGrid(data=[1]), ABOUT, times=2).data.tolist(), [-2])
         kind = invert.__gridweave_stage__
-        told = kind.interface()
-        self.assertEqual((told["summary"], told["inputs"][0]["name"], told["outputs"][0]["name"]), ("Turns signs.", "map", "inverted"))
+        interface = kind.interface()
+        self.assertEqual((interface["summary"], interface["inputs"][0]["name"], interface["outputs"][0]["name"]), ("Turns signs.", "map", "inverted"))
         made = self.begin(kind, {"times": 3})
         made.on_map(OccupancyGrid(data=[1]), ABOUT)
         made.on_map(OccupancyGrid(data=[1]), About("", 6, "/map", 0))
@@ -123,7 +123,7 @@ class StageTest(unittest.TestCase):
         self.assertEqual([message.data.tolist() for _, message, _ in self.sent], [[0], [1], [2]])
 
     def test_a_function_without_types_is_refused(self):
-        with self.assertRaisesRegex(TypeError, "must say the types"):
+        with self.assertRaisesRegex(TypeError, "must declare the types"):
             stage(lambda map: map)
 
 
@@ -146,9 +146,9 @@ class SourceTest(unittest.TestCase):
         self.sent = []
         return kind.begin(parameters, send=lambda *what: self.sent.append(what))
 
-    def test_a_source_has_no_inputs_and_says_when_its_messages_were_logged(self):
-        told = Ticks.interface()
-        self.assertEqual((told["inputs"], [port["name"] for port in told["outputs"]]), ([], ["out", "other"]))
+    def test_a_source_has_no_inputs_and_sets_log_times(self):
+        interface = Ticks.interface()
+        self.assertEqual((interface["inputs"], [port["name"] for port in interface["outputs"]]), ([], ["out", "other"]))
         steps = self.begin(Ticks).messages()
         next(steps)
         self.assertEqual([(name, robot, time) for name, _, robot, time in self.sent], [("out", "robot1", 0), ("other", "", 0)])
@@ -156,14 +156,14 @@ class SourceTest(unittest.TestCase):
         self.assertEqual([time for *_, time in self.sent], [0, 0, 5, 5, 5, 5, 7, 7])
 
     def test_log_times_that_fall_or_are_none_are_refused(self):
-        for times, says in (([3, 2], "2 ns comes after 3 ns"), ([-1], "never fall"), ([1 << 64], "fit in 64 bits")):
-            with self.assertRaisesRegex(ValueError, says):
+        for times, text in (([3, 2], "2 ns comes after 3 ns"), ([-1], "never fall"), ([1 << 64], "fit in 64 bits")):
+            with self.assertRaisesRegex(ValueError, text):
                 list(self.begin(Ticks, {"times": times}).messages())
         for time in (None, 1.5):
             with self.assertRaises(TypeError):
                 self.begin(Ticks).out.send(PoseStamped(), "robot1", time)
 
-    def test_only_a_source_says_log_times(self):
+    def test_only_a_source_sets_log_times(self):
         made = Corners.begin()
         with self.assertRaisesRegex(TypeError, "only a source"):
             made.corner.send(PoseStamped(), "robot1", log_time=1)

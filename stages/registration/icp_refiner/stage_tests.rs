@@ -59,8 +59,8 @@ fn the_error_of_each_iteration_is_sent_and_falls() {
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
     bench.give(&first_guess(&(a.transform_to(&b) * pose(0.3, -0.3, 0.03))));
-    let told: Vec<IcpErrors> = bench.stage.take("errors").unwrap();
-    let [IcpErrors { a, b, rank: 0, accepted: true, errors, .. }] = told.as_slice() else { panic!("{told:?}") };
+    let reported: Vec<IcpErrors> = bench.stage.take("errors").unwrap();
+    let [IcpErrors { a, b, rank: 0, accepted: true, errors, .. }] = reported.as_slice() else { panic!("{reported:?}") };
     assert_eq!((a.as_str(), b.as_str()), ("robot1", "robot2"));
     let (first, last) = (errors[0], errors[errors.len() - 1]);
     assert!(errors.len() > 3 && last < 0.5 * first && last < 0.03, "{errors:?}");

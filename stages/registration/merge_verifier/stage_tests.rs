@@ -176,11 +176,11 @@ fn an_initial_pose_is_used_as_it_is_if_the_user_chooses_it() {
     bench.give_map("robot2", &b);
     let nothing = Alignment { accepted: false, has_transform: false, ..proposed("maps", &Pose2::identity()) };
     let sent = bench.give(&nothing);
-    let [laid] = sent.as_slice() else { panic!("{sent:?}") };
-    assert!(laid.accepted && laid.source == "initial poses", "{laid:?}");
-    assert_eq!((laid.x, laid.y, laid.yaw), (5.0, 1.0, 0.5));
-    assert!((laid.covariance[0] - 1.0).abs() < 1e-9 && (laid.covariance[8] - 0.04).abs() < 1e-9, "{laid:?}");
-    assert_eq!(laid.header.frame_id, "robot1/map");
+    let [aligned] = sent.as_slice() else { panic!("{sent:?}") };
+    assert!(aligned.accepted && aligned.source == "initial poses", "{aligned:?}");
+    assert_eq!((aligned.x, aligned.y, aligned.yaw), (5.0, 1.0, 0.5));
+    assert!((aligned.covariance[0] - 1.0).abs() < 1e-9 && (aligned.covariance[8] - 0.04).abs() < 1e-9, "{aligned:?}");
+    assert_eq!(aligned.header.frame_id, "robot1/map");
 
     let mut bench = StageBench::new(&super::kind(), "hypotheses = { robot2 = 0 }");
     bench.give_map("robot1", &a);

@@ -2,7 +2,7 @@
 
 use super::{Point2, Pose2};
 use gridweave_runtime::ros::cell::{UNKNOWN, is_occupied};
-use gridweave_runtime::ros::{GridPrefix, Header, MapMetaData, OccupancyGrid, Time};
+use gridweave_runtime::ros::{GridError, GridPrefix, Header, MapMetaData, OccupancyGrid, Time};
 
 /// Number of cells that are tested together.
 const BLOCK: usize = 64;
@@ -84,31 +84,10 @@ pub fn most_cells_over(known: f64) -> f64 {
     (16 << 20) as f64 + 64.0 * known
 }
 
-/// Why a message cannot be used as a grid.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum GridError {
-    /// The number of cells is not width x height.
-    #[error("it has {actual} cells, but its size is {width} x {height}")]
-    CellCount {
-        /// Number of cells.
-        actual: usize,
-        /// Cells along x by the message.
-        width: usize,
-        /// Cells along y by the message.
-        height: usize,
-    },
-    /// The resolution is not a positive number.
-    #[error("its resolution is {0} m per cell, which is not positive")]
-    Resolution(f32),
-    /// The origin is not a pose.
-    #[error("a value of its origin is not finite")]
-    Origin,
-}
-
 /// An occupancy grid, its cells borrowed.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
-    /// Where the cells lie.
+    /// Geometry of the cells.
     pub geometry: GridGeometry,
     /// Row by row: -1 unknown, 0 free to 100 occupied.
     pub cells: &'a [i8],
@@ -119,17 +98,9 @@ impl<'a> Grid<'a> {
     /// memory is allocated by the sides.
     pub fn new(mut geometry: GridGeometry, cells: &'a [i8]) -> Result<Self, GridError> {
         let GridGeometry { width, height, resolution, origin } = geometry;
-        if width.checked_mul(height) != Some(cells.len()) {
-            return Err(GridError::CellCount { actual: cells.len(), width, height });
-        }
+        GridError::check(width, height, resolution, &origin, cells.len())?;
         if cells.is_empty() {
             (geometry.width, geometry.height) = (0, 0);
-        }
-        if !(resolution.is_finite() && resolution > 0.0) {
-            return Err(GridError::Resolution(resolution as f32));
-        }
-        if !(origin.translation.vector.iter().all(|v| v.is_finite()) && origin.rotation.angle().is_finite()) {
-            return Err(GridError::Origin);
         }
         Ok(Self { geometry, cells })
     }

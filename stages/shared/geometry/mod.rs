@@ -9,7 +9,7 @@ mod pose;
 mod rigid_fit;
 
 pub use cell_box::CellBox;
-pub use grid::{Cell, Grid, GridError, GridGeometry, most_cells_over};
+pub use grid::{Cell, Grid, GridGeometry, most_cells_over};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
 pub use point_index::{Buckets, Neighbour, PointIndex};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};

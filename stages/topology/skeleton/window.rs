@@ -6,7 +6,7 @@ use crate::shared::geometry::{Cell, CellBox, GridGeometry};
 /// has eight neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Window {
-    /// Where the cells of the grid lie.
+    /// Geometry of the grid.
     pub geometry: GridGeometry,
     pub(super) cell_box: CellBox,
     /// Cells of a row, the rim among them.

@@ -1,4 +1,4 @@
-"""The memory that a stage shares with the program that has started it, and the bells between them."""
+"""The memory that a stage shares with the program that has started it, and the doorbells between them."""
 
 import ctypes
 import os
@@ -15,13 +15,13 @@ from .stage import PROTOCOL, About
 
 #: How many samples may wait for the other side.
 CREDITS = 16
-#: How many messages may be held where they lie; what comes on top of them is copied.
+#: How many messages may be kept in shared memory; further ones are copied.
 HELD = 28
 _MOST = ctypes.c_uint8 * (1 << 46)
 
 
 class What(IntEnum):
-    """What a sample says."""
+    """Kind of a sample."""
 
     START = 1
     MESSAGE = 2
@@ -36,7 +36,7 @@ class What(IntEnum):
 
 
 class Header(ctypes.Structure):
-    """What goes with every sample: `CallHeader` of `runtime/src/program/header.rs`."""
+    """Header of every sample: `CallHeader` of `runtime/src/program/header.rs`."""
 
     _fields_ = [
         ("version", ctypes.c_uint32), ("what", ctypes.c_uint32), ("port", ctypes.c_uint32), ("wire", ctypes.c_uint32),
@@ -54,21 +54,21 @@ class Header(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Call:
-    """What the stage is told."""
+    """A call of the stage."""
 
     what: int
     port: int
     about: About
-    #: The bytes of a message where they lie in shared memory. They stay there for as long as anything refers to them.
+    #: The bytes of a message in shared memory. They stay there for as long as anything refers to them.
     data: memoryview
 
 
 class Calls:
     """The side of the program in the protocol of a call."""
 
-    def __init__(self, folder: str, bell_in: int, bell_out: int):
+    def __init__(self, folder: str, doorbell_in: int, doorbell_out: int):
         prefix = Path(folder).name
-        self._in, self._out = bell_in, bell_out
+        self._in, self._out = doorbell_in, doorbell_out
         self._credits, self._waiting, self._held = CREDITS, 0, 0
         self._is_called = False
         config = iox2.config.default()
@@ -122,11 +122,11 @@ class Calls:
         sample.delete()
 
     def _listen(self) -> bool:
-        """Waits for bells. False when there are no more."""
-        bells = os.read(self._in, 256)
-        self._waiting += bells.count(b"m")
-        self._credits += bells.count(b"c")
-        return bool(bells)
+        """Waits for doorbell events. Returns False at the end."""
+        events = os.read(self._in, 256)
+        self._waiting += events.count(b"m")
+        self._credits += events.count(b"c")
+        return bool(events)
 
     def send(self, port: int, message: Any, robot: str, log_time: int = 0) -> None:
         """Sends a message on an output, written straight into the memory that the stage reads. Of a source it has a log time."""
@@ -135,8 +135,8 @@ class Calls:
             raise ValueError(f"the name of the robot `{robot}` has {len(name)} bytes, and at most 64 fit")
         self._send(What.OUTPUT, port, name, size(message), lambda data: encode_into(message, data), log_time)
 
-    def say(self, what: What, text: str = "") -> None:
-        """Says something beside messages."""
+    def notify(self, what: What, text: str = "") -> None:
+        """Sends a notification that is no message."""
         data = text.encode(errors="replace")
 
         def write(memory: memoryview) -> None:

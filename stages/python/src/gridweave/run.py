@@ -20,7 +20,7 @@ from .stage import About, Context, Stage
 
 
 class Program:
-    """The stage, and what it is told."""
+    """A stage with its calls."""
 
     def __init__(self, module: str, calls: Calls):
         self.module, self.calls = module, calls
@@ -29,17 +29,17 @@ class Program:
         #: What a source still has to send.
         self.messages: Iterator[Any] = iter(())
 
-    def start(self, told: dict[str, Any]) -> None:
+    def start(self, request: dict[str, Any]) -> None:
         """Makes the stage."""
         made = load(self.module)
         interface = made.interface()
-        if interface != json.loads(told["interface"]):
+        if interface != json.loads(request["interface"]):
             raise RuntimeError(f"{self.module} has other ports or parameters than when the pipeline was loaded: load it again")
         outputs = {output["name"]: number for number, output in enumerate(interface["outputs"])}
-        context = Context(told["stage"], told["seed"], told["reference"], told["robots"], tuple(told["inputs"]))
-        own = {name: value for name, value in told["parameters"].items() if name in interface["parameters"]["properties"]}
+        context = Context(request["stage"], request["seed"], request["reference"], request["robots"], tuple(request["inputs"]))
+        own = {name: value for name, value in request["parameters"].items() if name in interface["parameters"]["properties"]}
         self.stage = made.begin(own, context, lambda name, *sent: self.calls.send(outputs[name], *sent),
-                                lambda what: self.calls.say(What.WARNING, what))
+                                lambda what: self.calls.notify(What.WARNING, what))
         self.inputs = [(name, port.type, getattr(self.stage, f"on_{name}")) for name, port in made._members(_input()).items()]
         if made._is_source():
             self.messages = self.stage.messages()  # type: ignore[attr-defined]
@@ -50,7 +50,7 @@ class Program:
         try:
             message = decode(message_type, data)
         except (SerdeError, AssertionError, IndexError, TypeError) as error:
-            self.calls.say(What.WARNING, f"messages on the input `{name}` that cannot be read are left out: {error}")
+            self.calls.notify(What.WARNING, f"messages on the input `{name}` that cannot be read are left out: {error}")
             return
         take(message, about)
 
@@ -59,7 +59,7 @@ class Program:
         try:
             next(self.messages)
         except StopIteration:
-            self.calls.say(What.END)
+            self.calls.notify(What.END)
 
     def serve(self) -> None:
         """Answers calls until there are no more."""
@@ -75,10 +75,10 @@ class Program:
                     self.stage.finish()
                 elif call.what == What.ABORT:
                     self.stage.abort(bytes(call.data).decode(errors="replace"))
-            except BaseException as error:  # noqa: BLE001: whatever it is, it is told
-                self.calls.say(What.FAILED, _told(error))
+            except BaseException as error:  # noqa: BLE001: every error is reported
+                self.calls.notify(What.FAILED, _traceback_of(error))
             else:
-                self.calls.say(What.DONE)
+                self.calls.notify(What.DONE)
 
 
 def _input() -> type:
@@ -87,7 +87,7 @@ def _input() -> type:
     return Input
 
 
-def _told(error: BaseException) -> str:
+def _traceback_of(error: BaseException) -> str:
     """An error and where it comes from, without what lies above the stage."""
     own = os.path.dirname(os.path.abspath(__file__))
     frames = traceback.extract_tb(error.__traceback__)
@@ -99,7 +99,7 @@ def _told(error: BaseException) -> str:
 
 
 def main() -> None:
-    """Runs a stage until it is told no more."""
+    """Runs a stage until the calls end."""
     # The stage that has started this program ends it: signals of the terminal or of the system are for that one.
     for ignored in (signal.SIGINT, signal.SIGTERM):
         signal.signal(ignored, signal.SIG_IGN)
@@ -109,14 +109,14 @@ def main() -> None:
     faulthandler.enable()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGUSR1})
     faulthandler.register(signal.SIGUSR1)
-    bell_in, bell_out = os.dup(0), os.dup(1)
+    doorbell_in, doorbell_out = os.dup(0), os.dup(1)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
-    # What a stage prints is no bell.
+    # What a stage prints must not go to the doorbell.
     os.dup2(2, 1)
     sys.stdout.reconfigure(line_buffering=True)
     module, folder = sys.argv[1:]
-    Program(module, Calls(folder, bell_in, bell_out)).serve()
+    Program(module, Calls(folder, doorbell_in, doorbell_out)).serve()
 
 
 if __name__ == "__main__":

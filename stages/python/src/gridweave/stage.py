@@ -79,7 +79,7 @@ class Parameter:
         return schema
 
     def value(self, given: Any) -> Any:
-        """A given value as the stage has it: a whole number may stand for one with a fraction."""
+        """A given value as the stage has it: a whole number is accepted for one with a fraction."""
         if isinstance(self.default, float):
             return float(given)
         if isinstance(self.default, list) and self.default and isinstance(self.default[0], float):
@@ -97,7 +97,7 @@ def _schema_of(default: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class About:
-    """What is known of a message beside what it says."""
+    """Metadata of a message."""
 
     #: The robot that it is about; empty if it is about none in particular.
     robot: str
@@ -111,7 +111,7 @@ class About:
 
 @dataclass(frozen=True)
 class Context:
-    """What a stage is told of its pipeline."""
+    """Context of a stage in its pipeline."""
 
     #: The stage's name in the pipeline.
     stage: str = ""
@@ -119,7 +119,7 @@ class Context:
     seed: int = 0
     #: The robot whose map frame is the world, if the pipeline says so.
     reference: str | None = None
-    #: How topics are told apart, as in the section `[robots]`.
+    #: Topics of each robot, as in the section `[robots]`.
     robots: dict[str, Any] | None = None
     #: What is wired to the stage, each with `port`, `from`, `type` and `topic`.
     inputs: tuple[dict[str, str], ...] = ()
@@ -148,7 +148,7 @@ class Stage:
     context: Context
 
     def finish(self) -> None:
-        """All inputs have ended. What is sent here carries the log time that they had come to. A source is not told: it knows."""
+        """All inputs have ended. What is sent here has the last log time of the inputs. It is not called for a source."""
 
     def abort(self, reason: str) -> None:
         """The run has failed elsewhere: leave what was made in a state that can be used."""
@@ -173,7 +173,7 @@ class Stage:
 
     @classmethod
     def interface(cls) -> dict[str, Any]:
-        """The ports and parameters, as the program that runs a pipeline is told them."""
+        """The ports and parameters as JSON, for the program that runs a pipeline."""
         for name in cls._members(Input):
             if not callable(getattr(cls, f"on_{name}", None)):
                 raise TypeError(f"{cls.__name__} has an input `{name}`, and no method on_{name}(self, message, about)")
@@ -222,7 +222,7 @@ def _untimed(send: Callable[..., None]) -> Callable[..., None]:
     """How a stage with inputs sends."""
     def checked(output: str, message: Any, robot: str, log_time: int | None) -> None:
         if log_time is not None:
-            raise TypeError("only a source says log times: what a stage sends has that of the message that it handles")
+            raise TypeError("only a source sets log times: messages of other stages have that of the message that they handle")
         send(output, message, robot)
 
     return checked
@@ -235,7 +235,7 @@ def _rising(send: Callable[..., None]) -> Callable[..., None]:
     def checked(output: str, message: Any, robot: str, log_time: int | None) -> None:
         nonlocal reached
         if log_time is None:
-            raise TypeError("a source says when a message was logged: send(message, robot, log_time=NANOSECONDS)")
+            raise TypeError("a source sets the log time of a message: send(message, robot, log_time=NANOSECONDS)")
         log_time = operator.index(log_time)
         if not reached <= log_time < 1 << 64:
             raise ValueError(f"the log time {log_time} ns comes after {reached} ns: those of a source never fall, and fit in 64 bits")
@@ -264,7 +264,7 @@ def stage(function: Callable[..., Any] | None = None, *, output: str = "out") ->
         raise TypeError(f"{name} must have one input, an `about` if it likes, and parameters behind a `*`")
     message = positional[0].name
     if message not in hints or "return" not in hints:
-        raise TypeError(f"{name} must say the types of its input and of its result, such as (map: OccupancyGrid) -> Segments")
+        raise TypeError(f"{name} must declare the types of its input and of its result, such as (map: OccupancyGrid) -> Segments")
     for keyword in keywords:
         if keyword.default is keyword.empty:
             raise TypeError(f"the parameter `{keyword.name}` of {name} has no default")
