@@ -1,11 +1,14 @@
 //! The contents of a log by robot.
 
 use super::LogInfo;
-use crate::robots::{Classified, InferredPoses, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance};
+use crate::names::rename_advice;
+use crate::robots::{
+    Classified, InferredPoses, MergedMaps, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance,
+};
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
 use gridweave_runtime::message::Channel;
-use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
+use gridweave_runtime::ros::{GridError, Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::RobotTopics;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -52,6 +55,11 @@ pub(super) struct RobotSurvey {
     mismatches: BTreeSet<String>,
     /// Topics with maps that belong to no robot.
     other_maps: BTreeSet<String>,
+    /// By robot: what is wrong with the first map that cannot be used, and how many such maps there are.
+    unusable_maps: BTreeMap<String, (GridError, u64)>,
+    merged_maps: MergedMaps,
+    /// Topics of merged maps of other programs.
+    merged_topics: BTreeSet<String>,
     robots: BTreeMap<String, RobotInfo>,
     tf: Option<TfPoses>,
     inferred: InferredPoses,
@@ -76,6 +84,9 @@ impl RobotSurvey {
             topics,
             mismatches: BTreeSet::new(),
             other_maps: BTreeSet::new(),
+            unusable_maps: BTreeMap::new(),
+            merged_maps: MergedMaps::default(),
+            merged_topics: BTreeSet::new(),
             robots: BTreeMap::new(),
             unreadable: BTreeMap::new(),
         }
@@ -101,11 +112,10 @@ impl RobotSurvey {
         (role, robot.to_owned())
     }
 
-    /// Whether the frame names in messages of this role and robot are needed.
-    pub(super) fn looks_at_frames(&self, role: Role, robot: &str) -> bool {
+    /// Whether the messages of a role are read: for the names of frames, and for maps that cannot be used.
+    pub(super) fn reads(role: Role) -> bool {
         match role {
-            Role::Tf | Role::Odometry => true,
-            Role::Map => self.inferred.asks_for_map(robot),
+            Role::Tf | Role::Odometry | Role::Map => true,
             _ => false,
         }
     }
@@ -118,10 +128,23 @@ impl RobotSurvey {
         let Some(info) = self.robots.get_mut(robot) else { return };
         match role {
             Role::Map => {
+                let Ok(map) = decode::<OccupancyGrid<'_>>(data) else {
+                    *self.unreadable.entry(topic.to_owned()).or_default() += 1;
+                    return;
+                };
+                if self.merged_maps.includes(robot, &map.header.frame_id) {
+                    self.merged_topics.insert(topic.to_owned());
+                    if info.maps == 0 {
+                        self.robots.remove(robot);
+                    }
+                    return;
+                }
                 info.maps += 1;
-                if self.inferred.asks_for_map(robot)
-                    && let Ok(map) = decode::<OccupancyGrid<'_>>(data)
-                {
+                if let Err(error) = map.check() {
+                    let (_, count) = self.unusable_maps.entry(robot.to_owned()).or_insert((error, 0));
+                    *count += 1;
+                }
+                if self.inferred.asks_for_map(robot) {
                     self.inferred.set_map_frame(robot, &map.header.frame_id);
                 }
             }
@@ -217,19 +240,38 @@ impl RobotSurvey {
         for (topic, count) in &self.unreadable {
             problems.push(format!("{count} messages on `{topic}` do not match their type"));
         }
-        let robots = &self.robots;
-        if robots.values().all(|robot| robot.maps == 0 && robot.scans == 0) {
-            let elsewhere = match self.other_maps.is_empty() {
-                true => "; there is no occupancy grid at all".to_owned(),
-                false => {
-                    let topics: Vec<_> = self.other_maps.iter().map(String::as_str).collect();
-                    format!("; there are occupancy grids on {}: set `robots.map` to match them", topics.join(", "))
-                }
-            };
-            problems.push(format!("no map was recognised: no topic fits `{}`{elsewhere}", self.topics.map));
+        for (robot, (error, count)) in &self.unusable_maps {
+            problems.push(format!("{count} of the maps of {robot} cannot be used: {error}"));
         }
-        if let [robot] = robots.keys().collect::<Vec<_>>()[..] {
-            problems.push(format!("there is one robot only, {robot}: nothing to merge"));
+        for topic in &self.merged_topics {
+            problems.push(format!("maps on `{topic}` are merged ones of another program, and are not used"));
+        }
+        let robots = &self.robots;
+        let pattern = &self.topics.map;
+        let has_no_map = robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
+        let with_maps = robots.iter().filter(|(_, robot)| robot.maps > 0);
+        let fitting: Vec<String> = with_maps.map(|(name, _)| pattern.replace("{robot}", name)).collect();
+        let other_maps = || self.other_maps.iter().map(String::as_str);
+        let advice = rename_advice(other_maps().chain(fitting.iter().map(String::as_str)), pattern);
+        let topics: Vec<&str> = other_maps().collect();
+        let topics = topics.join(", ");
+        match (advice.as_slice(), topics.as_str()) {
+            ([], "") if has_no_map => {
+                problems.push(format!("no map was recognised: no topic fits `{pattern}`; there is no occupancy grid at all"));
+            }
+            ([], topics) if has_no_map => problems.push(format!(
+                "no map was recognised: no topic fits `{pattern}`; there are occupancy grids on {topics}: if the log is of one \
+                 robot, name the robot (`gridweave merge ROBOT=LOG OTHER_ROBOT=OTHER_LOG`), else set `robots.map` to match them"
+            )),
+            ([], _) => {}
+            (advice, topics) => {
+                problems.push(format!("maps on {topics} do not fit `{pattern}`: give {}", advice.join(" ")));
+            }
+        }
+        if let [robot] = robots.keys().collect::<Vec<_>>()[..]
+            && advice.is_empty()
+        {
+            problems.push(format!("there is one robot only, {robot}: merge the log with that of another robot"));
         }
         let missing_poses = self.inferred.missing();
         let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {

@@ -16,6 +16,7 @@ mod infer_robots;
 mod input;
 mod naming;
 mod rename;
+mod rename_advice;
 mod rules;
 
 #[cfg(test)]
@@ -26,6 +27,7 @@ pub use error::NameError;
 pub use file_names::{FileNameError, robot_names};
 pub use input::Input;
 pub use rename::TopicRename;
+pub use rename_advice::rename_advice;
 pub use rules::{Convention, NameRules};
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};

@@ -1,15 +1,19 @@
 //! The robots of a log: which channel carries what of which robot, and how poses, scans and tag readings are read.
 
+mod cell_values;
 mod channels;
 mod inferred_poses;
+mod merged_maps;
 mod mounts;
 mod pose;
 mod scans;
 mod tag_positions;
 mod tag_reader;
 
+pub use cell_values::CellValues;
 pub(crate) use channels::{Classified, PoseSource, RobotChannels, Role};
 pub(crate) use inferred_poses::InferredPoses;
+pub(crate) use merged_maps::MergedMaps;
 pub(crate) use mounts::NoTransform;
 pub(crate) use pose::{NoPose, pose_with_covariance};
 pub(crate) use scans::{Scans, read_scan};

@@ -4,10 +4,10 @@ use super::RobotMessages;
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
-use crate::robots::{RobotChannels, Role};
+use crate::robots::{CellValues, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
-use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
 
@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 pub(super) struct ChannelRouter {
     robots: RobotTopics,
     roles: RobotChannels,
+    /// How the values of maps' cells are read.
+    map_values: CellValues,
+    merged_maps: MergedMaps,
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
@@ -26,15 +29,24 @@ impl ChannelRouter {
         robots: RobotTopics,
         channels: impl Iterator<Item = &'a Channel>,
         updates_maps: bool,
+        map_values: CellValues,
     ) -> Self {
         let roles = RobotChannels::new(robots.clone(), channels);
-        let derived = Derived::new(&robots, &roles, updates_maps);
-        Self { derived, roles, robots, routes: Vec::new(), by_channel: BTreeMap::new() }
+        let derived = Derived::new(&robots, &roles, updates_maps, map_values);
+        Self {
+            derived,
+            roles,
+            robots,
+            map_values,
+            merged_maps: MergedMaps::default(),
+            routes: Vec::new(),
+            by_channel: BTreeMap::new(),
+        }
     }
 
     /// Creates a router for channels that are added later. Whole maps are derived from map updates.
-    pub(super) fn live(robots: RobotTopics) -> Self {
-        let mut router = Self::new(robots, std::iter::empty(), true);
+    pub(super) fn live(robots: RobotTopics, map_values: CellValues) -> Self {
+        let mut router = Self::new(robots, std::iter::empty(), true, map_values);
         router.derived.expect_sensors();
         router
     }
@@ -72,11 +84,11 @@ impl ChannelRouter {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        pass(route, stamp, data, output)?;
+        pass(route, self.map_values, &mut self.merged_maps, stamp, data, output)?;
         self.derived.send(route, &self.roles, data, output)
     }
 
-    /// Sends a message unchanged on the port `other`.
+    /// Sends a message unchanged on the port for other messages.
     pub(super) fn pass_on(
         &mut self,
         index: usize,
@@ -90,7 +102,7 @@ impl ChannelRouter {
         }
     }
 
-    /// Learns from a message (frames, maps) without sending it.
+    /// Learns frames and maps from a message without sending anything.
     pub(super) fn learn(&mut self, index: usize, data: &[u8], output: &Output<RobotMessages>) {
         if let Some(route) = self.routes.get(index) {
             self.derived.learn(route, &self.roles, data, output);
@@ -111,12 +123,12 @@ impl ChannelRouter {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        pass(route, stamp, data, output)?;
+        pass(route, self.map_values, &mut self.merged_maps, stamp, data, output)?;
         self.derived.send_of_learnt(route, data, output)
     }
 
-    /// Adds the route of a channel, or returns the existing one; `None` if its name is too long and nothing in the
-    /// pipeline needs the channel.
+    /// Returns the index of a channel's route, and adds the route if there is none. `None` if the topic's name is too long and
+    /// no stage needs the channel.
     pub(super) fn add(
         &mut self,
         channel: Channel,
@@ -130,13 +142,13 @@ impl ChannelRouter {
         let classified = self.roles.classify(&channel);
         let topic = match FixedText::new(&channel.topic) {
             Err(error) if classified.role == Role::Other => {
-                output.warn(format!("messages on a topic were left out: its name {error}"));
+                output.warn(format!("messages on a topic were dropped: its name {error}"));
                 return Ok(None);
             }
             topic => topic.map_err(|error| StageError::new(doing("name"), error))?,
         };
         let robot = match FixedText::new(classified.robot) {
-            // Messages that are passed on unchanged need no robot.
+            // A message that is passed on unchanged needs no robot.
             Err(_) if classified.role == Role::Other => FixedText::EMPTY,
             robot => robot.map_err(|error| StageError::new(doing("robot's name"), error))?,
         };
@@ -168,13 +180,13 @@ impl ChannelRouter {
         Ok(Some(index))
     }
 
-    /// Warns of expected messages that never came.
+    /// Warns of ports that are read and for which no message came.
     pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         let routed = |role: fn(Role) -> bool| {
             self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
         };
-        let draws_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
-        if output.map.is_read() && !draws_maps && !routed(|role| role == Role::Map) {
+        let builds_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
+        if output.map.is_read() && !builds_maps && !routed(|role| role == Role::Map) {
             let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
             let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
             let others =
@@ -203,11 +215,32 @@ impl ChannelRouter {
     }
 }
 
-/// Sends a message unchanged on the port of its role.
-fn pass(route: &mut Route, stamp: Stamp, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
+/// Sends a message on the port of its role: unchanged, but for maps whose cells have values of another convention.
+fn pass(
+    route: &mut Route,
+    map_values: CellValues,
+    merged_maps: &mut MergedMaps,
+    stamp: Stamp,
+    data: &[u8],
+    output: &Output<RobotMessages>,
+) -> Result<(), StageError> {
     let log_time = output.log_time();
+    let frame = || decode::<Header>(data).map_or_else(|_| String::new(), |header| header.frame_id);
     match route.role {
-        Role::Map => route.send(stamp, data, &output.map, log_time),
+        Role::Map if merged_maps.includes(&route.robot, &frame()) => {
+            output.warn(format!(
+                "maps on `{}` are merged ones of another program, and are not taken as a robot's",
+                route.channel.topic
+            ));
+            route.send(stamp, data, &output.other, log_time)
+        }
+        Role::Map => match map_values.translate(data) {
+            Some((translated, convention)) => {
+                output.warn(format!("maps on `{}`: {convention}", route.channel.topic));
+                route.send(stamp, &translated, &output.map, log_time)
+            }
+            None => route.send(stamp, data, &output.map, log_time),
+        },
         Role::Tags => route.send(stamp, data, &output.tags, log_time),
         Role::Topology => route.send(stamp, data, &output.topology, log_time),
         Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan | Role::Tf | Role::Other => {

@@ -14,6 +14,7 @@ pub mod topology_file;
 #[cfg(test)]
 mod tests;
 
+pub use crate::robots::CellValues;
 pub use live_router::{LiveMessage, LiveRouter};
 pub use stage::McapSource;
 
@@ -47,6 +48,10 @@ pub struct SourceParameters {
     pub align_start: bool,
     /// Whether the thresholds of map files among the logs are applied literally; see `map_file_source`.
     pub literal_thresholds: bool,
+    /// How the values of maps' cells are read: by the distribution of the values in each map (`auto`), as map servers write them
+    /// (`occupancy`), as costmaps with costs around obstacles (`costmap`), or as two classes whatever their values
+    /// (`two_classes`). Maps of another convention are sent as map servers write them.
+    pub map_values: CellValues,
     /// Start, in seconds after the first message of the logs. The latest map of each robot before that, and other
     /// latched messages, are sent at the start.
     #[schemars(range(min = 0.0))]

@@ -7,6 +7,7 @@ use super::latched::{Latch, LatchedMessage, LatchedMessages};
 use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::reader::{SupplementKind, describes_its_file, read_attachment, read_metadata};
+use crate::robots::CellValues;
 use crate::robots::Role;
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
@@ -35,9 +36,15 @@ pub(crate) struct Router {
 
 impl Router {
     /// Creates a router for the messages of `files`. Whole maps are derived from map updates if `updates_maps`.
-    pub(crate) fn new(robots: RobotTopics, names: Names, files: Arc<[LogFile]>, updates_maps: bool) -> Self {
+    pub(crate) fn new(
+        robots: RobotTopics,
+        names: Names,
+        files: Arc<[LogFile]>,
+        updates_maps: bool,
+        map_values: CellValues,
+    ) -> Self {
         Self {
-            channels: ChannelRouter::new(robots, names.channels(), updates_maps),
+            channels: ChannelRouter::new(robots, names.channels(), updates_maps, map_values),
             names,
             renamed: Vec::new(),
             by_number: vec![Vec::new(); files.len()],

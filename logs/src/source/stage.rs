@@ -5,6 +5,7 @@ use super::router::Router;
 use super::{RobotMessages, SourceParameters};
 use crate::names::{self, Convention};
 use crate::reader::{LogFile, LogReader};
+use crate::robots::CellValues;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 
@@ -44,8 +45,10 @@ impl McapSource {
         let (reader, names) = opened.map_err(|error| StageError::new(doing(), error))?;
         let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
         let names_robots = rules.convention == Convention::ByRobot;
+        // What keeps the names of the log keeps its bytes.
+        let map_values = if names_robots { parameters.map_values } else { CellValues::Occupancy };
         Ok(Self {
-            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots),
+            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, map_values),
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
             latched: Some(LatchedMessages::default()),

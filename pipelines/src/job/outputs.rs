@@ -13,11 +13,12 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 ///
-/// An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being
+/// A log has the ending of another format. An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being
 /// written by another run.
 pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let inputs = inputs(pipeline);
     let outputs = outputs(pipeline, options);
+    logs(pipeline).iter().try_for_each(|log| check_log_ending(log))?;
     for (index, output) in outputs.iter().enumerate() {
         if inputs.iter().any(|input| is_or_holds(input, output)) {
             let text = format!("{} is an input, and would be overwritten: choose another output", output.display());
@@ -35,6 +36,25 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     // The last check, as it removes what killed runs have left.
     outputs.iter().try_for_each(|output| check_writable(output))?;
     Ok(())
+}
+
+/// Checks that the file of a log, which is written as MCAP, does not have the ending of another format.
+///
+/// # Errors
+///
+/// It does; the error names the option that writes that format.
+pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
+    let ending = log.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let instead = match ending.as_str() {
+        "png" | "pdf" | "svg" | "jpg" | "jpeg" => format!("give --picture {}, and a log as merged.mcap", log.display()),
+        "pgm" | "yaml" | "yml" | "bmp" => {
+            format!("give --map {}, and a log as merged.mcap", log.with_extension("yaml").display())
+        }
+        "json" => format!("give --summary {}, and a log as merged.mcap", log.display()),
+        "bag" | "db3" => format!("give {}: rosbag2 and Foxglove read MCAP", log.with_extension("mcap").display()),
+        _ => return Ok(()),
+    };
+    Err(BadUse(format!("a log is written as MCAP, and not as {}: {instead}", log.display())).into())
 }
 
 /// Lists the logs that a pipeline writes.
@@ -101,4 +121,27 @@ fn same_file(a: &Path, b: &Path) -> bool {
 #[cfg(not(unix))]
 fn same_file(a: &Path, b: &Path) -> bool {
     a == b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_with_the_ending_of_another_format_is_refused_with_the_option_that_writes_it() {
+        for (log, option) in [
+            ("a/merged.png", "--picture a/merged.png"),
+            ("merged.PDF", "--picture merged.PDF"),
+            ("merged.pgm", "--map merged.yaml"),
+            ("merged.json", "--summary merged.json"),
+            ("merged.bag", "give merged.mcap"),
+            ("merged.db3", "give merged.mcap"),
+        ] {
+            let error = check_log_ending(Path::new(log)).unwrap_err().to_string();
+            assert!(error.contains(option), "{error}");
+        }
+        for log in ["merged.mcap", "merged", "merged.part", ".png", "a.png/merged.mcap"] {
+            assert!(check_log_ending(Path::new(log)).is_ok(), "{log}");
+        }
+    }
 }

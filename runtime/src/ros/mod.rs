@@ -32,7 +32,7 @@ pub use gridweave::{
 pub use icp::IcpErrors;
 pub use machine::{MachineStages, StageProgress};
 pub use map_msgs::OccupancyGridUpdate;
-pub use nav::{GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
+pub use nav::{GridError, GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};
 pub use std_msgs::{Header, Time};
 pub use tags::{CommonTag, CommonTags, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange};

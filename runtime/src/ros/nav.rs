@@ -3,6 +3,7 @@
 use super::{
     EncodeError, Header, Pose, PoseStamped, PoseWithCovariance, RosMessage, Time, Vector3, encode_into, ros_messages,
 };
+use nalgebra::Isometry2;
 use serde::{Deserialize, Serialize};
 
 /// `nav_msgs/msg/MapMetaData`.
@@ -36,6 +37,61 @@ impl<'a> OccupancyGrid<'a> {
     /// The cells row by row, row 0 at the origin: -1 unknown, 0 free to 100 occupied; see [`cell`](super::cell).
     pub fn cells(&self) -> &'a [i8] {
         bytemuck::cast_slice(self.data)
+    }
+
+    /// Checks whether the message can be used as a grid.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check(&self) -> Result<(), GridError> {
+        let MapMetaData { width, height, resolution, origin, .. } = self.info;
+        GridError::check(width as usize, height as usize, f64::from(resolution), &origin.planar(), self.data.len())
+    }
+}
+
+/// Why a message cannot be used as a grid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// The number of cells is not width x height.
+    #[error("it has {actual} cells, but its size is {width} x {height}")]
+    CellCount {
+        /// Number of cells.
+        actual: usize,
+        /// Cells along x by the message.
+        width: usize,
+        /// Cells along y by the message.
+        height: usize,
+    },
+    /// The resolution is not a positive number.
+    #[error("its resolution is {0} m per cell, which is not positive")]
+    Resolution(f32),
+    /// The origin is not a pose.
+    #[error("a value of its origin is not finite")]
+    Origin,
+}
+
+impl GridError {
+    /// Checks the size, the resolution in metres per cell, the origin and the number of cells of a grid.
+    ///
+    /// # Errors
+    /// The first of these that cannot be used.
+    pub fn check(
+        width: usize,
+        height: usize,
+        resolution: f64,
+        origin: &Isometry2<f64>,
+        cells: usize,
+    ) -> Result<(), Self> {
+        if width.checked_mul(height) != Some(cells) {
+            return Err(Self::CellCount { actual: cells, width, height });
+        }
+        if !(resolution.is_finite() && resolution > 0.0) {
+            return Err(Self::Resolution(resolution as f32));
+        }
+        if !(origin.translation.vector.iter().all(|v| v.is_finite()) && origin.rotation.angle().is_finite()) {
+            return Err(Self::Origin);
+        }
+        Ok(())
     }
 }
 

@@ -3,17 +3,22 @@
 use super::super::RobotMessages;
 use super::super::channel::Route;
 use super::updated_maps::{UpdatedMap, UpdatedMaps};
-use crate::robots::{RobotChannels, Role};
+use crate::robots::{CellValues, RobotChannels, Role};
 use gridweave_runtime::ros::{OccupancyGridUpdate, decode};
 use gridweave_runtime::stage::{Output, StageError};
 
 /// Derives whole maps from map updates; `None` if that is off.
-pub(super) struct DerivedMaps(Option<UpdatedMaps>);
+pub(super) struct DerivedMaps {
+    /// `None` if no maps are made.
+    maps: Option<UpdatedMaps>,
+    /// How the values of their cells are read.
+    values: CellValues,
+}
 
 impl DerivedMaps {
     /// Whole maps are derived if `updates_maps`.
-    pub(super) fn new(updates_maps: bool) -> Self {
-        Self(updates_maps.then(UpdatedMaps::default))
+    pub(super) fn new(updates_maps: bool, values: CellValues) -> Self {
+        Self { maps: updates_maps.then(UpdatedMaps::default), values }
     }
 
     /// Stores a map that has updates, or applies an update to it. Returns whether the robot's map is due to be sent.
@@ -24,7 +29,7 @@ impl DerivedMaps {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> bool {
-        let Some(maps) = self.0.as_mut().filter(|_| output.map.is_read()) else { return false };
+        let Some(maps) = self.maps.as_mut().filter(|_| output.map.is_read()) else { return false };
         match route.role {
             Role::Map if roles.updates_map(&route.robot) => {
                 // Consumers of the map warn if it cannot be read.
@@ -56,17 +61,24 @@ impl DerivedMaps {
         if !self.update(route, roles, data, output) {
             return Ok(());
         }
-        let map = self.0.as_mut().and_then(|maps| maps.take(&route.robot));
-        map.map_or(Ok(()), |map| send_map(&route.robot, map, output))
+        let map = self.maps.as_mut().and_then(|maps| maps.take(&route.robot));
+        map.map_or(Ok(()), |map| send_map(&route.robot, map, self.values, output))
     }
 
     /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
-        let maps = self.0.iter_mut().flat_map(UpdatedMaps::take_all);
-        maps.into_iter().try_for_each(|(robot, map)| send_map(robot, map, output))
+        let values = self.values;
+        let maps = self.maps.iter_mut().flat_map(UpdatedMaps::take_all);
+        maps.into_iter().try_for_each(|(robot, map)| send_map(robot, map, values, output))
     }
 }
 
-fn send_map(robot: &str, map: &UpdatedMap, output: &Output<RobotMessages>) -> Result<(), StageError> {
-    output.map.send_grid(robot, &map.prefix, |blank| blank.copy_from(&map.cells))
+fn send_map(
+    robot: &str,
+    map: &UpdatedMap,
+    values: CellValues,
+    output: &Output<RobotMessages>,
+) -> Result<(), StageError> {
+    let (cells, _) = values.read(&map.prefix.info, bytemuck::cast_slice(&map.cells));
+    output.map.send_grid(robot, &map.prefix, |blank| blank.copy_from(bytemuck::cast_slice(&cells)))
 }

@@ -109,6 +109,25 @@ fn a_robot_without_alignments_has_a_reason() {
 }
 
 #[test]
+fn a_robot_whose_map_cannot_be_used_is_no_reference_and_has_that_as_reason() {
+    let mut run = Run::new(None);
+    run.map_of_resolution("robot1", "map", 0.0);
+    assert_eq!(run.latest().unwrap().reference, "robot1", "there is no other");
+    run.map("robot2", "map");
+    run.map("robot3", "map");
+    run.align(&between(2, 3));
+    assert_eq!(run.latest().unwrap().reference, "robot2");
+    assert!(run.pose_of("robot3").is_some());
+    let reason = run.reason("robot1");
+    assert_eq!(reason, "its map cannot be used: its resolution is 0 m per cell, which is not positive");
+    // A later map of it can be used.
+    run.map("robot1", "map");
+    assert!(!run.reason("robot1").contains("cannot be used"));
+    run.map_of_resolution("robot1", "map", f32::NAN);
+    assert!(!run.reason("robot1").contains("cannot be used"), "one that can be used has come before");
+}
+
+#[test]
 fn the_most_informative_refusal_is_the_reason() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));

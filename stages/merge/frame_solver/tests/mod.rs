@@ -7,7 +7,9 @@ mod tree;
 use super::kind;
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts};
+use gridweave_runtime::ros::{
+    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts,
+};
 use gridweave_runtime::stage::{Context, StageError, StageHarness};
 
 struct Run {
@@ -25,7 +27,12 @@ impl Run {
     }
 
     fn map(&mut self, robot: &str, frame_id: &str) {
-        let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), ..Default::default() };
+        self.map_of_resolution(robot, frame_id, 0.05);
+    }
+
+    fn map_of_resolution(&mut self, robot: &str, frame_id: &str, resolution: f32) {
+        let info = MapMetaData { resolution, ..Default::default() };
+        let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), info, ..Default::default() };
         self.stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(5), &map).unwrap();
     }
 

@@ -1,0 +1,124 @@
+//! Advice on `--rename` for maps whose topics do not fit the pattern of the pipeline.
+
+use super::TopicRename;
+use gridweave_runtime::stage::match_robot;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The placeholder for the name of a robot in a topic.
+const ROBOT: &str = "{robot}";
+
+/// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic that maps
+/// are expected on. Empty if every topic fits, or if the topics do not show which robots there are.
+///
+/// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`. Topics of one part, such as `/map1`,
+/// `/b_map` or `/map` beside `/robot2/map`, are renamed one by one.
+pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Vec<String> {
+    let (fitting, others): (BTreeSet<&str>, BTreeSet<&str>) =
+        topics.partition(|topic| match_robot(pattern, topic).is_some());
+    // A costmap is made of a map, and is none.
+    let others: Vec<&str> = others.into_iter().filter(|topic| !topic.contains("costmap")).collect();
+    if let Some(template) = common_template(&others) {
+        return vec![format!("--rename '{template}={pattern}'")];
+    }
+    let mut robots: BTreeSet<String> =
+        fitting.iter().filter_map(|topic| match_robot(pattern, topic)).map(str::to_owned).collect();
+    let single: Vec<&str> = others.into_iter().filter(|topic| topic.matches('/').count() == 1).collect();
+    // One map alone is that of the only robot: there is nothing to tell it from.
+    if robots.len() + single.len() < 2 {
+        return Vec::new();
+    }
+    let mut advice = Vec::new();
+    for topic in single {
+        let Some(robot) = robot_of_part(topic, &robots) else { continue };
+        let renamed = pattern.replace(ROBOT, &robot);
+        // What the option takes is the only thing that is advised.
+        if format!("{topic}={renamed}").parse::<TopicRename>().is_ok() {
+            advice.push(format!("--rename '{topic}={renamed}'"));
+            robots.insert(robot);
+        }
+    }
+    advice
+}
+
+/// The template with one part for the robot that most topics fit, two at the least.
+fn common_template(topics: &[&str]) -> Option<String> {
+    let mut templates: BTreeMap<String, usize> = BTreeMap::new();
+    for topic in topics {
+        let parts: Vec<&str> = topic.split('/').collect();
+        // The last part names what the topic carries, and the first is empty.
+        for varying in 1..parts.len().saturating_sub(1) {
+            let mut template = parts.clone();
+            template[varying] = ROBOT;
+            *templates.entry(template.join("/")).or_default() += 1;
+        }
+    }
+    let preference = |template: &str| {
+        let last = template.rsplit('/').next().unwrap_or_default();
+        (last == "map", last.ends_with("_map"))
+    };
+    let several = templates.into_iter().filter(|(_, count)| *count > 1);
+    // Of equals the first by name.
+    let best = several.rev().max_by_key(|(template, count)| (*count, preference(template)));
+    best.map(|(template, _)| template)
+}
+
+/// The name of the robot whose map is on a topic of one part: what is left of it without the word `map`; `robot1` and so on where
+/// nothing is left.
+fn robot_of_part(topic: &str, taken: &BTreeSet<String>) -> Option<String> {
+    let part = topic.strip_prefix('/')?;
+    let is_separator = |letter: char| letter == '_' || letter == '-';
+    let rest = part.strip_suffix("map").or_else(|| part.strip_prefix("map"))?.trim_matches(is_separator);
+    let is_number = !rest.is_empty() && rest.chars().all(|letter| letter.is_ascii_digit());
+    let name = if is_number { format!("robot{rest}") } else { rest.to_owned() };
+    let free = || (1..).map(|number| format!("robot{number}")).find(|name| !taken.contains(name));
+    if name.is_empty() { free() } else { Some(name).filter(|name| !taken.contains(name)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn advice(topics: &[&str]) -> Vec<String> {
+        rename_advice(topics.iter().copied(), "/{robot}/map")
+    }
+
+    #[test]
+    fn topics_that_differ_in_one_part_have_one_option() {
+        for (topics, template) in [
+            (&["/robot1/slam_toolbox/map", "/robot2/slam_toolbox/map"][..], "/{robot}/slam_toolbox/map"),
+            (&["/fleet/a/map", "/fleet/b/map", "/fleet/c/map"], "/fleet/{robot}/map"),
+            (
+                &[
+                    "/r1/rtabmap/grid_map",
+                    "/r1/rtabmap/octomap_grid",
+                    "/r2/rtabmap/grid_map",
+                    "/r2/rtabmap/octomap_grid",
+                ],
+                "/{robot}/rtabmap/grid_map",
+            ),
+            (&["/x/a/map", "/x/a/global_costmap", "/x/b/map", "/x/b/global_costmap"], "/x/{robot}/map"),
+        ] {
+            assert_eq!(advice(topics), [format!("--rename '{template}=/{{robot}}/map'")]);
+        }
+    }
+
+    #[test]
+    fn topics_of_one_part_are_renamed_one_by_one() {
+        let renamed = |pairs: &[(&str, &str)]| -> Vec<String> {
+            pairs.iter().map(|(topic, robot)| format!("--rename '{topic}=/{robot}/map'")).collect()
+        };
+        assert_eq!(advice(&["/map1", "/map2"]), renamed(&[("/map1", "robot1"), ("/map2", "robot2")]));
+        assert_eq!(advice(&["/a_map", "/b_map"]), renamed(&[("/a_map", "a"), ("/b_map", "b")]));
+        assert_eq!(advice(&["/map", "/robot2/map"]), renamed(&[("/map", "robot1")]));
+        assert_eq!(advice(&["/map", "/robot1/map"]), renamed(&[("/map", "robot2")]));
+    }
+
+    #[test]
+    fn nothing_is_advised_where_topics_fit_or_show_no_robots() {
+        for topics in
+            [&["/a/map", "/b/map"][..], &["/map"], &["/grid"], &["/x/y", "/z/w"], &["/global_costmap", "/a/map"], &[]]
+        {
+            assert_eq!(advice(topics), Vec::<String>::new(), "{topics:?}");
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Conventions in which programs write the cells of an occupancy grid, and their translation to that of ROS map servers: -1
+//! unknown, 0 free to 100 occupied.
+
+use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, cell, decode, encode};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::fmt;
+
+/// The value of a cell in a costmap whose obstacle the robot's centre must not be nearer to (nav2's inscribed cost).
+const INSCRIBED: i8 = 99;
+/// The value of an obstacle, in costmaps and in maps.
+const LETHAL: i8 = 100;
+/// The least cost of a known cell beside an obstacle of a costmap.
+const BESIDE_LETHAL: i8 = 90;
+/// The share of known cells beside obstacles that have at least this cost in a costmap.
+const COSTMAP_SHARE: f64 = 0.9;
+/// Two classes of values explain more of their variance than this: as much as they explain of values that are spread evenly.
+const EVEN_SPREAD: f64 = 0.75;
+/// The least difference of the means of two classes of values, if there are more than two values.
+const LEAST_CONTRAST: f64 = 20.0;
+
+/// How the values of cells are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellValues {
+    /// By the distribution of the values in each map: as `occupancy` where some cells are occupied and some free; as `costmap`
+    /// where obstacles are inflated; else as `two_classes` where the values fall into two classes.
+    #[default]
+    Auto,
+    /// As map servers write them: occupied from 65 to 100, free below 25.
+    Occupancy,
+    /// As nav2's costmaps: 100 is an obstacle, and costs that fall with the distance from it are free space.
+    Costmap,
+    /// The larger of two classes of values is occupied and the smaller free, whatever they are: 0 and 1, 30 and 70, 25 and 100.
+    TwoClasses,
+}
+
+/// What the values of one map's cells mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Convention {
+    /// What map servers write.
+    Occupancy,
+    /// Obstacles with the costs around them.
+    Costmap,
+    /// The means of two classes of values, free and occupied.
+    TwoClasses { free: f64, occupied: f64 },
+}
+
+impl fmt::Display for Convention {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Occupancy => f.write_str("cells are read as occupancy"),
+            Self::Costmap => f.write_str("a costmap: costs below 100 are read as free, 100 as occupied"),
+            Self::TwoClasses { free, occupied } => {
+                write!(f, "values about {free:.0} are read as free, values about {occupied:.0} as occupied")
+            }
+        }
+    }
+}
+
+impl CellValues {
+    /// The cells of a map in the convention of map servers, and the convention that they were in. Borrowed if they are in it.
+    pub(crate) fn read<'a>(self, info: &MapMetaData, cells: &'a [i8]) -> (Cow<'a, [i8]>, Convention) {
+        let convention = self.convention(info.width as usize, cells);
+        let read = match convention {
+            Convention::Occupancy => Cow::Borrowed(cells),
+            Convention::Costmap => Cow::Owned(without_costs(info.width as usize, cells)),
+            Convention::TwoClasses { free, occupied } => {
+                let scaled = |value: i8| {
+                    let share = (f64::from(value) - free) / (occupied - free);
+                    if cell::is_known(value) { (100.0 * share).round().clamp(0.0, 100.0) as i8 } else { cell::UNKNOWN }
+                };
+                Cow::Owned(cells.iter().map(|value| scaled(*value)).collect())
+            }
+        };
+        (read, convention)
+    }
+
+    /// A map message in the convention of map servers, and the convention that it was in; `None` if it is in it, or is no map.
+    pub(crate) fn translate(self, message: &[u8]) -> Option<(Vec<u8>, Convention)> {
+        let map: OccupancyGrid<'_> = decode(message).ok()?;
+        let cells = map.cells();
+        if (map.info.width as usize).checked_mul(map.info.height as usize) != Some(cells.len()) {
+            return None;
+        }
+        let (Cow::Owned(read), convention) = self.read(&map.info, cells) else { return None };
+        let translated = OccupancyGrid { data: bytemuck::cast_slice(&read), ..map };
+        Some((encode(&translated).ok()?, convention))
+    }
+
+    fn convention(self, width: usize, cells: &[i8]) -> Convention {
+        let classes = |counts: &Counts| match counts.two_classes() {
+            Some((free, occupied)) => Convention::TwoClasses { free, occupied },
+            None => Convention::Occupancy,
+        };
+        match self {
+            Self::Occupancy => Convention::Occupancy,
+            Self::Costmap => Convention::Costmap,
+            Self::TwoClasses => classes(&Counts::of(cells)),
+            Self::Auto => {
+                let counts = Counts::of(cells);
+                let has = |is: fn(i8) -> bool| (0..=LETHAL).any(|value| is(value) && counts.of_value(value) > 0);
+                match has(cell::is_occupied) && has(cell::is_free) {
+                    // Of a costmap as many cells are inscribed as are obstacles; the walk over its cells is left to such maps.
+                    true if counts.of_value(INSCRIBED) >= counts.of_value(LETHAL).max(1)
+                        && obstacles_are_inflated(width, cells) =>
+                    {
+                        Convention::Costmap
+                    }
+                    true => Convention::Occupancy,
+                    false => classes(&counts),
+                }
+            }
+        }
+    }
+}
+
+/// How many cells have each value from 0 to 100.
+struct Counts([u64; LETHAL as usize + 1]);
+
+impl Counts {
+    fn of(cells: &[i8]) -> Self {
+        let mut all = [0; 256];
+        cells.iter().for_each(|value| all[usize::from(value.cast_unsigned())] += 1);
+        let mut known = [0; LETHAL as usize + 1];
+        known.copy_from_slice(&all[..=LETHAL as usize]);
+        Self(known)
+    }
+
+    fn of_value(&self, value: i8) -> u64 {
+        usize::try_from(value).ok().and_then(|index| self.0.get(index)).copied().unwrap_or(0)
+    }
+
+    /// The means of the two classes into which the values fall, the larger of which has fewer cells as walls have; `None` if
+    /// they are one class. The classes are those of Otsu, "A threshold selection method from gray-level histograms" (1979).
+    fn two_classes(&self) -> Option<(f64, f64)> {
+        let total = self.0.iter().sum::<u64>() as f64;
+        let values = || self.0.iter().enumerate().map(|(value, count)| (value as f64, *count as f64));
+        let mean = values().map(|(value, count)| value * count).sum::<f64>() / total;
+        let variance = values().map(|(value, count)| (value - mean).powi(2) * count).sum::<f64>() / total;
+        let (mut below, mut sum) = (0.0, 0.0);
+        let mut best: Option<(f64, [f64; 4])> = None;
+        for (value, count) in values() {
+            below += count;
+            sum += value * count;
+            let above = total - below;
+            if below == 0.0 || above == 0.0 {
+                continue;
+            }
+            let (low, high) = (sum / below, (mean * total - sum) / above);
+            let between = below * above / (total * total) * (high - low).powi(2);
+            if best.is_none_or(|(most, _)| between > most) {
+                best = Some((between, [low, high, below, above]));
+            }
+        }
+        let (between, [low, high, below, above]) = best?;
+        let distinct = self.0.iter().filter(|count| **count > 0).count();
+        let is_contrast = distinct == 2 || high - low >= LEAST_CONTRAST;
+        (between > EVEN_SPREAD * variance && is_contrast && above < below).then_some((low, high))
+    }
+}
+
+/// The neighbours of a cell that share an edge with it.
+fn neighbours(width: usize, length: usize, index: usize) -> impl Iterator<Item = usize> {
+    let column = index % width.max(1);
+    let left = (column > 0).then(|| index - 1);
+    let right = (column + 1 < width).then_some(index + 1);
+    let (down, up) = (index.checked_sub(width), Some(index + width));
+    [left, right, down, up].into_iter().flatten().filter(move |neighbour| *neighbour < length)
+}
+
+/// Whether known cells beside obstacles have high costs.
+fn obstacles_are_inflated(width: usize, cells: &[i8]) -> bool {
+    let (mut known, mut inflated) = (0_u64, 0_u64);
+    for (index, _) in cells.iter().enumerate().filter(|(_, value)| **value == LETHAL) {
+        for beside in neighbours(width, cells.len(), index).map(|neighbour| cells[neighbour]) {
+            if cell::is_known(beside) && beside != LETHAL {
+                known += 1;
+                inflated += u64::from(beside >= BESIDE_LETHAL);
+            }
+        }
+    }
+    known > 0 && inflated as f64 >= COSTMAP_SHARE * known as f64
+}
+
+/// The cells of a costmap without the costs around obstacles: free on the side from which the cost falls to that of free space,
+/// unknown on the side from which it falls to unknown cells. The sides are found by flooding the costs from both (the watershed
+/// of Meyer, "Topographic distance and watershed lines", 1994); obstacles are the ridges between them.
+fn without_costs(width: usize, cells: &[i8]) -> Vec<i8> {
+    let is_cost = |value: i8| (1..LETHAL).contains(&value);
+    let mut read: Vec<i8> = cells.iter().map(|value| if is_cost(*value) { i8::MIN } else { *value }).collect();
+    read.iter_mut().filter(|value| !cell::is_known(**value) && **value != i8::MIN).for_each(|value| *value = -1);
+    let mut queue = BinaryHeap::new();
+    let mut order = 0_u64;
+    let mut flood = |from: usize, read: &mut [i8], queue: &mut BinaryHeap<Reverse<(i8, u64, usize)>>| {
+        for next in neighbours(width, cells.len(), from) {
+            if read[next] == i8::MIN {
+                read[next] = read[from];
+                order += 1;
+                queue.push(Reverse((cells[next], order, next)));
+            }
+        }
+    };
+    // Free space goes first: where a cost lies between both sides, something has seen it.
+    for side in [0, cell::UNKNOWN] {
+        for index in 0..cells.len() {
+            if read[index] == side && !is_cost(cells[index]) {
+                flood(index, &mut read, &mut queue);
+            }
+        }
+    }
+    while let Some(Reverse((_, _, index))) = queue.pop() {
+        flood(index, &mut read, &mut queue);
+    }
+    // What neither side reaches lies within obstacles.
+    read.iter_mut().filter(|value| **value == i8::MIN).for_each(|value| *value = cell::UNKNOWN);
+    read
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const N: i8 = -1;
+
+    fn read(values: CellValues, width: u32, cells: &[i8]) -> (Vec<i8>, Convention) {
+        let info = MapMetaData { width, height: cells.len() as u32 / width, ..Default::default() };
+        let (read, convention) = values.read(&info, cells);
+        (read.into_owned(), convention)
+    }
+
+    #[test]
+    fn what_map_servers_write_is_read_as_it_is() {
+        for cells in [&[0, 0, 0, 100, N][..], &[0, 3, 12, 40, 97, N], &[100, 100, N], &[0, 0, N], &[N, N], &[]] {
+            assert_eq!(read(CellValues::Auto, 1, cells), (cells.to_vec(), Convention::Occupancy), "{cells:?}");
+        }
+    }
+
+    #[test]
+    fn the_larger_of_two_values_is_occupied_and_the_smaller_free() {
+        for (free, occupied) in [(0, 1), (25, 100), (0, 64), (30, 70), (0, 50)] {
+            let cells = [N, free, free, free, occupied, free, N];
+            let (read, convention) = read(CellValues::Auto, 7, &cells);
+            assert_eq!(read, [N, 0, 0, 0, 100, 0, N], "{free} {occupied}");
+            let means = Convention::TwoClasses { free: f64::from(free), occupied: f64::from(occupied) };
+            assert_eq!(convention, means);
+        }
+    }
+
+    #[test]
+    fn probabilities_from_30_to_70_are_spread_over_the_whole_range() {
+        let cells: Vec<i8> =
+            [30; 40].into_iter().chain([33; 20]).chain([66; 5]).chain([70; 9]).chain([50, N]).collect();
+        let (read, _) = read(CellValues::Auto, 76, &cells);
+        let count = |is: fn(i8) -> bool| read.iter().filter(|value| is(**value)).count();
+        assert_eq!((count(cell::is_free), count(cell::is_occupied)), (60, 14));
+        assert_eq!(read[75], N);
+    }
+
+    #[test]
+    fn values_of_one_class_are_left_as_they_are() {
+        let spread: Vec<i8> = (30..60).collect();
+        for cells in [&spread[..], &[0, 1, 2, 3, 2, 1, 0], &[40, 40, 41], &[1, 1, 1, 0]] {
+            assert_eq!(read(CellValues::Auto, 1, cells).1, Convention::Occupancy, "{cells:?}");
+        }
+    }
+
+    /// A wall along a column with the costs about it, free space on its left and unknown space on its right.
+    fn costmap() -> Vec<i8> {
+        [[0, 0, 40, 70, 99, 100, 99, 70, N, N]; 6].concat()
+    }
+
+    #[test]
+    fn costs_are_free_on_the_side_of_free_space_and_unknown_behind_an_obstacle() {
+        let expected = [[0, 0, 0, 0, 0, 100, N, N, N, N]; 6].concat();
+        assert_eq!(read(CellValues::Auto, 10, &costmap()), (expected.clone(), Convention::Costmap));
+        assert_eq!(read(CellValues::Costmap, 10, &costmap()).0, expected);
+        assert_eq!(read(CellValues::Occupancy, 10, &costmap()).0, costmap());
+    }
+
+    #[test]
+    fn a_map_with_values_of_99_beside_walls_here_and_there_is_no_costmap() {
+        let mut cells = [[0, 0, 0, 100, 99, 0, N]; 6].concat();
+        cells[0] = 99;
+        assert_eq!(read(CellValues::Auto, 7, &cells).1, Convention::Occupancy);
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_read_is_in_the_convention_of_map_servers_and_unknown_cells_stay_so(
+            cells in proptest::collection::vec(any::<i8>(), 0..60),
+            width in 0_u32..9,
+            values in prop_oneof![Just(CellValues::Auto), Just(CellValues::Costmap), Just(CellValues::TwoClasses)],
+        ) {
+            let info = MapMetaData { width, ..Default::default() };
+            let (read, convention) = values.read(&info, &cells);
+            prop_assert_eq!(read.len(), cells.len());
+            if convention != Convention::Occupancy {
+                for (was, is) in cells.iter().zip(read.iter()) {
+                    prop_assert!(*is == cell::UNKNOWN || cell::is_known(*is));
+                    prop_assert!(cell::is_known(*was) || *is == cell::UNKNOWN);
+                }
+            }
+        }
+    }
+}
