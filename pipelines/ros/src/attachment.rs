@@ -1,14 +1,14 @@
-//! What goes with a message: its number, when it was sent, and by whom.
+//! The attachment of a message: its sequence number, its time, and its publisher.
 
-/// The bytes of an identifier.
+/// The size of an identifier, bytes.
 const GID_SIZE: u8 = 16;
-/// The bytes of an attachment: two numbers, and the identifier behind its length.
+/// The size of an attachment, bytes: two numbers, and the identifier with its length.
 const SIZE: usize = 8 + 8 + 1 + GID_SIZE as usize;
 
-/// The attachment of a message, as Zenoh's serialisation writes it: numbers in little-endian byte order.
+/// The attachment of a message, in Zenoh's serialization: numbers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Attachment {
-    /// Counts the messages of the publisher, from 1.
+    /// The sequence number of the message from its publisher, from 1.
     pub sequence: i64,
     /// When the message was sent, nanoseconds since the Unix epoch.
     pub source_time: i64,
@@ -27,7 +27,7 @@ impl Attachment {
         bytes
     }
 
-    /// Reads what [`to_bytes`](Self::to_bytes) wrote; `None` if it is none.
+    /// The attachment of the bytes of [`to_bytes`](Self::to_bytes); `None` if they are invalid.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; SIZE] = bytes.try_into().ok()?;
         let number = |at: usize| Some(i64::from_le_bytes(bytes.get(at..at + 8)?.try_into().ok()?));
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_attachment_is_none() {
+    fn invalid_bytes_are_no_attachment() {
         let whole = Attachment { sequence: 1, source_time: 2, gid: [3; 16] }.to_bytes();
         assert_eq!(Attachment::from_bytes(&[]), None);
         assert_eq!(Attachment::from_bytes(&whole[..32]), None);

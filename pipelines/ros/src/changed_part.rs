@@ -1,20 +1,20 @@
-//! Which part of a map has changed since the whole of it was sent.
+//! The part of a map that has changed since the last whole map was sent.
 //!
-//! Whoever has the last whole map has the map after any of the updates that follow, whether or not the ones between have come: an
-//! update covers all cells that differ from the whole map, and those that an earlier update has covered. So what is kept of the
-//! whole map for those who come late is what the next update applies to.
+//! A subscriber with the last whole map has the current map after any later update, even if it missed the updates between: an
+//! update covers all cells that differ from the whole map, and all cells of earlier updates. So the next update applies to the
+//! whole map that is retained for late joiners.
 
 use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
 
-/// An update has at most this share of the cells of the map: it is sent a second time behind the next whole map.
-const SHARE: usize = 4;
+/// An update has at most one in so many cells of the map, because it is sent again after the next whole map.
+const MAX_SHARE_DIVISOR: usize = 4;
 
 /// A rectangle of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Rectangle {
     /// The first column and the first row.
     low: [usize; 2],
-    /// The column and the row behind the last ones.
+    /// The column and the row after the last ones.
     high: [usize; 2],
 }
 
@@ -23,31 +23,31 @@ impl Rectangle {
         (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
     }
 
-    /// The smallest that holds both.
+    /// The smallest rectangle that contains both.
     fn with(self, other: Self) -> Self {
         let both = |a: [usize; 2], b: [usize; 2], of: fn(usize, usize) -> usize| [of(a[0], b[0]), of(a[1], b[1])];
         Self { low: both(self.low, other.low, usize::min), high: both(self.high, other.high, usize::max) }
     }
 }
 
-/// A map as it was sent: the last whole one, and what has changed since.
+/// The sent state of a map: the last whole map, and the changes since.
 #[derive(Debug)]
 pub(crate) struct SentMap {
     prefix: GridPrefix,
     /// The cells of the last whole map.
     whole: Vec<u8>,
-    /// The cells as they are.
+    /// The current cells.
     cells: Vec<u8>,
-    /// What the last update has covered; `None` if there was none after the whole map.
+    /// The part covered by the last update; `None` if there was none after the whole map.
     covered: Option<Rectangle>,
     /// How many cells all updates after the whole map have brought.
-    brought: usize,
-    /// What updates before the whole map had covered. The two are on topics of their own, and a listener may take them in another
-    /// order.
+    updated_cells: usize,
+    /// The part covered by updates before the whole map. Maps and updates have separate topics, so a subscriber may receive them
+    /// in another order.
     outdated: Option<Rectangle>,
 }
 
-/// What is to be sent of a map.
+/// The part of a map that is to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     /// All of it.
@@ -59,18 +59,18 @@ pub(crate) enum Part {
 }
 
 impl SentMap {
-    /// A map that is sent as a whole; `None` if it does not hold as many cells as it says.
+    /// The state for a first whole map; `None` if the number of cells does not match its size.
     pub(crate) fn new(map: &OccupancyGrid<'_>) -> Option<Self> {
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
         let is_whole = prefix.cell_count() == map.data.len();
         let cells = map.data.to_vec();
-        is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, brought: 0, outdated: None })
+        is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, updated_cells: 0, outdated: None })
     }
 
     /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for
     /// that, or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as
     /// the map has: so no more is sent than twice what had to be.
-    pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, hears_updates: bool) -> Part {
+    pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, receives_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id
             && (before.resolution, before.width, before.height, before.origin)
@@ -87,12 +87,13 @@ impl SentMap {
             (Some(changed), Some(covered)) => Some(changed.with(covered)),
             (changed, covered) => changed.or(covered),
         };
-        let is_small = |part: &Rectangle| part.cell_count() <= self.cells.len() / SHARE;
-        let may_update = lies_alike && hears_updates && part.as_ref().is_some_and(is_small);
-        match part.filter(|part| may_update && self.brought.saturating_add(part.cell_count()) < self.cells.len()) {
+        let is_small = |part: &Rectangle| part.cell_count() <= self.cells.len() / MAX_SHARE_DIVISOR;
+        let may_update = lies_alike && receives_updates && part.as_ref().is_some_and(is_small);
+        match part.filter(|part| may_update && self.updated_cells.saturating_add(part.cell_count()) < self.cells.len())
+        {
             Some(part) => {
                 self.covered = Some(part);
-                self.brought += part.cell_count();
+                self.updated_cells += part.cell_count();
                 Part::Update(part)
             }
             None => {
@@ -102,35 +103,35 @@ impl SentMap {
         }
     }
 
-    /// Whether updates have been sent after the last whole map.
+    /// Whether updates were sent after the last whole map.
     pub(crate) fn is_updated(&self) -> bool {
         self.covered.is_some()
     }
 
-    /// The whole map as it is, which counts as sent from here on.
+    /// The current whole map, which counts as sent.
     pub(crate) fn whole(&mut self) -> OccupancyGrid<'_> {
         self.set_whole();
         OccupancyGrid { header: self.prefix.header.clone(), info: self.prefix.info, data: &self.cells }
     }
 
-    /// What changes next is sent with all of the map.
-    pub(crate) fn owe_whole(&mut self) {
-        self.brought = self.cells.len();
+    /// Makes the next change be sent as a whole map.
+    pub(crate) fn request_whole(&mut self) {
+        self.updated_cells = self.cells.len();
     }
 
     fn set_whole(&mut self) {
         self.whole.clone_from(&self.cells);
-        (self.outdated, self.covered, self.brought) = (self.covered.take().or(self.outdated), None, 0);
+        (self.outdated, self.covered, self.updated_cells) = (self.covered.take().or(self.outdated), None, 0);
     }
 
-    /// The part of a whole map that is to be sent as an update behind it, as an update of before may be put into it otherwise.
+    /// The part that must be sent again as an update after a whole map, because an earlier update may be applied to it.
     pub(crate) fn take_outdated(&mut self) -> Option<Rectangle> {
         let Rectangle { low, high } = self.outdated.take()?;
         let high = [high[0].min(self.prefix.info.width as usize), high[1].min(self.prefix.info.height as usize)];
         (low[0] < high[0] && low[1] < high[1]).then_some(Rectangle { low, high })
     }
 
-    /// The header of an update with a part of the map, and the cells of that, which `cells` is filled with.
+    /// The update with a part of the map, whose cells are written to `cells`.
     pub(crate) fn update<'a>(&self, part: Rectangle, cells: &'a mut Vec<u8>) -> OccupancyGridUpdate<'a> {
         let Rectangle { low: [left, low], high: [right, high] } = part;
         cells.clear();
@@ -220,7 +221,7 @@ mod tests {
         cells.fill(9);
         assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Whole);
         cells[0] = 1;
-        sent.owe_whole();
+        sent.request_whole();
         assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Whole);
         cells[0] = 2;
         assert_eq!(sent.take(&map(8, 5, &cells), true), part([0, 0], [1, 1]));

@@ -1,19 +1,19 @@
-//! How a stage joins the Zenoh network that ROS 2 programs are in.
+//! The connection of a stage to the Zenoh network of ROS 2 programs.
 
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::path::{Path, PathBuf};
 use zenoh::{Config, Session, Wait};
 
-/// The router that `rmw_zenoh` looks for where nothing else is said.
+/// The default router of `rmw_zenoh`.
 pub(crate) const ROUTER: &str = "tcp/localhost:7447";
-/// Other programs may connect here, from this machine only.
+/// The default address to listen at, reachable from this machine only.
 pub(crate) const LISTEN: &str = "tcp/localhost:0";
-/// Names Zenoh's configuration file for ROS 2 programs.
+/// The environment variable with Zenoh's configuration file for ROS 2 programs.
 const CONFIGURATION_VARIABLE: &str = "ZENOH_SESSION_CONFIG_URI";
-/// Names the domain of ROS 2 programs.
+/// The environment variable with the domain of ROS 2 programs.
 const DOMAIN_VARIABLE: &str = "ROS_DOMAIN_ID";
 
-/// What the parameters of a stage say of the network.
+/// The network parameters of a stage.
 #[derive(Clone, Debug)]
 pub(crate) struct Connection {
     pub(crate) domain: Option<u32>,
@@ -24,7 +24,7 @@ pub(crate) struct Connection {
 }
 
 impl Connection {
-    /// What is wrong with it.
+    /// The errors of the parameters.
     pub(crate) fn check(&self) -> Vec<ParameterError> {
         let is_named = |name: &str| {
             let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
@@ -37,7 +37,10 @@ impl Connection {
         for (key, endpoints) in [("connect", &self.connect), ("listen", &self.listen)] {
             if let Some(wrong) = endpoints.iter().find(|endpoint| endpoint.parse::<zenoh::config::EndPoint>().is_err())
             {
-                errors.push(ParameterError::new(key, format!("`{wrong}` is none; write it as `tcp/HOST:PORT`")));
+                errors.push(ParameterError::new(
+                    key,
+                    format!("`{wrong}` is not an endpoint; write it as `tcp/HOST:PORT`"),
+                ));
             }
         }
         errors
@@ -61,7 +64,7 @@ impl Connection {
     /// Opens a session.
     ///
     /// # Errors
-    /// The configuration file is wrong, or nothing can listen where it is to.
+    /// The configuration file is invalid, or the address to listen at cannot be used.
     pub(crate) fn open(&self) -> Result<Session, StageError> {
         join(self.config())
     }
@@ -74,13 +77,13 @@ impl Connection {
         let settings = [
             ("scouting/multicast/enabled", "false"),
             ("scouting/gossip/enabled", "true"),
-            // What is kept for those who come later is sorted by time.
+            // The history for late joiners is sorted by time.
             ("timestamping/enabled", "true"),
         ];
         peer_config(&self.connect, &self.listen, &settings)
     }
 
-    /// Where a router is looked for, as words.
+    /// The addresses of routers, as text.
     pub(crate) fn routers(&self) -> String {
         match self.connect.is_empty() {
             true => "anywhere".to_owned(),
@@ -92,17 +95,17 @@ impl Connection {
 /// Opens a session.
 ///
 /// # Errors
-/// There is no configuration, or nothing can listen where it is to.
+/// The configuration is invalid, or the address to listen at cannot be used.
 pub(crate) fn join(config: Result<Config, String>) -> Result<Session, StageError> {
     let doing = "join the Zenoh network";
     let config = config.map_err(|cause| StageError::new(doing, cause))?;
     zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
 }
 
-/// A program that connects to some endpoints and listens at others, with some more settings of Zenoh as JSON5.
+/// The configuration of a peer that connects to some endpoints and listens at others, with further settings of Zenoh as JSON5.
 ///
 /// # Errors
-/// Zenoh takes something of it for wrong.
+/// Zenoh rejects a setting.
 pub(crate) fn peer_config(connect: &[String], listen: &[String], settings: &[(&str, &str)]) -> Result<Config, String> {
     let list = |endpoints: &[String]| serde_json::to_string(endpoints).map_err(|error| error.to_string());
     let mut config = Config::default();
@@ -117,16 +120,16 @@ pub(crate) fn peer_config(connect: &[String], listen: &[String], settings: &[(&s
 /// Reads a configuration file of Zenoh.
 ///
 /// # Errors
-/// It cannot be read, or says what Zenoh does not know.
+/// It cannot be read, or it has unknown settings.
 pub(crate) fn file_config(path: &Path) -> Result<Config, String> {
     Config::from_file(path).map_err(|error| format!("{}: {}", path.display(), in_words(&error)))
 }
 
-/// What an error of Zenoh says, without the place in its code.
+/// The text of an error of Zenoh, without the source location.
 pub(crate) fn in_words(error: &zenoh::Error) -> String {
     let text = error.to_string();
     match text.rsplit_once(" at ") {
-        Some((words, place)) if place.contains(".rs:") => words.to_owned(),
+        Some((words, location)) if location.contains(".rs:") => words.to_owned(),
         _ => text,
     }
 }
@@ -142,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_of_zenoh_is_told_without_the_place_in_its_code() {
+    fn the_text_of_an_error_of_zenoh_has_no_source_location() {
         let missing = file_config(Path::new("/there/is/no/such/file.json5")).err().unwrap();
         assert!(missing.starts_with("/there/is/no/such/file.json5: No such file"), "{missing}");
         assert!(!missing.contains(".rs:"), "{missing}");

@@ -1,4 +1,4 @@
-//! Definitions of message types: those that Gridweave knows, and those of packages of ROS that are installed beside it.
+//! Definitions of message types: those built into Gridweave, and those of installed ROS packages.
 
 use super::key_expression::Topic;
 use gridweave_logs::dynamic::Schema;
@@ -7,12 +7,12 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
-/// Names where packages of ROS are installed, in a shell where they are set up.
+/// The environment variable with the folders of installed ROS packages.
 const PREFIXES_VARIABLE: &str = "AMENT_PREFIX_PATH";
-/// Stands between a definition and the next of the types that it uses.
+/// The separator between a definition and those of the types that it uses.
 const SEPARATOR: &str = "================================================================================";
 const RANGE: &str = "sensor_msgs/msg/Range";
-/// What it is from Iron on; logs without definitions are older, and have it without the last field.
+/// The definition since Iron; the built-in one, for older logs without definitions, lacks the last field.
 const LATER_RANGE: &str = "\
 std_msgs/Header header
 uint8 ULTRASOUND=0
@@ -24,10 +24,10 @@ float32 max_range
 float32 range
 float32 variance
 ";
-/// A file that is larger is no definition.
-const LARGEST: u64 = 1 << 20;
+/// The maximum size of a definition, bytes.
+const MAX_SIZE: u64 = 1 << 20;
 
-/// Where definitions are looked for.
+/// The sources of definitions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Definitions {
     /// Folders of packages.
@@ -35,7 +35,7 @@ pub(crate) struct Definitions {
 }
 
 impl Definitions {
-    /// Those in these folders of packages, or, if there are none, in those that the environment names.
+    /// Definitions in these folders of packages or, if there are none, in those of the environment.
     pub(crate) fn new(folders: &[PathBuf]) -> Self {
         if !folders.is_empty() {
             return Self { folders: folders.to_vec() };
@@ -44,8 +44,8 @@ impl Definitions {
         Self { folders: std::env::split_paths(&prefixes).map(|prefix| prefix.join("share")).collect() }
     }
 
-    /// The definition of the type of a topic and of all that it uses, as a log holds it (`ros2msg`): of several the one with the
-    /// hash that the topic has, if there is one.
+    /// The definition of a topic's type and of all types that it uses, as in a log (`ros2msg`): of several the one with the
+    /// topic's hash, if there is one.
     pub(crate) fn text(&self, topic: &Topic) -> Option<String> {
         let candidates: Vec<String> = match topic.ros_type.as_str() {
             RANGE => schema_text(RANGE).into_iter().chain([self.with_used(RANGE, LATER_RANGE)]).collect(),
@@ -58,21 +58,21 @@ impl Definitions {
         candidates.iter().find(has_hash).or(candidates.first()).cloned()
     }
 
-    /// The hash of the type of a topic by its definition.
+    /// The hash of a topic's type, computed from its definition.
     pub(crate) fn hash(&self, topic: &Topic) -> Option<String> {
         hash(&topic.ros_type, &self.text(topic)?)
     }
 
-    /// The definition of a type with those of all that it uses behind it.
+    /// The definition of a type, followed by those of all types that it uses.
     fn with_used(&self, ros_type: &str, text: &str) -> String {
         let mut text = text.to_owned();
         let mut seen = BTreeSet::from([ros_type.to_owned()]);
         let mut to_do = used_types(ros_type, &text);
-        while let Some(used) = to_do.pop().filter(|_| text.len() as u64 <= LARGEST) {
+        while let Some(used) = to_do.pop().filter(|_| text.len() as u64 <= MAX_SIZE) {
             if !seen.insert(used.clone()) {
                 continue;
             }
-            // A known one comes with all that it uses.
+            // A built-in definition includes all types that it uses.
             let of_used = schema_text(&used).or_else(|| {
                 let of_used = self.installed(&used)?;
                 to_do.extend(used_types(&used, &of_used));
@@ -94,7 +94,8 @@ impl Definitions {
         }
         let file = format!("{package}/msg/{name}.msg");
         let files = self.folders.iter().map(|folder| folder.join(&file));
-        let is_small = |file: &PathBuf| fs::metadata(file).is_ok_and(|about| about.is_file() && about.len() <= LARGEST);
+        let is_small =
+            |file: &PathBuf| fs::metadata(file).is_ok_and(|about| about.is_file() && about.len() <= MAX_SIZE);
         files.filter(is_small).find_map(|file| fs::read_to_string(file).ok())
     }
 }
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_type_of_an_installed_package_is_known_with_all_that_it_uses() {
+    fn the_definition_of_an_installed_type_includes_all_types_that_it_uses() {
         let folder = TempDir::new().unwrap();
         let package = folder.path().join("tags_msgs/msg");
         fs::create_dir_all(&package).unwrap();
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_definitions_that_a_type_has_had_the_one_that_is_meant_counts() {
+    fn of_two_versions_of_a_type_the_one_with_the_topics_hash_is_used() {
         let definitions = Definitions::default();
         let later = "RIHS01_b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a";
         assert!(definitions.text(&topic(RANGE, later)).unwrap().contains("variance"));

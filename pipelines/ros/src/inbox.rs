@@ -1,20 +1,19 @@
-//! What has come from the network and was not taken yet.
+//! The queue of received events.
 
 use super::liveliness::Entity;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Something that has come.
+/// A received event.
 pub(crate) enum Event<M> {
-    /// A program is there from here on (or no longer).
+    /// A publisher, subscriber or node has appeared (or disappeared).
     Entity(Entity, bool),
-    /// A message on the topic of the given number.
+    /// A message on the topic with the given index.
     Message { topic: usize, message: M, arrived: i64 },
 }
 
-/// A queue of events. Of each topic it holds so many messages; when there are more, the oldest goes, as ROS has it with
-/// `keep_last`.
+/// A queue of events with a limited number of messages per topic. Beyond it the oldest is dropped, like `keep_last` of ROS.
 pub(crate) struct Inbox<M> {
     state: Mutex<State<M>>,
     has_come: Condvar,
@@ -22,9 +21,9 @@ pub(crate) struct Inbox<M> {
 
 struct State<M> {
     events: VecDeque<Event<M>>,
-    /// By topic: how many messages wait.
+    /// The number of pending messages by topic.
     waiting: Vec<usize>,
-    /// How many messages were dropped since that was asked for.
+    /// The number of dropped messages since the last query.
     dropped: u64,
 }
 
@@ -36,7 +35,7 @@ impl<M> Default for Inbox<M> {
 }
 
 impl<M> Inbox<M> {
-    /// Puts an event in. Of the messages of its topic `depth` are held.
+    /// Adds an event, and keeps the last `depth` messages of its topic.
     pub(crate) fn push(&self, event: Event<M>, depth: usize) {
         let mut state = self.lock();
         if let Event::Message { topic, .. } = event {
@@ -70,12 +69,12 @@ impl<M> Inbox<M> {
         Some(event)
     }
 
-    /// How many messages were dropped since this was asked last.
+    /// The number of messages dropped since the last call.
     pub(crate) fn take_dropped(&self) -> u64 {
         std::mem::take(&mut self.lock().dropped)
     }
 
-    /// Waits until something is there, or for as long as this.
+    /// Waits until there is an event, for at most `longest`.
     pub(crate) fn wait(&self, longest: Duration) {
         let is_empty = |state: &mut State<M>| state.events.is_empty();
         drop(self.has_come.wait_timeout_while(self.lock(), longest, is_empty));
@@ -99,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn of_each_topic_the_last_messages_are_held() {
+    fn the_last_messages_of_each_topic_are_kept() {
         let inbox = Inbox::default();
         let push = |topic, message, depth| inbox.push(Event::Message { topic, message, arrived: 0 }, depth);
         for message in 0..4 {
@@ -110,11 +109,11 @@ mod tests {
         assert_eq!((inbox.take_dropped(), inbox.take_dropped()), (2, 0));
         push(0, 7, 0);
         push(0, 8, 0);
-        assert_eq!(taken(&inbox), [(0, 8)], "one is always held");
+        assert_eq!(taken(&inbox), [(0, 8)], "one is always kept");
     }
 
     #[test]
-    fn who_waits_is_woken_by_what_comes() {
+    fn an_event_wakes_the_waiting_thread() {
         let inbox = Inbox::default();
         inbox.wait(Duration::ZERO);
         std::thread::scope(|scope| {

@@ -3,10 +3,10 @@
 use gridweave_logs::dynamic::Schema;
 use gridweave_logs::schemas::schema_text;
 
-/// Stands for the hash of a type where ROS knows none, as in Humble.
+/// The type hash where ROS has none, as in Humble.
 pub const NO_HASH: &str = "TypeHashNotSupported";
 
-/// A topic, as ROS 2 programs must agree on it to hear each other.
+/// A topic, with everything that a publisher and a subscriber of ROS 2 must agree on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Topic {
     /// The full name, such as `/robot1/map`.
@@ -18,25 +18,25 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// A topic of messages of a type that Gridweave knows; `None` if it does not.
+    /// A topic of a built-in message type; `None` if the type is unknown.
     pub fn known(name: &str, ros_type: &str) -> Option<Self> {
         Some(Self { name: name.to_owned(), ros_type: ros_type.to_owned(), type_hash: known_hash(ros_type)? })
     }
 
-    /// Where its messages are sent.
+    /// The key expression of its messages.
     pub fn key_expression(&self, domain: u32) -> String {
         let name = self.name.trim_matches('/');
         format!("{domain}/{name}/{}/{}", type_in_keys(&self.ros_type), self.type_hash)
     }
 }
 
-/// The hash of a type by the definition that Gridweave has of it; `None` if it has none.
+/// The hash of a built-in type; `None` if the type is unknown.
 pub fn known_hash(ros_type: &str) -> Option<String> {
     let schema = Schema::parse(ros_type, &schema_text(ros_type)?).ok()?;
     Some(schema.type_hash())
 }
 
-/// What DDS calls a type: `nav_msgs::msg::dds_::OccupancyGrid_` for `nav_msgs/msg/OccupancyGrid`.
+/// The DDS name of a type: `nav_msgs::msg::dds_::OccupancyGrid_` for `nav_msgs/msg/OccupancyGrid`.
 pub(crate) fn type_in_keys(ros_type: &str) -> String {
     match ros_type.rsplit_once('/') {
         Some((package, name)) => format!("{}::dds_::{name}_", package.replace('/', "::")),
@@ -44,7 +44,7 @@ pub(crate) fn type_in_keys(ros_type: &str) -> String {
     }
 }
 
-/// The other way round; `None` if it is no name of a type.
+/// The type with a DDS name; `None` if the name is invalid.
 pub(crate) fn type_of_key(type_in_keys: &str) -> Option<String> {
     let (package, name) = type_in_keys.split_once("::dds_::")?;
     let name = name.strip_suffix('_').filter(|name| !name.is_empty() && !package.is_empty())?;
@@ -59,7 +59,7 @@ mod tests {
 
     /// The examples of `docs/design.md` of `rmw_zenoh`.
     #[test]
-    fn a_topic_has_the_key_that_ros_gives_it() {
+    fn key_expressions_equal_those_of_ros() {
         let of = |name: &str| Topic::known(name, "std_msgs/msg/String").unwrap().key_expression(0);
         assert_eq!(of("/chatter"), format!("0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"));
         assert_eq!(of("/robot1/chatter"), format!("0/robot1/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"));
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_type_comes_back_as_it_went_in() {
+    fn converting_a_type_to_its_dds_name_and_back_gives_the_same_type() {
         for name in ["std_msgs/msg/String", "example_interfaces/srv/AddTwoInts"] {
             assert_eq!(type_of_key(&type_in_keys(name)).as_deref(), Some(name));
         }

@@ -1,22 +1,22 @@
-//! ROS 2 without ROS: stages that take what robots publish and publish what was found, over [Zenoh](https://zenoh.io), as the ROS
-//! 2 middleware `rmw_zenoh_cpp` speaks it.
+//! ROS 2 without ROS: stages that subscribe to the topics of robots and publish results, over [Zenoh](https://zenoh.io), with the
+//! protocol of the ROS 2 middleware `rmw_zenoh_cpp`.
 //!
-//! The binary `gridweave-ros` is the command `gridweave` with these kinds: `ros_source` and `ros_sink`. A program with stages of
-//! its own adds [`kinds`] to them:
+//! The binary `gridweave-ros` is the command `gridweave` with these additional kinds. A program with its own stages adds
+//! [`kinds`] in the same way:
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
-//!     gridweave::command_with(gridweave_ros::kinds(), gridweave_ros::bridge::hear)
+//!     gridweave::command_with(gridweave_ros::kinds(), gridweave_ros::bridge::on_log_warning)
 //! }
 //! ```
 //!
-//! What goes over the wire is written down in the `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics,
-//! [liveliness tokens](liveliness) by which programs know of each other, and [attachments](attachment) of messages.
+//! The protocol is documented in `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics, [liveliness
+//! tokens](liveliness) for discovery, and [attachments](attachment) of messages.
 
 #![forbid(unsafe_code)]
 
 pub mod attachment;
-mod audience;
+mod map_subscribers;
 pub mod bridge;
 mod changed_part;
 mod connection;
@@ -26,7 +26,7 @@ pub mod key_expression;
 pub mod liveliness;
 mod map_topics;
 mod node;
-mod own_trees;
+mod robot_trees;
 pub mod qos;
 mod settled_frames;
 pub mod sink;

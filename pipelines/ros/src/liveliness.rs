@@ -1,5 +1,5 @@
-//! Liveliness tokens: by them ROS 2 programs know what nodes, publishers and subscribers there are, so that `ros2 node list` and
-//! `ros2 topic list` show them.
+//! Liveliness tokens: the discovery of nodes, publishers and subscribers by ROS 2 programs, such as `ros2 node list` and
+//! `ros2 topic list`.
 
 use super::key_expression::{Topic, type_in_keys, type_of_key};
 use super::qos::Qos;
@@ -7,10 +7,10 @@ use std::fmt;
 use std::str::FromStr;
 use twox_hash::XxHash3_128;
 
-/// What all tokens begin with.
+/// The prefix of all tokens.
 const SPACE: &str = "@ros2_lv";
 
-/// What a token tells of.
+/// The kind of an entity.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A node.
@@ -21,7 +21,7 @@ pub enum Kind {
     Subscriber(Topic, Qos),
 }
 
-/// A node, or a publisher or subscriber of one.
+/// A node, or a publisher or subscriber of a node, as announced by a token.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Entity {
     /// The ROS domain.
@@ -30,23 +30,23 @@ pub struct Entity {
     pub session: String,
     /// The number of its node in the session.
     pub node_number: u32,
-    /// Its number in the session; for a node that of the node.
+    /// Its number in the session; for a node the number of the node.
     pub number: u32,
     /// The namespace of its node: `/`, or such as `/robot1`.
     pub namespace: String,
     /// The name of its node.
     pub node: String,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
 }
 
 impl Entity {
-    /// The key expression of the tokens of everything that there is in a domain.
+    /// The key expression that matches the tokens of all entities in a domain.
     pub fn all(domain: u32) -> String {
         format!("{SPACE}/{domain}/**")
     }
 
-    /// What tells its messages from those of others: the 128 bits of XXH3 over the token.
+    /// The identifier of its messages: the 128-bit XXH3 hash of the token.
     pub fn gid(&self) -> [u8; 16] {
         XxHash3_128::oneshot(self.to_string().as_bytes()).to_le_bytes()
     }
@@ -82,7 +82,7 @@ impl fmt::Display for Entity {
 impl FromStr for Entity {
     type Err = ();
 
-    /// An error for what is no token, or tells of something else than a topic.
+    /// An error for an invalid token, or one of another kind, such as a service.
     fn from_str(token: &str) -> Result<Self, ()> {
         let parts: Vec<&str> = token.split('/').collect();
         let [SPACE, domain, session, node_number, number, short, _enclave, namespace, node, topic @ ..] =
@@ -144,7 +144,7 @@ mod tests {
 
     /// The examples of `docs/design.md` of `rmw_zenoh`.
     #[test]
-    fn tokens_are_those_of_ros() {
+    fn tokens_equal_those_of_ros() {
         let topic = Topic { name: "/chatter".into(), ros_type: "std_msgs/msg/String".into(), type_hash: HASH.into() };
         let subscriber = Entity { number: 10, kind: Kind::Subscriber(topic.clone(), Qos::reliable(10)), ..listener() };
         let publisher = Entity {
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn names_in_a_namespace_come_back() {
+    fn names_in_a_namespace_are_read_back() {
         let node = Entity { namespace: "/fleet/robot1".into(), ..listener() };
         assert_eq!(node.to_string(), "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/0/NN/%/%fleet%robot1/listener");
         assert_eq!(node.to_string().parse(), Ok(node.clone()));
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_token_is_none() {
+    fn invalid_tokens_are_errors() {
         for text in [
             "",
             "@ros2_lv/0",

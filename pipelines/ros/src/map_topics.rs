@@ -1,13 +1,12 @@
-//! Maps that are published: whole ones, and between them the parts that have changed.
+//! Publishing of maps: whole maps, and updates of the changed parts between them.
 //!
-//! A whole map is kept for those who come late (transient local), and updates apply to it; see
-//! [`changed_part`](super::changed_part). Updates are kept for nobody: one of them on a later whole map would put back what has
-//! changed. So whoever comes when there were updates has an older map, until the next update or, at once, the whole map that is
-//! sent because of that.
+//! A whole map is retained for late joiners (transient local), and updates apply to it; see
+//! [`changed_part`](super::changed_part). Updates are not retained (volatile): an old update applied to a later whole map would
+//! revert changes. So a late joiner after updates receives an outdated map first, and a whole map is sent for it at once.
 
-use super::audience::{Audience, updates_of};
 use super::changed_part::{Part, Rectangle, SentMap};
 use super::key_expression::Topic;
+use super::map_subscribers::{MapSubscribers, updates_of};
 use super::node::{Node, Publisher};
 use super::qos::Qos;
 use gridweave_runtime::ros::{OccupancyGrid, OccupancyGridUpdate, RosMessage, encode};
@@ -16,15 +15,15 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// As many updates wait for one who is slow.
-const UPDATES: usize = 10;
+/// The depth of the publishers of updates, messages.
+const UPDATES_DEPTH: usize = 10;
 
-/// The maps that are published, by topic.
+/// The published maps, by topic.
 pub(crate) struct MapTopics {
-    audience: Arc<Audience>,
+    subscribers: Arc<MapSubscribers>,
     topics: Arc<Mutex<BTreeMap<String, MapTopic>>>,
-    /// Sends whole maps to those who come.
-    usher: Option<JoinHandle<()>>,
+    /// The thread that sends whole maps for late joiners.
+    late_join_thread: Option<JoinHandle<()>>,
 }
 
 struct MapTopic {
@@ -33,44 +32,45 @@ struct MapTopic {
     sent: SentMap,
 }
 
-/// What was sent of a map.
+/// The part of a map that was sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sent {
-    /// All of it.
+    /// The whole map.
     Whole,
-    /// What has changed.
+    /// An update of the changed part.
     Update,
     /// Nothing, as nothing has changed.
     Nothing,
 }
 
 impl MapTopics {
-    /// Looks out for those who hear maps.
+    /// Watches for subscribers of maps, and sends whole maps for late joiners.
     ///
     /// # Errors
     /// The session has failed, or no thread can be started.
     pub(crate) fn watch(node: &Node) -> Result<Self, StageError> {
-        let (audience, topics) = (Arc::<Audience>::default(), Arc::<Mutex<BTreeMap<_, _>>>::default());
-        let to = Arc::clone(&audience);
-        node.watch(move |entity, is_there| to.note(entity, is_there))?;
-        let (of, maps) = (Arc::clone(&audience), Arc::clone(&topics));
-        let usher = thread::Builder::new().name("late maps".to_owned()).spawn(move || {
-            while let Some(newcomer) = of.next_newcomer() {
+        let (subscribers, topics) = (Arc::<MapSubscribers>::default(), Arc::<Mutex<BTreeMap<_, _>>>::default());
+        let to = Arc::clone(&subscribers);
+        node.watch(move |entity, is_present| to.note(entity, is_present))?;
+        let (of, maps) = (Arc::clone(&subscribers), Arc::clone(&topics));
+        let late_join_thread = thread::Builder::new().name("late maps".to_owned()).spawn(move || {
+            while let Some(late_joiner) = of.next_late_joiner() {
                 let mut maps = lock(&maps);
-                let Some(map) = maps.get_mut(&newcomer.topic) else { continue };
-                if !map.sent.is_updated() && newcomer.is_latched {
-                    // It asks for the whole map that was sent last. An update might come before that.
-                    map.sent.owe_whole();
+                let Some(map) = maps.get_mut(&late_joiner.topic) else { continue };
+                if !map.sent.is_updated() && late_joiner.is_latched {
+                    // It requests the last whole map itself. An update could arrive before that.
+                    map.sent.request_whole();
                 } else if let Err(error) = map.send_whole() {
-                    tracing::warn!("a map was not sent to one who has come late: {error}");
+                    tracing::warn!("cannot send a whole map for a late joiner: {error}");
                 }
             }
         });
-        let usher = usher.map_err(|error| StageError::new("start a thread for those who come late", error))?;
-        Ok(Self { audience, topics, usher: Some(usher) })
+        let late_join_thread =
+            late_join_thread.map_err(|error| StageError::new("start the thread for late joiners", error))?;
+        Ok(Self { subscribers, topics, late_join_thread: Some(late_join_thread) })
     }
 
-    /// Publishes a map on a topic, the whole or what has changed. `None` if it does not hold as many cells as it says.
+    /// Publishes a map on a topic, as a whole or as an update. `None` if the number of cells does not match its size.
     ///
     /// # Errors
     /// The session has failed.
@@ -90,7 +90,7 @@ impl MapTopics {
             };
             let mut whole = node.publish(of(name, OccupancyGrid::NAME)?, Qos::latched(1))?;
             let updates = of(&updates_of(name), OccupancyGridUpdate::NAME)?;
-            let updates = node.publish(updates, Qos::reliable(UPDATES))?;
+            let updates = node.publish(updates, Qos::reliable(UPDATES_DEPTH))?;
             whole.send(bytes)?;
             topics.insert(name.to_owned(), MapTopic { whole, updates, sent });
             return Ok(Some(Sent::Whole));
@@ -98,7 +98,7 @@ impl MapTopics {
         if map.info.width as usize * map.info.height as usize != map.data.len() {
             return Ok(None);
         }
-        match topic.sent.take(map, self.audience.hears_updates(name)) {
+        match topic.sent.take(map, self.subscribers.receives_updates(name)) {
             Part::Nothing => Ok(Some(Sent::Nothing)),
             Part::Update(part) => topic.send_update(part).map(|()| Some(Sent::Update)),
             Part::Whole => {
@@ -108,7 +108,7 @@ impl MapTopics {
         }
     }
 
-    /// Publishes the whole of each map of which updates were the last that was sent.
+    /// Publishes the whole of each map that was last sent as an update.
     ///
     /// # Errors
     /// The session has failed.
@@ -128,11 +128,11 @@ impl MapTopic {
     fn send_update(&mut self, part: Rectangle) -> Result<(), StageError> {
         let mut cells = Vec::new();
         let update = encode(&self.sent.update(part, &mut cells))
-            .map_err(|error| StageError::new("publish what has changed in a map", error))?;
+            .map_err(|error| StageError::new("publish an update of a map", error))?;
         self.updates.send(&update)
     }
 
-    /// Behind a whole map: what updates of before would put back that are taken after it.
+    /// Sends an update after a whole map, for subscribers that apply an earlier update to it.
     fn send_outdated(&mut self) -> Result<(), StageError> {
         self.sent.take_outdated().map_or(Ok(()), |part| self.send_update(part))
     }
@@ -140,10 +140,10 @@ impl MapTopic {
 
 impl Drop for MapTopics {
     fn drop(&mut self) {
-        self.audience.end();
-        if let Some(usher) = self.usher.take() {
-            // It has told why, if it has panicked.
-            let _ = usher.join();
+        self.subscribers.end();
+        if let Some(late_join_thread) = self.late_join_thread.take() {
+            // A panic has been reported already.
+            let _ = late_join_thread.join();
         }
     }
 }

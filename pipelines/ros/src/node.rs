@@ -1,4 +1,4 @@
-//! A ROS 2 node: what tells others that it is there, and what it sends and hears.
+//! A ROS 2 node with its publishers and subscribers.
 
 use super::attachment::Attachment;
 use super::connection::{Connection, in_words, is_connected};
@@ -16,24 +16,24 @@ use zenoh_ext::{
     HistoryConfig, MissDetectionConfig, RecoveryConfig,
 };
 
-/// So often a publisher that keeps its last messages says how many it has sent, once it has sent another: by that a subscriber
-/// sees that it has missed one. As `rmw_zenoh` has it.
+/// The period at which a transient-local publisher sends its sequence number after a new message, so that subscribers detect
+/// missed messages; the same as in `rmw_zenoh`.
 const HEARTBEAT: Duration = Duration::from_millis(500);
-/// So long an answer with the messages of before may take.
+/// The timeout of a request for the history of a publisher.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);
 
-/// A node in a session of its own.
+/// A node with its own session.
 pub(crate) struct Node {
     session: Session,
     identity: Entity,
-    /// The numbers of its publishers and subscribers.
+    /// The number of its next publisher or subscriber.
     next_number: u32,
     _token: LivelinessToken,
     connection: Connection,
 }
 
 impl Node {
-    /// Joins the network as the node that the parameters name, or else with the name of the stage.
+    /// Joins the network as a node, named by the parameters or after the stage.
     ///
     /// # Errors
     /// The network cannot be joined.
@@ -53,12 +53,12 @@ impl Node {
         Ok(Self { session, identity, next_number: 1, _token: token, connection })
     }
 
-    /// The name of its session.
+    /// The id of its session.
     pub(crate) fn session_name(&self) -> &str {
         &self.identity.session
     }
 
-    /// Where a router is looked for, if there is neither a router nor another program that it is connected to.
+    /// The addresses of routers, if it is connected to neither a router nor another program.
     pub(crate) fn looks_for_router(&self) -> Option<String> {
         (!is_connected(&self.session)).then(|| self.connection.routers())
     }
@@ -69,7 +69,7 @@ impl Node {
         Entity { number, kind, ..self.identity.clone() }
     }
 
-    /// Calls for everything in the domain that is there and that comes, and again when it goes.
+    /// Calls `call` with every present and future entity of the domain, and again when it disappears.
     ///
     /// # Errors
     /// The session has failed.
@@ -81,13 +81,13 @@ impl Node {
         };
         let watched = self.session.liveliness().declare_subscriber(Entity::all(self.identity.domain)).history(true);
         let watched = watched.callback(callback).background().wait();
-        watched.map_err(|error| StageError::new("watch which ROS 2 programs there are", in_words(&error)))
+        watched.map_err(|error| StageError::new("discover ROS 2 programs", in_words(&error)))
     }
 
-    /// A publisher of a topic.
+    /// Creates a publisher of a topic.
     ///
     /// # Errors
-    /// The topic cannot be named so, or the session has failed.
+    /// The topic has an invalid name, or the session has failed.
     pub(crate) fn publish(&mut self, topic: Topic, qos: Qos) -> Result<Publisher, StageError> {
         let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
         let failed = |error: zenoh::Error| StageError::new(format!("publish `{name}`"), in_words(&error));
@@ -104,10 +104,10 @@ impl Node {
         Ok(Publisher { publisher, gid: entity.gid(), sequence: 0, name, _token: token })
     }
 
-    /// Calls with each message of a topic, first with those that its publishers have kept.
+    /// Subscribes to a topic: calls `call` with each message, first with those that its publishers have retained.
     ///
     /// # Errors
-    /// The topic cannot be named so, or the session has failed.
+    /// The topic has an invalid name, or the session has failed.
     pub(crate) fn subscribe(
         &mut self,
         topic: Topic,
@@ -131,7 +131,7 @@ impl Node {
     }
 }
 
-/// A topic that is published.
+/// A publisher of a topic.
 pub(crate) struct Publisher {
     publisher: AdvancedPublisher<'static>,
     gid: [u8; 16],
@@ -141,7 +141,7 @@ pub(crate) struct Publisher {
 }
 
 impl Publisher {
-    /// Sends a message, encoded.
+    /// Publishes an encoded message.
     ///
     /// # Errors
     /// The session has failed.
@@ -153,14 +153,13 @@ impl Publisher {
     }
 }
 
-/// A topic that is heard. That ends when it is dropped.
+/// A subscriber of a topic, until it is dropped.
 pub(crate) struct Subscriber {
     _subscriber: AdvancedSubscriber<()>,
     _token: LivelinessToken,
 }
 
-/// The time of this machine, nanoseconds since the Unix epoch. It is read where messages come from or go to other programs, and
-/// nowhere else.
+/// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other programs.
 pub(crate) fn nanoseconds_now() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
@@ -168,10 +167,10 @@ pub(crate) fn nanoseconds_now() -> i64 {
 
 fn declare(session: &Session, entity: &Entity) -> Result<LivelinessToken, StageError> {
     let token = session.liveliness().declare_token(entity.to_string()).wait();
-    token.map_err(|error| StageError::new(format!("tell of {}", entity.full_node_name()), in_words(&error)))
+    token.map_err(|error| StageError::new(format!("announce {}", entity.full_node_name()), in_words(&error)))
 }
 
-/// The name of a stage as part of one of a node.
+/// The name of a stage as part of a node's name.
 fn usable(stage: &str) -> String {
     stage.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
 }

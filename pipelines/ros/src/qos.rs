@@ -1,36 +1,36 @@
-//! Quality of service, as far as it means anything over Zenoh, and how liveliness tokens tell of it.
+//! Quality of service, as far as it applies to Zenoh, and its encoding in liveliness tokens.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// How many messages are kept where nothing else is said, as `rmw_zenoh` has it.
+/// The default depth of `rmw_zenoh`.
 const DEFAULT_DEPTH: usize = 42;
 
 /// The quality of service of a publisher or a subscriber.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Qos {
-    /// Whether no message is to be lost on the way.
+    /// Whether messages are delivered reliably.
     pub is_reliable: bool,
-    /// Whether the last messages are kept for those who come later: `transient_local`.
+    /// Whether the last messages are retained for late joiners: `transient_local`.
     pub is_latched: bool,
-    /// How many messages are kept; `None`: all.
+    /// The number of retained messages; `None` for all.
     pub depth: Option<usize>,
 }
 
 impl Qos {
-    /// Reliable, and the last so many messages are kept for those who come later, as map servers and static transforms are sent.
+    /// Reliable, with the last messages retained for late joiners, as for maps and static transforms.
     pub const fn latched(depth: usize) -> Self {
         Self { is_reliable: true, is_latched: true, depth: Some(depth) }
     }
 
-    /// Reliable, and nothing is kept for those who come later.
+    /// Reliable, with nothing retained for late joiners.
     pub const fn reliable(depth: usize) -> Self {
         Self { is_reliable: true, is_latched: false, depth: Some(depth) }
     }
 }
 
-/// `RELIABILITY:DURABILITY:HISTORY,DEPTH:DEADLINE:LIFESPAN:LIVELINESS`, where a part that is left out is the default: reliable,
-/// volatile, the last 42, without limits of time.
+/// `RELIABILITY:DURABILITY:HISTORY,DEPTH:DEADLINE:LIFESPAN:LIVELINESS`. An omitted part has its default: reliable, volatile, the
+/// last 42, without time limits.
 impl fmt::Display for Qos {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let reliability = if self.is_reliable { "" } else { "2" };
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_is_understood() {
+    fn a_quality_of_service_is_written_and_read_back() {
         for (text, qos) in [
             ("::,10:,:,:,,", Qos::reliable(10)),
             ("::,:,:,:,,", Qos::reliable(42)),
@@ -79,11 +79,11 @@ mod tests {
             assert_eq!(text.parse(), Ok(qos), "{text}");
             assert_eq!(qos.to_string(), text);
         }
-        assert_eq!("1:2:1,10:,:,:,,".parse(), Ok(Qos::reliable(10)), "with what could be left out");
+        assert_eq!("1:2:1,10:,:,:,,".parse(), Ok(Qos::reliable(10)), "with parts that could be omitted");
     }
 
     #[test]
-    fn nonsense_is_none() {
+    fn invalid_text_is_an_error() {
         for text in ["", ":", "::,x:,:,:,,", "x::,1:,:,:,,", "::1:,:,:,,", "::,1:,:"] {
             assert_eq!(text.parse::<Qos>(), Err(()), "{text}");
         }

@@ -1,10 +1,10 @@
-//! The stage `ros_sink`: publishes what was found, so that ROS 2 programs have it as if a node had sent it.
+//! The stage `ros_sink`: publishes results as a ROS 2 node.
 
 use super::connection::{Connection, LISTEN, ROUTER};
 use super::key_expression::Topic;
 use super::map_topics::{MapTopics, Sent};
 use super::node::{Node, Publisher};
-use super::own_trees::{OwnTrees, in_own_tree};
+use super::robot_trees::{RobotTrees, in_robot_tree};
 use super::qos::Qos;
 use super::settled_frames::{Change, SettledFrames};
 use gridweave_logs::names::TopicRename;
@@ -18,30 +18,29 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// So many messages are kept that are not of those of which the last holds.
+/// The depth of publishers that are not latched, messages.
 const DEPTH: usize = 10;
 
 /// The parameters of `ros_sink`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
+    /// The ROS domain. The default is the environment variable ROS_DOMAIN_ID, or 0.
     pub domain: Option<u32>,
-    /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
+    /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. The connection is retried until it succeeds.
     pub connect: Vec<String>,
-    /// Where other programs may connect, as `tcp/HOST:PORT`; port 0 is any that is free. Nothing else is listened to.
+    /// The addresses where other programs may connect, as `tcp/HOST:PORT`; port 0 is any free port.
     pub listen: Vec<String>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and `listen`: for TLS, for example. If it is not
-    /// given, the environment variable ZENOH_SESSION_CONFIG_URI names one, as for ROS 2 programs.
+    /// A configuration file of Zenoh (JSON5) that replaces `connect` and `listen`, for example for TLS. The default is the
+    /// environment variable ZENOH_SESSION_CONFIG_URI, as for ROS 2 programs.
     pub zenoh_config: Option<PathBuf>,
-    /// The name of the ROS 2 node; `gridweave_` and the name of the stage if it is not given.
+    /// The name of the ROS 2 node; the default is `gridweave_` and the name of the stage.
     pub node: Option<String>,
-    /// Topics that get other names than they would have in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` stands for one
-    /// part of both.
+    /// Topics with other names than in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` matches one part of both.
     pub rename: Vec<String>,
-    /// Whether parts of a map that have changed are published on its topic with `_updates` behind
-    /// (`map_msgs/msg/OccupancyGridUpdate`) while every node that hears the map hears these as well. The whole map follows where
-    /// anybody does not, when another one comes, and once updates would have brought as many cells as the map has.
+    /// Whether changed parts of a map are published on its topic with the suffix `_updates`
+    /// (`map_msgs/msg/OccupancyGridUpdate`), if every node that subscribes to the map subscribes to these too. The whole map is
+    /// sent if any node does not, for a late joiner, and once updates would have as many cells as the map.
     pub map_updates: bool,
 }
 
@@ -80,7 +79,7 @@ impl Parameters for SinkParameters {
     }
 }
 
-/// Whether this is the full name of a topic in ROS 2.
+/// Whether a name is a valid full topic name in ROS 2.
 fn is_topic(name: &str) -> bool {
     let is_part = |part: &str| {
         !part.is_empty()
@@ -94,10 +93,10 @@ fn is_topic(name: &str) -> bool {
 pub fn kind() -> StageKind {
     StageKind::stage(
         "ros_sink",
-        "Publishes what it is given in ROS 2, over Zenoh as `rmw_zenoh_cpp` speaks it, on the topics that it would have in a log. \
-         What holds until it is sent again, such as maps and static transforms, is kept for those who come later (transient \
-         local); of a map the part that has changed is sent, where everybody hears that. A frame is told anew only where it has moved by more than it is uncertain, by the covariances in \
-         `gridweave_msgs/msg/RobotFrames` where these are given, too",
+        "Publishes its inputs in ROS 2, over Zenoh with the protocol of `rmw_zenoh_cpp`, on the topics that they have in a log. \
+         States such as maps and static transforms are retained for late joiners (transient local). Of a map only the changed \
+         part is sent if all subscribers support that. A frame is published again only after it has moved by more than its \
+         uncertainty, given by the covariances in `gridweave_msgs/msg/RobotFrames`, if these are an input",
         RosSink::new,
     )
     .any_inputs("in", "what to publish: outputs of any stage but a source", RosSink::receive)
@@ -105,36 +104,36 @@ pub fn kind() -> StageKind {
     .build()
 }
 
-/// Publishes what it is given.
+/// Publishes its inputs in ROS 2.
 struct RosSink {
-    /// `None` if maps are always sent whole.
+    /// The published maps; `None` if maps are always sent whole.
     maps: Option<MapTopics>,
     node: Node,
     renames: Vec<TopicRename>,
     /// The type of each wire's messages.
     types: Vec<String>,
-    /// By topic; none for one that cannot be published.
+    /// The publishers by topic; none for a topic that cannot be published.
     publishers: BTreeMap<String, Option<Publisher>>,
     frames: SettledFrames,
-    trees: OwnTrees,
-    /// By robot with a tree of its own: the frames that were told there.
-    told_in_trees: BTreeMap<String, Vec<TransformStamped>>,
+    trees: RobotTrees,
+    /// The frames published in the robots' own trees, by robot.
+    published_in_trees: BTreeMap<String, Vec<TransformStamped>>,
 }
 
 impl RosSink {
     fn new(parameters: SinkParameters, context: &Context) -> Result<Self, StageError> {
         if let Some(wire) = context.inputs.iter().find(|wire| wire.topic.is_empty()) {
-            let text = format!("`{}` gives what robots have sent: it would be sent to them again", wire.from);
+            let text = format!("`{}` provides the robots' own messages, which would be sent back to them", wire.from);
             return Err(StageError::new(format!("make the stage `{}`", context.stage), text)
-                .with_help("leave it out of `inputs`"));
+                .with_help("remove it from `inputs`"));
         }
         let doing = || format!("make the stage `{}`", context.stage);
         let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
         let node = Node::start(parameters.connection(), &context.stage)?;
         Ok(Self {
             maps: parameters.map_updates.then(|| MapTopics::watch(&node)).transpose()?,
-            trees: OwnTrees::watch(&node)?,
-            told_in_trees: BTreeMap::new(),
+            trees: RobotTrees::watch(&node)?,
+            published_in_trees: BTreeMap::new(),
             node,
             renames,
             types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
@@ -146,7 +145,7 @@ impl RosSink {
     fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let ros_type = self.types.get(message.wire()).cloned().unwrap_or_default();
         let topic = message.header().topic.as_str().to_owned();
-        self.tell_own_trees(output)?;
+        self.publish_in_robot_trees(output)?;
         if ros_type == RobotFrames::NAME
             && let Ok(frames) = message.decode::<RobotFrames>()
         {
@@ -154,9 +153,9 @@ impl RosSink {
         }
         if ros_type == TFMessage::NAME && is_static(&topic) {
             return match message.decode::<TFMessage>() {
-                Ok(transforms) => self.tell_frames(&topic, &transforms, output),
+                Ok(transforms) => self.publish_frames(&topic, &transforms, output),
                 Err(error) => {
-                    output.warn(format!("transforms that cannot be read were left out: {error}"));
+                    output.warn(format!("transforms that cannot be decoded were skipped: {error}"));
                     Ok(())
                 }
             };
@@ -171,7 +170,7 @@ impl RosSink {
         self.maps.as_ref().map_or(Ok(()), MapTopics::send_updated)
     }
 
-    /// Publishes a map, or what has changed in it.
+    /// Publishes a map, or an update of its changed part.
     fn publish_map(&mut self, topic: &str, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         let (name, Some(maps)) = (self.name(topic), &self.maps) else { return Ok(()) };
         let sent = match message.decode::<OccupancyGrid<'_>>() {
@@ -185,39 +184,39 @@ impl RosSink {
                 output.count("map updates published", 1);
             }
             Some(Sent::Nothing) => output.count("maps without a change, not published", 1),
-            None => output.warn(format!("maps on `{name}` were left out: they do not hold as many cells as they say")),
+            None => output.warn(format!("maps on `{name}` were skipped: their numbers of cells do not match their sizes")),
         }
         Ok(())
     }
 
-    /// The name that a topic gets.
+    /// The published name of a topic.
     fn name(&self, topic: &str) -> String {
         self.renames.iter().find_map(|rename| rename.apply(topic)).unwrap_or_else(|| topic.to_owned())
     }
 
-    /// Publishes the static transforms of all frames, those that have settled as they were. A publisher keeps its last message
-    /// alone, so that one holds all of them.
-    fn tell_frames(&mut self, topic: &str, message: &TFMessage, output: &Output<()>) -> Result<(), StageError> {
+    /// Publishes the static transforms of all frames in one message, because a publisher retains its last message only. Settled
+    /// frames are unchanged.
+    fn publish_frames(&mut self, topic: &str, message: &TFMessage, output: &Output<()>) -> Result<(), StageError> {
         let mut is_changed = false;
         for transform in &message.transforms {
             let change = self.frames.update(transform);
             is_changed |= matches!(change, Change::First | Change::Moved { .. });
-            announce(transform, &change, output);
+            report_change(transform, &change, output);
         }
         if !is_changed {
             return Ok(());
         }
         let transforms = self.frames.told().cloned().collect();
         self.publish_transforms(topic, transforms, output)?;
-        self.tell_own_trees(output)
+        self.publish_in_robot_trees(output)
     }
 
-    /// Publishes where the frames of a robot lie in the tree that it has for itself, too, with the names that they have there.
-    fn tell_own_trees(&mut self, output: &Output<()>) -> Result<(), StageError> {
+    /// Publishes the frames of robots with their own tf trees there too, with their names in these trees.
+    fn publish_in_robot_trees(&mut self, output: &Output<()>) -> Result<(), StageError> {
         for (robot, topic) in self.trees.topics() {
-            let transforms: Vec<_> = self.frames.told().filter_map(|told| in_own_tree(&robot, told)).collect();
-            if !transforms.is_empty() && self.told_in_trees.get(&robot) != Some(&transforms) {
-                self.told_in_trees.insert(robot, transforms.clone());
+            let transforms: Vec<_> = self.frames.told().filter_map(|told| in_robot_tree(&robot, told)).collect();
+            if !transforms.is_empty() && self.published_in_trees.get(&robot) != Some(&transforms) {
+                self.published_in_trees.insert(robot, transforms.clone());
                 self.publish_transforms(&topic, transforms, output)?;
             }
         }
@@ -261,24 +260,24 @@ impl RosSink {
     }
 }
 
-/// Says what those who plan with a frame should know.
-fn announce(transform: &TransformStamped, change: &Change, output: &Output<()>) {
+/// Counts and logs the change of a frame.
+fn report_change(transform: &TransformStamped, change: &Change, output: &Output<()>) {
     let (parent, child) = (&transform.header.frame_id, &transform.child_frame_id);
     match change {
         Change::First => {
-            output.count("frames told", 1);
-            tracing::info!("`{child}` lies in `{parent}` from here on");
+            output.count("frames published", 1);
+            tracing::info!("the frame `{child}` is published in `{parent}`");
         }
         Change::Moved { distance, angle } => {
             output.count("frames moved", 1);
             let degrees = angle.to_degrees();
             tracing::warn!("`{child}` has moved in `{parent}` by {distance:.3} m and {degrees:.2} degrees");
         }
-        Change::Held => output.count("changes of frames within their uncertainty, not told", 1),
+        Change::Held => output.count("changes of frames within their uncertainty, not published", 1),
         Change::Same => {}
         Change::OtherParent { before } => {
             output
-                .warn(format!("`{child}` stays in `{before}`: a frame that was told cannot get the parent `{parent}`"));
+                .warn(format!("`{child}` stays in `{before}`: a published frame cannot get the new parent `{parent}`"));
         }
     }
 }
@@ -288,7 +287,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_topics_are_those_of_ros() {
+    fn valid_topic_names_are_those_of_ros() {
         for name in ["/map", "/robot1/markers/walls", "/tf_static", "/_a/b2"] {
             assert!(is_topic(name), "{name}");
         }

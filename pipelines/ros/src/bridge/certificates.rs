@@ -1,17 +1,18 @@
-//! The certificates by which the ends of a bridge know each other.
+//! The certificates with which the ends of a bridge authenticate each other.
 
 use super::network::is_encrypted;
 use gridweave_runtime::stage::ParameterError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What the parameters of a stage say of certificates: files in PEM.
+/// The certificate parameters of a stage: files in PEM.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Certificates {
-    /// The authority by which the certificate of the other end is signed.
+    /// The authority that has signed the certificate of the other end.
     pub(super) authority: Option<PathBuf>,
-    /// What this end shows of itself, and the key to it.
+    /// The certificate of this end.
     pub(super) certificate: Option<PathBuf>,
+    /// The private key of the certificate.
     pub(super) key: Option<PathBuf>,
 }
 
@@ -21,14 +22,14 @@ impl Certificates {
         files.into_iter().filter_map(|(name, file)| Some((name, file.as_deref()?)))
     }
 
-    /// What is wrong with them where an end connects and listens there.
+    /// The errors of the parameters for the given addresses.
     pub(super) fn check(&self, connect: &[String], listen: &[String], has_file: bool) -> Vec<ParameterError> {
         let first = self.files().map(|(name, _)| name).next();
         let has_tls = |endpoints: &[String]| endpoints.iter().any(|endpoint| is_encrypted(endpoint));
         let error = |field: &str, text: &str| vec![ParameterError::new(field, text)];
         match (first, &self.certificate, &self.key) {
             (Some(first), ..) if has_file => {
-                error(first, "is not used beside `zenoh_config`, which names the certificates itself")
+                error(first, "cannot be combined with `zenoh_config`, which has its own certificates")
             }
             (_, Some(_), None) => error("key", "must be given, too: the private key of `certificate`"),
             (_, None, Some(_)) => error("certificate", "must be given, too: the certificate that `key` is for"),
@@ -36,19 +37,19 @@ impl Certificates {
                 error(first, "is for addresses of the form `tls/HOST:PORT`, and there is none")
             }
             (_, None, None) if !has_file && has_tls(listen) => {
-                error("certificate", "must be given, and its `key`: who connects to `tls/...` asks for it")
+                error("certificate", "must be given, with its `key`: connections to `tls/...` require it")
             }
             (_, Some(_), _) if self.authority.is_none() && !has_tls(listen) => {
-                error("authority", "must be given, too: the authority by which the other end's certificate is signed")
+                error("authority", "must be given, too: the authority that has signed the other end's certificate")
             }
             _ => Vec::new(),
         }
     }
 
-    /// The settings of Zenoh, as JSON5. With an authority and a certificate each end asks the other for its own.
+    /// The settings of Zenoh, as JSON5. With an authority and a certificate each end requires one of the other (mutual TLS).
     ///
     /// # Errors
-    /// A file cannot be read: Zenoh tells nobody.
+    /// A file cannot be read, which Zenoh would not report.
     pub(super) fn settings(&self) -> Result<Vec<(&'static str, String)>, String> {
         let mut settings = Vec::new();
         for (name, path) in self.files() {
@@ -75,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn certificates_are_given_where_they_are_used_and_with_what_belongs_to_them() {
+    fn incomplete_or_unused_certificates_are_errors() {
         let given = |names: &str| {
             let path = |name: &str| names.contains(name).then(|| PathBuf::from(name));
             Certificates { authority: path("authority"), certificate: path("certificate"), key: path("key") }
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_there_is_told() {
+    fn a_missing_file_is_an_error() {
         let missing = Certificates { authority: Some("/there/is/none.pem".into()), ..Default::default() };
         let error = missing.settings().unwrap_err();
         assert!(error.starts_with("cannot read `authority`, /there/is/none.pem: No such file"), "{error}");

@@ -5,20 +5,20 @@ use crate::node::nanoseconds_now;
 /// The clock of a machine.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
-    /// By how much it is ahead of what the system shows, nanoseconds: for tests, which have one machine.
+    /// The offset to the system clock, nanoseconds: for tests, which run on one machine.
     pub(super) ahead: i64,
 }
 
 impl Clock {
-    /// Nanoseconds since the Unix epoch. It is read where a bridge begins and ends, and nowhere else.
+    /// Nanoseconds since the Unix epoch. It is read only at the two ends of a bridge.
     pub(super) fn nanoseconds(self) -> i64 {
         nanoseconds_now().saturating_add(self.ahead)
     }
 }
 
-/// By how much the clock of the receiver is ahead, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from when
-/// the sender asked and heard the answer, by its own clock, and when the receiver heard and answered, by that one's. It is wrong
-/// by no more than half of what both ways took.
+/// The clock offset of the receiver, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from the times at which
+/// the sender sent the request and received the answer, by its clock, and at which the receiver received and answered it, by the
+/// receiver's clock. Its error is at most half of the round-trip time.
 pub(super) fn offset(sent: i64, came: i64, answered: i64, received: i64) -> i64 {
     let there = i128::from(came) - i128::from(sent);
     let back = i128::from(answered) - i128::from(received);
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_offset_is_what_one_clock_shows_more_than_the_other() {
+    fn the_offset_is_the_difference_of_the_clocks() {
         const HOUR: i64 = 3_600_000_000_000;
         // 30 there, 10 in between, 50 back.
         assert_eq!(offset(1000, 1030 + HOUR, 1040 + HOUR, 1090), HOUR - 10);

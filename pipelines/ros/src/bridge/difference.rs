@@ -1,20 +1,20 @@
-//! What is new of a message, against another that the reader has: for maps, of which little changes from one to the next.
+//! The compressed difference of a message to a previous one, for maps, which change little from one to the next.
 //!
-//! It is a frame of Zstandard whose dictionary is the other message, as `zstd --patch-from` makes it. So it holds for maps that
-//! grow, shrink and move, and for messages of any type, and what comes out is the message byte for byte: a checksum says so.
+//! It is a Zstandard frame whose dictionary is the previous message, as `zstd --patch-from` makes it. So it works for maps that
+//! grow, shrink and move, and for messages of any type. A checksum verifies that the message is restored byte for byte.
 
 use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, DCtx, DParameter, get_error_name, get_frame_content_size};
 
-/// Beyond it a step of compression takes far longer than it saves.
+/// The compression level: higher ones take much longer than they save.
 const LEVEL: i32 = 3;
-/// Windows of 2 to this reach back over two maps of 64 million cells.
+/// The base-2 logarithm of the largest window, which covers two maps of 64 million cells.
 const LARGEST_WINDOW: u32 = 27;
 const SMALLEST_WINDOW: u32 = 10;
-/// The most bytes of a message, against those that say they are larger than memory.
-pub(super) const LARGEST: usize = 1 << 30;
+/// The maximum size of a message, bytes, as a guard against wrong sizes.
+pub(super) const MAX_SIZE: usize = 1 << 30;
 
-/// The message, compressed against `known`; against nothing where that is empty.
+/// The message, compressed with the dictionary `known`; without a dictionary if that is empty.
 ///
 /// # Errors
 /// There is not enough memory.
@@ -39,13 +39,13 @@ pub(super) fn difference(known: &[u8], message: &[u8]) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The message of which `difference` was made against the same `known`.
+/// Restores the message from its difference to the same `known`.
 ///
 /// # Errors
-/// The bytes are none, or were made against something else.
+/// The bytes are invalid, or were made with another dictionary.
 pub(super) fn message(known: &[u8], difference: &[u8]) -> io::Result<Vec<u8>> {
     let size = get_frame_content_size(difference).ok().flatten().and_then(|size| usize::try_from(size).ok());
-    let size = size.filter(|size| *size <= LARGEST).ok_or(io::ErrorKind::InvalidData)?;
+    let size = size.filter(|size| *size <= MAX_SIZE).ok_or(io::ErrorKind::InvalidData)?;
     let mut context = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
     context.set_parameter(DParameter::WindowLogMax(LARGEST_WINDOW)).map_err(failed)?;
     if !known.is_empty() {
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_with_little_new_takes_little_and_comes_back_byte_for_byte() {
+    fn the_difference_of_a_slightly_changed_map_is_small_and_restores_it_byte_for_byte() {
         let before = cells(700, 500);
         let mut after = before.clone();
         for row in 100..140 {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_to_another_message_is_none() {
+    fn a_wrong_dictionary_or_invalid_bytes_are_an_error() {
         let (before, after) = (cells(100, 100), cells(101, 100));
         let new = difference(&before, &after).unwrap();
         assert!(message(&cells(102, 100), &new).is_err());
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_empty_stays_empty() {
+    fn an_empty_message_is_restored() {
         let new = difference(&[], &[]).unwrap();
         assert_eq!(message(&[], &new).unwrap(), b"");
     }

@@ -1,41 +1,41 @@
-//! Links of a live run on one machine, carried to a run on another over [Zenoh](https://zenoh.io).
+//! Links of a live run on one machine, transported to a run on another over [Zenoh](https://zenoh.io).
 //!
-//! A `bridge_sink` is one end, a sender; a `bridge_source` the other, a receiver, of any number of senders. The links that are
-//! carried keep their promises:
+//! One end is a `bridge_sink`, a sender; the other is a `bridge_source`, a receiver of any number of senders. The bridge gives
+//! the same guarantees as a link:
 //!
-//! - **Order.** The messages of a sender arrive as they were given to it, each once.
-//! - **Nothing lost.** What was not taken is sent again; so a link that breaks delays, and no more. What waits beyond the room
-//!   that there is, is dropped, counted, and told at both ends.
-//! - **Progress.** An end is said. A sender that dies does not look like one that is done: it is told to be gone.
+//! - **Order.** The messages of a sender arrive in their order, each exactly once.
+//! - **No loss.** Unacknowledged messages are sent again, so a broken connection only delays them. Messages beyond the limits of
+//!   the queue are dropped, counted, and reported at both ends.
+//! - **Progress.** The end of a stream is sent explicitly, so a sender that dies is not mistaken for one that has finished: the
+//!   receiver reports that it is gone.
 //!
 //! # The protocol, version 1
 //!
-//! 1. **Presence.** Each end has a Zenoh session and a liveliness token of its own,
-//!    `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. The numbers are those of the sessions: who is started again has another.
-//! 2. **Batches.** A sender asks the receiver to take a batch (a query of Zenoh under the receiver's key), which holds all that
-//!    waits, up to 128 KB. The receiver passes it on and then answers. What is not answered is asked again, the same bytes under
-//!    the same number; the receiver answers again what it has taken already. So one batch is on its way at a time, and the
-//!    slower the link, the larger it is.
-//! 3. **Greeting.** Batch 0 says which links are carried, and carries nothing. Its answer says what the receiver's clock shows.
-//! 4. **Beginning anew.** A receiver that does not know what a batch builds upon says so. The sender greets it, and sends all
-//!    channels, what still waits, and the last message of each topic, as late readers of a link get it.
-//! 5. **Differences.** Of topics whose last message is all that holds, such as maps, each message is told by its difference to
-//!    the one before it, compressed; the receiver makes of it the same bytes.
-//! 6. **Time.** Where the clocks differ by more than `clock_tolerance`, the receiver adds the difference that was measured to
-//!    the log times and the times of publication. What stands in the messages themselves, such as their stamps, stays as it is:
-//!    it is compared with other times of the same robot alone.
-//! 7. **Taps.** A sender shows links of its run to programs that ask for them, whether it carries them or not: `tap/mod.rs`. An end
-//!    that knows no taps does not answer them, and carries as ever.
+//! 1. **Presence.** Each end has its own Zenoh session and liveliness token, `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. The
+//!    number is derived from the session: a restarted end has another one.
+//! 2. **Batches.** A sender sends a batch with all pending messages, up to 128 KB, as a Zenoh query under the receiver's key. The
+//!    receiver forwards the messages and then answers. A batch without an answer is sent again, with the same bytes and number;
+//!    the receiver answers a batch that it has taken already again. So one batch is in flight at a time, and batches grow on a
+//!    slow connection.
+//! 3. **Handshake.** Batch 0 lists the links, without messages. Its answer contains the receiver's clock.
+//! 4. **Restart.** A receiver that misses the state that a batch depends on rejects it. The sender repeats the handshake, and
+//!    sends all channels, the pending messages, and the last message of each topic, as for late joiners of a link.
+//! 5. **Differences.** On topics with states, such as maps, each message is sent as its compressed difference to the previous
+//!    one; the receiver restores the same bytes.
+//! 6. **Time.** If the clocks differ by more than `clock_tolerance`, the receiver adds the measured offset to log times and
+//!    publish times. Times inside messages, such as stamps, are unchanged, as they are only compared with times of the same robot.
+//! 7. **Taps.** A sender provides links of its run to programs that request them, whether it transports them or not:
+//!    `tap/mod.rs`. An end without support for taps does not answer the requests.
 
-mod absent;
+mod absent_senders;
 mod certificates;
 mod clock;
 mod difference;
-mod intake;
+mod ingest;
 mod network;
 mod outbox;
 mod presence;
-mod refusals;
+mod connection_errors;
 mod report;
 mod sender;
 pub mod sink;
@@ -46,7 +46,7 @@ mod tests;
 mod wire;
 
 use gridweave_runtime::stage::StageKind;
-pub use refusals::hear;
+pub use connection_errors::on_log_warning;
 
 /// The stage kinds of a bridge.
 pub fn kinds() -> [StageKind; 3] {

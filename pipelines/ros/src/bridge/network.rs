@@ -1,7 +1,7 @@
-//! How the ends of a bridge find each other, and whom they let in.
+//! The connection between the ends of a bridge, and its encryption.
 
 use super::certificates::Certificates;
-use super::refusals::obstacle;
+use super::connection_errors::connection_error;
 use crate::connection::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::net::IpAddr;
@@ -9,12 +9,12 @@ use std::path::PathBuf;
 use zenoh::config::EndPoint;
 use zenoh::{Config, Session};
 
-/// Where a receiver listens, and a sender looks for it, where nothing else is said.
+/// The default address of a receiver.
 pub(super) const BASE: &str = "tcp/localhost:7448";
-/// The protocols of Zenoh that encrypt.
+/// The encrypted protocols of Zenoh.
 const ENCRYPTED: [&str; 2] = ["tls", "quic"];
 
-/// What the parameters of a stage say of the network.
+/// The network parameters of a stage.
 #[derive(Clone, Debug)]
 pub(super) struct Network {
     pub(super) bridge: String,
@@ -27,7 +27,7 @@ pub(super) struct Network {
 }
 
 impl Network {
-    /// What is wrong with it.
+    /// The errors of the parameters.
     pub(super) fn check(&self) -> Vec<ParameterError> {
         let mut errors = Vec::new();
         if !is_part_of_key(&self.bridge) {
@@ -37,10 +37,10 @@ impl Network {
             for endpoint in endpoints {
                 match endpoint.parse::<EndPoint>() {
                     Err(_) => {
-                        let text = format!("`{endpoint}` is none; write it as `tcp/HOST:PORT`");
+                        let text = format!("`{endpoint}` is not an endpoint; write it as `tcp/HOST:PORT`");
                         errors.push(ParameterError::new(key, text));
                     }
-                    Ok(_) if !self.insecure && is_open(endpoint) => {
+                    Ok(_) if !self.insecure && is_unencrypted(endpoint) => {
                         errors.push(ParameterError::new(key, open(endpoint)))
                     }
                     Ok(_) if !cfg!(feature = "tls") && is_encrypted(endpoint) => {
@@ -51,7 +51,7 @@ impl Network {
             }
         }
         if self.discover && !self.insecure && self.zenoh_config.is_none() {
-            let text = "asks everybody on the network, and what is sent to who answers is not encrypted: name the other end as \
+            let text = "connects to any program that answers on the network, without encryption: name the other end as \
                         `tls/HOST:PORT`, or set `insecure = true` on a network that you trust";
             errors.push(ParameterError::new("discover", text));
         }
@@ -63,15 +63,15 @@ impl Network {
     /// Joins the network.
     ///
     /// # Errors
-    /// The configuration file is wrong, or opens what is not to be open; or nothing can listen where it is to.
+    /// The configuration file is invalid or has unencrypted addresses, or the address to listen at cannot be used.
     pub(super) fn open(&self) -> Result<Session, StageError> {
         join(self.config())
     }
 
-    /// Joins the network as a client of who listens there, which leads to all others that are connected to it.
+    /// Joins the network as a client of the program that listens there, which routes to all others connected to it.
     ///
     /// # Errors
-    /// The configuration file is wrong, or nothing listens there.
+    /// The configuration file is invalid, or nothing listens there.
     pub(super) fn open_as_client(&self) -> Result<Session, StageError> {
         join(self.client_config())
     }
@@ -81,7 +81,7 @@ impl Network {
         let mut settings = vec![("mode", "\"client\""), ("listen/endpoints", "[]")];
         let is_here = |endpoint: &String| host(endpoint).is_some_and(is_loopback);
         if self.zenoh_config.is_none() && self.connect.iter().all(is_here) {
-            // This machine is called otherwise in its certificate.
+            // The certificate has another name for this machine.
             settings.push(("transport/link/tls/verify_name_on_connect", "false"));
         }
         for (key, value) in settings {
@@ -94,7 +94,7 @@ impl Network {
         if let Some(path) = &self.zenoh_config {
             let config = file_config(path)?;
             let endpoints = ["connect/endpoints", "listen/endpoints"].map(|key| endpoints_of(&config, key));
-            return match endpoints.iter().flatten().find(|endpoint| !self.insecure && is_open(endpoint)) {
+            return match endpoints.iter().flatten().find(|endpoint| !self.insecure && is_unencrypted(endpoint)) {
                 Some(endpoint) => Err(format!("{}: {}", path.display(), open(endpoint))),
                 None => Ok(config),
             };
@@ -102,60 +102,60 @@ impl Network {
         let certificates = self.certificates.settings()?;
         let mut settings = vec![
             ("scouting/multicast/enabled", if self.discover { "true" } else { "false" }),
-            // Senders have nothing to say to each other.
+            // Senders need no connections to each other.
             ("scouting/gossip/autoconnect", "{ router: [], peer: [], client: [] }"),
         ];
         settings.extend(certificates.iter().map(|(key, value)| (*key, value.as_str())));
         peer_config(&self.connect, &self.listen, &settings)
     }
 
-    /// Why none of the endpoints to connect to is reached, as far as that can be told. Asks each of them, one after the other.
-    pub(super) fn obstacles(&self) -> Vec<String> {
-        obstacles_of(self.config())
+    /// The reasons why the endpoints cannot be reached, as far as known. Tries each of them, one after the other.
+    pub(super) fn connection_errors(&self) -> Vec<String> {
+        connection_errors_of(self.config())
     }
 
     /// The same for a client.
-    pub(super) fn obstacles_as_client(&self) -> Vec<String> {
-        obstacles_of(self.client_config())
+    pub(super) fn connection_errors_as_client(&self) -> Vec<String> {
+        connection_errors_of(self.client_config())
     }
 
-    /// Where others connect to, as words.
-    pub(super) fn doors(&self) -> String {
+    /// The addresses to listen at, as text.
+    pub(super) fn listen_text(&self) -> String {
         match &self.zenoh_config {
-            Some(path) => format!("where {} says", path.display()),
+            Some(path) => format!("the addresses in {}", path.display()),
             None => self.listen.join(" and "),
         }
     }
 
-    /// Where the other end is looked for, as words.
-    pub(super) fn others(&self) -> String {
+    /// The addresses to connect to, as text.
+    pub(super) fn connect_text(&self) -> String {
         match (&self.zenoh_config, self.connect.is_empty()) {
-            (Some(path), _) => format!("where {} says", path.display()),
+            (Some(path), _) => format!("the addresses in {}", path.display()),
             (None, true) => "anywhere".to_owned(),
             (None, false) => self.connect.join(" or "),
         }
     }
 }
 
-fn obstacles_of(config: Result<Config, String>) -> Vec<String> {
+fn connection_errors_of(config: Result<Config, String>) -> Vec<String> {
     let Ok(config) = config else { return Vec::new() };
     let why = |endpoint: String| {
         let mut config = config.clone();
         let list = serde_json::to_string(&[&endpoint]).ok()?;
         config.insert_json5("connect/endpoints", &list).ok()?;
-        Some(format!("{endpoint}: {}", obstacle(config)?))
+        Some(format!("{endpoint}: {}", connection_error(config)?))
     };
     endpoints_of(&config, "connect/endpoints").into_iter().filter_map(why).collect()
 }
 
-/// What the name of a bridge or a sender may be.
+/// Whether a text is a valid name of a bridge or a sender.
 pub(super) fn is_part_of_key(name: &str) -> bool {
     let is_usual = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     !name.is_empty() && name.len() <= 100 && name.chars().all(is_usual)
 }
 
-/// Whether what goes there leaves this machine, and can be read on its way.
-fn is_open(endpoint: &str) -> bool {
+/// Whether an endpoint is on another machine and not encrypted.
+fn is_unencrypted(endpoint: &str) -> bool {
     host(endpoint).is_none_or(|host| !is_loopback(host)) && !is_encrypted(endpoint)
 }
 
@@ -171,19 +171,19 @@ fn is_loopback(host: &str) -> bool {
     host == "localhost" || host.parse().is_ok_and(|address: IpAddr| address.is_loopback())
 }
 
-/// Whether what goes there is encrypted.
+/// Whether an endpoint is encrypted.
 pub(super) fn is_encrypted(endpoint: &str) -> bool {
     endpoint.split_once('/').is_some_and(|(protocol, _)| ENCRYPTED.contains(&protocol))
 }
 
 fn open(endpoint: &str) -> String {
     format!(
-        "`{endpoint}` is not this machine, and what goes there is not encrypted: write it as `tls/HOST:PORT`, with certificates, or \
-         set `insecure = true` on a network that you trust"
+        "`{endpoint}` is on another machine, and the connection is not encrypted: write it as `tls/HOST:PORT`, with certificates, \
+         or set `insecure = true` on a network that you trust"
     )
 }
 
-/// All endpoints that a configuration has under a key, for whatever mode.
+/// All endpoints of a configuration under a key, for any mode.
 fn endpoints_of(config: &Config, key: &str) -> Vec<String> {
     fn strings(value: &serde_json::Value, found: &mut Vec<String>) {
         match value {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_the_machine_is_encrypted_or_told_to_be_open() {
+    fn an_endpoint_on_another_machine_must_be_encrypted_or_insecure_must_be_set() {
         for closed in ["tcp/localhost:7448", "tcp/127.0.0.1:0", "tcp/[::1]:7448", "tls/10.0.0.1:7448"] {
             let is_known = cfg!(feature = "tls") || !is_encrypted(closed);
             assert_eq!(network(&[closed], &[]).check().is_empty(), is_known, "{closed}");
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_configuration_file_does_not_open_what_is_not_told_to_be_open() {
+    fn a_configuration_file_needs_insecure_for_unencrypted_endpoints() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("zenoh.json5");
         let config = |listen: &str| {

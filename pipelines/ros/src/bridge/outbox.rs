@@ -1,8 +1,8 @@
-//! What a sender has to send, until the receiver has taken it.
+//! The outbox of a sender: messages until the receiver has acknowledged them, independent of the network.
 //!
-//! It knows no network. One batch is on its way at a time: all that was waiting, up to a size. It is sent again, the same bytes,
-//! until it is answered; so nothing is lost, doubled or overtaken, and on a slow link batches grow instead of queues. What
-//! waits beyond what may is dropped, and counted.
+//! One batch is in flight at a time: all pending messages, up to a size. It is sent again with the same bytes until it is
+//! answered, so nothing is lost, duplicated or reordered, and on a slow connection batches grow instead of queues. Messages
+//! beyond the limits are dropped and counted.
 
 use super::difference::difference;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, to_bytes};
@@ -10,59 +10,59 @@ use gridweave_logs::qos;
 use gridweave_runtime::message::{LogTime, MessageHeader};
 use std::collections::{BTreeMap, VecDeque};
 
-/// A batch takes no further entries when it has this many bytes.
+/// The size at which a batch is full, bytes.
 const BATCH_SIZE: usize = 128 * 1024;
 
-/// How much may wait.
+/// The limits of the queue.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Messages of a topic.
+    /// The maximum number of pending messages of a topic.
     pub(super) messages: usize,
-    /// The same of a topic whose last message is all that holds, such as a map.
+    /// The same for a topic with states, of which only the last message matters, such as maps.
     pub(super) states: usize,
 }
 
-/// What a sender has done.
+/// The totals of a sender.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Totals {
-    /// Messages that were taken by the receiver.
+    /// Messages that the receiver has acknowledged.
     pub(super) sent: u64,
-    /// Messages that were dropped because there was no room.
+    /// Messages that were dropped because the queue was full.
     pub(super) dropped: u64,
-    /// Messages that waited for a receiver that began anew, and were left out for the last of their topic.
+    /// Pending messages that were replaced by the last one of their topic after a restart of the receiver.
     pub(super) superseded: u64,
-    /// Batches that were taken.
+    /// Batches that were acknowledged.
     pub(super) batches: u64,
-    /// Bytes of these batches, as they were sent.
+    /// The compressed size of these batches, bytes.
     pub(super) bytes: u64,
-    /// Bytes of the messages in them.
+    /// The size of the messages in them, bytes.
     pub(super) message_bytes: u64,
 }
 
-/// What is to be sent.
+/// The outbox of a sender.
 #[derive(Debug)]
 pub(super) struct Outbox {
     sender: String,
     session: u64,
     limits: Limits,
     links: Vec<Link>,
-    /// The link of what this end has to tell of itself, which is not counted with what it was given.
+    /// The link of this end's own reports, which are not counted.
     report: Option<u32>,
     last_log_time: Option<LogTime>,
-    /// What waits, in its order.
+    /// The pending entries in order.
     waiting: BTreeMap<u64, Waiting>,
     next_order: u64,
-    /// By link and topic.
+    /// The topics by link and name.
     topics: BTreeMap<(u32, String), Topic>,
-    /// The channels that were announced, by link and number.
+    /// The announced channels, by link and number.
     channels: BTreeMap<(u32, u32), Entry>,
-    /// The receiver that has answered the greeting.
+    /// The receiver that has answered the handshake.
     receiver: Option<u64>,
     clock_offset: i64,
-    /// How often it has begun anew.
-    greeting: u64,
+    /// The number of handshakes.
+    handshake: u64,
     next_number: u64,
-    on_its_way: Option<Sent>,
+    in_flight: Option<Sent>,
     is_ended: bool,
     is_end_taken: bool,
     totals: Totals,
@@ -78,9 +78,9 @@ struct Waiting {
 /// The messages of one topic of a link.
 #[derive(Debug, Default)]
 struct Topic {
-    /// Which of those that wait are its own.
+    /// The keys of its pending entries.
     waiting: VecDeque<u64>,
-    /// The last message: the next is told by what it has new, if the topic is one of states.
+    /// The last message, to which the next one is sent as a difference if the topic has states.
     last: Option<(Entry, Vec<u8>)>,
 }
 
@@ -107,9 +107,9 @@ impl Outbox {
             channels: BTreeMap::new(),
             receiver: None,
             clock_offset: 0,
-            greeting: 1,
+            handshake: 1,
             next_number: 0,
-            on_its_way: None,
+            in_flight: None,
             is_ended: false,
             is_end_taken: false,
             totals: Totals::default(),
@@ -125,12 +125,12 @@ impl Outbox {
         }
     }
 
-    /// Makes a link one of what this end has to tell of itself: it is not counted.
+    /// Makes a link that of this end's own reports, which are not counted.
     pub(super) fn report_on(&mut self, link: usize) {
         self.report = u32::try_from(link).ok();
     }
 
-    /// Tells something of this end, unless what it has told before still waits, or the end was said.
+    /// Adds a report, unless the previous one is still pending, or the stream has ended.
     ///
     /// # Errors
     /// There is not enough memory.
@@ -143,7 +143,7 @@ impl Outbox {
         self.put(key, entry(link as usize, header, Form::Whole, Vec::new()), bytes, true)
     }
 
-    /// The log time of the last message that it was given.
+    /// The log time of the last message that was pushed.
     pub(super) fn last_log_time(&self) -> Option<LogTime> {
         self.last_log_time
     }
@@ -152,7 +152,7 @@ impl Outbox {
         entry.form != Form::Channel && Some(entry.link) != self.report
     }
 
-    /// Takes a message of a link.
+    /// Adds a message of a link.
     ///
     /// # Errors
     /// There is not enough memory.
@@ -163,13 +163,13 @@ impl Outbox {
         let entry = entry(link, header, Form::Whole, Vec::new());
         let key = (entry.link, entry.topic.clone());
         let most = if is_state { self.limits.states } else { self.limits.messages };
-        self.make_room(&key, is_state, most.max(1));
+        self.drop_oldest(&key, is_state, most.max(1));
         self.put(key, entry, bytes, is_state)
     }
 
-    /// Drops the oldest of a topic. A state is told by the difference to the one before it: of them all that wait go, for one that
-    /// is told as a whole.
-    fn make_room(&mut self, key: &(u32, String), is_state: bool, most: usize) {
+    /// Drops the oldest message of a full topic. States are sent as differences to the previous one, so all pending ones are
+    /// dropped, and the next one is sent as a whole.
+    fn drop_oldest(&mut self, key: &(u32, String), is_state: bool, most: usize) {
         let Some(topic) = self.topics.get_mut(key).filter(|topic| topic.waiting.len() >= most) else { return };
         let dropped: Vec<u64> = topic.waiting.drain(..if is_state { topic.waiting.len() } else { 1 }).collect();
         if is_state {
@@ -204,67 +204,67 @@ impl Outbox {
         order
     }
 
-    /// Nothing more will be pushed.
+    /// Ends the stream: nothing more will be pushed.
     pub(super) fn end(&mut self) {
         self.is_ended = true;
     }
 
-    /// Whether nothing more will be pushed.
+    /// Whether the stream has ended.
     pub(super) fn is_ended(&self) -> bool {
         self.is_ended
     }
 
-    /// Whether the receiver has taken all, and the end.
+    /// Whether the receiver has acknowledged everything, including the end.
     pub(super) fn is_done(&self) -> bool {
         self.is_end_taken
     }
 
-    /// How many messages the receiver has not taken.
-    pub(super) fn untaken(&self) -> usize {
-        let on_its_way = self.on_its_way.iter().flat_map(|sent| sent.entries.iter().map(|(_, waiting)| waiting));
-        self.waiting.values().chain(on_its_way).filter(|waiting| self.is_counted(&waiting.entry)).count()
+    /// The number of messages that the receiver has not acknowledged.
+    pub(super) fn unacknowledged(&self) -> usize {
+        let in_flight = self.in_flight.iter().flat_map(|sent| sent.entries.iter().map(|(_, waiting)| waiting));
+        self.waiting.values().chain(in_flight).filter(|waiting| self.is_counted(&waiting.entry)).count()
     }
 
     pub(super) fn totals(&self) -> Totals {
         self.totals
     }
 
-    /// Whether the next batch is a greeting.
-    pub(super) fn is_greeting(&self) -> bool {
+    /// Whether the next batch is a handshake.
+    pub(super) fn is_handshake(&self) -> bool {
         self.receiver.is_none()
     }
 
     /// Whether there is something to send.
     fn has_batch(&self) -> bool {
-        self.on_its_way.is_some()
+        self.in_flight.is_some()
             || self.receiver.is_none()
             || !self.waiting.is_empty()
             || (self.is_ended && !self.is_end_taken)
     }
 
-    /// The batch to be sent to the receiver of the given number. One that is another than before is greeted.
+    /// The batch to be sent to the receiver with the given number; a handshake if it is another one than before.
     ///
     /// # Errors
     /// There is not enough memory.
     pub(super) fn batch_for(&mut self, receiver: u64) -> Result<Option<&[u8]>, String> {
         if self.receiver.is_some_and(|before| before != receiver) {
-            self.begin_anew()?;
+            self.restart()?;
         }
         self.batch()
     }
 
-    /// The batch to be sent, the same until it is answered; none if there is nothing to send.
+    /// The batch to be sent, the same until it is answered; none if nothing is pending.
     ///
     /// # Errors
     /// There is not enough memory.
     pub(super) fn batch(&mut self) -> Result<Option<&[u8]>, String> {
-        if self.on_its_way.is_none() && self.has_batch() {
+        if self.in_flight.is_none() && self.has_batch() {
             let entries = if self.receiver.is_some() { self.take_waiting() } else { Vec::new() };
             let is_end = self.is_ended && self.waiting.is_empty() && self.receiver.is_some();
             let batch = Batch {
                 sender: self.sender.clone(),
                 session: self.session,
-                greeting: self.greeting,
+                handshake: self.handshake,
                 number: self.next_number,
                 receiver: self.receiver.unwrap_or(0),
                 clock_offset: self.clock_offset,
@@ -274,9 +274,9 @@ impl Outbox {
                 entries: entries.iter().map(|(_, waiting)| waiting.entry.clone()).collect(),
             };
             let bytes = to_bytes(&batch)?;
-            self.on_its_way = Some(Sent { bytes, number: batch.number, is_end, entries });
+            self.in_flight = Some(Sent { bytes, number: batch.number, is_end, entries });
         }
-        Ok(self.on_its_way.as_ref().map(|sent| sent.bytes.as_slice()))
+        Ok(self.in_flight.as_ref().map(|sent| sent.bytes.as_slice()))
     }
 
     fn take_waiting(&mut self) -> Vec<(u64, Waiting)> {
@@ -293,12 +293,12 @@ impl Outbox {
         entries
     }
 
-    /// The receiver has answered. A greeting that it has taken tells by how much its clock is ahead.
+    /// Handles an answer of the receiver. The answer to a handshake gives the clock offset of the receiver.
     ///
     /// # Errors
-    /// The receiver cannot read what it was sent, and says why. There is not enough memory.
+    /// The receiver cannot read the batch, or there is not enough memory.
     pub(super) fn answered(&mut self, answer: &Answer, clock_offset: Option<i64>) -> Result<(), String> {
-        let Some(sent) = self.on_its_way.take_if(|sent| sent.number == answer.number) else { return Ok(()) };
+        let Some(sent) = self.in_flight.take_if(|sent| sent.number == answer.number) else { return Ok(()) };
         match (answer.outcome, self.receiver) {
             (Outcome::Taken, None) => {
                 self.receiver = Some(answer.receiver);
@@ -318,34 +318,34 @@ impl Outbox {
                 Ok(())
             }
             (Outcome::Taken | Outcome::Unknown, _) => {
-                self.on_its_way = Some(sent);
-                self.begin_anew()
+                self.in_flight = Some(sent);
+                self.restart()
             }
             (Outcome::Unreadable, _) => {
-                self.on_its_way = Some(sent);
-                self.begin_anew()?;
+                self.in_flight = Some(sent);
+                self.restart()?;
                 Err(answer.text.clone())
             }
         }
     }
 
-    /// Greets again, and then sends what waits, what was on its way, and the last message of each topic: the receiver is another
-    /// than before, and has nothing of it.
+    /// Restarts with a handshake for another receiver, followed by the pending entries, those in flight, and the last message of
+    /// each topic.
     ///
     /// # Errors
     /// There is not enough memory.
-    fn begin_anew(&mut self) -> Result<(), String> {
+    fn restart(&mut self) -> Result<(), String> {
         (self.receiver, self.next_number, self.is_end_taken) = (None, 0, false);
-        self.greeting += 1;
-        let on_its_way = self.on_its_way.take().map(|sent| sent.entries).unwrap_or_default();
-        for (order, waiting) in on_its_way.into_iter().rev() {
+        self.handshake += 1;
+        let in_flight = self.in_flight.take().map(|sent| sent.entries).unwrap_or_default();
+        for (order, waiting) in in_flight.into_iter().rev() {
             if let Some(topic) = self.topics.get_mut(&(waiting.entry.link, waiting.entry.topic.clone())) {
                 topic.waiting.push_front(order);
             }
             self.waiting.insert(order, waiting);
         }
         self.waiting.retain(|_, waiting| waiting.entry.form != Form::Channel);
-        // Channels come before all else.
+        // Channels come first.
         let rest = std::mem::take(&mut self.waiting);
         let mut orders = BTreeMap::new();
         for channel in self.channels.values().cloned().collect::<Vec<_>>() {
@@ -357,15 +357,15 @@ impl Outbox {
         for topic in self.topics.values_mut() {
             topic.waiting = topic.waiting.iter().filter_map(|order| orders.get(order).copied()).collect();
         }
-        self.send_last_again()
+        self.resend_last()
     }
 
-    fn send_last_again(&mut self) -> Result<(), String> {
+    fn resend_last(&mut self) -> Result<(), String> {
         for key in self.topics.keys().cloned().collect::<Vec<_>>() {
             let Some(topic) = self.topics.get_mut(&key) else { continue };
             let Some((entry, _)) = &topic.last else { continue };
             let is_state = entry.form != Form::Whole;
-            // Of states those that wait are differences to what the receiver has not.
+            // Pending states are differences to messages that the receiver does not have.
             let superseded = if is_state { std::mem::take(&mut topic.waiting) } else { VecDeque::new() };
             if let Some((entry, bytes)) = topic.last.take_if(|_| is_state || topic.waiting.is_empty()) {
                 self.totals.superseded += superseded.len().saturating_sub(1) as u64;

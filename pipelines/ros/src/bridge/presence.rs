@@ -1,7 +1,7 @@
-//! Who is there: the liveliness tokens of the two ends of a bridge, and of those who tap links of a sender's run.
+//! Discovery: the liveliness tokens of the two ends of a bridge, and of programs that tap links of a sender's run.
 //!
-//! A token stands under `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when nothing
-//! was heard of it for ten seconds.
+//! The key of a token is `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when the
+//! connection was silent for ten seconds.
 
 use crate::connection::in_words;
 use gridweave_runtime::stage::StageError;
@@ -9,12 +9,12 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
-/// Which end of a bridge.
+/// The role of a program on a bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     Sender,
     Receiver,
-    /// Looks on at a link of a sender's run.
+    /// A program that taps a link of a sender's run.
     Tapper,
 }
 
@@ -28,24 +28,24 @@ impl Role {
     }
 }
 
-/// One end of a bridge.
+/// An end of a bridge, as announced by its token.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Presence {
-    /// What to call it.
+    /// Its name.
     pub(super) name: String,
-    /// Tells it apart from those of its name.
+    /// Its number, which distinguishes ends with the same name.
     pub(super) number: u64,
 }
 
 impl Presence {
-    /// The number of an end in a session of its own. No two sessions have the same.
+    /// The number of an end, derived from the unique id of its session.
     pub(super) fn number_of(session: &Session) -> u64 {
         let bytes = session.zid().to_le_bytes();
         // 0 is none.
         bytes.first_chunk().map_or(1, |bytes| u64::from_le_bytes(*bytes)).max(1)
     }
 
-    /// Where it is found.
+    /// The key expression of its token.
     pub(super) fn key(&self, bridge: &str, role: Role) -> String {
         format!("gridweave/bridge/{bridge}/{}/{}/{:016x}", role.word(), self.name, self.number)
     }
@@ -56,17 +56,18 @@ impl Presence {
         Some(Self { name: parts.next()?.to_owned(), number })
     }
 
-    /// Tells that it is there, for as long as the token is held.
+    /// Announces it until the token is dropped.
     ///
     /// # Errors
     /// The session has failed.
     pub(super) fn declare(&self, session: &Session, bridge: &str, role: Role) -> Result<LivelinessToken, StageError> {
         let token = session.liveliness().declare_token(self.key(bridge, role)).wait();
-        token.map_err(|error| StageError::new(format!("tell of the {} `{}`", role.word(), self.name), in_words(&error)))
+        token
+            .map_err(|error| StageError::new(format!("announce the {} `{}`", role.word(), self.name), in_words(&error)))
     }
 }
 
-/// Calls for every end of a bridge that has the role, and again when it goes.
+/// Calls `call` with every present and future end of a bridge with the role, and again when it disappears.
 ///
 /// # Errors
 /// The session has failed.
@@ -91,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_is_known_by_its_key() {
+    fn an_end_is_read_back_from_its_key() {
         let end = Presence { name: "robot-1.local".into(), number: 0xabc };
         let key = end.key("floor_2", Role::Sender);
         assert_eq!(key, "gridweave/bridge/floor_2/sender/robot-1.local/0000000000000abc");

@@ -1,4 +1,4 @@
-//! What the stages of a machine do, told to the other end of a bridge.
+//! Reports of the stages' progress to the other end of a bridge.
 
 use super::network::is_part_of_key;
 use super::wire::Link;
@@ -7,34 +7,34 @@ use gridweave_runtime::ros::{Header, MachineStages, RosMessage, StageProgress, e
 use gridweave_runtime::stage::{RunStatistics, StageStatistics};
 use std::time::{Duration, Instant};
 
-/// The output of a receiver that it comes out at.
+/// The output of a receiver for the reports.
 pub(super) const PORT: &str = "stages";
 
-/// Tells what the stages of a run do, every so often.
+/// Periodic reports of the progress of a run's stages.
 #[derive(Debug)]
 pub(super) struct Report {
     machine: String,
     statistics: RunStatistics,
     interval: Duration,
-    /// What was told last, and when.
+    /// The time and the statistics of the previous report.
     before: Option<(Instant, Vec<StageStatistics>)>,
 }
 
 impl Report {
-    /// Tells every `interval` what `statistics` gives, as of the machine.
+    /// Reports of `statistics` every `interval`, on behalf of the machine.
     pub(super) fn new(machine: &str, statistics: RunStatistics, interval: Duration) -> Self {
         Self { machine: machine.to_owned(), statistics, interval, before: None }
     }
 
-    /// What it is sent on.
+    /// The link of the reports.
     pub(super) fn link() -> Link {
         Link { port: PORT.to_owned(), ros_type: MachineStages::NAME.to_owned() }
     }
 
-    /// What is to be told at a time, which is `clock` in nanoseconds since the Unix epoch; none if it is not time yet.
+    /// The next report, if it is due; `clock` is the time in nanoseconds since the Unix epoch.
     ///
     /// # Errors
-    /// The message cannot be made.
+    /// The message cannot be encoded.
     pub(super) fn take(
         &mut self,
         now: Instant,
@@ -63,7 +63,7 @@ impl Report {
     }
 }
 
-/// What a stage has done, and since `before`, which was so many seconds ago.
+/// The progress of a stage, with rates since `before`, `seconds` seconds ago.
 fn progress(stage: &StageStatistics, before: Option<&StageStatistics>, seconds: f64) -> StageProgress {
     let rate = |now: f64, before: Option<f64>| match before {
         Some(before) if seconds > 0.0 => (now - before).max(0.0) / seconds,
@@ -92,7 +92,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
 
     #[test]
-    fn what_stages_do_is_told_every_interval_with_the_rates_since_it_was_told_last() {
+    fn a_report_is_due_every_interval_and_has_the_rates_since_the_previous_one() {
         static MESSAGES: AtomicU64 = AtomicU64::new(100);
         let now = || {
             let messages_in = MESSAGES.load(Ordering::Relaxed);
@@ -111,7 +111,7 @@ mod tests {
         let first = decode::<MachineStages>(&bytes).unwrap();
         assert_eq!((first.machine.as_str(), first.interval), ("robot-1.local", 2.0));
         assert_eq!((first.stages[0].messages_in, first.stages[0].in_per_s, first.stages[0].busy), (100, 0.0, 0.0));
-        // Who knows the definition alone reads the same.
+        // Decoding by the definition gives the same.
         let text = gridweave_logs::schemas::schema_text(MachineStages::NAME).unwrap();
         let schema = gridweave_logs::dynamic::Schema::parse(MachineStages::NAME, &text).unwrap();
         let read = schema.decode(&bytes).unwrap().to_json(gridweave_logs::dynamic::JsonOptions::default());

@@ -1,4 +1,4 @@
-//! Sends what is in an outbox to the receiver of a bridge, in a thread of its own.
+//! The sending end of a bridge: a thread that sends the outbox to the receiver.
 
 use super::clock::Clock;
 use super::network::Network;
@@ -18,32 +18,32 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::CongestionControl;
 use zenoh::{Session, Wait};
 
-/// A batch that was not answered for so long is sent again.
+/// The time after which an unanswered batch is sent again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
-/// So long somebody who waits does not look around.
-const LOOK_INTERVAL: Duration = Duration::from_millis(100);
-/// After what went wrong, it waits so long before it tries again.
+/// The interval at which a waiting thread checks its conditions.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// The delay after an error.
 const AFTER_FAILURE: Duration = Duration::from_secs(1);
-/// So long a receiver may take to be found before somebody is told.
-const PATIENCE: Duration = Duration::from_secs(3);
-/// So long after that it is looked for the reason again, which may have become another.
-const NEXT_LOOK: Duration = Duration::from_secs(30);
+/// The time without a receiver after which its absence is reported.
+const REPORT_AFTER: Duration = Duration::from_secs(3);
+/// The time until the reason of the absence is checked again.
+const REPORT_INTERVAL: Duration = Duration::from_secs(30);
 
-/// How a sender goes about it.
+/// The settings of a sender.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     pub(super) network: Network,
-    /// What to call it.
+    /// Its name.
     pub(super) name: String,
     pub(super) limits: Limits,
-    /// At least so long from one batch to the next.
+    /// The minimum time from one batch to the next.
     pub(super) interval: Duration,
     pub(super) clock: Clock,
-    /// The links of the run, for those who tap, or why they are not shown.
+    /// The links of the run, for taps, or why they are not available.
     pub(super) links: Result<RunLinks, &'static str>,
 }
 
-/// The end of a bridge that sends.
+/// The sending end of a bridge.
 pub(super) struct Sender {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -58,20 +58,20 @@ struct Shared {
 
 struct State {
     outbox: Outbox,
-    /// The receivers that are there.
+    /// The present receivers.
     receivers: BTreeSet<Presence>,
     is_stopped: bool,
-    /// What was told last of why there is no receiver.
-    told_of_absence: Option<String>,
-    /// What somebody should know.
+    /// The last report of why there is no receiver.
+    reported_absence: Option<String>,
+    /// Notices for the user.
     notices: Vec<String>,
 }
 
 impl Sender {
-    /// Joins the network, and begins.
+    /// Joins the network, and starts the thread.
     ///
     /// # Errors
-    /// It cannot be joined.
+    /// The network cannot be joined.
     pub(super) fn start(settings: Settings, mut links: Vec<Link>, report: Option<Report>) -> Result<Self, StageError> {
         let session = settings.network.open()?;
         let number = Presence::number_of(&session);
@@ -84,12 +84,17 @@ impl Sender {
         if report.is_some() {
             outbox.report_on(carried);
         }
-        let state =
-            State { outbox, receivers: BTreeSet::new(), is_stopped: false, told_of_absence: None, notices: Vec::new() };
+        let state = State {
+            outbox,
+            receivers: BTreeSet::new(),
+            is_stopped: false,
+            reported_absence: None,
+            notices: Vec::new(),
+        };
         let shared = Arc::new(Shared { state: Mutex::new(state), has_changed: Condvar::new() });
         let of_callback = Arc::clone(&shared);
-        watch(&session, &settings.network.bridge, Role::Receiver, move |receiver, is_there| {
-            of_callback.note_receiver(receiver, is_there);
+        watch(&session, &settings.network.bridge, Role::Receiver, move |receiver, is_present| {
+            of_callback.note_receiver(receiver, is_present);
         })?;
         let of_thread = Arc::clone(&shared);
         let thread = thread::Builder::new().name("bridge".to_owned());
@@ -104,7 +109,7 @@ impl Sender {
         self.shared.has_changed.notify_all();
     }
 
-    /// Sends a message of a link, when its turn has come.
+    /// Adds a message of a link to the outbox.
     ///
     /// # Errors
     /// There is not enough memory.
@@ -114,8 +119,8 @@ impl Sender {
         pushed.map_err(|error| StageError::new("send a message over the bridge", error))
     }
 
-    /// Says that nothing follows, and waits until the receiver has taken that, but no longer than `longest`. Gives how many
-    /// messages it has not taken; none if it has taken everything, and the end.
+    /// Ends the stream, and waits until the receiver has acknowledged it, for at most `longest`. Returns the number of
+    /// unacknowledged messages; none if everything was acknowledged.
     pub(super) fn end(&self, longest: Duration) -> Option<usize> {
         let mut state = self.shared.lock();
         state.outbox.end();
@@ -124,7 +129,7 @@ impl Sender {
         while !state.outbox.is_done() {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                return Some(state.outbox.untaken());
+                return Some(state.outbox.unacknowledged());
             }
             state = self.shared.wait(state, left);
         }
@@ -135,7 +140,7 @@ impl Sender {
         self.shared.lock().outbox.totals()
     }
 
-    /// What has happened since this was asked last.
+    /// The notices since the last call.
     pub(super) fn take_notices(&self) -> Vec<String> {
         std::mem::take(&mut self.shared.lock().notices)
     }
@@ -143,7 +148,7 @@ impl Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
-        // Those who tap get the last of the run.
+        // Taps get the last messages of the run.
         drop(self.taps.take());
         self.shared.lock().is_stopped = true;
         self.shared.has_changed.notify_all();
@@ -164,15 +169,15 @@ impl Shared {
         self.has_changed.wait_timeout(state, longest).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    fn note_receiver(&self, receiver: Presence, is_there: bool) {
+    fn note_receiver(&self, receiver: Presence, is_present: bool) {
         let mut state = self.lock();
-        match is_there {
+        match is_present {
             true => {
                 let is_new = state.receivers.insert(receiver.clone());
                 let others = state.receivers.len() - 1;
                 if is_new && others > 0 {
-                    state.tell(format!(
-                        "{} receivers have the name of one bridge: only one of them is sent anything",
+                    state.notify(format!(
+                        "{} receivers have the name of this bridge: messages are sent to one of them only",
                         others + 1
                     ));
                 }
@@ -181,12 +186,13 @@ impl Shared {
             false => {
                 state.receivers.remove(&receiver);
                 let name = receiver.name;
-                // Who has taken the end goes by right; and if it has not, that is told.
+                // After the end the receiver is expected to leave; a missing acknowledgement is reported elsewhere.
                 match state.outbox.is_ended() {
                     true => tracing::info!("the receiver `{name}` is gone"),
                     false => {
-                        state
-                            .tell(format!("the receiver `{name}` is gone: what follows waits until it is there again"));
+                        state.notify(format!(
+                            "the receiver `{name}` is gone: what follows waits until it is there again"
+                        ));
                     }
                 }
             }
@@ -197,26 +203,26 @@ impl Shared {
 }
 
 impl State {
-    fn tell(&mut self, text: String) {
+    fn notify(&mut self, text: String) {
         tracing::warn!("{text}");
         self.notices.push(text);
     }
 }
 
-/// When it is to be told next that there is no receiver; never, once one was found.
+/// The time of the next report that there is no receiver; none once one was found.
 struct Search(Option<Instant>);
 
 impl Search {
     fn is_due(&mut self) -> bool {
         let is_due = self.0.is_some_and(|next| Instant::now() >= next);
         if is_due {
-            self.0 = Some(Instant::now() + NEXT_LOOK);
+            self.0 = Some(Instant::now() + REPORT_INTERVAL);
         }
         is_due
     }
 }
 
-/// What the thread works with.
+/// The state of the thread.
 struct Worker {
     session: Session,
     settings: Settings,
@@ -226,32 +232,32 @@ struct Worker {
 
 impl Worker {
     fn run(mut self) {
-        let mut search = Search(Some(Instant::now() + PATIENCE));
-        while let Some((receiver, batch, is_greeting)) = self.next_batch(&mut search) {
+        let mut search = Search(Some(Instant::now() + REPORT_AFTER));
+        while let Some((receiver, batch, is_handshake)) = self.next_batch(&mut search) {
             let sent = Instant::now();
-            let answered = self.ask(&receiver, batch).and_then(|answer| {
+            let answered = self.send_batch(&receiver, batch).and_then(|answer| {
                 let Some((answer, offset)) = answer else { return Ok(false) };
-                let answered = self.shared.lock().outbox.answered(&answer, is_greeting.then_some(offset));
-                answered.map(|()| true).map_err(|text| format!("the receiver cannot read what it gets: {text}"))
+                let answered = self.shared.lock().outbox.answered(&answer, is_handshake.then_some(offset));
+                answered.map(|()| true).map_err(|text| format!("the receiver cannot read a batch: {text}"))
             });
             self.shared.has_changed.notify_all();
             let pause = match answered {
                 Ok(true) => self.settings.interval.saturating_sub(sent.elapsed()),
-                Ok(false) => LOOK_INTERVAL,
+                Ok(false) => POLL_INTERVAL,
                 Err(wrong) => {
-                    self.shared.lock().tell(wrong);
+                    self.shared.lock().notify(wrong);
                     AFTER_FAILURE
                 }
             };
             self.pause(pause);
         }
-        // What is still to be told to Zenoh, such as that this sender goes, is told by closing.
+        // Closing flushes pending messages of Zenoh, such as the withdrawn token.
         if let Err(error) = self.session.close().wait() {
             tracing::debug!("the session was not closed: {}", in_words(&error));
         }
     }
 
-    /// Waits for something to send, and somebody to send it to. None when it is to stop.
+    /// Waits for a batch and a receiver; none when the thread must stop.
     fn next_batch(&mut self, search: &mut Search) -> Option<(Presence, Vec<u8>, bool)> {
         let shared = Arc::clone(&self.shared);
         let mut state = shared.lock();
@@ -259,58 +265,62 @@ impl Worker {
             if state.is_stopped {
                 return None;
             }
-            // Its log time is that of the message before it, as that of a log which is played is not that of the clock.
+            // A report has the log time of the previous message, because the log time of a played log is not the clock.
             if let (Some(report), Some(log_time)) = (&mut self.report, state.outbox.last_log_time()) {
                 let told = report.take(Instant::now(), log_time, self.settings.clock.nanoseconds().unsigned_abs());
                 let told =
                     told.and_then(|told| told.map_or(Ok(()), |(header, bytes)| state.outbox.report(&header, &bytes)));
                 if let Err(wrong) = told {
-                    state.tell(format!("what the stages here do cannot be told: {wrong}"));
+                    state.notify(format!("cannot report the progress of the stages: {wrong}"));
                     self.report = None;
                 }
             }
             if search.is_due() && state.receivers.is_empty() {
-                self.tell_why_nobody_is_there();
+                self.report_absence();
             }
-            // Of several the same one always.
+            // Of several receivers always the same one.
             if let Some(receiver) = state.receivers.first().cloned() {
                 search.0 = None;
                 let batch = state.outbox.batch_for(receiver.number).map(|batch| batch.map(<[u8]>::to_vec));
-                let is_greeting = state.outbox.is_greeting();
+                let is_handshake = state.outbox.is_handshake();
                 match batch {
-                    Ok(Some(batch)) => return Some((receiver, batch, is_greeting)),
+                    Ok(Some(batch)) => return Some((receiver, batch, is_handshake)),
                     Ok(None) => {}
-                    Err(wrong) => state.tell(format!("a batch could not be made: {wrong}")),
+                    Err(wrong) => state.notify(format!("cannot encode a batch: {wrong}")),
                 }
             }
-            state = shared.wait(state, LOOK_INTERVAL);
+            state = shared.wait(state, POLL_INTERVAL);
         }
     }
 
-    /// Tells that nobody is there, and what is known of the reason: in a thread of its own, as that takes long to find out.
-    fn tell_why_nobody_is_there(&self) {
+    /// Reports that there is no receiver, with the reason if known. Runs in a separate thread, as finding the reason takes long.
+    fn report_absence(&self) {
         let (network, shared) = (self.settings.network.clone(), Arc::clone(&self.shared));
         let is_connected = is_connected(&self.session);
         let find = move || {
-            let obstacles = if is_connected { Vec::new() } else { network.obstacles() };
-            let (bridge, others) = (&network.bridge, network.others());
-            let reasons = if obstacles.is_empty() { String::new() } else { format!(" ({})", obstacles.join("; ")) };
+            let connection_errors = if is_connected { Vec::new() } else { network.connection_errors() };
+            let (bridge, others) = (&network.bridge, network.connect_text());
+            let reasons = if connection_errors.is_empty() {
+                String::new()
+            } else {
+                format!(" ({})", connection_errors.join("; "))
+            };
             let text = format!(
                 "there is no receiver of the bridge `{bridge}` at {others}{reasons}. It is looked for until it is there"
             );
             let mut state = shared.lock();
-            if state.receivers.is_empty() && state.told_of_absence.as_ref() != Some(&text) {
-                state.told_of_absence = Some(text.clone());
-                state.tell(text);
+            if state.receivers.is_empty() && state.reported_absence.as_ref() != Some(&text) {
+                state.reported_absence = Some(text.clone());
+                state.notify(text);
             }
         };
         if let Err(error) = thread::Builder::new().name("bridge search".to_owned()).spawn(find) {
-            tracing::warn!("the thread that finds out why nobody is there was not started: {error}");
+            tracing::warn!("cannot start the thread that checks why there is no receiver: {error}");
         }
     }
 
-    /// Sends a batch, and waits for the answer; none if none comes. With it comes by how much the clock of the receiver is ahead.
-    fn ask(&self, receiver: &Presence, batch: Vec<u8>) -> Result<Option<(Answer, i64)>, String> {
+    /// Sends a batch and waits for the answer; none if there is no answer. Returns it with the clock offset of the receiver.
+    fn send_batch(&self, receiver: &Presence, batch: Vec<u8>) -> Result<Option<(Answer, i64)>, String> {
         let key = receiver.key(&self.settings.network.bridge, Role::Receiver);
         let sent = self.settings.clock.nanoseconds();
         let asked = self
@@ -320,12 +330,12 @@ impl Worker {
             .congestion_control(CongestionControl::Block)
             .timeout(ANSWER_TIMEOUT)
             .wait();
-        let answers = asked.map_err(|error| format!("nothing can be sent: {}", in_words(&error)))?;
+        let answers = asked.map_err(|error| format!("cannot send a batch: {}", in_words(&error)))?;
         loop {
-            match answers.recv_timeout(LOOK_INTERVAL) {
+            match answers.recv_timeout(POLL_INTERVAL) {
                 Ok(None) if self.shared.lock().is_stopped => return Ok(None),
                 Ok(None) => {}
-                // No answer comes any more.
+                // The query has ended without an answer.
                 Err(_) => return Ok(None),
                 Ok(Some(reply)) => {
                     let Ok(sample) = reply.result() else { continue };
@@ -343,7 +353,7 @@ impl Worker {
         let mut state = self.shared.lock();
         while !state.is_stopped {
             let left = until.saturating_duration_since(Instant::now());
-            // Who ends waits for what is on its way.
+            // A stop ends the pause.
             if left.is_zero() {
                 return;
             }

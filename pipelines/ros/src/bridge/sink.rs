@@ -15,53 +15,54 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Why nobody can tap.
+/// The reasons why links cannot be tapped.
 const NOT_ALLOWED: &str = "its `bridge_sink` has `allow_tap = false`";
-const NOT_TO_BE_SEEN: &str = "its run keeps its links to itself, as all do but those on the engine `processes`";
+const NOT_TO_BE_SEEN: &str = "the links of its run cannot be observed: that needs the engine `processes`";
 
 /// The parameters of `bridge_sink`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The name of the bridge, which the `bridge_source` at its other end has, too.
+    /// The name of the bridge, the same as that of the `bridge_source` at the other end.
     pub bridge: String,
-    /// What the other end calls this one; the name of the machine if it is not given.
+    /// The name of this end; the default is the name of the machine.
     pub sender: Option<String>,
-    /// The robot that messages about none in particular are sent as: a base that sends its merged map to another is one. Its
-    /// topics and map frames get its name.
+    /// The robot as which messages about no particular robot are sent, for example by a base that sends its merged map to another
+    /// base. Their topics and map frames get its name.
     pub robot: Option<String>,
-    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Until one answers it is looked for.
+    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is retried until it
+    /// succeeds.
     pub connect: Vec<String>,
-    /// Where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Nothing is listened to if none are given.
+    /// The addresses where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub listen: Vec<String>,
-    /// Look for the other end on the local network, by multicast.
+    /// Search for the other end on the local network, by multicast.
     pub discover: bool,
-    /// The authority (PEM) by which the certificate of the other end must be signed, for `tls/HOST:PORT`; without it one that
-    /// browsers know.
+    /// The authority (PEM) that must have signed the certificate of the other end, for `tls/HOST:PORT`; the default is the public
+    /// authorities of browsers.
     pub authority: Option<PathBuf>,
-    /// The certificate (PEM) of this end, for receivers that ask for one.
+    /// The certificate (PEM) of this end, for receivers that require one.
     pub certificate: Option<PathBuf>,
     /// The private key (PEM) of `certificate`.
     pub key: Option<PathBuf>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen`, `discover` and the certificates.
+    /// A configuration file of Zenoh (JSON5) that replaces `connect`, `listen`, `discover` and the certificates.
     pub zenoh_config: Option<PathBuf>,
-    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    /// Allow addresses of other machines without encryption, on a trusted network.
     pub insecure: bool,
-    /// So many messages of a topic wait to be sent before the oldest is dropped.
+    /// The maximum number of pending messages of a topic; beyond it the oldest is dropped.
     #[schemars(range(min = 1))]
     pub keep_last: usize,
-    /// So many of a topic whose last message is all that holds, such as a map, wait before all of them go for the next.
+    /// The maximum number of pending messages of a topic with states, such as maps; beyond it all of them are replaced by the next.
     #[schemars(range(min = 1))]
     pub keep_maps: usize,
-    /// At least so many seconds from one batch of messages to the next.
+    /// The minimum time from one batch of messages to the next, seconds.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub interval: f64,
-    /// So many seconds apart the other end is told what the stages of this run do, for its `top`; 0 for never.
+    /// The period at which the progress of the stages is reported to the other end, for its `top`, seconds; 0 for never.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub tell_stages: f64,
-    /// Show the links of this run to who taps them over the bridge, also those that are not sent: by `tap` on the base.
+    /// Allow the other end to tap the links of this run, including those that are not sent, with `tap` on the base.
     pub allow_tap: bool,
-    /// For so many seconds the end of the run waits until the other end has taken what was sent last.
+    /// The maximum time that the end of the run waits for the other end to acknowledge the last messages, seconds.
     #[schemars(range(min = 0.0, max = 86400.0))]
     pub linger: f64,
 }
@@ -114,7 +115,7 @@ impl SinkParameters {
     }
 }
 
-/// The name of this machine, as far as it can be the name of a sender.
+/// The name of this machine, with characters replaced that are not allowed in the name of a sender.
 fn machine() -> String {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let name = name.trim().replace(|c: char| !is_part_of_key(&c.to_string()), "_");
@@ -130,7 +131,7 @@ impl Parameters for SinkParameters {
         if self.robot.as_ref().is_some_and(|robot| robot.is_empty() || robot.contains('/') || robot.len() > 60) {
             errors.push(ParameterError::new(
                 "robot",
-                "must be the name of a robot, without a slash and not above 60 bytes",
+                "must be the name of a robot, without a slash and at most 60 bytes",
             ));
         }
         errors
@@ -146,9 +147,9 @@ pub fn kind() -> StageKind {
 pub(super) fn kind_with(clock: Clock) -> StageKind {
     StageKind::stage(
         "bridge_sink",
-        "Sends what it is given to the `bridge_source` of a run on another machine, over Zenoh: each message once and in order, \
-         however bad the link. What is new of a map is sent, not the whole map. While the link is broken messages wait; those for \
-         which there is no room are dropped, and counted",
+        "Sends its inputs to the `bridge_source` of a run on another machine, over Zenoh: each message once and in order, even over \
+         a bad connection. Of a map only the difference is sent. While the connection is broken messages are queued; those beyond \
+         the limits are dropped and counted",
         move |parameters, context| BridgeSink::new(parameters, context, clock),
     )
     .any_inputs("in", "what to send: outputs of any stage", BridgeSink::receive)
@@ -157,13 +158,13 @@ pub(super) fn kind_with(clock: Clock) -> StageKind {
     .build()
 }
 
-/// Sends what it is given.
+/// Sends its inputs over the bridge.
 pub(super) struct BridgeSink {
     sender: Sender,
     links: Vec<Link>,
     robot: Option<String>,
     linger: Duration,
-    /// What was counted.
+    /// The totals that were counted already.
     counted: Totals,
 }
 
@@ -206,7 +207,7 @@ impl BridgeSink {
         Ok(())
     }
 
-    /// A message about no robot as one about the given one, and its bytes if they are others then.
+    /// Changes a message about no robot to one about the given robot; returns its bytes if they have changed.
     fn as_robot(
         &self,
         robot: &str,
@@ -229,19 +230,19 @@ impl BridgeSink {
     }
 
     pub(super) fn finish(&mut self, output: &Output<()>) -> Result<(), StageError> {
-        let untaken = self.sender.end(self.linger);
+        let unacknowledged = self.sender.end(self.linger);
         self.tell(output);
-        if let Some(messages) = untaken {
+        if let Some(messages) = unacknowledged {
             let seconds = self.linger.as_secs_f64();
-            let text = format!("the other end of the bridge has not taken the end within {seconds} s");
-            tracing::warn!("{text}; {messages} messages were not taken");
+            let text = format!("the other end of the bridge has not acknowledged the end within {seconds} s");
+            tracing::warn!("{text}; {messages} messages were not acknowledged");
             output.warn(text);
-            output.count("messages that were not taken before the end", messages as u64);
+            output.count("messages that were not acknowledged before the end", messages as u64);
         }
         Ok(())
     }
 
-    /// Counts what has been done since the last time, and tells what has happened.
+    /// Counts the changes of the totals since the last call, and forwards notices.
     fn tell(&mut self, output: &Output<()>) {
         let now = self.sender.totals();
         let before = std::mem::replace(&mut self.counted, now);
@@ -251,7 +252,7 @@ impl BridgeSink {
             ("bytes sent", now.bytes - before.bytes),
             ("bytes of the messages in them", now.message_bytes - before.message_bytes),
             ("messages dropped because the bridge does not keep up", now.dropped - before.dropped),
-            ("messages left out for the last of their topic", now.superseded - before.superseded),
+            ("messages superseded by the last of their topic", now.superseded - before.superseded),
         ] {
             if more > 0 {
                 output.count(what, more);
@@ -261,7 +262,7 @@ impl BridgeSink {
             output.warn("messages were dropped because the bridge does not keep up");
         }
         if now.superseded > before.superseded {
-            output.warn("of the maps that waited for a receiver that began anew the last were sent alone");
+            output.warn("only the last of the pending maps were sent, as the receiver was restarted");
         }
         self.sender.take_notices().into_iter().for_each(|notice| output.warn(notice));
     }

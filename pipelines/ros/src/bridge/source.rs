@@ -1,12 +1,12 @@
 //! The stage `bridge_source`: takes what other machines send over a bridge into a live pipeline.
 
-use super::absent::Absent;
+use super::absent_senders::AbsentSenders;
 use super::certificates::Certificates;
 use super::clock::Clock;
-use super::intake::{Intake, Item, Taken};
+use super::ingest::{Ingest, Item, Taken};
 use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
-use super::refusals::take_heard;
+use super::connection_errors::take_refusals;
 use super::report;
 use super::wire::{Link, to_bytes};
 use crate::connection::in_words;
@@ -153,7 +153,7 @@ enum Event {
 
 /// Takes what senders send.
 pub(super) struct BridgeSource {
-    intake: Intake,
+    ingest: Ingest,
     events: Receiver<Event>,
     /// What has come and was not looked at.
     waiting: VecDeque<Event>,
@@ -162,12 +162,12 @@ pub(super) struct BridgeSource {
     /// The senders that are there.
     senders: BTreeSet<Presence>,
     /// Those that have gone without an end.
-    absent: Absent,
+    absent: AbsentSenders,
     /// The sessions of those that have said their end.
     ended: BTreeSet<u64>,
     end_after: Option<usize>,
     /// Where others connect to, as words.
-    doors: String,
+    listen_text: String,
     /// Why somebody was not let in, as far as it was told on the log.
     refusals: BTreeSet<String>,
     /// The numbers that channels have here: by port, sender, number there, and topic.
@@ -191,22 +191,22 @@ impl BridgeSource {
         let take = move |query: Query| drop(batches.send(Event::Batch(query, clock.nanoseconds())));
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("receive over the bridge", in_words(&error)))?;
-        watch(&session, &network.bridge, Role::Sender, move |sender, is_there| {
-            drop(to.send(Event::Sender(sender, is_there)));
+        watch(&session, &network.bridge, Role::Sender, move |sender, is_present| {
+            drop(to.send(Event::Sender(sender, is_present)));
         })?;
         let token = me.declare(&session, &network.bridge, Role::Receiver)?;
         let tolerance = (parameters.clock_tolerance * 1e9) as i64;
         Ok(Self {
-            intake: Intake::new(number, tolerance),
+            ingest: Ingest::new(number, tolerance),
             events,
             waiting: VecDeque::new(),
             key,
             clock,
             senders: BTreeSet::new(),
-            absent: Absent::default(),
+            absent: AbsentSenders::default(),
             ended: BTreeSet::new(),
             end_after: parameters.end_after,
-            doors: network.doors(),
+            listen_text: network.listen_text(),
             refusals: BTreeSet::new(),
             channels: BTreeMap::new(),
             _token: token,
@@ -215,10 +215,10 @@ impl BridgeSource {
         })
     }
 
-    fn note_sender(&mut self, sender: Presence, is_there: bool, output: &Output<Ports>) {
+    fn note_sender(&mut self, sender: Presence, is_present: bool, output: &Output<Ports>) {
         let name = sender.name.clone();
-        if is_there {
-            self.absent.came(&sender).into_iter().for_each(|session| self.intake.forget(session));
+        if is_present {
+            self.absent.remove(&sender).into_iter().for_each(|session| self.ingest.forget(session));
             let is_other =
                 |other: &Presence| other.name == name && *other != sender && !self.ended.contains(&other.number);
             if self.senders.iter().any(is_other) {
@@ -231,9 +231,9 @@ impl BridgeSource {
         }
         self.senders.remove(&sender);
         match self.ended.contains(&sender.number) {
-            true => self.intake.forget(sender.number),
+            true => self.ingest.forget(sender.number),
             false => {
-                self.absent.left(sender).into_iter().for_each(|session| self.intake.forget(session));
+                self.absent.add(sender).into_iter().for_each(|session| self.ingest.forget(session));
                 warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows"));
             }
         }
@@ -241,8 +241,8 @@ impl BridgeSource {
 
     /// Tells whom this end has not let in. They try again and again: the log is told once.
     fn note_refusals(&mut self, output: &Output<Ports>) {
-        for reason in take_heard() {
-            let text = format!("somebody was not let in at {}: {reason}", self.doors);
+        for reason in take_refusals() {
+            let text = format!("somebody was not let in at {}: {reason}", self.listen_text);
             output.count("connections that were not let in", 1);
             match self.refusals.insert(reason) {
                 true => warn(output, text),
@@ -253,7 +253,7 @@ impl BridgeSource {
 
     fn take_batch(&mut self, query: &Query, came: i64, output: &Output<Ports>) -> Result<(), StageError> {
         let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
-        let (taken, answer) = self.intake.take(&bytes);
+        let (taken, answer) = self.ingest.take(&bytes);
         let sender = taken.sender.clone();
         self.tell(&taken, output);
         for item in taken.items {
@@ -376,7 +376,7 @@ impl Source for BridgeSource {
         for _ in 0..BATCHES {
             let Some(event) = self.waiting.pop_front().or_else(|| self.events.try_recv().ok()) else { break };
             match event {
-                Event::Sender(sender, is_there) => self.note_sender(sender, is_there, output),
+                Event::Sender(sender, is_present) => self.note_sender(sender, is_present, output),
                 Event::Batch(query, came) => self.take_batch(&query, came, output)?,
             }
         }

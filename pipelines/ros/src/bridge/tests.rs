@@ -1,7 +1,7 @@
-//! An outbox and an intake with a network between them that loses, repeats and delays.
+//! An outbox and an ingest with a network between them that loses, repeats and delays.
 
 use super::clock::Clock;
-use super::intake::{Intake, Item, Taken};
+use super::ingest::{Ingest, Item, Taken};
 use super::outbox::{Limits, Outbox};
 use super::wire::{Answer, Link, Outcome};
 use super::{sink, source};
@@ -49,10 +49,10 @@ fn messages(items: &[Item]) -> Messages {
 }
 
 /// Lets the batches through until there are none.
-fn carry(outbox: &mut Outbox, intake: &mut Intake, offset: i64) -> Taken {
+fn carry(outbox: &mut Outbox, ingest: &mut Ingest, offset: i64) -> Taken {
     let mut all = Taken::default();
     while let Some(batch) = outbox.batch().unwrap() {
-        let (taken, answer) = intake.take(batch);
+        let (taken, answer) = ingest.take(batch);
         outbox.answered(&answer, Some(offset)).unwrap();
         all.items.extend(taken.items);
         all.dropped += taken.dropped;
@@ -64,13 +64,13 @@ fn carry(outbox: &mut Outbox, intake: &mut Intake, offset: i64) -> Taken {
 
 #[test]
 fn what_waits_beyond_its_room_is_dropped_and_told_at_both_ends() {
-    let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+    let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     for time in 0..9 {
         outbox.push(POSES, &header("/robot1/pose", time), &[time as u8]).unwrap();
         outbox.push(MAPS, &header("/robot1/map", 100 + time), &[time as u8; 50]).unwrap();
     }
     // Of five poses the last, and of maps those that came after all that waited went.
-    let taken = carry(&mut outbox, &mut intake, 0);
+    let taken = carry(&mut outbox, &mut ingest, 0);
     let times: Vec<u64> = messages(&taken.items).iter().map(|(time, _)| *time).collect();
     assert_eq!(times, [4, 5, 6, 106, 7, 107, 8, 108]);
     assert_eq!(messages(&taken.items)[3].1, [6; 50]);
@@ -79,19 +79,19 @@ fn what_waits_beyond_its_room_is_dropped_and_told_at_both_ends() {
 
 #[test]
 fn an_end_is_said_once_all_is_taken() {
-    let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+    let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     outbox.push(POSES, &header("/robot1/pose", 1), &[1]).unwrap();
-    assert!(!carry(&mut outbox, &mut intake, 0).is_end);
+    assert!(!carry(&mut outbox, &mut ingest, 0).is_end);
     outbox.push(POSES, &header("/robot1/pose", 2), &[2]).unwrap();
     outbox.end();
-    assert_eq!((outbox.is_done(), outbox.untaken()), (false, 1));
-    assert!(carry(&mut outbox, &mut intake, 0).is_end);
-    assert_eq!((outbox.is_done(), outbox.untaken()), (true, 0));
+    assert_eq!((outbox.is_done(), outbox.unacknowledged()), (false, 1));
+    assert!(carry(&mut outbox, &mut ingest, 0).is_end);
+    assert_eq!((outbox.is_done(), outbox.unacknowledged()), (true, 0));
 }
 
 #[test]
 fn a_receiver_that_begins_anew_gets_what_waits_and_the_last_of_each_topic() {
-    let (mut outbox, mut first) = (outbox(7, 10), Intake::new(1, SECOND));
+    let (mut outbox, mut first) = (outbox(7, 10), Ingest::new(1, SECOND));
     outbox.announce(MAPS, 3, gridweave_runtime::message::Channel::default().encode().unwrap());
     outbox.push(MAPS, &header("/robot1/map", 1), &[1; 500]).unwrap();
     outbox.push(POSES, &header("/robot1/pose", 2), &[2]).unwrap();
@@ -101,7 +101,7 @@ fn a_receiver_that_begins_anew_gets_what_waits_and_the_last_of_each_topic() {
     // The first receiver has taken this, and dies before it can say so.
     let batch = outbox.batch().unwrap().unwrap().to_vec();
     assert_eq!(first.take(&batch).0.items.len(), 2);
-    let mut second = Intake::new(2, SECOND);
+    let mut second = Ingest::new(2, SECOND);
     let taken = carry(&mut outbox, &mut second, 0);
     assert!(matches!(taken.items[0], Item::Channel { .. }));
     assert_eq!(messages(&taken.items), [(4, vec![4; 500]), (2, vec![2])]);
@@ -112,20 +112,20 @@ fn a_receiver_that_begins_anew_gets_what_waits_and_the_last_of_each_topic() {
 
 #[test]
 fn what_an_end_tells_of_itself_does_not_pile_up_and_is_not_counted() {
-    let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+    let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     outbox.report_on(MAPS);
-    carry(&mut outbox, &mut intake, 0);
+    carry(&mut outbox, &mut ingest, 0);
     for time in 0..5 {
         outbox.report(&header("/robot1/stages", time), &[time as u8; 40]).unwrap();
     }
-    assert_eq!(outbox.untaken(), 0);
+    assert_eq!(outbox.unacknowledged(), 0);
     // While one waits, no other is taken.
-    assert_eq!(messages(&carry(&mut outbox, &mut intake, 0).items), [(0, vec![0; 40])]);
+    assert_eq!(messages(&carry(&mut outbox, &mut ingest, 0).items), [(0, vec![0; 40])]);
     outbox.report(&header("/robot1/stages", 5), &[5; 40]).unwrap();
-    assert_eq!(messages(&carry(&mut outbox, &mut intake, 0).items), [(5, vec![5; 40])]);
+    assert_eq!(messages(&carry(&mut outbox, &mut ingest, 0).items), [(5, vec![5; 40])]);
     outbox.end();
     outbox.report(&header("/robot1/stages", 6), &[6; 40]).unwrap();
-    assert!(carry(&mut outbox, &mut intake, 0).is_end);
+    assert!(carry(&mut outbox, &mut ingest, 0).is_end);
     assert_eq!((outbox.totals().sent, outbox.totals().dropped, outbox.is_done()), (0, 0, true));
 }
 
@@ -139,9 +139,9 @@ fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
         (-HOUR, at - HOUR as u64, Some(-HOUR)),
         (HOUR, at + HOUR as u64, Some(HOUR)),
     ] {
-        let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+        let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
         outbox.push(POSES, &header("/robot1/pose", at), &[1]).unwrap();
-        let taken = carry(&mut outbox, &mut intake, offset);
+        let taken = carry(&mut outbox, &mut ingest, offset);
         assert_eq!((messages(&taken.items)[0].0, taken.clock), (expected, told), "{offset}");
     }
 }
@@ -183,15 +183,15 @@ fn a_clock_that_is_off_by_an_hour_is_seen_when_the_ends_meet() {
 
 #[test]
 fn what_is_no_batch_is_told_and_changes_nothing() {
-    let (mut outbox, mut intake) = (outbox(7, 3), Intake::new(1, SECOND));
+    let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     outbox.push(MAPS, &header("/robot1/map", 1), &[1; 100]).unwrap();
-    carry(&mut outbox, &mut intake, 0);
+    carry(&mut outbox, &mut ingest, 0);
     for nonsense in [&b""[..], b"abc", b"\x01\0\0\0 and so on", b"\x02\0\0\0"] {
-        let (taken, answer) = intake.take(nonsense);
+        let (taken, answer) = ingest.take(nonsense);
         assert!(taken.wrong.is_some() && taken.items.is_empty() && answer.outcome == Outcome::Unreadable);
     }
     outbox.push(MAPS, &header("/robot1/map", 2), &[2; 100]).unwrap();
-    assert_eq!(messages(&carry(&mut outbox, &mut intake, 0).items), [(2, vec![2; 100])]);
+    assert_eq!(messages(&carry(&mut outbox, &mut ingest, 0).items), [(2, vec![2; 100])]);
 }
 
 /// A map with a header of its size, so that one that grows or moves differs everywhere.
@@ -238,12 +238,12 @@ proptest! {
     ) {
         let mut outbox = Outbox::new("robot1".into(), 7, links(), Limits { messages: 1000, states: 1000 });
         let mut receiver = 1;
-        let mut intake = Intake::new(receiver, SECOND);
+        let mut ingest = Ingest::new(receiver, SECOND);
         let (mut sent, mut came): (Messages, Messages) = (Vec::new(), Vec::new());
         let (mut before, mut restarts) = (Vec::<Vec<u8>>::new(), 0);
-        let ask = |outbox: &mut Outbox, intake: &mut Intake, came: &mut Messages, is_answered: bool| {
+        let ask = |outbox: &mut Outbox, ingest: &mut Ingest, came: &mut Messages, is_answered: bool| {
             let batch = outbox.batch().unwrap().map(<[u8]>::to_vec)?;
-            let (taken, answer): (Taken, Answer) = intake.take(&batch);
+            let (taken, answer): (Taken, Answer) = ingest.take(&batch);
             assert_eq!(taken.wrong, None);
             came.extend(messages(&taken.items));
             if is_answered {
@@ -263,19 +263,19 @@ proptest! {
                     outbox.push(POSES, &header("/robot1/pose", time), &time.to_le_bytes()).unwrap();
                     sent.push((time, time.to_le_bytes().to_vec()));
                 }
-                Step::Carry => before.extend(ask(&mut outbox, &mut intake, &mut came, true)),
+                Step::Carry => before.extend(ask(&mut outbox, &mut ingest, &mut came, true)),
                 Step::LoseBatch => drop(outbox.batch().unwrap()),
-                Step::LoseAnswer => before.extend(ask(&mut outbox, &mut intake, &mut came, false)),
+                Step::LoseAnswer => before.extend(ask(&mut outbox, &mut ingest, &mut came, false)),
                 Step::Repeat => {
                     for batch in before.iter().rev().take(3) {
-                        let (taken, _) = intake.take(batch);
+                        let (taken, _) = ingest.take(batch);
                         assert_eq!(taken.items, []);
                     }
                 }
                 Step::Restart => {
                     restarts += 1;
                     receiver += 1;
-                    intake = Intake::new(receiver, SECOND);
+                    ingest = Ingest::new(receiver, SECOND);
                 }
             }
         }
@@ -284,7 +284,7 @@ proptest! {
             if outbox.is_done() {
                 break;
             }
-            ask(&mut outbox, &mut intake, &mut came, true);
+            ask(&mut outbox, &mut ingest, &mut came, true);
         }
         prop_assert!(outbox.is_done());
         for message in &came {

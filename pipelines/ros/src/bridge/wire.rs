@@ -1,4 +1,4 @@
-//! What the two ends of a bridge say to each other, in bytes: CDR, compressed with Zstandard, behind the version of the protocol.
+//! The messages between the two ends of a bridge: the version of the protocol, followed by CDR, compressed with Zstandard.
 
 use super::difference;
 use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
@@ -6,38 +6,38 @@ use gridweave_runtime::ros::{decode, encode};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// The version of the protocol. Ends of different versions tell so, and carry nothing.
+/// The version of the protocol. Ends of different versions report an error, and transport nothing.
 pub(super) const VERSION: u32 = 1;
 
-/// What a sender asks a receiver to take, all of it or nothing.
+/// A batch of a sender, which the receiver takes as a whole or not at all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Batch {
-    /// What to call the sender.
+    /// The name of the sender.
     pub(super) sender: String,
-    /// Tells the sender apart from those of its name that were there before it.
+    /// The session of the sender, which distinguishes it from earlier ones of the same name.
     pub(super) session: u64,
-    /// Counts how often the sender has begun anew.
-    pub(super) greeting: u64,
-    /// 0 is a greeting, with which a sender begins with a receiver that does not know it. The others are counted from 1.
+    /// The number of the sender's last handshake.
+    pub(super) handshake: u64,
+    /// The number of the batch: 0 for a handshake, the others are counted from 1.
     pub(super) number: u64,
-    /// The receiver that is meant; 0 in a greeting.
+    /// The number of the receiver; 0 in a handshake.
     pub(super) receiver: u64,
-    /// What the clock of the receiver shows more than that of the sender, nanoseconds.
+    /// The clock offset of the receiver, nanoseconds.
     pub(super) clock_offset: i64,
-    /// How many messages the sender has dropped in all, because there was no room for them.
+    /// The number of all messages that the sender has dropped.
     pub(super) dropped: u64,
-    /// Whether nothing follows.
+    /// Whether this is the end of the stream.
     pub(super) is_end: bool,
-    /// The links that the sender carries, in a greeting.
+    /// The links of the sender, in a handshake.
     pub(super) links: Vec<Link>,
-    /// What is carried.
+    /// The messages and channels.
     pub(super) entries: Vec<Entry>,
 }
 
-/// A link that is carried.
+/// A link of a bridge.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Link {
-    /// The output that it is one of.
+    /// The name of the output.
     pub(super) port: String,
     /// The ROS 2 type of its messages; empty for any.
     pub(super) ros_type: String,
@@ -46,7 +46,7 @@ pub(super) struct Link {
 /// A message, or the announcement of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Entry {
-    /// By the greeting.
+    /// The index of the link in the handshake.
     pub(super) link: u32,
     pub(super) form: Form,
     pub(super) channel: u32,
@@ -60,7 +60,7 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// That of a message or a channel of a link, with these bytes.
+    /// The entry of a message or a channel of a link, with the given bytes.
     pub(super) fn new(link: u32, header: &MessageHeader, form: Form, bytes: Vec<u8>) -> Self {
         Self {
             link,
@@ -75,7 +75,7 @@ impl Entry {
         }
     }
 
-    /// The header that a message has.
+    /// The header of the message.
     ///
     /// # Errors
     /// A name in it is too long.
@@ -92,62 +92,63 @@ impl Entry {
     }
 }
 
-/// What the bytes of an entry are.
+/// The encoding of an entry's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Form {
     /// A message.
     Whole,
-    /// The difference of a message to the last one of its link and topic.
+    /// The difference of a message to the previous one of its link and topic.
     Difference,
-    /// The difference of a message to nothing, with which differences of its link and topic begin.
+    /// A compressed message, to which the next difference of its link and topic refers.
     Beginning,
     /// A channel.
     Channel,
 }
 
-/// What a receiver answers.
+/// The answer of a receiver.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Answer {
-    /// Who answers: another number after each start.
+    /// The number of the receiver, another one after each start.
     pub(super) receiver: u64,
-    /// The batch that this answers.
+    /// The number of the batch.
     pub(super) number: u64,
-    /// What became of it.
+    /// The outcome of the batch.
     pub(super) outcome: Outcome,
-    /// When the batch came and when this was sent, nanoseconds by the clock of the receiver.
+    /// When the batch was received, nanoseconds by the clock of the receiver.
     pub(super) came: i64,
+    /// When the answer was sent, nanoseconds by the clock of the receiver.
     pub(super) answered: i64,
-    /// What was wrong, for people.
+    /// The error, for people.
     pub(super) text: String,
 }
 
-/// What became of a batch.
+/// The outcome of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Outcome {
-    /// It was taken, then or before.
+    /// It was taken, at this time or before.
     Taken,
-    /// The receiver does not know what the batch builds upon: the sender is to begin anew.
+    /// The receiver misses the state that the batch depends on: the sender must restart.
     Unknown,
     /// It cannot be read.
     Unreadable,
 }
 
-/// As bytes.
+/// Encodes a message between the ends.
 pub(super) fn to_bytes<T: Serialize>(said: &T) -> Result<Vec<u8>, String> {
     let plain = encode(said).map_err(|error| error.to_string())?;
     let packed = difference::difference(&[], &plain).map_err(|error| error.to_string())?;
     Ok([VERSION.to_le_bytes().as_slice(), &packed].concat())
 }
 
-/// Reads what [`to_bytes`] wrote.
+/// Decodes the bytes of [`to_bytes`].
 ///
 /// # Errors
-/// They are of another version, or something else.
+/// They are of another version, or invalid.
 pub(super) fn from_bytes<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
-    let (version, packed) = bytes.split_first_chunk::<4>().ok_or_else(|| "it is cut".to_owned())?;
+    let (version, packed) = bytes.split_first_chunk::<4>().ok_or_else(|| "it is truncated".to_owned())?;
     let version = u32::from_le_bytes(*version);
     if version != VERSION {
-        return Err(format!("it is of version {version} of the bridge, and this is version {VERSION}"));
+        return Err(format!("it has version {version} of the bridge protocol, and this end has version {VERSION}"));
     }
     let plain = difference::message(&[], packed).map_err(|error| error.to_string())?;
     decode(&plain).map_err(|error| error.to_string())
@@ -158,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_answer_comes_back_and_nothing_else_is_one() {
+    fn an_answer_is_decoded_and_truncated_or_other_bytes_are_errors() {
         let answer = Answer {
             receiver: 3,
             number: 4,

@@ -143,8 +143,8 @@ fn an_end_that_nobody_takes_is_told() {
     give_pose(&mut sink, 1);
     sink.finish(LogTime(1)).unwrap();
     let warnings = sink.warnings();
-    assert!(warnings.keys().any(|text| text.contains("has not taken the end")), "{warnings:?}");
-    assert_eq!(sink.counts()["messages that were not taken before the end"], 1);
+    assert!(warnings.keys().any(|text| text.contains("has not acknowledged the end")), "{warnings:?}");
+    assert_eq!(sink.counts()["messages that were not acknowledged before the end"], 1);
 }
 
 /// A wire between two ports of this machine, which can be cut.

@@ -21,7 +21,7 @@ connect = ["ENDPOINT"]
 "#;
 /// So many messages are missed by each who looks on at a link of a [`robot`].
 const MISSED: u64 = 3;
-/// So many programs may look on at a link.
+/// So many programs may observe a link.
 const MOST: usize = 4;
 
 /// Begins to tap a link that is not sent, and reads the first lines: the last poses of two robots.
@@ -264,12 +264,12 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
 fn a_robot_that_does_not_show_its_links_says_why() {
     for (more, link, told) in [
         ("allow_tap = false", Some(Link::default()), "`allow_tap = false`"),
-        ("", None, "its run keeps its links to itself"),
+        ("", None, "the links of its run cannot be observed"),
     ] {
         let (endpoint, _) = free_endpoint();
         let _base = source(&endpoint, "");
         let _robot = robot(&endpoint, more, link.as_ref());
         let error = go_on(&mut tap_stage(&endpoint, ""), told, |_| false).unwrap();
-        assert!(error.starts_with("cannot look on at `slam` of `robot-1`: ") && error.contains(told), "{error}");
+        assert!(error.starts_with("cannot observe `slam` of `robot-1`: ") && error.contains(told), "{error}");
     }
 }

@@ -286,7 +286,7 @@ fn a_base_that_is_killed_and_started_again_is_told_and_gets_what_follows() {
         "{told}"
     );
     assert!(
-        told.contains("warning: of the maps that waited for a receiver that began anew the last were sent alone"),
+        told.contains("warning: only the last of the pending maps were sent, as the receiver was restarted"),
         "{told}"
     );
     // What the killed run has left.
@@ -346,6 +346,6 @@ fn without_a_base_a_bridge_says_so_and_ends_with_status_1() {
     let carried = bridge.end_with(1);
     assert!(carried.contains("carried 0 of "), "{carried}");
     let told = bridge.errors();
-    assert!(told.contains("the other end of the bridge has not taken the end within 0.1 s"), "{told}");
+    assert!(told.contains("the other end of the bridge has not acknowledged the end within 0.1 s"), "{told}");
     robot.end();
 }

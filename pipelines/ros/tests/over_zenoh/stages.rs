@@ -313,5 +313,5 @@ fn what_robots_have_sent_is_not_sent_to_them_again() {
     }];
     let context = Context { stage: "ros".into(), inputs, ..Default::default() };
     let error = StageHarness::with_context(&gridweave_ros::sink::kind(), "", &context).err().unwrap();
-    assert!(error.to_string().contains("it would be sent to them again"), "{error}");
+    assert!(error.to_string().contains("would be sent back to them"), "{error}");
 }

@@ -102,9 +102,9 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     let counts = sink.counts();
     let count = |what: &str| counts.get(what).copied().unwrap_or_default();
     // Messages taken do not count: a receiver that was restarted takes the retained messages once more.
-    let lost = count("messages that were not taken before the end")
+    let lost = count("messages that were not acknowledged before the end")
         + count("messages dropped because the bridge does not keep up")
-        + count("messages left out for the last of their topic");
+        + count("messages superseded by the last of their topic");
     let (carried, bytes) = (messages.saturating_sub(lost), count("bytes sent"));
     print_line(format_args!("carried {carried} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
     let missed: u64 = watched.iter().map(WatchedLink::missed).sum();

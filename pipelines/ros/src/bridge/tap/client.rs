@@ -19,7 +19,7 @@ use zenoh::{Session, Wait};
 /// What was not answered for so long is asked again.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
 /// So long somebody who waits does not look around.
-const LOOK_INTERVAL: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// So often a sender is asked that does not answer, before that is told.
 const ATTEMPTS: usize = 20;
 /// So many batches wait for the reader: a slow one is asked for no more.
@@ -48,7 +48,7 @@ pub(super) enum Event {
     /// So many messages more were missed.
     Missed(u64),
     /// What somebody should know.
-    Told(String),
+    Notice(String),
     /// The run has ended.
     Ended,
     Failed(StageError),
@@ -72,9 +72,9 @@ impl Client {
         let (running, thread) = sync_channel::<()>(0);
         let is_stopped = Arc::<AtomicBool>::default();
         let until = settings.wait.map(|wait| Instant::now() + wait);
-        let asker = Asker { settings, events: to, is_stopped: Arc::clone(&is_stopped), until, opening: 0, taken: 0 };
+        let poller = Poller { settings, events: to, is_stopped: Arc::clone(&is_stopped), until, opening: 0, taken: 0 };
         let work = move || {
-            asker.run();
+            poller.run();
             drop(running);
         };
         let started = thread::Builder::new().name("bridge tap".to_owned()).spawn(work);
@@ -109,7 +109,7 @@ impl From<StageError> for Over {
     }
 }
 
-struct Asker {
+struct Poller {
     settings: Settings,
     events: SyncSender<Event>,
     is_stopped: Arc<AtomicBool>,
@@ -121,7 +121,7 @@ struct Asker {
 
 type Senders = Arc<Mutex<BTreeSet<Presence>>>;
 
-impl Asker {
+impl Poller {
     fn run(mut self) {
         let over = loop {
             let session = match self.join() {
@@ -133,8 +133,8 @@ impl Asker {
             drop(session.close().wait());
             match over {
                 Ok(()) => {
-                    let others = self.settings.network.others();
-                    if let Err(over) = self.tell(format!("the connection to {others} is lost: it is tried again")) {
+                    let others = self.settings.network.connect_text();
+                    if let Err(over) = self.notify(format!("the connection to {others} is lost: it is tried again")) {
                         break over;
                     }
                 }
@@ -150,15 +150,15 @@ impl Asker {
     }
 
     fn doing(&self) -> String {
-        format!("look on at `{}` of `{}`", self.settings.link, self.settings.sender)
+        format!("observe `{}` of `{}`", self.settings.link, self.settings.sender)
     }
 
     fn is_late(&self) -> bool {
         self.until.is_some_and(|until| Instant::now() >= until)
     }
 
-    fn tell(&self, text: String) -> Result<(), Over> {
-        self.send(Event::Told(text))
+    fn notify(&self, text: String) -> Result<(), Over> {
+        self.send(Event::Notice(text))
     }
 
     fn send(&self, event: Event) -> Result<(), Over> {
@@ -167,7 +167,7 @@ impl Asker {
 
     /// Waits a while.
     fn pause(&self) -> Result<(), Over> {
-        thread::sleep(LOOK_INTERVAL);
+        thread::sleep(POLL_INTERVAL);
         match self.is_stopped.load(Ordering::Relaxed) {
             true => Err(Over::Stopped),
             false => Ok(()),
@@ -187,12 +187,12 @@ impl Asker {
             if !self.is_late() && (is_told || self.until.is_some()) {
                 continue;
             }
-            let obstacles = self.settings.network.obstacles_as_client();
-            let why = if obstacles.is_empty() { error.to_string() } else { obstacles.join("; ") };
+            let connection_errors = self.settings.network.connection_errors_as_client();
+            let why = if connection_errors.is_empty() { error.to_string() } else { connection_errors.join("; ") };
             if self.is_late() {
                 return Err(StageError::new(self.doing(), why).into());
             }
-            self.tell(format!("no machine is reached ({why}). It is tried until one is"))?;
+            self.notify(format!("no machine is reached ({why}). It is tried until one is"))?;
             is_told = true;
         }
     }
@@ -201,9 +201,9 @@ impl Asker {
     fn tap(&mut self, session: &Session) -> Result<(), Over> {
         let (senders, bridge) = (Senders::default(), self.settings.network.bridge.clone());
         let seen = Arc::clone(&senders);
-        watch(session, &bridge, Role::Sender, move |sender, is_there| {
+        watch(session, &bridge, Role::Sender, move |sender, is_present| {
             let mut senders = seen.lock().unwrap_or_else(PoisonError::into_inner);
-            match is_there {
+            match is_present {
                 true => drop(senders.insert(sender)),
                 false => drop(senders.remove(&sender)),
             }
@@ -216,7 +216,7 @@ impl Asker {
             if !is_connected(session) {
                 return Ok(());
             }
-            self.tell(format!("the machine `{}` is gone: it is waited for until it is there again", sender.name))?;
+            self.notify(format!("the machine `{}` is gone: it is waited for until it is there again", sender.name))?;
         }
     }
 
@@ -227,7 +227,7 @@ impl Asker {
             let mut of_name = there.iter().filter(|sender| sender.name == self.settings.sender);
             if let Some(found) = of_name.next() {
                 if of_name.next().is_some() {
-                    self.tell(format!("several senders are called `{}`: one of them is asked", found.name))?;
+                    self.notify(format!("several senders are called `{}`: one of them is asked", found.name))?;
                 }
                 return Ok(Some(found.clone()));
             }
@@ -248,7 +248,7 @@ impl Asker {
         let names: BTreeSet<&str> = senders.iter().map(|sender| sender.name.as_str()).collect();
         let names: Vec<&str> = names.into_iter().collect();
         let help = suggest(sender, &names, "there are").unwrap_or_else(|| "there is none at all".to_owned());
-        let (bridge, others) = (&network.bridge, network.others());
+        let (bridge, others) = (&network.bridge, network.connect_text());
         let cause = format!("the bridge `{bridge}` at {others} has no machine `{sender}`; {help}");
         StageError::new(self.doing(), cause).of_parameter("sender")
     }
@@ -261,9 +261,9 @@ impl Asker {
         sender: &Presence,
         senders: &Senders,
     ) -> Result<(), Over> {
-        let is_there = || senders.lock().unwrap_or_else(PoisonError::into_inner).contains(sender);
+        let is_present = || senders.lock().unwrap_or_else(PoisonError::into_inner).contains(sender);
         let mut request = Request { tapper: me.number, ..Default::default() };
-        let Some(answer) = self.ask_until_answered(session, sender, &request, &is_there)? else { return Ok(()) };
+        let Some(answer) = self.ask_until_answered(session, sender, &request, &is_present)? else { return Ok(()) };
         let links: Vec<(&str, &str)> =
             answer.links.iter().map(|link| (link.stage.as_str(), link.output.as_str())).collect();
         let run = format!("the run on `{}`", sender.name);
@@ -275,10 +275,10 @@ impl Asker {
         let mut missed = 0;
         loop {
             (request.opening, request.taken) = (self.opening, self.taken);
-            let Some(answer) = self.ask_until_answered(session, sender, &request, &is_there)? else { return Ok(()) };
+            let Some(answer) = self.ask_until_answered(session, sender, &request, &is_present)? else { return Ok(()) };
             if answer.opening != self.opening {
                 if self.opening != 0 {
-                    self.tell(format!("`{}` is looked on at anew: messages may have been missed", request.link))?;
+                    self.notify(format!("`{}` is looked on at anew: messages may have been missed", request.link))?;
                 }
                 (self.opening, self.taken, missed) = (answer.opening, 0, 0);
             }
@@ -303,7 +303,7 @@ impl Asker {
         session: &Session,
         sender: &Presence,
         request: &Request,
-        is_there: &dyn Fn() -> bool,
+        is_present: &dyn Fn() -> bool,
     ) -> Result<Option<Answer>, Over> {
         for _ in 0..ATTEMPTS {
             match self.ask(session, sender, request)? {
@@ -314,7 +314,7 @@ impl Asker {
                 Some(answer) => return Ok(Some(answer)),
                 None => self.pause()?,
             }
-            if !is_there() || !is_connected(session) {
+            if !is_present() || !is_connected(session) {
                 return Ok(None);
             }
         }
@@ -335,7 +335,7 @@ impl Asker {
             .wait();
         let answers = asked.map_err(|error| failed(in_words(&error)))?;
         loop {
-            match answers.recv_timeout(LOOK_INTERVAL) {
+            match answers.recv_timeout(POLL_INTERVAL) {
                 Ok(None) if self.is_stopped.load(Ordering::Relaxed) => return Err(Over::Stopped),
                 Ok(None) if !is_connected(session) => return Ok(None),
                 Ok(None) => {}

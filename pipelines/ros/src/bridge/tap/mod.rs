@@ -10,14 +10,14 @@
 //! 5. **Bounds.** What waits beyond the room that there is, is dropped, the oldest first, and counted with what the sender itself
 //!    has missed of the link.
 
-mod answering;
+mod server;
 mod client;
-mod desk;
+mod sessions;
 mod requests;
 mod source;
 #[cfg(test)]
 mod tests;
-mod waiting;
+mod message_queue;
 
-pub(super) use answering::Taps;
+pub(super) use server::Taps;
 pub(super) use source::kind;

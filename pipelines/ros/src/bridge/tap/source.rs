@@ -184,7 +184,7 @@ impl Source for BridgeTap {
                 output.count("messages missed", messages);
                 output.warn("messages were missed, as what taps the link was too slow for them");
             }
-            Ok(Event::Told(text)) => {
+            Ok(Event::Notice(text)) => {
                 tracing::warn!("{text}");
                 output.warn(text);
             }

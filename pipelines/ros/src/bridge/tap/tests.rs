@@ -1,8 +1,8 @@
 //! A desk, with links of which the tests say what passes.
 
-use super::desk::Desk;
+use super::message_queue::Limits;
 use super::requests::{Answer, Request, State};
-use super::waiting::Room;
+use super::sessions::TapSessions;
 use gridweave_runtime::message::{Message, MessageFlags, MessageHeader};
 use gridweave_runtime::stage::{LinkView, RunLink, RunLinks, StageError};
 use std::sync::{Arc, Mutex};
@@ -51,7 +51,7 @@ impl Drop for Viewer {
 
 /// A desk that shows the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked by
 /// the number of the question.
-fn desk(room: Room) -> (Desk<u32>, SharedLink) {
+fn sessions(limits: Limits) -> (TapSessions<u32>, SharedLink) {
     let link = Arc::new(Mutex::new(Link { is_made: true, ..Default::default() }));
     let named = |output: &str| RunLink { stage: "slam".into(), output: output.into(), ..Default::default() };
     let of_open = Arc::clone(&link);
@@ -65,7 +65,7 @@ fn desk(room: Room) -> (Desk<u32>, SharedLink) {
         link.viewers += 1;
         Ok(Some(Box::new(Viewer(Arc::clone(&of_open)))))
     });
-    (Desk::new(Ok(links), room), link)
+    (TapSessions::new(Ok(links), limits), link)
 }
 
 fn request(opening: u64, taken: u64) -> Request {
@@ -97,137 +97,137 @@ fn refusal(answers: impl IntoIterator<Item = (u32, Answer)>) -> String {
 
 #[test]
 fn who_taps_gets_each_message_once_and_an_answer_that_was_lost_once_more() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    assert_eq!(desk.ask(&request(0, 0), 1, now), None);
-    assert_eq!(desk.look(now), []);
+    assert_eq!(sessions.request(&request(0, 0), 1, now), None);
+    assert_eq!(sessions.poll(now), []);
     pass(&link, 1..4);
-    assert_eq!(said(&desk.look(now), 1), (1, 1, vec![1, 2, 3]));
+    assert_eq!(said(&sessions.poll(now), 1), (1, 1, vec![1, 2, 3]));
     pass(&link, [4]);
     // What passes while nobody asks waits.
-    assert_eq!(desk.look(now), []);
-    let lost = desk.ask(&request(1, 0), 2, now).unwrap();
+    assert_eq!(sessions.poll(now), []);
+    let lost = sessions.request(&request(1, 0), 2, now).unwrap();
     assert_eq!(said(&[lost], 2), (1, 1, vec![1, 2, 3]));
-    assert_eq!(desk.ask(&request(1, 1), 3, now), None);
-    assert_eq!(said(&desk.look(now), 3), (1, 2, vec![4]));
+    assert_eq!(sessions.request(&request(1, 1), 3, now), None);
+    assert_eq!(said(&sessions.poll(now), 3), (1, 2, vec![4]));
     assert_eq!((viewers(&link), link.lock().unwrap().tried), (1, 1));
 }
 
 #[test]
 fn where_nothing_passes_that_is_answered_after_a_while() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    desk.ask(&request(0, 0), 1, now);
-    assert_eq!(desk.look(now + Duration::from_secs(1)), []);
-    assert_eq!(said(&desk.look(now + Duration::from_secs(3)), 1), (1, 0, vec![]));
+    sessions.request(&request(0, 0), 1, now);
+    assert_eq!(sessions.poll(now + Duration::from_secs(1)), []);
+    assert_eq!(said(&sessions.poll(now + Duration::from_secs(3)), 1), (1, 0, vec![]));
     let later = now + Duration::from_secs(4);
-    assert_eq!(desk.ask(&request(1, 0), 2, later), None);
+    assert_eq!(sessions.request(&request(1, 0), 2, later), None);
     pass(&link, [1]);
-    assert_eq!(said(&desk.look(later), 2), (1, 1, vec![1]));
+    assert_eq!(said(&sessions.poll(later), 2), (1, 1, vec![1]));
 }
 
 #[test]
 fn what_builds_upon_what_is_not_known_begins_anew() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     for (asked, opening, taken) in [(1, 0, 0), (2, 77, 3), (3, 2, 5), (4, 0, 0)] {
-        assert_eq!(desk.ask(&request(opening, taken), asked, now), None);
+        assert_eq!(sessions.request(&request(opening, taken), asked, now), None);
         pass(&link, [u64::from(asked)]);
-        assert_eq!(said(&desk.look(now), asked), (u64::from(asked), 1, vec![u64::from(asked)]));
+        assert_eq!(said(&sessions.poll(now), asked), (u64::from(asked), 1, vec![u64::from(asked)]));
         assert_eq!(viewers(&link), 1, "that before it is closed");
     }
 }
 
 #[test]
 fn a_link_is_looked_on_at_no_longer_when_who_tapped_it_has_left_or_is_silent() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    desk.ask(&request(0, 0), 1, now);
-    desk.look(now);
-    desk.leave(6);
-    assert_eq!((viewers(&link), desk.is_idle()), (1, false), "another has left");
-    desk.leave(5);
-    assert_eq!((viewers(&link), desk.is_idle()), (0, true));
-    desk.ask(&request(0, 0), 2, now);
-    desk.look(now);
-    desk.look(now + Duration::from_secs(59));
+    sessions.request(&request(0, 0), 1, now);
+    sessions.poll(now);
+    sessions.remove(6);
+    assert_eq!((viewers(&link), sessions.is_idle()), (1, false), "another has left");
+    sessions.remove(5);
+    assert_eq!((viewers(&link), sessions.is_idle()), (0, true));
+    sessions.request(&request(0, 0), 2, now);
+    sessions.poll(now);
+    sessions.poll(now + Duration::from_secs(59));
     assert_eq!(viewers(&link), 1);
-    desk.look(now + Duration::from_secs(60));
-    assert_eq!((viewers(&link), desk.is_idle()), (0, true));
+    sessions.poll(now + Duration::from_secs(60));
+    assert_eq!((viewers(&link), sessions.is_idle()), (0, true));
 }
 
 #[test]
 fn what_waits_for_a_slow_program_is_bounded_and_what_is_dropped_counts_as_missed() {
-    let (mut desk, link) = desk(Room { messages: 10, bytes: 1000 });
+    let (mut sessions, link) = sessions(Limits { messages: 10, bytes: 1000 });
     let now = Instant::now();
-    desk.ask(&request(0, 0), 1, now);
+    sessions.request(&request(0, 0), 1, now);
     pass(&link, [0]);
-    assert_eq!(said(&desk.look(now), 1), (1, 1, vec![0]));
+    assert_eq!(said(&sessions.poll(now), 1), (1, 1, vec![0]));
     for round in 0..5 {
         pass(&link, 10 * round..10 * round + 10);
-        desk.look(now);
+        sessions.poll(now);
     }
     link.lock().unwrap().missed = 7;
-    assert_eq!(desk.ask(&request(1, 1), 2, now), None);
-    let answers = desk.look(now);
+    assert_eq!(sessions.request(&request(1, 1), 2, now), None);
+    let answers = sessions.poll(now);
     assert_eq!((answers[0].1.missed, said(&answers, 2)), (47, (1, 2, (40..50).collect())));
 }
 
 #[test]
 fn the_links_are_told_and_others_refused() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    let (_, answer) = desk.ask(&Request::default(), 1, now).unwrap();
+    let (_, answer) = sessions.request(&Request::default(), 1, now).unwrap();
     let names: Vec<String> = answer.links.iter().map(|link| format!("{}.{}", link.stage, link.output)).collect();
     assert_eq!((answer.state, names), (State::GoesOn, vec!["slam.map".to_owned(), "slam.pose".to_owned()]));
     let other = Request { link: "slam.scan".into(), ..request(0, 0) };
-    assert!(refusal(desk.ask(&other, 2, now)).contains("no link `slam.scan`"));
-    assert!(desk.is_idle() && link.lock().unwrap().tried == 0);
-    let mut closed = Desk::new(Err("nobody may"), Room::default());
-    assert_eq!(refusal(closed.ask(&Request::default(), 3, now)), "nobody may");
-    assert_eq!(refusal(closed.ask(&request(0, 0), 4, now)), "nobody may");
+    assert!(refusal(sessions.request(&other, 2, now)).contains("no link `slam.scan`"));
+    assert!(sessions.is_idle() && link.lock().unwrap().tried == 0);
+    let mut closed = TapSessions::new(Err("nobody may"), Limits::default());
+    assert_eq!(refusal(closed.request(&Request::default(), 3, now)), "nobody may");
+    assert_eq!(refusal(closed.request(&request(0, 0), 4, now)), "nobody may");
     assert!(closed.is_idle());
 }
 
 #[test]
 fn a_link_that_is_not_made_is_looked_for_now_and_then_and_given_up() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     link.lock().unwrap().is_made = false;
     let start = Instant::now();
     let after = |milliseconds: u64| start + Duration::from_millis(milliseconds);
-    desk.ask(&request(0, 0), 1, start);
+    sessions.request(&request(0, 0), 1, start);
     for milliseconds in 0..1000 {
-        assert_eq!(desk.look(after(milliseconds)), []);
+        assert_eq!(sessions.poll(after(milliseconds)), []);
     }
     assert_eq!(link.lock().unwrap().tried, 10);
     // The program asks again meanwhile.
-    assert_eq!(said(&desk.look(after(9000)), 1), (1, 0, vec![]));
-    assert_eq!(desk.ask(&request(1, 0), 2, after(9000)), None);
-    let why = refusal(desk.look(after(10_000)));
+    assert_eq!(said(&sessions.poll(after(9000)), 1), (1, 0, vec![]));
+    assert_eq!(sessions.request(&request(1, 0), 2, after(9000)), None);
+    let why = refusal(sessions.poll(after(10_000)));
     assert!(why.contains("has not made the link within 10 s"), "{why}");
-    assert!(desk.is_idle());
+    assert!(sessions.is_idle());
 }
 
 #[test]
 fn a_link_that_cannot_be_read_any_more_is_told_and_closed() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    desk.ask(&request(0, 0), 1, now);
-    desk.look(now);
+    sessions.request(&request(0, 0), 1, now);
+    sessions.poll(now);
     link.lock().unwrap().is_broken = true;
-    assert!(refusal(desk.look(now)).contains("it is broken"));
-    assert_eq!((viewers(&link), desk.is_idle()), (0, true));
+    assert!(refusal(sessions.poll(now)).contains("it is broken"));
+    assert_eq!((viewers(&link), sessions.is_idle()), (0, true));
 }
 
 #[test]
 fn at_the_end_of_a_run_the_last_of_it_is_told() {
-    let (mut desk, link) = desk(Room::default());
+    let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
-    desk.ask(&request(0, 0), 1, now);
-    desk.look(now);
+    sessions.request(&request(0, 0), 1, now);
+    sessions.poll(now);
     pass(&link, [1]);
-    desk.end();
-    let answers = desk.look(now);
+    sessions.end();
+    let answers = sessions.poll(now);
     assert_eq!((answers[0].1.state, said(&answers, 1)), (State::Ended, (1, 1, vec![1])));
-    assert_eq!((viewers(&link), desk.is_idle()), (0, true));
+    assert_eq!((viewers(&link), sessions.is_idle()), (0, true));
 }

@@ -2,9 +2,9 @@
 
 use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
-use super::desk::Desk;
+use super::message_queue::Limits;
 use super::requests::{Answer, Request, State};
-use super::waiting::Room;
+use super::sessions::TapSessions;
 use crate::connection::in_words;
 use gridweave_runtime::stage::{RunLinks, StageError};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -14,7 +14,7 @@ use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
 /// So often it is looked for messages while somebody taps.
-const LOOK_INTERVAL: Duration = Duration::from_millis(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// For so long the end of the run waits for those who tap to ask for the last of it.
 const LINGER: Duration = Duration::from_secs(2);
 
@@ -50,14 +50,14 @@ impl Taps {
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("answer those who tap", in_words(&error)))?;
         let left = events.clone();
-        watch(session, bridge, Role::Tapper, move |tapper, is_there| {
-            if !is_there {
+        watch(session, bridge, Role::Tapper, move |tapper, is_present| {
+            if !is_present {
                 drop(left.send(Event::Left(tapper.number)));
             }
         })?;
         let thread = thread::Builder::new().name("bridge taps".to_owned());
         // Links can be looked on at by one thread only, which begins with none.
-        let work = move || Worker { key, desk: Desk::new(links, Room::default()), events: received }.run();
+        let work = move || Worker { key, sessions: TapSessions::new(links, Limits::default()), events: received }.run();
         let thread = thread.spawn(work);
         let thread = thread.map_err(|error| StageError::new("start the thread that answers those who tap", error))?;
         Ok(Self { events, thread: Some(thread), _queryable: queryable })
@@ -75,33 +75,33 @@ impl Drop for Taps {
 
 struct Worker {
     key: String,
-    desk: Desk<Query>,
+    sessions: TapSessions<Query>,
     events: Receiver<Event>,
 }
 
 impl Worker {
     fn run(mut self) {
         while self.next() {}
-        self.desk.end();
+        self.sessions.end();
         let until = Instant::now() + LINGER;
-        while !self.desk.is_idle() && Instant::now() < until {
+        while !self.sessions.is_idle() && Instant::now() < until {
             self.next();
         }
     }
 
     /// Handles what comes next, and looks on. `false` when it is to stop.
     fn next(&mut self) -> bool {
-        let event = match self.desk.is_idle() {
+        let event = match self.sessions.is_idle() {
             true => self.events.recv().map_err(|_| RecvTimeoutError::Disconnected),
-            false => self.events.recv_timeout(LOOK_INTERVAL),
+            false => self.events.recv_timeout(POLL_INTERVAL),
         };
         match event {
             Ok(Event::Asked(query)) => self.take(query),
-            Ok(Event::Left(tapper)) => self.desk.leave(tapper),
+            Ok(Event::Left(tapper)) => self.sessions.remove(tapper),
             Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => return false,
             Err(RecvTimeoutError::Timeout) => {}
         }
-        for (query, answer) in self.desk.look(Instant::now()) {
+        for (query, answer) in self.sessions.poll(Instant::now()) {
             self.reply(&query, &answer);
         }
         true
@@ -110,7 +110,7 @@ impl Worker {
     fn take(&mut self, query: Query) {
         let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
         let answer = match from_bytes::<Request>(&bytes) {
-            Ok(request) => self.desk.ask(&request, query, Instant::now()),
+            Ok(request) => self.sessions.request(&request, query, Instant::now()),
             Err(wrong) => Some((query, Answer::nothing(State::Refused, wrong))),
         };
         if let Some((query, answer)) = answer {

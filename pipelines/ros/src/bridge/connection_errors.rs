@@ -1,14 +1,14 @@
-//! Why two programs are not connected, in words that say what would mend it.
+//! Explanations of failed connections, with what would fix them.
 //!
-//! Zenoh tries again for as long as it takes, and hands nobody the reason. The end that connects finds it out by [`obstacle`];
-//! the one that listens by what Zenoh writes to the log, which a program hands to [`hear`].
+//! Zenoh retries connections without reporting the reason. The connecting end finds it with [`connection_error`]; the listening
+//! end from Zenoh's log, whose warnings a program passes to [`on_log_warning`].
 
 use crate::connection::in_words;
 use std::sync::{Mutex, PoisonError};
 use zenoh::{Config, Wait};
 
-/// What is known of the words of an error, of rustls or the system, and what would mend it. Each holds for either end.
-const MENDS: [(&str, &str); 12] = [
+/// Parts of error texts of rustls or the system, and what would fix the error. Each applies to either end.
+const FIXES: [(&str, &str); 12] = [
     ("UnknownIssuer", "the certificate of the other end is not signed by the `authority` that is named here"),
     ("not valid for name", "connect by a name that the certificate has, or make a certificate with this name"),
     ("certificate expired", "make another certificate, or set the clock right"),
@@ -26,8 +26,8 @@ const MENDS: [(&str, &str); 12] = [
         "alert: BadCertificate",
         "the other end does not take this one's `certificate`: it must have the name by which the other end connects",
     ),
-    ("InvalidContentType", "the other end does not speak TLS: both must name `tls/HOST:PORT`"),
-    ("on TCP link", "the other end does not speak as this one does: it may be that it names `tls/HOST:PORT`"),
+    ("InvalidContentType", "the other end does not use TLS: both must use `tls/HOST:PORT`"),
+    ("on TCP link", "the other end uses another protocol: it may use `tls/HOST:PORT`"),
     ("Connection refused", "nothing listens there"),
     (
         "Connection reset",
@@ -35,18 +35,18 @@ const MENDS: [(&str, &str); 12] = [
     ),
 ];
 
-/// The words, and what would mend it.
+/// An error text, with what would fix it if known.
 pub(super) fn explained(words: &str) -> String {
-    match MENDS.iter().find(|(part, _)| words.contains(part)) {
-        Some((_, mend)) => format!("{words}: {mend}"),
+    match FIXES.iter().find(|(part, _)| words.contains(part)) {
+        Some((_, fix)) => format!("{words}: {fix}"),
         None => words.to_owned(),
     }
 }
 
-/// Tries once to connect as the configuration says, which must name one endpoint. Gives why that cannot be; none if it can. Takes
-/// as long as Zenoh waits for an answer, ten seconds unless it is told otherwise.
-pub(super) fn obstacle(mut config: Config) -> Option<String> {
-    // As a peer, which gives the reason as an error, once.
+/// Tries once to connect to the only endpoint of a configuration. Returns the error; none if it succeeds. Takes up to Zenoh's
+/// timeout, ten seconds by default.
+pub(super) fn connection_error(mut config: Config) -> Option<String> {
+    // A peer, unlike a client, returns the reason as an error.
     let once = [
         ("mode", "\"peer\""),
         ("listen/endpoints", "[]"),
@@ -61,7 +61,7 @@ pub(super) fn obstacle(mut config: Config) -> Option<String> {
     }
     match zenoh::open(config).wait() {
         Ok(session) => {
-            // What goes wrong here changes nothing in the answer.
+            // An error of closing does not matter.
             drop(session.close().wait());
             None
         }
@@ -69,32 +69,32 @@ pub(super) fn obstacle(mut config: Config) -> Option<String> {
     }
 }
 
-/// No more than so many wait to be told.
-const MOST: usize = 1000;
-/// The part of Zenoh that lets in who connects by TLS, and what it says behind the reason, which is seldom right.
-const DOORKEEPER: &str = "zenoh_link_tls";
+/// The maximum number of stored refusals.
+const MAX_REFUSALS: usize = 1000;
+/// The module of Zenoh that accepts TLS connections, and a suffix of its warnings that is usually wrong.
+const TLS_MODULE: &str = "zenoh_link_tls";
 const HINT: &str = ". Hint: increase the system open file limit.";
 
-static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+static REFUSALS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Hears what a module of a library warns of. Of what Zenoh says, `bridge_source` tells whom it has not let in, and why.
-pub fn hear(module: &str, words: &str) {
+/// Records a warning that a library has logged, if it is a refused TLS connection; `bridge_source` reports these.
+pub fn on_log_warning(module: &str, words: &str) {
     if let Some(reason) = refusal(module, words) {
-        let mut heard = HEARD.lock().unwrap_or_else(PoisonError::into_inner);
-        if heard.len() < MOST {
-            heard.push(explained(reason));
+        let mut refusals = REFUSALS.lock().unwrap_or_else(PoisonError::into_inner);
+        if refusals.len() < MAX_REFUSALS {
+            refusals.push(explained(reason));
         }
     }
 }
 
-/// Why somebody was not let in, if that is what the words say.
+/// The reason of a refused connection, if a warning is about one.
 fn refusal<'a>(module: &str, words: &'a str) -> Option<&'a str> {
-    words.strip_suffix(HINT).filter(|_| module.starts_with(DOORKEEPER))
+    words.strip_suffix(HINT).filter(|_| module.starts_with(TLS_MODULE))
 }
 
-/// Why somebody was not let in, for each time since this was asked last. All stages of a process have it in common.
-pub(super) fn take_heard() -> Vec<String> {
-    std::mem::take(&mut *HEARD.lock().unwrap_or_else(PoisonError::into_inner))
+/// The reasons of all refused connections since the last call. All stages of a process share them.
+pub(super) fn take_refusals() -> Vec<String> {
+    std::mem::take(&mut *REFUSALS.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
 #[cfg(test)]
@@ -102,17 +102,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_is_told_with_what_would_mend_it() {
-        let told = explained("invalid peer certificate: UnknownIssuer");
+    fn a_known_error_is_explained() {
+        let text = explained("invalid peer certificate: UnknownIssuer");
         assert!(
-            told.starts_with("invalid peer certificate: UnknownIssuer: ") && told.contains("`authority`"),
-            "{told}"
+            text.starts_with("invalid peer certificate: UnknownIssuer: ") && text.contains("`authority`"),
+            "{text}"
         );
         assert_eq!(explained("something else"), "something else");
     }
 
     #[test]
-    fn of_all_that_is_warned_of_refusals_alone_are_heard() {
+    fn only_warnings_about_refused_connections_are_recorded() {
         let words = "peer sent no certificates. Hint: increase the system open file limit.";
         assert_eq!(refusal("zenoh_link_tls::unicast", words), Some("peer sent no certificates"));
         assert_eq!(refusal("zenoh_link_tls::unicast", "Skipping name verification of TLS server"), None);

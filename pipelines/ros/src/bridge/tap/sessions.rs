@@ -1,7 +1,7 @@
 //! What a sender shows of the links of its run, and to whom. It knows no network.
 
+use super::message_queue::{Limits, MessageQueue};
 use super::requests::{Answer, Link, Request, State};
-use super::waiting::{Room, Waiting};
 use gridweave_runtime::stage::{LinkView, RunLinks};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -15,9 +15,9 @@ const LINK_TIMEOUT: Duration = Duration::from_secs(10);
 const LINK_INTERVAL: Duration = Duration::from_millis(100);
 
 /// The links that are looked on at. `R` is a way to answer a request.
-pub(super) struct Desk<R> {
+pub(super) struct TapSessions<R> {
     links: Result<RunLinks, &'static str>,
-    room: Room,
+    limits: Limits,
     openings: u64,
     /// By tapper.
     open: BTreeMap<u64, Opening<R>>,
@@ -29,7 +29,7 @@ struct Opening<R> {
     link: usize,
     number: u64,
     view: View,
-    waiting: Waiting,
+    queue: MessageQueue,
     /// The last batch, until it is known to have come.
     last: Option<Answer>,
     /// How many batches there were.
@@ -45,10 +45,10 @@ enum View {
     Open(Box<dyn LinkView>),
 }
 
-impl<R> Desk<R> {
+impl<R> TapSessions<R> {
     /// Shows these links, or says why it shows none.
-    pub(super) fn new(links: Result<RunLinks, &'static str>, room: Room) -> Self {
-        Self { links, room, openings: 0, open: BTreeMap::new(), is_over: false }
+    pub(super) fn new(links: Result<RunLinks, &'static str>, limits: Limits) -> Self {
+        Self { links, limits, openings: 0, open: BTreeMap::new(), is_over: false }
     }
 
     /// Whether nothing is looked on at.
@@ -56,8 +56,8 @@ impl<R> Desk<R> {
         self.open.is_empty()
     }
 
-    /// Somebody asks. Gives what to answer if that is known at once; otherwise [`look`](Self::look) will tell.
-    pub(super) fn ask(&mut self, request: &Request, asks: R, now: Instant) -> Option<(R, Answer)> {
+    /// Somebody asks. Gives what to answer if that is known at once; otherwise [`poll`](Self::poll) will tell.
+    pub(super) fn request(&mut self, request: &Request, asks: R, now: Instant) -> Option<(R, Answer)> {
         let links = match &self.links {
             Ok(links) => links,
             Err(why) => return Some((asks, Answer::nothing(State::Refused, *why))),
@@ -91,7 +91,7 @@ impl<R> Desk<R> {
             link,
             number: self.openings,
             view: View::Awaited(now, None),
-            waiting: Waiting::new(self.room),
+            queue: MessageQueue::new(self.limits),
             last: None,
             batches: 0,
             asked: now,
@@ -102,7 +102,7 @@ impl<R> Desk<R> {
     }
 
     /// The tapper has gone.
-    pub(super) fn leave(&mut self, tapper: u64) {
+    pub(super) fn remove(&mut self, tapper: u64) {
         self.open.remove(&tapper);
     }
 
@@ -116,7 +116,7 @@ impl<R> Desk<R> {
     }
 
     /// Takes what has passed since the last time. Gives what there is to answer.
-    pub(super) fn look(&mut self, now: Instant) -> Vec<(R, Answer)> {
+    pub(super) fn poll(&mut self, now: Instant) -> Vec<(R, Answer)> {
         let Ok(links) = &self.links else { return Vec::new() };
         let is_over = self.is_over;
         let mut answers = Vec::new();
@@ -130,7 +130,7 @@ impl<R> Desk<R> {
                 return false;
             }
             let is_held = now.saturating_duration_since(open.asked) >= HOLD;
-            if (is_over || is_held || !open.waiting.is_empty())
+            if (is_over || is_held || !open.queue.is_empty())
                 && let Some(asks) = open.asks.take()
             {
                 let answer = open.answer(is_over);
@@ -179,22 +179,22 @@ impl<R> Opening<R> {
 
     fn take(&mut self) -> Result<(), String> {
         let View::Open(view) = &mut self.view else { return Ok(()) };
-        let waiting = &mut self.waiting;
+        let waiting = &mut self.queue;
         view.take(&mut |message| waiting.push(&message)).map_err(|error| error.to_string())
     }
 
     fn answer(&mut self, is_over: bool) -> Answer {
-        let passed = self.waiting.batch();
+        let passed = self.queue.batch();
         self.batches += u64::from(!passed.is_empty());
         let missed = match &self.view {
             View::Awaited(..) => 0,
             View::Open(view) => view.missed(),
         };
         let answer = Answer {
-            state: if is_over && self.waiting.is_empty() { State::Ended } else { State::GoesOn },
+            state: if is_over && self.queue.is_empty() { State::Ended } else { State::GoesOn },
             opening: self.number,
             number: self.batches,
-            missed: missed + self.waiting.dropped(),
+            missed: missed + self.queue.dropped(),
             links: Vec::new(),
             passed,
             text: String::new(),

@@ -10,13 +10,13 @@ const BATCH_SIZE: usize = 128 * 1024;
 
 /// How much may wait; the last message does in any case. Not much: who taps wants to see what passes, and not what has passed long ago.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Room {
+pub(super) struct Limits {
     pub(super) messages: usize,
     /// Bytes of their contents.
     pub(super) bytes: usize,
 }
 
-impl Default for Room {
+impl Default for Limits {
     fn default() -> Self {
         Self { messages: 1000, bytes: 8 << 20 }
     }
@@ -24,8 +24,8 @@ impl Default for Room {
 
 /// What waits.
 #[derive(Debug, Default)]
-pub(super) struct Waiting {
-    room: Room,
+pub(super) struct MessageQueue {
+    limits: Limits,
     entries: VecDeque<Passed>,
     messages: usize,
     bytes: usize,
@@ -34,9 +34,9 @@ pub(super) struct Waiting {
     dropped: u64,
 }
 
-impl Waiting {
-    pub(super) fn new(room: Room) -> Self {
-        Self { room, ..Self::default() }
+impl MessageQueue {
+    pub(super) fn new(limits: Limits) -> Self {
+        Self { limits, ..Self::default() }
     }
 
     /// How many messages were dropped.
@@ -65,7 +65,7 @@ impl Waiting {
             }
             _ => {
                 while self.messages > 0
-                    && (self.messages >= self.room.messages || self.bytes + bytes.len() > self.room.bytes)
+                    && (self.messages >= self.limits.messages || self.bytes + bytes.len() > self.limits.bytes)
                 {
                     self.drop_oldest();
                 }
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn what_there_is_no_room_for_is_dropped_oldest_first_but_for_announcements() {
-        let mut waiting = Waiting::new(Room { messages: 3, bytes: 100 });
+        let mut waiting = MessageQueue::new(Limits { messages: 3, bytes: 100 });
         waiting.push(&message(0, MessageFlags::CHANNEL, 7, 10));
         for sequence in 1..6 {
             waiting.push(&message(sequence, MessageFlags::DATA, 7, 10));
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_batch_is_bounded_but_holds_one_message() {
-        let mut waiting = Waiting::default();
+        let mut waiting = MessageQueue::default();
         for (sequence, size) in
             [(1, 2 * BATCH_SIZE), (2, 10), (3, BATCH_SIZE), (4, BATCH_SIZE / 2), (5, BATCH_SIZE / 2)]
         {

@@ -1,7 +1,6 @@
-//! What a receiver has taken of its senders.
+//! The receiver's state for its senders, independent of the network.
 //!
-//! It knows no network. Of each sender it takes the batches in their order, each once, and makes of them the messages as they
-//! were given to the sender.
+//! It takes the batches of each sender in order, each once, and restores the original messages.
 
 use super::difference::message;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};
@@ -9,7 +8,7 @@ use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What a sender has sent, in its order.
+/// An item of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Item {
     /// The messages of this link with the header's channel were logged on this one.
@@ -18,59 +17,59 @@ pub(super) enum Item {
     Message { link: Arc<Link>, header: MessageHeader, bytes: Vec<u8> },
 }
 
-/// What was taken.
+/// The contents of a batch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Taken {
-    /// Who has sent it; empty if that cannot be read.
+    /// The name of the sender; empty if it cannot be read.
     pub(super) sender: String,
     pub(super) session: u64,
-    /// What is new.
+    /// The items that are no duplicates.
     pub(super) items: Vec<Item>,
-    /// How many messages the sender has dropped since it told last.
+    /// The number of messages that the sender has dropped since the previous batch.
     pub(super) dropped: u64,
-    /// By how much the clock of the sender differs, if it was told that just now that it does, or no longer; nanoseconds.
+    /// The new clock correction for the sender, nanoseconds, if it has changed; 0 if its clock is right.
     pub(super) clock: Option<i64>,
-    /// Whether the sender has just said that nothing follows.
+    /// Whether the sender has ended.
     pub(super) is_end: bool,
-    /// What cannot be read.
+    /// The error, if the batch cannot be read.
     pub(super) wrong: Option<String>,
 }
 
-/// What the receiver knows of its senders.
+/// The receiver's state for its senders.
 #[derive(Debug)]
-pub(super) struct Intake {
+pub(super) struct Ingest {
     receiver: u64,
-    /// Clocks may differ by so much, nanoseconds.
+    /// The maximum clock offset without correction, nanoseconds.
     tolerance: i64,
-    /// By session.
+    /// The senders by session.
     senders: BTreeMap<u64, Sender>,
 }
 
 #[derive(Debug, Default)]
 struct Sender {
     links: Vec<Arc<Link>>,
-    /// Which greeting of the sender this is since.
-    greeting: u64,
+    /// The number of the sender's last handshake.
+    handshake: u64,
     /// The number of the next batch.
     next: u64,
-    /// What is added to the times of the sender, nanoseconds.
+    /// The correction added to the times of the sender, nanoseconds.
     correction: i64,
     dropped: u64,
-    /// By link and topic: the last message of those that are told by what they have new.
+    /// The last message of each link and topic whose messages are sent as differences.
     known: BTreeMap<(u32, String), Vec<u8>>,
 }
 
-impl Intake {
+impl Ingest {
     pub(super) fn new(receiver: u64, tolerance: i64) -> Self {
         Self { receiver, tolerance, senders: BTreeMap::new() }
     }
 
-    /// Forgets a sender that is gone for good.
+    /// Removes the state of a sender.
     pub(super) fn forget(&mut self, session: u64) {
         self.senders.remove(&session);
     }
 
-    /// Takes a batch, and says what to answer once that was passed on.
+    /// Takes a batch. Returns its contents, and the answer to send once these were forwarded.
     pub(super) fn take(&mut self, bytes: &[u8]) -> (Taken, Answer) {
         let receiver = self.receiver;
         let answer = |number, outcome, text: &str| Answer {
@@ -90,9 +89,9 @@ impl Intake {
         };
         let number = batch.number;
         let mut told = Taken { sender: batch.sender.clone(), session: batch.session, ..Default::default() };
-        let known = self.senders.get(&batch.session).map(|sender| (sender.greeting, sender.next));
-        // What comes late was taken, or told anew, before.
-        if known.is_some_and(|known| (batch.greeting, number) < known) {
+        let known = self.senders.get(&batch.session).map(|sender| (sender.handshake, sender.next));
+        // A delayed batch was taken before, or its messages were sent again after a restart.
+        if known.is_some_and(|known| (batch.handshake, number) < known) {
             return (told, answer(number, Outcome::Taken, ""));
         }
         if number == 0 {
@@ -100,11 +99,11 @@ impl Intake {
             let before = self.senders.remove(&batch.session).unwrap_or_default();
             let Sender { correction, dropped, .. } = before;
             let known = BTreeMap::new();
-            let sender = Sender { links, greeting: batch.greeting, next: 1, correction, dropped, known };
+            let sender = Sender { links, handshake: batch.handshake, next: 1, correction, dropped, known };
             self.senders.insert(batch.session, sender);
             return (told, answer(number, Outcome::Taken, ""));
         }
-        let is_next = known == Some((batch.greeting, number)) && batch.receiver == self.receiver;
+        let is_next = known == Some((batch.handshake, number)) && batch.receiver == self.receiver;
         let Some(sender) = self.senders.get_mut(&batch.session).filter(|_| is_next) else {
             return (told, answer(number, Outcome::Unknown, ""));
         };
@@ -121,7 +120,7 @@ impl Intake {
                 (told, answer(number, Outcome::Taken, ""))
             }
             Err(wrong) => {
-                // What is known of it is no longer whole.
+                // The state of the sender is incomplete.
                 self.senders.remove(&batch.session);
                 let answer = answer(number, Outcome::Unreadable, &wrong);
                 told.wrong = Some(wrong);
@@ -151,7 +150,7 @@ impl Sender {
         let nothing = Vec::new();
         let key = (entry.link, entry.topic.clone());
         let known = match entry.form {
-            Form::Difference => self.known.get(&key).ok_or_else(|| text(&"what it builds upon is not known"))?,
+            Form::Difference => self.known.get(&key).ok_or_else(|| text(&"the previous message is unknown"))?,
             Form::Whole | Form::Beginning | Form::Channel => &nothing,
         };
         if entry.form == Form::Whole {
